@@ -2,16 +2,16 @@
 """Commands that need an environment.
 
     python3 dev.py demo            start the service, send it one request, stop it
-    python3 dev.py test [ARGS]     every check, then every test; ARGS go to pytest, --quick leaves out the slow tests
-    python3 dev.py check           the checks without pytest
+    python3 dev.py test [ARGS]     every check, then every test; ARGS go to pytest, --quick leaves
+    out the slow tests python3 dev.py check           the checks without pytest
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until a signal stops it
-    python3 dev.py wheels          the wheel of every platform and the source distribution, checked, in dist
-    python3 dev.py exec CMD [ARGS] run one command inside the development environment
+    python3 dev.py wheels          the wheel of every platform and the source distribution, checked,
+    in dist python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
 
-Needs Python 3.11 or newer and nothing else: the rest is installed into ``.venv`` beside this file, as pinned in
-``requirements/``, and again when these files or the kernel's sources change.
+Needs Python 3.11 or newer and nothing else: the rest is installed into ``.venv`` beside this file,
+as pinned in ``requirements/``, and again when these files or the kernel's sources change.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = str(BIN / ("python.exe" if os.name == "nt" else "python"))
 MARKER = VENV / "mumacro-installed.json"
 OLDEST, NEWER_NAMES = (3, 11), ("python3.13", "python3.12", "python3.11")
-# Each set holds those before it, at the same versions; zig.txt is added where a compiler is missing.
+# Each set holds those before it, at the same versions; zig.txt is added where a compiler is
+# missing.
 SETS = {"service": ("build", "service"), "test": ("test",), "tools": ("test", "tools")}
 
 
@@ -42,15 +43,26 @@ class FailedError(Exception):
 
 
 def environment() -> dict[str, str]:
-    """The environment variables with ``.venv`` first, without those that would add other packages; caches are in it."""
-    # without compiled modules kept there, each of hundreds of processes would compile up to 3,000 again
-    env = {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE")}
+    """The environment variables with ``.venv`` first, without those that would add other packages;
+    caches are in it."""
+    # without compiled modules kept there, each of hundreds of processes would compile up to 3,000
+    # again
+    env = {
+        k: v
+        for k, v in os.environ.items()
+        if k not in ("PYTHONHOME", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
+    }
     env |= {"VIRTUAL_ENV": str(VENV), "PATH": f"{BIN}{os.pathsep}{env.get('PATH', os.defpath)}"}
-    return {"ZIG_GLOBAL_CACHE_DIR": str(VENV / "zig"), "PYTHONPYCACHEPREFIX": str(VENV / "bytecode"), **env}
+    return {
+        "ZIG_GLOBAL_CACHE_DIR": str(VENV / "zig"),
+        "PYTHONPYCACHEPREFIX": str(VENV / "bytecode"),
+        **env,
+    }
 
 
 def run(*command: str | Path, quiet: bool = False) -> int:
-    """Run a command from the root and return its exit code; ``quiet``: its output is shown only when it fails."""
+    """Run a command from the root and return its exit code; ``quiet``: its output is shown only
+    when it fails."""
     env = environment()
     words = [shutil.which(command[0], path=env["PATH"]) or command[0], *map(str, command[1:])]
     out, err = (subprocess.PIPE, subprocess.STDOUT) if quiet else (None, None)
@@ -65,14 +77,21 @@ def digest(*paths: Path) -> str:
 
 
 def current() -> dict[str, str]:
-    """Digests of what each part of ``.venv`` is made from: sets of locks, the kernel and its sources."""
-    kernel = sorted([*(ROOT / "mumacro" / "kernel").glob("*.[ch]"), *(ROOT / "mumacro").glob("_kernel.*")])
-    locks = {key: digest(*(ROOT / "requirements" / f"{name}.txt" for name in names)) for key, names in SETS.items()}
+    """Digests of what each part of ``.venv`` is made from: sets of locks, the kernel and its
+    sources."""
+    kernel = sorted(
+        [*(ROOT / "mumacro" / "kernel").glob("*.[ch]"), *(ROOT / "mumacro").glob("_kernel.*")]
+    )
+    locks = {
+        key: digest(*(ROOT / "requirements" / f"{name}.txt" for name in names))
+        for key, names in SETS.items()
+    }
     return {**locks, "kernel": digest(ROOT / "hatch_build.py", *kernel)}
 
 
 def installed() -> dict[str, str]:
-    """The parts that ``.venv`` holds and that are current; empty if it is absent, broken or incomplete."""
+    """The parts that ``.venv`` holds and that are current; empty if it is absent, broken or
+    incomplete."""
     try:
         found = json.loads(MARKER.read_text(encoding="utf-8"))
         works = subprocess.run([PYTHON, "-c", ""], check=False).returncode == 0  # noqa: S603 (a link may be broken)
@@ -87,45 +106,64 @@ def installed() -> dict[str, str]:
 
 def pip(*arguments: str) -> None:
     # Without compiling: Python compiles files on import, only a third of them.
-    if run(PYTHON, "-m", "pip", "-q", "--no-input", "install", "--no-compile", *arguments, quiet=True):
+    if run(
+        PYTHON, "-m", "pip", "-q", "--no-input", "install", "--no-compile", *arguments, quiet=True
+    ):
         raise FailedError(f"pip could not install {' '.join(arguments)} (see above)")
 
 
 def install_locks(*names: str) -> None:
     """Install exactly what the locks pin."""
     print(f"Installing requirements/{' and '.join(names)}.txt", flush=True)
-    pip("--require-hashes", *(word for name in names for word in ("-r", f"requirements/{name}.txt")))
+    pip(
+        "--require-hashes", *(word for name in names for word in ("-r", f"requirements/{name}.txt"))
+    )
 
 
 def ensure(set_name: str = "tools") -> None:
-    """Install the locked set into ``.venv`` and compile the kernel; do nothing if both are there already."""
+    """Install the locked set into ``.venv`` and compile the kernel; do nothing if both are there
+    already."""
     have = installed()
     complete = any(name in have for name in list(SETS)[list(SETS).index(set_name) :])
     if complete and "kernel" in have:
         return
     MARKER.unlink(missing_ok=True)
     if not complete:
-        if not have.keys() & SETS.keys():  # absent, or made from older locks: packages that they dropped must go too
+        # absent, or made from older locks: packages that they dropped must go too
+        if not have.keys() & SETS.keys():
             print(f"Making {VENV} with Python {sys.version.split()[0]}", flush=True)
             if run(sys.executable, "-m", "venv", "--clear", VENV, quiet=True):
-                raise FailedError("no virtual environment (see above); Debian has apt-get install python3-venv for it")
+                raise FailedError(
+                    "no virtual environment (see above); Debian has apt-get install python3-venv "
+                    "for it"
+                )
         install_locks(*SETS[set_name])
-    # without isolation: the build backend is among the pins; what it needs on this machine it says itself
+    # without isolation: the build backend is among the pins; what it needs on this machine it says
+    # itself
     needed = "hatchling.build.get_requires_for_build_editable()"
-    if run(PYTHON, "-c", f"import hatchling.build; raise SystemExit(7 * ('zig' in str({needed})))") == 7:
+    if (
+        run(PYTHON, "-c", f"import hatchling.build; raise SystemExit(7 * ('zig' in str({needed})))")
+        == 7
+    ):
         install_locks("zig")
     print("Compiling the kernel", flush=True)
     pip("--no-deps", "--no-build-isolation", "-e", ".")
     names = {set_name, "kernel", *have}
-    MARKER.write_text(json.dumps({name: made for name, made in current().items() if name in names}), encoding="utf-8")
+    MARKER.write_text(
+        json.dumps({name: made for name, made in current().items() if name in names}),
+        encoding="utf-8",
+    )
 
 
 def check() -> int:
     """Run the checks of pyproject.toml, one on each processor; returns how many failed."""
-    import tomllib  # not at the top: an interpreter without it must still reach the message in main()
+    # not at the top: an interpreter without it must still reach the message in main()
+    import tomllib
 
     ensure()
-    checks = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]["checks"]
+    checks = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"][
+        "checks"
+    ]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         codes = pool.map(lambda words: run(*words.split(), quiet=True), checks.values())
         failed = [name for name, code in zip(checks, codes, strict=True) if code]
@@ -134,9 +172,14 @@ def check() -> int:
 
 
 def test(*arguments: str) -> int:
-    """An empty ``-m`` replaces that of pyproject.toml; every processor runs a file at a time, with ``-n 0`` one."""
+    """An empty ``-m`` replaces that of pyproject.toml; every processor runs a file at a time, with
+    ``-n 0`` one."""
     failed = check()
-    chosen = [word for word in (*(() if "--quick" in arguments else ("-m", "")), *arguments) if word != "--quick"]
+    chosen = [
+        word
+        for word in (*(() if "--quick" in arguments else ("-m", "")), *arguments)
+        if word != "--quick"
+    ]
     return run(PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *chosen) or failed
 
 
@@ -180,7 +223,11 @@ COMMANDS: dict[str, Callable[..., int]] = {
 def main(word: str = "", *rest: str) -> int:
     """Run the command that the first argument names; 2 if it is unknown."""
     takes_arguments = word in ("test", "serve", "exec", "lock")
-    if word not in COMMANDS or (rest and not takes_arguments) or (word != "exec" and "--help" in rest):
+    if (
+        word not in COMMANDS
+        or (rest and not takes_arguments)
+        or (word != "exec" and "--help" in rest)
+    ):
         print(__doc__)
         return 0 if "--help" in (word, *rest) or word in ("-h", "help") else 2
     if sys.version_info < OLDEST:

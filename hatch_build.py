@@ -1,11 +1,14 @@
-"""Compile mumacro/kernel into the shared object that the library opens: ``python hatch_build.py [FOLDER]``.
+"""Compile mumacro/kernel into the shared object that the library opens: ``python hatch_build.py
+[FOLDER]``.
 
-Without FOLDER it is made in place.  hatchling calls the class below for wheels and editable installs.  The compiler is
-the one that CC names, else cc, clang or gcc, else the package ziglang, which then becomes a build dependency.  CFLAGS
-is not read: other flags give other bits.  Two variables change what is made:
+Without FOLDER it is made in place.  hatchling calls the class below for wheels and editable
+installs.  The compiler is the one that CC names, else cc, clang or gcc, else the package ziglang,
+which then becomes a build dependency.  CFLAGS is not read: other flags give other bits.  Two
+variables change what is made:
 
-    MUMACRO_BUILD_DEBUG=1             no optimization, with debugger symbols and sanitizers; needs gcc or clang
-    MUMACRO_BUILD_PLATFORM=win_amd64  by zig for one of the platforms in pyproject.toml, [tool.mumacro.wheels]
+    MUMACRO_BUILD_DEBUG=1             no optimization, with debugger symbols and sanitizers; needs
+    gcc or clang MUMACRO_BUILD_PLATFORM=win_amd64  by zig for one of the platforms in
+    pyproject.toml, [tool.mumacro.wheels]
 """
 
 import functools
@@ -25,31 +28,48 @@ from packaging.tags import platform_tags
 ROOT = Path(__file__).resolve().parent
 SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]
 TARGETS: dict[str, str] = SETTINGS["wheels"]
-DEBUG = ["-O0", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+DEBUG = [
+    "-O0",
+    "-g",
+    "-fno-omit-frame-pointer",
+    "-fsanitize=address,undefined",
+    "-fno-sanitize-recover=all",
+]
 FLAGS = ["-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC"]
 FLAGS += DEBUG if os.environ.get("MUMACRO_BUILD_DEBUG") else ["-O3", "-DNDEBUG"]
 AVX2 = ["-mavx2", "-mfma"]
 AVX512 = [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl", "-mavx512bw", "-mprefer-vector-width=512"]
-NOT_READ = {".doctrees", "_sources", ".buildinfo", ".inv", ".map"}  # of the built documents: no page needs it
+# of the built documents: no page needs it
+NOT_READ = {".doctrees", "_sources", ".buildinfo", ".inv", ".map"}
 NO_COMPILER = "No C compiler works here (tried cc, clang and gcc)"
-PROBE = "#include <math.h>\n#include <stdint.h>\nint64_t f(double x) { return (int64_t)floor(x); }\n"
+PROBE = (
+    "#include <math.h>\n#include <stdint.h>\nint64_t f(double x) { return (int64_t)floor(x); }\n"
+)
 
 
 def levels(platform: str) -> dict[str, list[str]]:
-    """The instruction levels of a platform with their flags; one of them is chosen when the library is loaded."""
-    return {"base": [], "avx2": AVX2, "avx512": AVX512} if platform.endswith(("x86_64", "amd64")) else {"base": []}
+    """The instruction levels of a platform with their flags; one of them is chosen when the library
+    is loaded."""
+    return (
+        {"base": [], "avx2": AVX2, "avx512": AVX512}
+        if platform.endswith(("x86_64", "amd64"))
+        else {"base": []}
+    )
 
 
 def own_platform() -> str:
-    """The tag of this machine.  It promises no older C library: a local compiler binds to the one that is here."""
+    """The tag of this machine.  It promises no older C library: a local compiler binds to the one
+    that is here."""
     return next(tag for tag in platform_tags() if not tag.startswith(("manylinux", "musllinux")))
 
 
 @functools.cache
 def local_compiler() -> list[str]:
-    """The compiler of this machine, tried on a small program: it may lack headers or AVX-512.  Empty if none works."""
+    """The compiler of this machine, tried on a small program: it may lack headers or AVX-512.
+    Empty if none works."""
     named, last = os.environ.get("CC"), list(levels(own_platform()).values())[-1]
-    # gcc for Windows stores AVX registers at addresses that are not aligned (GCC bug 54412): the program would crash.
+    # gcc for Windows stores AVX registers at addresses that are not aligned (GCC bug 54412): the
+    # program would crash.
     for name in [named] if named else [] if os.name == "nt" else ["cc", "clang", "gcc"]:
         words = shlex.split(name, posix=os.name != "nt")
         with tempfile.TemporaryDirectory() as folder:
@@ -61,21 +81,30 @@ def local_compiler() -> list[str]:
             except (OSError, subprocess.CalledProcessError):
                 continue
     if named:
-        sys.exit(f"CC={named} makes no shared object with {shlex.join(FLAGS + last)}: name another, or unset CC")
+        sys.exit(
+            f"CC={named} makes no shared object with {shlex.join(FLAGS + last)}: name another, or "
+            "unset CC"
+        )
     return []
 
 
 def choose(platform: str | None) -> tuple[list[str], str]:
-    """The command that compiles for a platform of ``TARGETS``, or without one for this machine; the platform."""
+    """The command that compiles for a platform of ``TARGETS``, or without one for this machine; the
+    platform."""
     if platform and platform not in TARGETS:
         sys.exit(f"MUMACRO_BUILD_PLATFORM={platform} is not one of {', '.join(TARGETS)}")
     if not platform and (local := local_compiler()):
         return local, own_platform()
     if DEBUG[0] in FLAGS:
-        sys.exit("MUMACRO_BUILD_DEBUG needs gcc or clang on this machine: zig has no sanitizer for addresses")
+        sys.exit(
+            "MUMACRO_BUILD_DEBUG needs gcc or clang on this machine: zig has no sanitizer for "
+            "addresses"
+        )
     if not find_spec("ziglang"):
         sys.exit(f"{NO_COMPILER}: install one, or the package ziglang (pip install ziglang)")
-    platform = platform or next((tags for tags in TARGETS if {*tags.split(".")} & {*platform_tags()}), None)
+    platform = platform or next(
+        (tags for tags in TARGETS if {*tags.split(".")} & {*platform_tags()}), None
+    )
     target = ["-target", TARGETS[platform]] if platform else ["-mcpu=baseline"]
     return [sys.executable, "-m", "ziglang", "cc", *target, "-s"], platform or own_platform()
 
@@ -87,28 +116,43 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     # musl has another file name on every system; it is always there, Python has loaded it.
     libraries = {"win": [], "mus": ["-nostdlib"]}.get(platform[:3], ["-lm"])
     sources, has = ROOT / "mumacro" / "kernel", levels(platform)
-    objects = {f"{level}.o": ["level.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in has.items()}
+    objects = {
+        f"{level}.o": ["level.c", f"-DMUMACRO_LEVEL={level}", *flags]
+        for level, flags in has.items()
+    }
     objects["dispatch.o"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in has)]
-    compiling = [[f"{sources / file}", *words, "-c", "-o", made] for made, (file, *words) in objects.items()]
+    compiling = [
+        [f"{sources / file}", *words, "-c", "-o", made] for made, (file, *words) in objects.items()
+    ]
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        for words in (compiling, [["-shared", *objects, "-o", name, *libraries]]):  # each list at the same time
+        # each list at the same time
+        for words in (compiling, [["-shared", *objects, "-o", name, *libraries]]):
             jobs = [subprocess.Popen([*command, *FLAGS, *one], cwd=place) for one in words]  # noqa: S603 - see above
             if sum(job.wait() != 0 for job in jobs):  # waits for all
                 sys.exit("The C compiler failed: see above")
-        # A running program keeps the old file: the new one takes its place and is not written into it.
+        # A running program keeps the old file: the new one takes its place and is not written into
+        # it.
         return (Path(place) / name).replace(folder / name), platform
 
 
 def guide() -> dict[str, str]:
-    """The built documents, where there are any, and their places in the wheel: the service shows them."""
+    """The built documents, where there are any, and their places in the wheel: the service shows
+    them."""
     site = ROOT / "build" / "docs"
-    read = (path for path in site.rglob("*.*") if NOT_READ.isdisjoint((*path.relative_to(site).parts, path.suffix)))
+    read = (
+        path
+        for path in site.rglob("*.*")
+        if NOT_READ.isdisjoint((*path.relative_to(site).parts, path.suffix))
+    )
     files = [path for path in read if path.is_file()]
-    return {str(path): f"mumacro/service/guide/{path.relative_to(site).as_posix()}" for path in files}
+    return {
+        str(path): f"mumacro/service/guide/{path.relative_to(site).as_posix()}" for path in files
+    }
 
 
 class KernelHook(BuildHookInterface[Any]):
-    """A wheel gets the shared object, the guide and a tag for its platform; an editable install has it in place."""
+    """A wheel gets the shared object, the guide and a tag for its platform; an editable install has
+    it in place."""
 
     def dependencies(self) -> list[str]:
         """Ziglang if no compiler works here, or if another platform is asked for."""

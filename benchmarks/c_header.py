@@ -29,17 +29,33 @@ def c_header(quick: bool) -> str:
     n, rounds = (20_000, 2) if quick else (500_000, 7)
     surrogate = Surrogate.open(ROOT / "tables" / "mumacro-1e-10.nc", threads=1)
     v, y = 10.0 ** np.random.default_rng(11).uniform(-3.0, 3.0, (2, n))
-    at, beside, out = (a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (v, y, np.empty(n)))
+    at, beside, out = (
+        a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (v, y, np.empty(n))
+    )
     work: dict[str, Callable[[], object]] = {"the library": lambda: surrogate.mu_ratio(v, y)}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_c(surrogate.table, folder)
-        sources: list[str | Path] = [DRIVER, folder / "mumacro.c", folder / "mumacro_table.c", f"-I{folder}"]
+        sources: list[str | Path] = [
+            DRIVER,
+            folder / "mumacro.c",
+            folder / "mumacro_table.c",
+            f"-I{folder}",
+        ]
         for compiler in filter(shutil.which, ("gcc", "clang")):
             for options in OPTIONS:
                 progress(row := f"`{compiler} {options}`")
                 made = folder / f"driver{len(work)}.so"
-                words = [compiler, *options.split(), "-shared", "-fPIC", *sources, "-o", made, "-lm"]
+                words = [
+                    compiler,
+                    *options.split(),
+                    "-shared",
+                    "-fPIC",
+                    *sources,
+                    "-o",
+                    made,
+                    "-lm",
+                ]
                 subprocess.run(words, check=True)
                 library = ctypes.CDLL(str(made))
                 work[row] = partial(library.ratio_array, at, beside, n, out)

@@ -1,4 +1,5 @@
-"""Time of one call, a point of large arrays, and a new process; beside scipy's elliptic integral and numpy."""
+"""Time of one call, a point of large arrays, and a new process; beside scipy's elliptic integral
+and numpy."""
 
 from benchmarks.measuring import ROOT, best_of, main, markdown, quantity  # isort: split
 
@@ -43,7 +44,10 @@ def started(program: str) -> float:
 
 def processes(quick: bool) -> str:
     rounds = range(1 if quick else 5)
-    rows = [[name, quantity(statistics.median(started(text) for _ in rounds))] for name, text in PROCESSES.items()]
+    rows = [
+        [name, quantity(statistics.median(started(text) for _ in rounds))]
+        for name, text in PROCESSES.items()
+    ]
     return markdown(["a new process, median of 5", "[s]"], rows)
 
 
@@ -51,15 +55,31 @@ def calls(points: int, quick: bool) -> str:
     rng = np.random.default_rng(0)
     n = 10_000 if quick else points
     v, y = 10.0 ** rng.uniform(-3.0, 3.0, (2, n))
-    names = {"s": mumacro.open(1e-10, threads=1), "ellipk": ellipk, "v": v, "y": y, "m": rng.uniform(0.0, 1.0, n),
-             "case": CASE, "many": {**CASE, "v0": 0.4 * v, "y0": 3e-6 * y}}  # fmt: skip
+    names = {
+        "s": mumacro.open(1e-10, threads=1),
+        "ellipk": ellipk,
+        "v": v,
+        "y": y,
+        "m": rng.uniform(0.0, 1.0, n),
+        "case": CASE,
+        "many": {**CASE, "v0": 0.4 * v, "y0": 3e-6 * y},
+    }
     tables = []
     for kind, statements, number, scale, unit in (
-        ("one call", SCALARS, 2000, 1e6, "us"), (f"{n:,} points, one thread", ARRAYS, 1, 1e9 / n, "ns a point"),
-    ):  # fmt: skip
-        work = {name: partial(timeit.timeit, text, globals=names, number=number) for name, text in statements.items()}
+        ("one call", SCALARS, 2000, 1e6, "us"),
+        (f"{n:,} points, one thread", ARRAYS, 1, 1e9 / n, "ns a point"),
+    ):
+        work = {
+            name: partial(timeit.timeit, text, globals=names, number=number)
+            for name, text in statements.items()
+        }
         best = best_of(2 if quick else 15, work)
-        tables.append(markdown([kind, f"[{unit}]"], [[name, quantity(t / number * scale)] for name, t in best.items()]))
+        tables.append(
+            markdown(
+                [kind, f"[{unit}]"],
+                [[name, quantity(t / number * scale)] for name, t in best.items()],
+            )
+        )
     said = f"Table 1e-10, kernel of the level {mumacro.library.kernels[-1].level}."
     return "\n\n".join([said, *tables, processes(quick)])
 

@@ -1,10 +1,11 @@
-"""Check values for ports and installations: tests/data/check_values.csv, from quadruple-precision points.
+"""Check values for ports and installations: tests/data/check_values.csv, from quadruple-precision
+points.
 
     python benchmarks/check_values.py            prints the file
     python benchmarks/check_values.py --write    writes it
 
-Values come from tests/data/points.csv and border.csv, computed by another solver, and from closed forms in 50 digits;
-not from this project's own solver or tables.  docs/accuracy.md describes them.
+Values come from tests/data/points.csv and border.csv, computed by another solver, and from closed
+forms in 50 digits; not from this project's own solver or tables.  docs/accuracy.md describes them.
 """
 
 import csv
@@ -18,9 +19,23 @@ from mpmath import agm, mp, mpf, sqrt
 
 DATA = Path(__file__).resolve().parent.parent / "tests" / "data"
 FILE = DATA / "check_values.csv"
-COLUMNS = ("quantity", "where", "v_tilde", "y_tilde", "mu0", "Fz", "k", "y0", "omega", "v0", "value", "tolerance")
+COLUMNS = (
+    "quantity",
+    "where",
+    "v_tilde",
+    "y_tilde",
+    "mu0",
+    "Fz",
+    "k",
+    "y0",
+    "omega",
+    "v0",
+    "value",
+    "tolerance",
+)
 A_CLASS = 6  # reference points of each class
-# powers of two: l0 = mu0 Fz / k = 2^-19 m and l0 omega = 2^-2 m/s, so that y0 and v0 give the groups back exactly
+# powers of two: l0 = mu0 Fz / k = 2^-19 m and l0 omega = 2^-2 m/s, so that y0 and v0 give the
+# groups back exactly
 MU0, FZ, K, OMEGA = 0.25, 8.0, 2.0**20, 2.0**17
 L0 = MU0 * FZ / K
 DOUBLE = 1e-14  # relative, of a solver in double precision
@@ -34,8 +49,16 @@ def read(name: str) -> list[dict[str, str]]:
 
 def row(quantity: str, where: str, value: float, tolerance: float, **inputs: Any) -> dict[str, Any]:
     """One check value; inputs that it does not depend on stay empty."""
-    numbers = {name: text if isinstance(text, str) else repr(float(text)) for name, text in inputs.items()}
-    return {"quantity": quantity, "where": where, **numbers, "value": repr(value), "tolerance": f"{tolerance:.1e}"}
+    numbers = {
+        name: text if isinstance(text, str) else repr(float(text)) for name, text in inputs.items()
+    }
+    return {
+        "quantity": quantity,
+        "where": where,
+        **numbers,
+        "value": repr(value),
+        "tolerance": f"{tolerance:.1e}",
+    }
 
 
 def chosen() -> list[dict[str, str]]:
@@ -71,7 +94,9 @@ def closed_forms() -> Iterator[dict[str, Any]]:
         yield row("mu_macro", where, MU0, DOUBLE * MU0, **{**usual, **change})
     for y in (0.25, 0.5, 0.75, 0.96875, 1.0, 2.0):
         value = MU0 * float(sqrt(max(mpf(0), 1 - mpf(y) ** 2)))
-        yield row("mu_macro", "static (38)", value, DOUBLE * MU0, **{**usual, "y0": y * L0, "v0": 0.0})
+        yield row(
+            "mu_macro", "static (38)", value, DOUBLE * MU0, **{**usual, "y0": y * L0, "v0": 0.0}
+        )
     for ratio in (2.0**-10, 0.5, 1.0, 4.0, 1024.0):
         value = MU0 * float(1 / agm(1, sqrt(1 + mpf(ratio) ** 2)))
         case = {**usual, "k": "rigid", "y0": L0, "v0": L0 * OMEGA / ratio}

@@ -1,4 +1,5 @@
-"""Cost of a ball and of oscillation along and normal beside one spring; and the errors of the ball's rules.
+"""Cost of a ball and of oscillation along and normal beside one spring; and the errors of the
+ball's rules.
 
 python benchmarks/contacts.py --only costs    # nanoseconds a point, one thread, log-uniform points
 python benchmarks/contacts.py --only errors   # the constants of mumacro/contact.py, measured anew
@@ -37,13 +38,15 @@ def costs() -> str:
     return markdown(("contact", "table", "ns", "springs"), rows)
 
 
-RULES, MANY, HUGE = 5, 160, 1e6  # pieces; nodes of what counts as exact; a constant beside which rounding is nothing
+# pieces; nodes of what counts as exact; a constant beside which rounding is nothing
+RULES, MANY, HUGE = 5, 160, 1e6
 CLOSE = 2  # has no relative error
 NAMES = ("mu_ratio", "power", "stick_fraction", "slope along v~", "slope along y~")
 
 
 def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
-    """Log-uniform over all of the legal range, and where rules err most: borders, corners, the steepest ray."""
+    """Log-uniform over all of the legal range, and where rules err most: borders, corners, the
+    steepest ray."""
     rng = np.random.default_rng(seed)
 
     def decades(low: float, high: float) -> Array:
@@ -57,29 +60,46 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
     if along:
         y = decades(-300, 279)
         x = np.where(rng.random(count) < 0.5, decades(-12, -0.01), 1.0 - decades(-12, -0.01))
-        first = 1.5 / (np.sqrt((1.0 - x) * (1.0 + x)) - x * np.arccos(x)) * beside(-12, 0)  # reverse slip begins
-        pairs += [(y * decades(-25, 0), y), (x * first, first), (first * (1.0 - decades(-15, 0)), first)]
+        # reverse slip begins
+        first = 1.5 / (np.sqrt((1.0 - x) * (1.0 + x)) - x * np.arccos(x)) * beside(-12, 0)
+        pairs += [
+            (y * decades(-25, 0), y),
+            (x * first, first),
+            (first * (1.0 - decades(-15, 0)), first),
+        ]
         pairs += [(near * decades(-25, 0), near) for near in (beside(-15, 0), 1.5 * beside(-15, 0))]
     else:
         border = opened(1e-12).v_tilde_crit
         small, wide, high = decades(-6, 0.5), decades(-6, 6), decades(-1, 6)
         pairs += [(decades(-25, 6), decades(-12, 6)), (decades(-300, 279), decades(-300, 279))]
-        pairs += [(small * small * decades(-5, 2), small), (decades(-25, 0.3), 1.5 * beside(-15, 0))]
+        pairs += [
+            (small * small * decades(-5, 2), small),
+            (decades(-25, 0.3), 1.5 * beside(-15, 0)),
+        ]
         pairs += [(0.33516779066085 * wide * beside(-12, -0.5), wide)]
         pairs += [(1.5 * border(high / 1.5) * beside(-12, -0.5), high)]
-        near = decades(-0.2, 0.6)  # the steepest ray enters where the ball begins to slide as a whole
-        pairs += [(0.33516779066085 * near * beside(-9, -0.5), near), (decades(-3, 0.2), 1.5 * decades(0.0, 0.25))]
+        # the steepest ray enters where the ball begins to slide as a whole
+        near = decades(-0.2, 0.6)
+        pairs += [
+            (0.33516779066085 * near * beside(-9, -0.5), near),
+            (decades(-3, 0.2), 1.5 * decades(0.0, 0.25)),
+        ]
     return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))  # type: ignore[return-value]
 
 
-def asked(s: Surrogate, v: Array, y: Array, direction: str, put: list[tuple[Array, Array]]) -> list[Array]:
+def asked(
+    s: Surrogate, v: Array, y: Array, direction: str, put: list[tuple[Array, Array]]
+) -> list[Array]:
     """Rows (values, bounds) of :data:`NAMES` for a ball with these rules."""
     s._data.put_rules(put, driven_rule())
     kind: Any = {"contact": "ball", "direction": direction}
     found = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
     answer = s.evaluate(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y0=y, gradient=True, **kind)
     with np.errstate(all="ignore"):
-        slopes = ((answer.gradient[name] * x, answer.gradient_bound[name] * x) for name, x in (("v0", v), ("y0", y)))
+        slopes = (
+            (answer.gradient[name] * x, answer.gradient_bound[name] * x)
+            for name, x in (("v0", v), ("y0", y))
+        )
         return found + list(map(np.array, slopes))
 
 
@@ -91,10 +111,11 @@ def largest(error: Array, scale: Array) -> float:
 
 
 def errors(count: int = 15_000) -> str:
-    """Every rule against one with :data:`MANY` nodes, alone in the kernel: what ``mumacro.contact._RULES`` states.
+    """Every rule against one with :data:`MANY` nodes, alone in the kernel: what
+    ``mumacro.contact._RULES`` states.
 
-    The kernel's own scales: the bound of a rule whose constant is huge.  Tables without errors leave the bounds that
-    rounding has; what these cover is no error of a rule.
+    The kernel's own scales: the bound of a rule whose constant is huge.  Tables without errors
+    leave the bounds that rounding has; what these cover is no error of a rule.
     """
     s, none = Surrogate.open(1e-12), np.zeros((2, 5))
     for code, (polynomials, of_values, of_slopes) in list(s._data.quantities.items()):
@@ -111,19 +132,26 @@ def errors(count: int = 15_000) -> str:
         return found
 
     def compared(piece: int, nodes: int) -> Iterator[tuple[Array, Array, Array]]:
-        """The errors, and the scales of the absolute and of the relative constant, of :data:`NAMES`."""
+        """The errors, and the scales of the absolute and of the relative constant, of
+        :data:`NAMES`."""
         exact, plain = by(piece, MANY, none), by(piece, nodes, none)
         scales = (by(piece, nodes, constants) for constants in (absolute, absolute[::-1]))
         for i, (true, rule, *high) in enumerate(zip(exact, plain, *scales, strict=True)):
-            error = np.maximum(np.abs(true[0] - rule[0]) - true[1] - rule[1] - 4e-16 * whole[i], 0.0)
+            error = np.maximum(
+                np.abs(true[0] - rule[0]) - true[1] - rule[1] - 4e-16 * whole[i], 0.0
+            )
             yield error, *((bound[1] - rule[1]) / HUGE for bound in high)
 
     said = list[str]()
     for tolerance, pieces in contact._RULES.items():
         said.append(f"    {tolerance!r}: (")
         for piece, (nodes, *_) in enumerate(pieces):
-            constants = np.array([[largest(error, scale) for scale in both]
-                                  for error, *both in compared(piece, nodes)]).T.tolist()  # fmt: skip
+            constants = np.array(
+                [
+                    [largest(error, scale) for scale in both]
+                    for error, *both in compared(piece, nodes)
+                ]
+            ).T.tolist()
             if piece == CLOSE:
                 constants[1] = []
             rows = ("(" + ", ".join(f"{2.0 * x:.2g}" for x in row) + ")" for row in constants)

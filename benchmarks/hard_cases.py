@@ -37,7 +37,14 @@ def grazing() -> str:
         v = crit * (1.0 - gap)
         at, full = interpolant(orbit(v, y)[2]), solve(v, y)
         negative = sum(at(tau) < 0.0 for tau in np.linspace(0.0, math.pi, 101))
-        rows.append([f"{gap:.0e}", str(negative), f"{full.min_slip_speed:.1e}", f"{full.stick_fraction:.3e}"])
+        rows.append(
+            [
+                f"{gap:.0e}",
+                str(negative),
+                f"{full.min_slip_speed:.1e}",
+                f"{full.stick_fraction:.3e}",
+            ]
+        )
     header = ("1 - v~/v~crit", "of 101 samples below 0", "smallest lam", "stick fraction, solved")
     return f"y~ = 1, lam along the orbit that slides all the time:\n\n{markdown(header, rows)}"
 
@@ -56,10 +63,23 @@ def surplus() -> str:
         full = solve(v, y)
         if full.regime == "stick_slip":
             hinted(v, y, w, out, orbit)
-            naive = (orbit[DURATION] * (orbit[COS_0] + 0.5 * v * orbit[DURATION]) + out[SUM_UX]) / math.pi
-            found.append((abs(out[SIGMA] - orbit[SIGMA_0]), abs(naive - mu) / mu, abs(full.mu_ratio - mu) / mu))
+            naive = (
+                orbit[DURATION] * (orbit[COS_0] + 0.5 * v * orbit[DURATION]) + out[SUM_UX]
+            ) / math.pi
+            found.append(
+                (
+                    abs(out[SIGMA] - orbit[SIGMA_0]),
+                    abs(naive - mu) / mu,
+                    abs(full.mu_ratio - mu) / mu,
+                )
+            )
     spread, lost, kept = map(max, zip(*found, strict=True))
-    head = ("points below the border", "slip and stick miss half a period by", "mu~ off by", "surplus taken out")
+    head = (
+        "points below the border",
+        "slip and stick miss half a period by",
+        "mu~ off by",
+        "surplus taken out",
+    )
     return markdown(head, [[str(len(found)), quantity(spread), quantity(lost), quantity(kept)]])
 
 
@@ -85,7 +105,13 @@ def double_root() -> str:
             exact = float(a * a + b * b - 1)
         off = (quantity(abs(one / exact - 1.0)) for one in (naive, ours))
         rows.append([f"{d:.0e}", f"{exact:.6e}", f"{naive:.6e}", *off])
-    header = ("time since the onset", "exact", "naive", "its rel error", "rel error, root divided out")
+    header = (
+        "time since the onset",
+        "exact",
+        "naive",
+        "its rel error",
+        "rel error, root divided out",
+    )
     return f"v~ = {v}, y~ = {y}:\n\n{markdown(header, rows)}"
 
 
@@ -100,7 +126,10 @@ def creep() -> str:
         rows.append([f"{v:g}", f"{y:g}", full.regime.replace("_", "-"), cycles, off])
     text = markdown(("v~", "y~", "regime", "cycles", "error when it stops"), rows, 3)
     here = max(abs(solve(v, y).mu_ratio - mu) / mu for v, y, mu in reference("creep"))
-    return f"{text}\n\nThe solver here, at the reference points of creep: max rel error {quantity(here)}."
+    return (
+        f"{text}\n\nThe solver here, at the reference points of creep: max rel error "
+        f"{quantity(here)}."
+    )
 
 
 def _corner(radius: Array, psi: Array) -> tuple[Array, Array, Array]:
@@ -110,7 +139,9 @@ def _corner(radius: Array, psi: Array) -> tuple[Array, Array, Array]:
 
 
 def _solved(v: Array, eta: Array) -> Array:
-    one = np.vectorize(lambda a, b: solve(float(a), 1.0 + float(b), float(b)).mu_ratio, otypes=[np.float64])
+    one = np.vectorize(
+        lambda a, b: solve(float(a), 1.0 + float(b), float(b)).mu_ratio, otypes=[np.float64]
+    )
     out: Array = one(v, eta)
     return out
 
@@ -127,10 +158,15 @@ def exact_eta() -> str:
 
 
 def _fit_error(
-    n: int, spans: tuple[tuple[float, float], tuple[float, float]], f: Callable[[Array, Array], Array],
-    a: Array, b: Array, truth: Array,
-) -> float:  # fmt: skip
-    """Largest error at (a, b) of the n x n Chebyshev interpolant of ``f`` on the rectangle ``spans``."""
+    n: int,
+    spans: tuple[tuple[float, float], tuple[float, float]],
+    f: Callable[[Array, Array], Array],
+    a: Array,
+    b: Array,
+    truth: Array,
+) -> float:
+    """Largest error at (a, b) of the n x n Chebyshev interpolant of ``f`` on the rectangle
+    ``spans``."""
     grid = [nodes(n, *span) for span in spans]
     c = chebyshev_coefficients(f(grid[0][:, None], grid[1][None, :]))
     left, right = (
@@ -160,7 +196,10 @@ def cusp() -> str:
     def plain(a: Array, b: Array) -> Array:
         return _solved(np.exp(a), np.exp(b) - 1.0)
 
-    spans, s0 = ((0.0, 0.8 / math.sqrt(2.0)), (0.0, 0.8 * math.sqrt(2.0))), math.sqrt(2.0) * radius * np.cos(psi)
+    spans, s0 = (
+        ((0.0, 0.8 / math.sqrt(2.0)), (0.0, 0.8 * math.sqrt(2.0))),
+        math.sqrt(2.0) * radius * np.cos(psi),
+    )
     rows = []
     for n in (8, 16, 32, 64):
         progress(f"corner {n} x {n}")
@@ -170,10 +209,15 @@ def cusp() -> str:
             _fit_error(n, ((0.0, 0.8), (0.0, HALF)), polar, radius, psi, inside / phi),
         )
         rows.append([f"{n} x {n}", *map(quantity, errors)])
-    header = ("Chebyshev nodes", "mu~ on (ln v~, ln y~)", "mu~/phi on (phi, s0)", "mu~/phi on (R, psi)")
+    header = (
+        "Chebyshev nodes",
+        "mu~ on (ln v~, ln y~)",
+        "mu~/phi on (phi, s0)",
+        "mu~/phi on (R, psi)",
+    )
     return (
-        "Largest absolute error at 2,000 random points; the two right columns over R <= 0.8, the left one over v~ in "
-        f"[1e-6, 0.05], y~ in [0.7, 1.3]:\n\n{markdown(header, rows)}"
+        "Largest absolute error at 2,000 random points; the two right columns over R <= 0.8, the "
+        f"left one over v~ in [1e-6, 0.05], y~ in [0.7, 1.3]:\n\n{markdown(header, rows)}"
     )
 
 
@@ -183,7 +227,13 @@ def small_amplitude() -> str:
     rows = []
     for y in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
         full = solve(v, y)
-        rows.append([f"{y:.0e}", f"{full.deficit:.6e}", quantity(abs((1.0 - full.mu_ratio) / full.deficit - 1))])
+        rows.append(
+            [
+                f"{y:.0e}",
+                f"{full.deficit:.6e}",
+                quantity(abs((1.0 - full.mu_ratio) / full.deficit - 1)),
+            ]
+        )
     header = ("y~", "1 - mu~, solved", "rel error of 1 - fl(mu~)")
     return f"v~ = {v:g}:\n\n{markdown(header, rows, 0)}"
 
@@ -199,7 +249,8 @@ def short_stick() -> str:
         ux, uy = cth + v * d, 2.0 * y * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d) - sth
         x, chart = (-math.asin(min(ux, 1.0)), 1) if uy > 0.0 else (math.atan2(uy, ux), 0)
         slid = []
-        for sigma in (s0 + d, s1 + math.pi):  # s1 = s0 + d - pi is measured from the far turn and rounded there
+        # s1 = s0 + d - pi is measured from the far turn and rounded there
+        for sigma in (s0 + d, s1 + math.pi):
             slip(v, y, sigma, -1, x, chart, HALF, True, w, out)
             slid.append(float(out[SUM_UX]))
         rows.append([f"{y:.0e}", f"{d:.2e}", quantity(abs(slid[1] / slid[0] - 1))])
@@ -219,14 +270,18 @@ def stiffness() -> str:
 
         explicit = "-"
         if v <= 1e4:
-            run = solve_ivp(rate, (-HALF, HALF), [math.atan(v * y / (1 + v * v))], method="DOP853", rtol=1e-9)
+            run = solve_ivp(
+                rate, (-HALF, HALF), [math.atan(v * y / (1 + v * v))], method="DOP853", rtol=1e-9
+            )
             explicit = f"{run.t.size - 1:,}"
         continuous(v, y, w, out)
         rows.append([f"{v:.0e}", explicit, str(int(out[STEPS]))])
     return markdown(("v~ = y~", "explicit steps (DOP853, rtol 1e-9)", "steps here"), rows, 0)
 
 
-SECTIONS = sections(grazing, surplus, double_root, creep, exact_eta, cusp, small_amplitude, short_stick, stiffness)
+SECTIONS = sections(
+    grazing, surplus, double_root, creep, exact_eta, cusp, small_amplitude, short_stick, stiffness
+)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS)

@@ -1,6 +1,8 @@
-"""Shared by every script of benchmarks/ and fuzz/: clock, machine, tables, and the command line that stores results.
+"""Shared by every script of benchmarks/ and fuzz/: clock, machine, tables, and the command line
+that stores results.
 
-Imported before numpy: it sets one thread for every numerical library, and numpy reads that once, when it loads.
+Imported before numpy: it sets one thread for every numerical library, and numpy reads that once,
+when it loads.
 """
 
 import argparse
@@ -12,7 +14,12 @@ from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter, process_time
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+for _name in (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+):
     os.environ[_name] = "1"
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -20,8 +27,12 @@ RESULTS = ROOT / "build" / "results"
 IMAGES = ROOT / "docs" / "img"
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvicorn")
 FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
-#: the documents that hold results, each between a begin and an end marker with the name of its section
-PAGES = tuple(ROOT / path for path in ("docs/accuracy.md", "docs/python.md", "docs/service.md", "tables/README.md"))
+#: the documents that hold results, each between a begin and an end marker with the name of its
+#: section
+PAGES = tuple(
+    ROOT / path
+    for path in ("docs/accuracy.md", "docs/python.md", "docs/service.md", "tables/README.md")
+)
 
 
 def sections(*each: Callable[..., str]) -> dict[str, Callable[..., str]]:
@@ -29,21 +40,29 @@ def sections(*each: Callable[..., str]) -> dict[str, Callable[..., str]]:
     return {section.__name__: section for section in each}
 
 
-def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | str) -> None:
+def main(
+    text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | str
+) -> None:
     """The command line of a script: run its sections, print them, and with ``--write`` store them.
 
-    A section returns Markdown; it receives the ``options``, each with its default, as keywords.  A line about the
-    machine is added.  ``--write`` stores it as build/results/SCRIPT-SECTION.md, and between its markers where a
-    document of :data:`PAGES` has them.
+    A section returns Markdown; it receives the ``options``, each with its default, as keywords.  A
+    line about the machine is added.  ``--write`` stores it as build/results/SCRIPT-SECTION.md, and
+    between its markers where a document of :data:`PAGES` has them.
     """
-    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=text, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--only", choices=list(sections), help="one section")
-    parser.add_argument("--write", action="store_true", help="store the results in build/results, and in documents")
+    parser.add_argument(
+        "--write", action="store_true", help="store the results in build/results, and in documents"
+    )
     for name, default in options.items():
         if isinstance(default, bool):
             parser.add_argument(f"--{name}", action="store_true")
         else:
-            parser.add_argument(f"--{name}", type=type(default), default=default, help=f"default: {default}")
+            parser.add_argument(
+                f"--{name}", type=type(default), default=default, help=f"default: {default}"
+            )
     given = parser.parse_args()
     if given.write and (getattr(given, "quick", False) or getattr(given, "share", 1.0) < 1.0):
         parser.error("--write stores full runs only")
@@ -74,7 +93,9 @@ def processor() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor() or platform.machine()
-    found = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
+    found = {
+        key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)
+    }
     name = found.get("model name", platform.machine())
     if "cpu family" in found:
         name += f" (family {found['cpu family']}, model {found.get('model', '?')})"
@@ -97,7 +118,8 @@ def progress(text: str) -> None:
 
 
 def best_of(rounds: int, work: Mapping[str, Callable[[], object]]) -> dict[str, float]:
-    """Processor seconds of the best of ``rounds`` calls of each function, after one untimed call; for one thread.
+    """Processor seconds of the best of ``rounds`` calls of each function, after one untimed call;
+    for one thread.
 
     The rounds are interleaved, so that other load slows all functions equally.
     """
@@ -113,7 +135,8 @@ def best_of(rounds: int, work: Mapping[str, Callable[[], object]]) -> dict[str, 
 
 
 def quantity(value: float, digits: int = 2) -> str:
-    """``value`` with ``digits`` significant digits: plain between 0.01 and 1e5, else as a power of ten."""
+    """``value`` with ``digits`` significant digits: plain between 0.01 and 1e5, else as a power of
+    ten."""
     if value == 0.0:
         return "0"
     if 0.01 <= abs(value) < 1e5:
@@ -124,12 +147,17 @@ def quantity(value: float, digits: int = 2) -> str:
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
-    """A Markdown table; the first ``text_columns`` columns are text, the rest numbers, set to the right."""
+    """A Markdown table; the first ``text_columns`` columns are text, the rest numbers, set to the
+    right."""
     widths = [max(len(header[i]), 3, *(len(row[i]) for row in rows)) for i in range(len(header))]
 
     def line(cells: Sequence[str]) -> str:
         sized = enumerate(zip(cells, widths, strict=True))
-        return "| " + " | ".join(c.ljust(w) if i < text_columns else c.rjust(w) for i, (c, w) in sized) + " |"
+        return (
+            "| "
+            + " | ".join(c.ljust(w) if i < text_columns else c.rjust(w) for i, (c, w) in sized)
+            + " |"
+        )
 
     rule = ["-" * w if i < text_columns else "-" * (w - 1) + ":" for i, w in enumerate(widths)]
     return "\n".join([line(header), line(rule), *map(line, rows)])

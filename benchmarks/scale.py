@@ -2,8 +2,9 @@
 
     python benchmarks/scale.py [--cases 1e8] [--write]
 
-Every chunk of cases is generated, evaluated and reduced (mean, extremes, a histogram) by Dask's threads; no case is
-stored.  Processor time is the sum over all threads: other work on the machine has little effect on it.
+Every chunk of cases is generated, evaluated and reduced (mean, extremes, a histogram) by Dask's
+threads; no case is stored.  Processor time is the sum over all threads: other work on the machine
+has little effect on it.
 """
 
 from benchmarks.measuring import main, markdown, quantity  # isort: split
@@ -20,8 +21,14 @@ from scipy.stats import qmc
 from mumacro import Surrogate
 
 PLAN = 1e12  # cases of the worked plan
-RANGES = {"mu0": (0.1, 1.0), "Fz": (1, 100), "k": (1e5, 1e8), "y0": (1e-7, 1e-5), "omega": (1e3, 1e6),
-          "v0": (1e-4, 1.0)}  # fmt: skip
+RANGES = {
+    "mu0": (0.1, 1.0),
+    "Fz": (1, 100),
+    "k": (1e5, 1e8),
+    "y0": (1e-7, 1e-5),
+    "omega": (1e3, 1e6),
+    "v0": (1e-4, 1.0),
+}
 
 
 def points(block_info: Any = None) -> Any:
@@ -40,11 +47,16 @@ def reduced(surrogate: Surrogate, n: int) -> float:
     sizes = da.core.normalize_chunks(2**20, (n,))[0]
     u = da.map_blocks(points, chunks=(sizes, (len(RANGES),)), dtype=float, meta=np.empty((0, 0)))
     shares = {name: (u[:, i], *ends) for i, (name, ends) in enumerate(RANGES.items())}
-    columns = {name: ("case", column.map_blocks(over, *ends, dtype=float)) for name, (column, *ends) in shares.items()}
+    columns = {
+        name: ("case", column.map_blocks(over, *ends, dtype=float))
+        for name, (column, *ends) in shares.items()
+    }
     ratio = surrogate.evaluate(xr.Dataset(columns)).mu_ratio.data
     counts, _ = da.histogram(ratio, bins=1000, range=(0.0, 1.0))
     before = process_time()
-    mean, low, high, counted = dask.compute(ratio.mean(), ratio.min(), ratio.max(), counts.sum(), scheduler="threads")
+    mean, low, high, counted = dask.compute(
+        ratio.mean(), ratio.min(), ratio.max(), counts.sum(), scheduler="threads"
+    )
     if not (counted == n and 0.0 <= low <= mean <= high <= 1.0):
         raise SystemExit(f"error: {counted} cases from {low} to {high}, mean {mean}")
     return (process_time() - before) / n

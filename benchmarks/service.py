@@ -1,9 +1,11 @@
-"""Cost of a request over HTTP: processor time of this service and of others, waits beside batches, start, memory.
+"""Cost of a request over HTTP: processor time of this service and of others, waits beside batches,
+start, memory.
 
     python benchmarks/service.py [--write]    takes about three minutes
 
-Linux, two processors: one for the servers, one for the client.  Servers run at the same time and get the same requests
-in turn, so that other load slows all of them; figures are medians of the rounds.
+Linux, two processors: one for the servers, one for the client.  Servers run at the same time and
+get the same requests in turn, so that other load slows all of them; figures are medians of the
+rounds.
 """
 
 from benchmarks.measuring import FINEST, main, markdown, sections  # isort: split
@@ -31,8 +33,16 @@ from tests.serving import CASE, Server, asking, connect, head, running, serving
 
 FIRST, CLIENT = ("taskset", "-c", "0"), {1}  # the processors of the servers and of the client
 ROUNDS, REQUESTS, CLIENTS = 5, 800, 16
-KINDS = {name: TYPES[form] for name, form in (
-    ("columns", "json"), ("rows", "json"), ("lines", "ndjson"), ("csv", "csv"), ("arrow", "arrow"))}  # fmt: skip
+KINDS = {
+    name: TYPES[form]
+    for name, form in (
+        ("columns", "json"),
+        ("rows", "json"),
+        ("lines", "ndjson"),
+        ("csv", "csv"),
+        ("arrow", "arrow"),
+    )
+}
 
 
 def post(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
@@ -80,16 +90,20 @@ def batch(server: Server, kind: str, body: bytes) -> None:
 
 
 def peer(name: str, folder: str) -> AbstractContextManager[Server]:
-    return running([*FIRST, sys.executable, "-m", "benchmarks.service_peers", name], Path(folder) / name)
+    return running(
+        [*FIRST, sys.executable, "-m", "benchmarks.service_peers", name], Path(folder) / name
+    )
 
 
 def single() -> str:
     os.sched_setaffinity(0, CLIENT)  # else it interrupts the servers whenever they answer
     found: dict[str, list[tuple[float, float]]] = {}
     with (
-        tempfile.TemporaryDirectory() as folder, serving(FINEST, before=FIRST) as own, peer("raw", folder) as raw,
+        tempfile.TemporaryDirectory() as folder,
+        serving(FINEST, before=FIRST) as own,
+        peer("raw", folder) as raw,
         peer("fastapi", folder) as fast,
-    ):  # fmt: skip
+    ):
         asked = [(f"this service, {name}", own, text) for name, text in FORMS.items()]
         asked.append(("FastAPI, models in and out", fast, FORMS["POST"]))
         for _ in range(1 + ROUNDS):
@@ -108,21 +122,32 @@ def single() -> str:
     mean = math.exp(statistics.fmean(math.log(float(row[2])) for row in rows[: len(FORMS)]))
     floor = statistics.median(floor for pairs in found.values() for floor, _ in pairs)
     rows.append(("raw ASGI, nothing checked", f"{floor:.0f}", "1.00"))
-    return f"{markdown(('one case', 'processor time [us]', 'times raw ASGI'), rows)}\n\nGeometric mean: {mean:.2f}."
+    return (
+        f"{markdown(('one case', 'processor time [us]', 'times raw ASGI'), rows)}\n\nGeometric "
+        f"mean: {mean:.2f}."
+    )
 
 
 def body_of(form: str, n: int) -> bytes:
     random = np.random.default_rng(n)
     table = {
-        "mu0": random.uniform(0.1, 0.9, n), "Fz": 10 ** random.uniform(0, 2, n), "k": 10 ** random.uniform(5, 7, n),
-        "y0": 10 ** random.uniform(-8, -4, n), "omega": 10 ** random.uniform(4, 6, n),
+        "mu0": random.uniform(0.1, 0.9, n),
+        "Fz": 10 ** random.uniform(0, 2, n),
+        "k": 10 ** random.uniform(5, 7, n),
+        "y0": 10 ** random.uniform(-8, -4, n),
+        "omega": 10 ** random.uniform(4, 6, n),
         "v0": 10 ** random.uniform(-4, 1, n),
-    }  # fmt: skip
+    }
     if form == "columns":
         return orjson.dumps(table, option=orjson.OPT_SERIALIZE_NUMPY)
     if form == "lines":
-        parts = ({name: column[i : i + 1000] for name, column in table.items()} for i in range(0, n, 1000))
-        return b"".join(orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n" for part in parts)
+        parts = (
+            {name: column[i : i + 1000] for name, column in table.items()}
+            for i in range(0, n, 1000)
+        )
+        return b"".join(
+            orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n" for part in parts
+        )
     if form == "arrow":
         return stream_of(pa.record_batch(table))
     columns = (column.tolist() for column in table.values())
@@ -144,9 +169,18 @@ def batches() -> str:
                 batch(own, kind, body)
                 speeds.append(0.1 / (own.busy() - before))
             waits = [f"{1e3 * longest(own, kind, body, 5):.0f}"]
-            waits.append("-" if form == "csv" else f"{1e3 * longest(own, kind, body_of(form, 1_000_000), 1):.0f}")
+            waits.append(
+                "-"
+                if form == "csv"
+                else f"{1e3 * longest(own, kind, body_of(form, 1_000_000), 1):.0f}"
+            )
             rows.append((form, f"{statistics.median(speeds):.2g}", *waits))
-    head = ("as", "million cases per processor second", "longest wait [ms]", "beside a million cases [ms]")
+    head = (
+        "as",
+        "million cases per processor second",
+        "longest wait [ms]",
+        "beside a million cases [ms]",
+    )
     return markdown(head, rows)
 
 
@@ -165,7 +199,10 @@ def start() -> str:
             times.append(own.wait_until_ready())
             time.sleep(1.0)
             idle = own.memory()
-    rows = [("ready after [s]", f"{statistics.median(times):.2f}"), ("memory of an idle process [MB]", f"{idle:.0f}")]
+    rows = [
+        ("ready after [s]", f"{statistics.median(times):.2f}"),
+        ("memory of an idle process [MB]", f"{idle:.0f}"),
+    ]
     return markdown(("one worker, one table", ""), rows)
 
 

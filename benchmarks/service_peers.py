@@ -1,7 +1,7 @@
 """The servers for comparison: ``python -m benchmarks.service_peers raw|fastapi``.
 
-``raw``: stock uvicorn and orjson, which reads six numbers and answers one, without checks: the cost of the server
-underneath.  ``fastapi``: models in and out around the same table, as in its tutorial.
+``raw``: stock uvicorn and orjson, which reads six numbers and answers one, without checks: the cost
+of the server underneath.  ``fastapi``: models in and out around the same table, as in its tutorial.
 """
 
 import sys
@@ -45,7 +45,11 @@ def fastapi() -> Any:
     async def one(case: Case) -> Any:
         found = surrogate.evaluate(**case.model_dump(exclude_none=True))
         names = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
-        return {**{name: getattr(found, name) for name in names}, "table": label, "api_version": "1"}
+        return {
+            **{name: getattr(found, name) for name in names},
+            "table": label,
+            "api_version": "1",
+        }
 
     return app
 
@@ -53,4 +57,9 @@ def fastapi() -> Any:
 if __name__ == "__main__":
     import uvicorn
 
-    uvicorn.run({"raw": raw, "fastapi": fastapi}[sys.argv[1]](), port=0, access_log=False, server_header=False)
+    uvicorn.run(
+        {"raw": raw, "fastapi": fastapi}[sys.argv[1]](),
+        port=0,
+        access_log=False,
+        server_header=False,
+    )

@@ -4,10 +4,11 @@
 
 One thread.  Points are log-uniform over v~, y~ in [1e-3, 1e3].
 
-Marching is the usual method: the equations of motion are integrated with scipy until two cycles agree.  Stick and slip
-are phases of :func:`scipy.integrate.solve_ivp`, their ends are events, and the average of u_x is an unknown.  A
-disturbance of the cycle decays with the slip path, by exp(-2 pi v~) a cycle in continuous sliding, so the cost grows as
-v~ falls; for the same reason two cycles agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
+Marching is the usual method: the equations of motion are integrated with scipy until two cycles
+agree.  Stick and slip are phases of :func:`scipy.integrate.solve_ivp`, their ends are events, and
+the average of u_x is an unknown.  A disturbance of the cycle decays with the slip path, by exp(-2
+pi v~) a cycle in continuous sliding, so the cost grows as v~ falls; for the same reason two cycles
+agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
 """
 
 from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
@@ -40,11 +41,12 @@ class Marched:
 
 
 def march(v: float, y: float, max_step: float = math.inf) -> Marched:
-    """Steady mu~ at v~ = ``v``, y~ = ``y`` by marching whole cycles from an unloaded spring (eqs. (9)-(12), (15)).
+    """Steady mu~ at v~ = ``v``, y~ = ``y`` by marching whole cycles from an unloaded spring (eqs.
+    (9)-(12), (15)).
 
-    Gives up after 20 + 6/v~ cycles, several times the number for the decay exp(-2 pi v~) a cycle.  That happens beside
-    the border, where steps of any length jump over short windows of stick; ``max_step`` = 0.1 rad avoids it for 2 to 4
-    times the cost.
+    Gives up after 20 + 6/v~ cycles, several times the number for the decay exp(-2 pi v~) a cycle.
+    That happens beside the border, where steps of any length jump over short windows of stick;
+    ``max_step`` = 0.1 rad avoids it for 2 to 4 times the cost.
     """
 
     def stick(tau: float, s: Any) -> list[float]:
@@ -68,7 +70,9 @@ def march(v: float, y: float, max_step: float = math.inf) -> Marched:
     for cycle in range(1, max_cycles + 1):
         tau, total = 0.0, 0.0
         while tau < PERIOD:
-            law, event, start = (stick, full, [*state, total]) if sticking else (slip, speed, [*state, total])
+            law, event, start = (
+                (stick, full, [*state, total]) if sticking else (slip, speed, [*state, total])
+            )
             options: Any = {"rtol": RTOL, "atol": ATOL, "max_step": max_step}
             run = solve_ivp(law, (tau, PERIOD), start, method="DOP853", events=event, **options)
             tau, total = float(run.t[-1]), float(run.y[-1, -1])
@@ -98,7 +102,9 @@ def by_regime(n: int, rounds: int) -> str:
     drawn = points(n, seed=1)
     slides = drawn[:, 0] >= solve_chunk("border", drawn)[:, 1]
     parts = {"all": drawn, REGIMES[0]: drawn[slides], REGIMES[1]: drawn[~slides]}
-    best = best_of(rounds, {name: partial(solve_chunk, "full", part) for name, part in parts.items()})
+    best = best_of(
+        rounds, {name: partial(solve_chunk, "full", part) for name, part in parts.items()}
+    )
     mean = {name: quantity(best[name] / len(part) * 1e6) for name, part in parts.items()}
     rows = [[name.replace("_", "-"), f"{len(part):,}", mean[name]] for name, part in parts.items()]
     return markdown(("regime", "points", "mean, microseconds"), rows)
@@ -115,7 +121,10 @@ def against_marching(n: int) -> str:
         marched = march(v, y)
         found.append((marched.agreed, process_time() - start, abs(marched.mu_ratio - exact)))
     rows = [["compiled solver", str(n), quantity(1e6 * direct), "reference"]]
-    for agreed, name in ((True, "two cycles agree to 1e-9"), (False, "given up, beside the border")):
+    for agreed, name in (
+        (True, "two cycles agree to 1e-9"),
+        (False, "given up, beside the border"),
+    ):
         chosen = [(seconds, error) for ended, seconds, error in found if ended == agreed]
         if chosen:
             seconds, error = np.array(chosen).T
@@ -129,8 +138,8 @@ def solver(points: int, rounds: int, quick: bool) -> str:
     regimes = by_regime(n, rounds)
     return (
         f"{n:,} points, one thread, best of {rounds} rounds, processor time.\n\n{regimes}\n\n"
-        "Beside scipy's `solve_ivp` (DOP853, rtol 1e-9, atol 1e-12, events at the end of stick and of slip), at points "
-        f"with v~ >= {PEER_LOW:g}:\n\n{against_marching(3 if quick else 40)}"
+        "Beside scipy's `solve_ivp` (DOP853, rtol 1e-9, atol 1e-12, events at the end of stick and "
+        f"of slip), at points with v~ >= {PEER_LOW:g}:\n\n{against_marching(3 if quick else 40)}"
     )
 
 

@@ -2,13 +2,12 @@
 
     python benchmarks/tables_readme.py [--build] [--workers 2] [--write]
 
-Prints; ``--write`` replaces the text between the markers.  ``--build`` rebuilds each table in a temporary
-folder, times it and compares its checksum with the committed one; without it those columns are kept
-from the page, as long as they were measured for the committed table.
+Prints; ``--write`` replaces the text between the markers.  ``--build`` rebuilds each table in a
+temporary folder, times it and compares its checksum with the committed one; without it those
+columns are kept from the page, as long as they were measured for the committed table.
 """
 
-from benchmarks.measuring import PAGES, ROOT, machine, main, markdown, progress, quantity  # isort: split
-
+# isort: split
 import json
 import os
 import re
@@ -19,16 +18,34 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
+from benchmarks.measuring import PAGES, ROOT, machine, main, markdown, progress, quantity
 from mumacro import Surrogate
 
-HEADER = ("table", "tolerance", "solves", "bytes", "memory of the cells, bytes", "max abs error", "max rel error",
-          "max abs error of the stick fraction", "max rel error of the power")  # fmt: skip
+HEADER = (
+    "table",
+    "tolerance",
+    "solves",
+    "bytes",
+    "memory of the cells, bytes",
+    "max abs error",
+    "max rel error",
+    "max abs error of the stick fraction",
+    "max rel error of the power",
+)
 COMPANIONS = ("verified_max_stick_error", "verified_max_rel_power_error")
 BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
 
 
 def command(tolerance: float, out: str, workers: int | None = None) -> list[str]:
-    words = ["-m", "builder", "build", "--tolerance", f"{tolerance:.0e}".replace("e-0", "e-"), "--out", out]
+    words = [
+        "-m",
+        "builder",
+        "build",
+        "--tolerance",
+        f"{tolerance:.0e}".replace("e-0", "e-"),
+        "--out",
+        out,
+    ]
     return words + ([] if workers is None else ["--workers", str(workers)])
 
 
@@ -47,29 +64,48 @@ def rebuilt(table: Surrogate, workers: int) -> list[str]:
 
 def kept(page: str, checksum: str) -> list[str]:
     """The measured columns of the row with that checksum, if there is one."""
-    found = re.search(rf"^\|[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|\s*`{checksum}`\s*\|$", page, re.MULTILINE)
+    found = re.search(
+        rf"^\|[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|\s*`{checksum}`\s*\|$", page, re.MULTILINE
+    )
     return [cell.strip() for cell in found.groups()] if found else ["-", "-", "-"]
 
 
 def tables(build: bool, workers: int) -> str:
     old = PAGES[-1].read_text("utf-8")
-    opened = sorted((Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")), key=lambda s: -s.tolerance)
+    opened = sorted(
+        (Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")),
+        key=lambda s: -s.tolerance,
+    )
     rows, builds = [], []
     for s in opened:
         counts = (int(str(s.attributes["n_solves"])), s.path.stat().st_size, s.memory)
-        errors = (s.max_abs_error, s.max_rel_error, *(float(str(s.attributes[name])) for name in COMPANIONS))
+        errors = (
+            s.max_abs_error,
+            s.max_rel_error,
+            *(float(str(s.attributes[name])) for name in COMPANIONS),
+        )
         numbers = (*(f"{count:,}" for count in counts), *(f"{error:.2e}" for error in errors))
         rows.append([f"`{s.path.name}`", f"{s.tolerance:.0e}", *numbers])
         cost = rebuilt(s, workers) if build else kept(old, s.checksum)
         builds.append([f"`{s.path.name}`", *cost, f"`{s.checksum}`"])
-    commands = "\n".join(f"    python {' '.join(command(s.tolerance, f'tables/{s.path.name}'))}" for s in opened)
+    commands = "\n".join(
+        f"    python {' '.join(command(s.tolerance, f'tables/{s.path.name}'))}" for s in opened
+    )
     note = re.search(r"^Built anew .*\n.*$", old, re.MULTILINE)
     said = note.group() if note else "Not built anew yet."
     if build:
-        said = f"Built anew on {workers} threads with the program that this page was written with.\n{machine()}"
+        said = (
+            f"Built anew on {workers} threads with the program that this page was written "
+            f"with.\n{machine()}"
+        )
     points = {int(str(s.attributes["verified_points"])) for s in opened}
-    verified = f"Errors are the largest on {' or '.join(f'{n:,}' for n in sorted(points))} fresh solves, off the nodes."
-    return "\n\n".join([commands, verified, markdown(HEADER, rows), said, markdown(BUILD_HEADER, builds, 1)])
+    verified = (
+        f"Errors are the largest on {' or '.join(f'{n:,}' for n in sorted(points))} fresh "
+        "solves, off the nodes."
+    )
+    return "\n\n".join(
+        [commands, verified, markdown(HEADER, rows), said, markdown(BUILD_HEADER, builds, 1)]
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Every equation of the paper against the full model.
 
-    python benchmarks/validation.py [--only SECTION] [--write]  A deviation is formula/exact - 1 unless the section
+    python benchmarks/validation.py [--only SECTION] [--write]  A deviation is formula/exact - 1
+    unless the section
 states otherwise; exact is the solver, or the 1e-12 table where thousands of points are needed.
 """
 
@@ -37,7 +38,8 @@ def percent(x: float) -> str:
 
 
 def intervals(x: Array, miss: Array, level: float) -> str:
-    """Where ``miss`` <= ``level``, as text; ends are interpolated between the samples of ``x`` (log-spaced)."""
+    """Where ``miss`` <= ``level``, as text; ends are interpolated between the samples of ``x``
+    (log-spaced)."""
     inside = miss <= level
     if inside.all():
         return "all"
@@ -46,7 +48,10 @@ def intervals(x: Array, miss: Array, level: float) -> str:
     cuts = [quantity(float(cut), 3) for cut in x[at] * (x[at + 1] / x[at]) ** share]
     ends = [""] * bool(inside[0]) + cuts + [""] * bool(inside[-1])
     pairs = zip(ends[::2], ends[1::2], strict=True)
-    return ", ".join(f"{a} to {b}" if a and b else f"<= {b}" if b else f">= {a}" for a, b in pairs) or "none"
+    return (
+        ", ".join(f"{a} to {b}" if a and b else f"<= {b}" if b else f">= {a}" for a, b in pairs)
+        or "none"
+    )
 
 
 def reference(case: str = "") -> list[tuple[float, float, float]]:
@@ -57,7 +62,8 @@ def reference(case: str = "") -> list[tuple[float, float, float]]:
 
 
 def model() -> str:
-    """Eqs. (5), (9)-(12), (15): the solver against quadruple precision and against plain marching."""
+    """Eqs. (5), (9)-(12), (15): the solver against quadruple precision and against plain
+    marching."""
     points = reference()
     miss = max(abs(solve(v, y).mu_ratio - mu) for v, y, mu in points)
     rows = [["quadruple precision, another solver", str(len(points)), quantity(miss)]]
@@ -75,7 +81,8 @@ def interpolant(values: Array) -> Callable[..., float]:
 
 @cache
 def orbit(v: float, y: float) -> tuple[Array, Array, Array]:
-    """Periodic solution of eq. (11): tau, theta and the slip speed (12), by Newton's method on 256 Fourier points."""
+    """Periodic solution of eq. (11): tau, theta and the slip speed (12), by Newton's method on 256
+    Fourier points."""
     n = 256
     tau = 2.0 * np.pi * np.arange(n) / n
     k = np.arange(n)[:, None] - np.arange(n)[None, :]
@@ -98,7 +105,9 @@ def angles() -> str:
     rows = []
     for y in (0.1, 0.3, 0.5, 0.7, 1.0):
         v = border(y)[0]
-        rows.append([f"{y:g}", percent(y / math.hypot(1.0, v) / np.abs(orbit(v, y)[1]).max() - 1.0)])
+        rows.append(
+            [f"{y:g}", percent(y / math.hypot(1.0, v) / np.abs(orbit(v, y)[1]).max() - 1.0)]
+        )
     return markdown(["y~", "amplitude (18) [%]"], rows)
 
 
@@ -110,14 +119,20 @@ def static() -> str:
         top = float(table().mu_ratio(crit, y))
         share = f"{100.0 * (top - low) / (1.0 - low):.0f}"
         rows.append([f"{y:g}", percent(low / top - 1.0), share, f"{1.0 / crit:.3g}"])
-    return markdown(["y~", "(16) at the border [%]", "of the rise to 1 [%]", "v~ = 1 in v~crit"], rows)
+    return markdown(
+        ["y~", "(16) at the border [%]", "of the rise to 1 [%]", "v~ = 1 in v~crit"], rows
+    )
 
 
 BORDERS: dict[str, Formula] = {
-    "(23)": closed_forms.border_23, "(24), (39)": closed_forms.border_24, "(26) with 4.5": closed_forms.border_26,
-    "(27)": closed_forms.border_27, "*two terms*": closed_forms.border_small_amplitude,
-    "*4.402914*": closed_forms.border_large_amplitude, "*blend*": closed_forms.border_blend,
-}  # fmt: skip
+    "(23)": closed_forms.border_23,
+    "(24), (39)": closed_forms.border_24,
+    "(26) with 4.5": closed_forms.border_26,
+    "(27)": closed_forms.border_27,
+    "*two terms*": closed_forms.border_small_amplitude,
+    "*4.402914*": closed_forms.border_large_amplitude,
+    "*blend*": closed_forms.border_blend,
+}
 
 
 def deviations() -> str:
@@ -145,15 +160,33 @@ def constants() -> str:
     root = math.sqrt(ratio)
     rows = [
         ["y~/v~crit^2 for y~ -> infinity, (26)", "4.5", f"{ratio:.6f}", percent(4.5 / ratio - 1.0)],
-        ["v~crit/sqrt(y~) for y~ -> infinity, (26)", "0.47", f"{1 / root:.6f}", percent(0.47 * root - 1)],
-        ["second coefficient of v~crit at small y~, (23), (24)", "1/2", f"{second:.5f}", percent(0.5 / second - 1.0)],
+        [
+            "v~crit/sqrt(y~) for y~ -> infinity, (26)",
+            "0.47",
+            f"{1 / root:.6f}",
+            percent(0.47 * root - 1),
+        ],
+        [
+            "second coefficient of v~crit at small y~, (23), (24)",
+            "1/2",
+            f"{second:.5f}",
+            percent(0.5 / second - 1.0),
+        ],
         ["coefficient of y~^4 in mu~ at the border, (32)", "0", f"{quarter:.5f}", "-"],
-        ["slope of the master curve at v~ = 0, (28)", "5/2", f"{slope:.6f}", percent(2.5 / slope - 1.0)],
+        [
+            "slope of the master curve at v~ = 0, (28)",
+            "5/2",
+            f"{slope:.6f}",
+            percent(2.5 / slope - 1.0),
+        ],
     ]
     text = markdown(["quantity", "paper", "exact", "deviation [%]"], rows)
     x = np.linspace(0.0, 1.0, 100_001)
     fit = float((closed_forms.master_curve(x) - closed_forms.master_curve_limit(x)).min())
-    text += f"\n\n(27) is farthest off, by {percent(-float(blend[at]))} %, at y~ = {AMPLITUDES[at]:.3f}. "
+    text += (
+        f"\n\n(27) is farthest off, by {percent(-float(blend[at]))} %, at y~ = "
+        f"{AMPLITUDES[at]:.3f}. "
+    )
     return f"{text}(28) less N_0 is lowest, {fit:.5f}."
 
 
@@ -175,8 +208,23 @@ def master_curve() -> str:
         )
         paper = np.abs(law / table().mu_ratio(v, float(y)) - 1.0).max()
         cells = [quantity(float(-off.min()), 3), f"{x[int(np.argmin(off))]:.2f}"]
-        rows.append([f"{y:.1f}", *cells, quantity(float(limit)), percent(float(ends))[1:], percent(float(paper))[1:]])
-    header = ["y~", "(28) too low by", "at v~/v~crit", "N_0 off by", "mu~ [%]", "the paper's law [%]"]
+        rows.append(
+            [
+                f"{y:.1f}",
+                *cells,
+                quantity(float(limit)),
+                percent(float(ends))[1:],
+                percent(float(paper))[1:],
+            ]
+        )
+    header = [
+        "y~",
+        "(28) too low by",
+        "at v~/v~crit",
+        "N_0 off by",
+        "mu~ [%]",
+        "the paper's law [%]",
+    ]
     return markdown(header, rows)
 
 
@@ -195,15 +243,28 @@ def continuous() -> str:
     )
     rows = []
     for name, values in formulas:  # the values at the border have one dimension
-        worst = np.abs(values / (exact[0] if values.ndim == 1 else exact) - 1.0).reshape(-1, grid.size).max(axis=0)
+        worst = (
+            np.abs(values / (exact[0] if values.ndim == 1 else exact) - 1.0)
+            .reshape(-1, grid.size)
+            .max(axis=0)
+        )
         cells = [percent(float(np.interp(y, grid, worst)))[1:] for y in (0.1, 0.3, 0.5, 1.0)]
         rows.append([name, *cells, *(intervals(grid, worst, level) for level in LEVELS)])
-    header = ["mu~ by", *(f"off by [%] at y~ = {y}" for y in (0.1, 0.3, 0.5, 1)), *(f"y~ {w}" for w in WITHIN)]
+    header = [
+        "mu~ by",
+        *(f"off by [%] at y~ = {y}" for y in (0.1, 0.3, 0.5, 1)),
+        *(f"y~ {w}" for w in WITHIN),
+    ]
     closed = np.abs(formulas[-1][1] - exact).max()
     wide = np.geomspace(1e-2, 1e5, 1401)
     speeds = table().v_tilde_crit(wide) * np.geomspace(1.0, 1e3, 301)[:, None]
-    closed = max(closed, np.abs(closed_forms.continuous(speeds, wide) - table().mu_ratio(speeds, wide)).max())
-    return f"{markdown(header, rows)}\n\nThe last formula is off by {closed:.4f} at the most, absolute, for every y~."
+    closed = max(
+        closed, np.abs(closed_forms.continuous(speeds, wide) - table().mu_ratio(speeds, wide)).max()
+    )
+    return (
+        f"{markdown(header, rows)}\n\nThe last formula is off by {closed:.4f} at the most, "
+        "absolute, for every y~."
+    )
 
 
 def large_amplitudes() -> str:
@@ -217,7 +278,9 @@ def large_amplitudes() -> str:
     grid = np.geomspace(1.0, 1e6, 601)
     v = np.sqrt(grid) * np.geomspace(1e-4, 1e2, 1201)[:, None]
     worst = np.abs(closed_forms.outer(grid / v) - table().mu_ratio(v, grid)).max(axis=0)
-    sure = ", ".join(f"{level:g} for y~ {intervals(grid, worst, level)}" for level in (0.05, 0.01, 0.005, 0.001))
+    sure = ", ".join(
+        f"{level:g} for y~ {intervals(grid, worst, level)}" for level in (0.05, 0.01, 0.005, 0.001)
+    )
     return f"{markdown(header, rows)}\n\nAbsolute deviation at every speed at most {sure}."
 
 
@@ -227,7 +290,9 @@ def summary() -> str:
     slowest = 1e-3
     for y in (0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 2.0, 8.0, 80.0):
         crit = float(table().v_tilde_crit(y))
-        v = np.concatenate([[0.0], crit * np.geomspace(slowest, 1.0, 2001), crit * np.geomspace(1.0, 1e4, 801)])
+        v = np.concatenate(
+            [[0.0], crit * np.geomspace(slowest, 1.0, 2001), crit * np.geomspace(1.0, 1e4, 801)]
+        )
         mu = table().mu_ratio(v, y)
         low = float(closed_forms.static_limit(y))
         if y < 1.0:
@@ -238,12 +303,24 @@ def summary() -> str:
         slides = v > crit
         relative = (np.abs(law - mu)[slides] / mu[slides]).max()
         name = "(38), (39), (40), (28)" if y < 1.0 else "(37)"
-        rows.append([f"{y:g}", name, percent(float(relative))[1:], quantity(float(np.abs(law - mu).max()))])
+        rows.append(
+            [f"{y:g}", name, percent(float(relative))[1:], quantity(float(np.abs(law - mu).max()))]
+        )
     header = ["y~", "law", "continuous, off by [%]", "absolute, all speeds"]
     return f"Stick-slip from {slowest:g} v~crit up:\n\n{markdown(header, rows, 2)}"
 
 
-SECTIONS = sections(model, static, angles, deviations, constants, master_curve, continuous, large_amplitudes, summary)
+SECTIONS = sections(
+    model,
+    static,
+    angles,
+    deviations,
+    constants,
+    master_curve,
+    continuous,
+    large_amplitudes,
+    summary,
+)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS)

@@ -17,7 +17,8 @@ from mumacro.writing import alone_in
 
 
 class _Bar:
-    """Progress as a line on stderr: one that is written again on a terminal, elsewhere one for each finished stage."""
+    """Progress as a line on stderr: one that is written again on a terminal, elsewhere one for each
+    finished stage."""
 
     def __init__(self, stages: int) -> None:
         self.stages, self.done, self.start = stages, 0, time.monotonic()
@@ -25,9 +26,16 @@ class _Bar:
     def __call__(self, text: str, done: bool) -> None:
         self.done += done
         bar = ("#" * round(30 * self.done / self.stages)).ljust(30, ".")
-        line = f"{bar} {self.done:2d}/{self.stages} {time.monotonic() - self.start:6.0f} s  {text:<32}"
+        line = (
+            f"{bar} {self.done:2d}/{self.stages} {time.monotonic() - self.start:6.0f} s  {text:<32}"
+        )
         if sys.stderr.isatty():
-            print(f"\r{line}", end="\n" if self.done == self.stages else "", file=sys.stderr, flush=True)
+            print(
+                f"\r{line}",
+                end="\n" if self.done == self.stages else "",
+                file=sys.stderr,
+                flush=True,
+            )
         elif done:
             print(line.rstrip(), file=sys.stderr)
 
@@ -46,16 +54,24 @@ def _build(chosen: Namespace) -> str:
 
     out, tolerance = chosen.out, chosen.tolerance
     if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
-        raise UsageError(f"--tolerance must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}")
+        raise UsageError(
+            f"--tolerance must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}"
+        )
     _place(out)
     checkpoint = out.with_name(out.name + ".checkpoint")
     with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep:
         surrogate = build_table(out, tolerance, sweep, _Bar(stages()))
-    return as_json({
-        "table": str(out), "tolerance": tolerance, "verified_max_abs_error": surrogate.max_abs_error,
-        "verified_max_rel_error": surrogate.max_rel_error, "n_solves": sweep.n_solves, "bytes": out.stat().st_size,
-        "content_sha256": surrogate.checksum,
-    })  # fmt: skip
+    return as_json(
+        {
+            "table": str(out),
+            "tolerance": tolerance,
+            "verified_max_abs_error": surrogate.max_abs_error,
+            "verified_max_rel_error": surrogate.max_rel_error,
+            "n_solves": sweep.n_solves,
+            "bytes": out.stat().st_size,
+            "content_sha256": surrogate.checksum,
+        }
+    )
 
 
 def _solve(chosen: Namespace) -> int:
@@ -80,7 +96,9 @@ def _verify(chosen: Namespace) -> int:
     report |= {"tolerance": surrogate.tolerance, "holds": holds(report, surrogate.tolerance)}
     print(as_json(report))
     if not report["holds"]:
-        raise ImpossibleError(f"{chosen.table} misses its tolerance of {surrogate.tolerance:g} or a bound")
+        raise ImpossibleError(
+            f"{chosen.table} misses its tolerance of {surrogate.tolerance:g} or a bound"
+        )
     return 0
 
 
@@ -130,7 +148,9 @@ def _whole(low: int, high: float = math.inf) -> Callable[[str], int]:
 
 def _parser(prog: str) -> OneLineParser:
     text = "exit codes: 0 done, 1 no result or a tolerance missed, 2 wrong arguments"
-    parser = OneLineParser(prog=prog, description="Build, verify, query and export tables offline.", epilog=text)
+    parser = OneLineParser(
+        prog=prog, description="Build, verify, query and export tables offline.", epilog=text
+    )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def command(run: Callable[[Namespace], int | str], text: str) -> OneLineParser:
@@ -144,30 +164,53 @@ def _parser(prog: str) -> OneLineParser:
         "type": _whole(1, 1024),
         "help": "threads; default: %(default)s",
     }
-    one = command(_build, "Build a table; a killed build resumes from OUT.checkpoint and gives the same data.")
+    one = command(
+        _build, "Build a table; a killed build resumes from OUT.checkpoint and gives the same data."
+    )
     one.add_argument("--out", type=Path, required=True, help="the netCDF file to write")
-    text = "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: %(default)s"
+    text = (
+        "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: "
+        "%(default)s"
+    )
     one.add_argument("--tolerance", type=float, default=1e-8, help=text)
     one.add_argument("--workers", **workers)
     one = command(_solve, "Solve the full model once and print the steady cycle as JSON.")
-    one.add_argument("--v", type=float, required=True, help="dimensionless speed v~, from 1e-60 to 1e10")
-    one.add_argument("--y", type=float, required=True, help="dimensionless amplitude y~, from 1e-15 to 1e14")
-    one = command(_verify, "Compare a table with fresh solves; exit code 1 when it misses its own tolerance.")
+    one.add_argument(
+        "--v", type=float, required=True, help="dimensionless speed v~, from 1e-60 to 1e10"
+    )
+    one.add_argument(
+        "--y", type=float, required=True, help="dimensionless amplitude y~, from 1e-15 to 1e14"
+    )
+    one = command(
+        _verify, "Compare a table with fresh solves; exit code 1 when it misses its own tolerance."
+    )
     one.add_argument("table", type=Path, help="a table file")
     text = "fresh solves to compare with; default: %(default)s"
     one.add_argument("--points", type=_whole(100, 10_000_000), default=20_000, help=text)
-    one.add_argument("--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s")
+    one.add_argument(
+        "--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s"
+    )
     one.add_argument("--workers", **workers)
     one = command(_export, "Write a table for other tools; print what was written as JSON.")
     one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")
     text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"
     one.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     one.add_argument("--format", required=True, help="c, csv, fmu or fmu3")
-    text = "the file to write; for c a header .h or a folder for three files; default: here, by the name of the table"
+    text = (
+        "the file to write; for c a header .h or a folder for three files; default: here, by "
+        "the name of the table"
+    )
     one.add_argument("--out", type=Path, help=text)
     one = command(_figures, "Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG.")
-    one.add_argument("--out", type=Path, required=True, help="the folder to write to; it is made where it is missing")
-    one.add_argument("--table", type=Path, help="the table that lines come from; default: the tightest")
+    one.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        help="the folder to write to; it is made where it is missing",
+    )
+    one.add_argument(
+        "--table", type=Path, help="the table that lines come from; default: the tightest"
+    )
     return parser
 
 

@@ -7,7 +7,15 @@ import numpy as np
 
 from mumacro import charts
 from mumacro.arrays import Array
-from mumacro.cells import LOCAL, WIDTH, Border, cell_scale, chebyshev_coefficients, interpolation_matrix, nodes
+from mumacro.cells import (
+    LOCAL,
+    WIDTH,
+    Border,
+    cell_scale,
+    chebyshev_coefficients,
+    interpolation_matrix,
+    nodes,
+)
 from mumacro.charts import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
 from mumacro.library import kernels
 from mumacro.table import Block, BorderPiece
@@ -25,10 +33,12 @@ NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more
 def solve_nodes(
     index: int, shape: tuple[int, int], border: Border, sweep: Sweep
 ) -> tuple[Array, Array, dict[str, Array], dict[str, Array]]:
-    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves.
+    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from
+    fresh solves.
 
-    The last is the solver's rounding in it where a base is subtracted: 1 - mu~ and q without a base keep their digits,
-    but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to 0.
+    The last is the solver's rounding in it where a base is subtracted: 1 - mu~ and q without a base
+    keep their digits, but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to
+    0.
     """
     chart, found, cancelled = charts.CHARTS[index], {}, {}
     a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
@@ -42,7 +52,9 @@ def solve_nodes(
                 rest = np.where(base == 1.0, -solved[complement], rest)
             found[quantity.name] = rest / factor
             noise = solver_noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
-            cancelled[quantity.name] = np.where((base == 0.0) | (base == 1.0), 0.0, noise / np.abs(factor))
+            cancelled[quantity.name] = np.where(
+                (base == 0.0) | (base == 1.0), 0.0, noise / np.abs(factor)
+            )
     return a, b, found, cancelled
 
 
@@ -51,7 +63,8 @@ def _next(n: int) -> int:
 
 
 def _tail(coefficients: Array, axis: int) -> float:
-    """What the interpolant still misses along one axis: its last two Chebyshev coefficients, summed over the other."""
+    """What the interpolant still misses along one axis: its last two Chebyshev coefficients, summed
+    over the other."""
     c = np.abs(np.moveaxis(coefficients, axis, 0)).reshape(coefficients.shape[axis], -1)
     return float(c[-2:].sum(axis=1).max())
 
@@ -64,7 +77,8 @@ LINES = 33  # across an axis, along which cells are tried
 def _fewest(axis: Axis, exact: Callable[[Array], Array], wanted: float, relative: bool) -> int:
     """Fewest cells along an axis for which polynomials of a cell's degree follow ``exact``.
 
-    ``exact`` (points) -> (points, lines) takes evaluation's coordinate; errors are compared with ``wanted``.
+    ``exact`` (points) -> (points, lines) takes evaluation's coordinate; errors are compared with
+    ``wanted``.
     """
     low, high = axis.span
     step = 2 if axis.name == "s" else 1  # the knot of sigma is an edge of cells
@@ -94,20 +108,25 @@ def _block_cells(chart: Chart, values: Array, axis: int, wanted: float) -> int:
     own, lines = (chart.a, chart.b)[axis], np.cos(np.linspace(0.0, np.pi, LINES))
     c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
     across = c @ interpolation_matrix(values.shape[1 - axis], lines).T
-    return _fewest(own, lambda x: interpolation_matrix(len(c), _position(own, x)) @ across, wanted, False)
+    return _fewest(
+        own, lambda x: interpolation_matrix(len(c), _position(own, x)) @ across, wanted, False
+    )
 
 
 def _border_cells(piece: int, values: Array, wanted: float) -> int:
     axis, c = BORDER_PIECES[piece][1], chebyshev_coefficients(values)
 
     def exact(x: Array) -> Array:
-        return (interpolation_matrix(c.size, _position(axis, x)) @ c * cell_scale(piece, x))[:, None]
+        return (interpolation_matrix(c.size, _position(axis, x)) @ c * cell_scale(piece, x))[
+            :, None
+        ]
 
     return _fewest(axis, exact, wanted, True)
 
 
 def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
-    """The stored border; its own tolerance is tighter than the table's, since every stick-slip node is built on it."""
+    """The stored border; its own tolerance is tighter than the table's, since every stick-slip node
+    is built on it."""
     wanted = max(1e-3 * tolerance, 4e-15)
     pieces = []
     for piece, (_, axis, _) in enumerate(BORDER_PIECES):
@@ -116,7 +135,10 @@ def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
         while True:
             x = nodes(n, axis.low, axis.high)
             y = axis.amplitude(x)
-            values = sweep.solve("border", np.ones_like(y), y)["deficit"] / kernels[-1].border_scales(piece, y)[0]
+            values = (
+                sweep.solve("border", np.ones_like(y), y)["deficit"]
+                / kernels[-1].border_scales(piece, y)[0]
+            )
             if _tail(chebyshev_coefficients(values), 0) <= wanted or n >= MAX_NODES or to_infinity:
                 break
             n = _next(n)
@@ -131,7 +153,8 @@ def build_block(
     tolerance: float,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Block:
-    """Solve nodes until the Chebyshev tail in both directions is below SHARE * tolerance, then cut the cells."""
+    """Solve nodes until the Chebyshev tail in both directions is below SHARE * tolerance, then cut
+    the cells."""
     chart = charts.CHARTS[index]
     wanted = max(SHARE * tolerance, NODE_FLOOR)
     tail_block = chart.a.name == "inverse_y"
@@ -143,10 +166,14 @@ def build_block(
         values = found["mu_ratio"]
         left = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):
-            # twice no better by a third: what is left is the solver's rounding, to which more nodes only add
+            # twice no better by a third: what is left is the solver's rounding, to which more nodes
+            # only add
             stuck[axis] = 0 if left[axis] < 0.67 * best[axis] else stuck[axis] + 1
             best[axis] = min(best[axis], left[axis])
-        grow = [left[axis] > wanted and (na, nb)[axis] < MAX_NODES and stuck[axis] < 3 for axis in (0, 1)]
+        grow = [
+            left[axis] > wanted and (na, nb)[axis] < MAX_NODES and stuck[axis] < 3
+            for axis in (0, 1)
+        ]
         if tail_block:
             grow[0] = False
         if not any(grow):

@@ -1,9 +1,10 @@
 """A table in the formats of other tools: C sources, FMU; its plain grid as CSV.
 
-The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and ``error_estimate`` over
-(``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all dimensionless.  It is a grid for tools with
-their own interpolation: its nodes are solved, the values between them depend on that tool.  The tolerance of
-the table is kept by :class:`mumacro.Surrogate` alone.
+The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and
+``error_estimate`` over (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all
+dimensionless.  It is a grid for tools with their own interpolation: its nodes are solved, the
+values between them depend on that tool.  The tolerance of the table is kept by
+:class:`mumacro.Surrogate` alone.
 
 Every file is written beside its name and then renamed, and the same table gives the same bytes.
 """
@@ -70,7 +71,8 @@ def export_table(path: str | Path, kind: str, out: str | Path) -> Table:
     Raises
     ------
     ExportError
-        Unknown format, a compiler that fails, ``out`` is the table itself or no place for C sources.
+        Unknown format, a compiler that fails, ``out`` is the table itself or no place for C
+        sources.
     TableError
         The table cannot be read.
     OSError

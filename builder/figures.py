@@ -1,9 +1,11 @@
-"""The figures of Benad, Nakano, Popov, Popov (2018), Fig. 4 to 11, from this project's solver and a table.
+"""The figures of Benad, Nakano, Popov, Popov (2018), Fig. 4 to 11, from this project's solver and a
+table.
 
-Axes are the paper's: v~ over y~ in Fig. 4 to 7, mu~ over v~ in Fig. 8, the normalised rise over v~/v~crit in Fig. 9,
-mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11.  Lines come from the table, dots from fresh solves, crosses and
-dashed lines from the paper's formulas.  A figure is a function of a table that returns what is drawn; one function
-draws them all.  Needs matplotlib, the extra ``figures``.
+Axes are the paper's: v~ over y~ in Fig. 4 to 7, mu~ over v~ in Fig. 8, the normalised rise over
+v~/v~crit in Fig. 9, mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11.  Lines come from the
+table, dots from fresh solves, crosses and dashed lines from the paper's formulas.  A figure is a
+function of a table that returns what is drawn; one function draws them all.  Needs matplotlib, the
+extra ``figures``.
 """
 
 import math
@@ -21,7 +23,11 @@ from mumacro.law import approximations, border_speeds, friction_law
 from .steady import border
 
 SIZE, DPI = (7.2, 4.6), 110
-V, Y, MU = r"$\tilde v_0 = v_0/(l_0\omega)$", r"$\tilde y_0 = y_0/l_0$", r"$\tilde\mu_\mathrm{macro}$"
+V, Y, MU = (
+    r"$\tilde v_0 = v_0/(l_0\omega)$",
+    r"$\tilde y_0 = y_0/l_0$",
+    r"$\tilde\mu_\mathrm{macro}$",
+)
 
 
 #: (v~, y~) -> title
@@ -33,7 +39,8 @@ CASES = {
 
 
 class Curve(NamedTuple):
-    """Points (n,), how matplotlib marks them, a label; with ``z`` (m, n) a map over axes ``x`` (n,) and ``y`` (m,)."""
+    """Points (n,), how matplotlib marks them, a label; with ``z`` (m, n) a map over axes ``x`` (n,)
+    and ``y`` (m,)."""
 
     x: Array
     y: Array
@@ -43,7 +50,8 @@ class Curve(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """One pair of axes: name, start and end of each; curves; text at points; settings of matplotlib's axes."""
+    """One pair of axes: name, start and end of each; curves; text at points; settings of
+    matplotlib's axes."""
 
     x: tuple[str, float, float]
     y: tuple[str, float, float]
@@ -58,11 +66,13 @@ def _solved(y: NDArray[Any]) -> Array:
 
 
 def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """The steady cycle at v~ = ``v`` > 0, y~ = ``y`` [-], marched: an independent and simple method for pictures.
+    """The steady cycle at v~ = ``v`` > 0, y~ = ``y`` [-], marched: an independent and simple method
+    for pictures.
 
-    With u = u_x + i u_y and w = v~ tau + i y~ sin tau, eqs. (9) to (12) are u' = w' during stick, abs(u) < 1, and
-    u' = (w' - u^2 conj(w')) / 2 on the circle.  A step of slip is the linear fractional map of that equation for the
-    mean w', which keeps to the circle and is right to second order in the step.
+    With u = u_x + i u_y and w = v~ tau + i y~ sin tau, eqs. (9) to (12) are u' = w' during stick,
+    abs(u) < 1, and u' = (w' - u^2 conj(w')) / 2 on the circle.  A step of slip is the linear
+    fractional map of that equation for the mean w', which keeps to the circle and is right to
+    second order in the step.
 
     Parameters
     ----------
@@ -76,15 +86,16 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
     tau : ndarray
         Phase at the end of each step [rad], shape (steps,), from 0 to 2 pi.
     u : ndarray
-        Force of the spring over mu0 Fz [-], along and across the sliding direction, shape (steps, 2).
+        Force of the spring over mu0 Fz [-], along and across the sliding direction, shape (steps,
+        2).
     sticks : ndarray of bool
         Whether the foot rests in that step, shape (steps,).
 
     Examples
     --------
     >>> tau, u, sticks = steady_cycle(0.1, 0.8)
-    >>> round(float(u[:, 0].mean()), 4), round(float(sticks.mean()), 2)        # mu~ and stick fraction
-    (0.8064, 0.57)
+    >>> round(float(u[:, 0].mean()), 4), round(float(sticks.mean()), 2)        # mu~ and stick
+    fraction (0.8064, 0.57)
     """
     tau = np.linspace(0.0, 2.0 * math.pi, steps + 1)
     moves = (v * tau[1] + 1j * np.diff(y * np.sin(tau))).tolist()
@@ -97,29 +108,38 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
             if sticks[i]:
                 u = free
             else:
-                u = (u + 0.5 * move) / (1.0 + 0.5 * move.conjugate() * u) if on_circle else free / abs(free)
+                u = (
+                    (u + 0.5 * move) / (1.0 + 0.5 * move.conjugate() * u)
+                    if on_circle
+                    else free / abs(free)
+                )
             on_circle = not sticks[i]
             path[i] = u
     return tau[1:], path.view(np.float64).reshape(steps, 2), sticks
 
 
 def _cycle(_: Surrogate) -> list[Panel]:
-    """One cycle of each regime: the path of the spring's end in the friction circle, above its two components."""
+    """One cycle of each regime: the path of the spring's end in the friction circle, above its two
+    components."""
     discs, traces, turn = [], [], np.linspace(0.0, 2.0 * np.pi, 361)
     for (v, y), title in CASES.items():
         tau, u, sticks = steady_cycle(v, y)
-        (slip_x, slip_y), (stick_x, stick_y) = (np.where(at[:, None], u, np.nan).T for at in (~sticks, sticks))
+        (slip_x, slip_y), (stick_x, stick_y) = (
+            np.where(at[:, None], u, np.nan).T for at in (~sticks, sticks)
+        )
         mean = float(u[:, 0].mean())
         disc = [
-            Curve(np.cos(turn), np.sin(turn), "0.6"), Curve(slip_x, slip_y, "k-", "slip"),
+            Curve(np.cos(turn), np.sin(turn), "0.6"),
+            Curve(slip_x, slip_y, "k-", "slip"),
             Curve(stick_x, stick_y, "C3--", "stick"),
             Curve(np.array([mean]), np.zeros(1), "C0o", r"mean: $\tilde\mu$"),
-        ]  # fmt: skip
+        ]
         title = f"{title}\n$\\tilde v$ = {v:g}, $\\tilde y$ = {y:g}: $\\tilde\\mu$ = {mean:.3f}"
         trace = [
-            Curve(tau, u[:, 0], "C0-", "$u_x$, along"), Curve(tau, u[:, 1], "C1-", "$u_y$, across"),
+            Curve(tau, u[:, 0], "C0-", "$u_x$, along"),
+            Curve(tau, u[:, 1], "C1-", "$u_y$, across"),
             Curve(tau, np.where(sticks, -1.05, np.nan), "C3-", "stick"),
-        ]  # fmt: skip
+        ]
         axes, fixed = ("$u_x$, along", -1.1, 1.1), {"aspect": "equal", "title": title}
         discs.append(Panel(axes, ("$u_y$, across", -1.1, 1.1), disc, {}, fixed))
         traces.append(Panel((r"$\tau = \omega t$", 0.0, 6.2832), ("", -1.1, 1.1), trace))
@@ -130,9 +150,16 @@ def _regions(s: Surrogate) -> list[Panel]:
     """Fig. 4: the two regimes and the line between small and large angles."""
     y, v = np.linspace(0.0, 5.0, 401), np.linspace(0.0, 2.5, 201)
     equality = r"(20) as an equality, $\tilde y = \sqrt{1+\tilde v^2}$"
-    curves = [Curve(y, s.v_tilde_crit(y), "k-", "border, exact"), Curve(np.hypot(1.0, v), v, "C7--", equality)]
-    notes = {(1.0, 2.1): "continuous sliding", (4.1, 0.6): "stick and slip", (0.45, 0.75): "small angles",
-             (3.6, 1.6): "large angles"}  # fmt: skip
+    curves = [
+        Curve(y, s.v_tilde_crit(y), "k-", "border, exact"),
+        Curve(np.hypot(1.0, v), v, "C7--", equality),
+    ]
+    notes = {
+        (1.0, 2.1): "continuous sliding",
+        (4.1, 0.6): "stick and slip",
+        (0.45, 0.75): "small angles",
+        (3.6, 1.6): "large angles",
+    }
     return [Panel((Y, 0.0, 5.0), (V, 0.0, 2.5), curves, notes)]
 
 
@@ -149,21 +176,41 @@ def _small_border(_: Surrogate) -> list[Panel]:
 
 def _whole_border(_: Surrogate) -> list[Panel]:
     """Fig. 6: the border with (26) and (27), and how far these are off."""
-    y, dots, wide = np.linspace(0.0, 10.0, 501), np.linspace(0.4, 10.0, 25), np.geomspace(0.03, 1e4, 401)
+    y, dots, wide = (
+        np.linspace(0.0, 10.0, 501),
+        np.linspace(0.4, 10.0, 25),
+        np.geomspace(0.03, 1e4, 401),
+    )
     exact = _solved(wide)[0]
     formulas = ((closed_forms.border_26, "C3--", "(26)"), (closed_forms.border_27, "C0-", "(27)"))
     curves = [Curve(y, formula(y), look, label) for formula, look, label in formulas]
-    off = [Curve(wide, 100.0 * (formula(wide) / exact - 1.0), look, label) for formula, look, label in formulas]
+    off = [
+        Curve(wide, 100.0 * (formula(wide) / exact - 1.0), look, label)
+        for formula, look, label in formulas
+    ]
     return [
-        Panel((Y, 0.0, 10.2), (V, 0.0, 1.7), [*curves, Curve(dots, _solved(dots)[0], "ko", "exact, solved")]),
-        Panel((Y, 0.03, 1e4), ("formula over exact, less 1 [%]", -6.0, 6.0), off, {}, {"xscale": "log"}),
+        Panel(
+            (Y, 0.0, 10.2),
+            (V, 0.0, 1.7),
+            [*curves, Curve(dots, _solved(dots)[0], "ko", "exact, solved")],
+        ),
+        Panel(
+            (Y, 0.03, 1e4),
+            ("formula over exact, less 1 [%]", -6.0, 6.0),
+            off,
+            {},
+            {"xscale": "log"},
+        ),
     ]
 
 
 def _surface(s: Surrogate) -> list[Panel]:
     """Fig. 7: mu~ over the plane."""
     y, v = np.linspace(0.0, 2.0, 241), np.linspace(0.0, 1.5, 181)
-    curves = [Curve(y, v, "", MU, s.mu_ratio(v[:, None], y)), Curve(y, s.v_tilde_crit(y), "C3-", "border")]
+    curves = [
+        Curve(y, v, "", MU, s.mu_ratio(v[:, None], y)),
+        Curve(y, s.v_tilde_crit(y), "C3-", "border"),
+    ]
     return [Panel((Y, 0.0, 2.0), (V, 0.0, 1.5), curves)]
 
 
@@ -175,7 +222,9 @@ def _cuts(s: Surrogate) -> list[Panel]:
     curves[10] = curves[10]._replace(label=r"$\tilde y = 1$")
     crit, top = _solved(amplitudes[1:])
     curves.append(Curve(crit, top, "C3o", r"border: $\tilde\mu(\tilde v_\mathrm{crit})$, solved"))
-    curves.append(Curve(np.zeros(11), closed_forms.static_limit(amplitudes[:11]), "C2s", "static value (16)"))
+    curves.append(
+        Curve(np.zeros(11), closed_forms.static_limit(amplitudes[:11]), "C2s", "static value (16)")
+    )
     notes = {(1.95, float(s.mu_ratio(2.0, y))): f"{y:g}" for y in (0.5, 1.0, 1.5, 2.0)}
     return [Panel((V, 0.0, 2.0), (MU, 0.0, 1.03), curves, notes)]
 
@@ -185,30 +234,66 @@ def _master_curve(s: Surrogate) -> list[Panel]:
     x, inside, curves = np.linspace(0.0, 1.0, 601) ** 2 * 2.0, np.linspace(0.0, 1.0, 201), []
     for y in np.arange(1, 10) * 0.1:
         crit, low = float(s.v_tilde_crit(y)), float(closed_forms.static_limit(y))
-        curves.append(Curve(x, (s.mu_ratio(x * crit, y) - low) / (s.mu_ratio(crit, y) - low), "C0-"))
+        curves.append(
+            Curve(x, (s.mu_ratio(x * crit, y) - low) / (s.mu_ratio(crit, y) - low), "C0-")
+        )
     curves[0] = curves[0]._replace(label=r"exact, $\tilde y$ = 0.1, 0.2, ..., 0.9")
-    curves.append(Curve(inside, closed_forms.master_curve_limit(inside), "k--", r"$N_0$, the limit $\tilde y \to 0$"))
+    curves.append(
+        Curve(
+            inside,
+            closed_forms.master_curve_limit(inside),
+            "k--",
+            r"$N_0$, the limit $\tilde y \to 0$",
+        )
+    )
     curves.append(Curve(inside[::10], closed_forms.master_curve(inside[::10]), "C3x", "(28)"))
-    share = r"$(\tilde\mu - \tilde\mu_\mathrm{static})/(\tilde\mu_\mathrm{crit} - \tilde\mu_\mathrm{static})$"
-    return [Panel((r"$\tilde v_0/\tilde v_{0,\mathrm{crit}}$", 0.0, 2.0), (share, 0.0, 1.12), curves)]
+    share = (
+        r"$(\tilde\mu - \tilde\mu_\mathrm{static})/(\tilde\mu_\mathrm{crit} - "
+        r"\tilde\mu_\mathrm{static})$"
+    )
+    return [
+        Panel((r"$\tilde v_0/\tilde v_{0,\mathrm{crit}}$", 0.0, 2.0), (share, 0.0, 1.12), curves)
+    ]
 
 
 def _large_amplitudes(s: Surrogate) -> list[Panel]:
     """Fig. 10: mu~ over v~/y~ with (35)."""
-    x, dots = np.linspace(0.0, 1.0, 401) ** 2 * 2.0, 0.8 * np.array([1, 2, 3, 4, 6, 8, 12, 16, 25, 50, 100])
+    x, dots = (
+        np.linspace(0.0, 1.0, 401) ** 2 * 2.0,
+        0.8 * np.array([1, 2, 3, 4, 6, 8, 12, 16, 25, 50, 100]),
+    )
     curves = [Curve(x, s.mu_ratio(x * y, y), "C0-") for y in 0.8 * np.arange(1, 101)]
-    crosses, (crit, top) = np.concatenate([[0.01, 0.03, 0.06], np.arange(0.1, 2.01, 0.1)]), _solved(dots)
+    crosses, (crit, top) = (
+        np.concatenate([[0.01, 0.03, 0.06], np.arange(0.1, 2.01, 0.1)]),
+        _solved(dots),
+    )
     curves.append(Curve(crit / dots, top, "ko", "border, solved"))
     curves.append(Curve(crosses, closed_forms.outer(1.0 / crosses), "C3x", "(35)"))
-    notes = {(x, float(s.mu_ratio(x * y, y))): f"{y:g}" for x, y in ((0.9, 0.8), (0.9, 1.6), (0.75, 80.0))}
-    return [Panel((r"$\tilde v_0/\tilde y_0 = v_0/(\omega y_0)$", 0.0, 2.0), (MU, 0.0, 1.03), curves, notes)]
+    notes = {
+        (x, float(s.mu_ratio(x * y, y))): f"{y:g}"
+        for x, y in ((0.9, 0.8), (0.9, 1.6), (0.75, 80.0))
+    }
+    return [
+        Panel(
+            (r"$\tilde v_0/\tilde y_0 = v_0/(\omega y_0)$", 0.0, 2.0),
+            (MU, 0.0, 1.03),
+            curves,
+            notes,
+        )
+    ]
 
 
 def _dimensional_law(s: Surrogate) -> list[Panel]:
     """Fig. 11: mu_macro over v0 of one contact at two amplitudes, with the paper's laws."""
     v0, curves = np.linspace(0.0, 1.0, 601) ** 2 * 0.25, []
     for y0, look in ((0.6e-6, "C0-"), (4e-6, "C2-")):
-        case: dict[str, float | None] = {"mu0": 0.5, "Fz": 10.0, "k": 5e6, "omega": 2.0 * np.pi * 20e3, "y0": y0}
+        case: dict[str, float | None] = {
+            "mu0": 0.5,
+            "Fz": 10.0,
+            "k": 5e6,
+            "omega": 2.0 * np.pi * 20e3,
+            "y0": y0,
+        }
         law = friction_law(s, "v0", v0, case)
         paper = approximations(s, law)
         curves.append(Curve(v0, law.answer.mu_macro, look, f"exact, $y_0$ = {y0 * 1e6:g} $l_0$"))
@@ -217,8 +302,13 @@ def _dimensional_law(s: Surrogate) -> list[Panel]:
             continue
         curves.append(Curve(v0, paper["master_curve"], "C3--", "(28) from (38) to (40)"))
         x, y = np.array([[mark.value, mark.mu_macro] for mark in law.border]).T
-        curves += [Curve(x, y, "ko", "border"), Curve(np.zeros(1), law.mu_static[:1], "ks", "static value (38)")]
-        curves.append(Curve(border_speeds(s, law)["eq_24"][:1], paper["critical"][:1], "C3x", "(39), (40)"))
+        curves += [
+            Curve(x, y, "ko", "border"),
+            Curve(np.zeros(1), law.mu_static[:1], "ks", "static value (38)"),
+        ]
+        curves.append(
+            Curve(border_speeds(s, law)["eq_24"][:1], paper["critical"][:1], "C3x", "(39), (40)")
+        )
     speed = r"$v_0$ [m/s]   ($l_0$ = 1 $\mu$m, $\omega$ = 2$\pi$ 20 kHz)"
     return [Panel((speed, 0.0, 0.25), (r"$\mu_\mathrm{macro}$", 0.0, 0.53), curves)]
 
@@ -242,8 +332,17 @@ def _draw(panel: Panel, axes: Any) -> None:
         if curve.z is None:
             axes.plot(curve.x, curve.y, curve.look, label=curve.label or None, ms=5, lw=1.2)
         else:
-            shown = axes.contourf(curve.x, curve.y, curve.z, levels=np.linspace(0.0, 1.0, 41), cmap="YlGnBu_r")
-            axes.contour(curve.x, curve.y, curve.z, levels=np.arange(0.1, 1.0, 0.1), colors="k", linewidths=0.7)
+            shown = axes.contourf(
+                curve.x, curve.y, curve.z, levels=np.linspace(0.0, 1.0, 41), cmap="YlGnBu_r"
+            )
+            axes.contour(
+                curve.x,
+                curve.y,
+                curve.z,
+                levels=np.arange(0.1, 1.0, 0.1),
+                colors="k",
+                linewidths=0.7,
+            )
             axes.figure.colorbar(shown, label=curve.label, ticks=np.linspace(0.0, 1.0, 11))
     for (x, y), text in panel.notes.items():
         axes.text(x, y, text, ha="center", va="bottom")
@@ -254,7 +353,8 @@ def _draw(panel: Panel, axes: Any) -> None:
 
 
 def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
-    """Write every figure of :data:`FIGURES` to the existing ``folder`` as PNG, 792 x 506 pixels; return the paths.
+    """Write every figure of :data:`FIGURES` to the existing ``folder`` as PNG, 792 x 506 pixels;
+    return the paths.
 
     ``surrogate`` is the table that the lines come from.  The same picture is the same bytes.
 
@@ -276,5 +376,6 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
         for panel, axes in zip(panels, places.flat, strict=True):
             _draw(panel, axes)
         written.append(folder / f"{name}.png")
-        figure.savefig(written[-1], dpi=DPI, metadata={"Software": None})  # no version of the drawing library in it
+        # no version of the drawing library in it
+        figure.savefig(written[-1], dpi=DPI, metadata={"Software": None})
     return written

@@ -2,10 +2,11 @@
 
 Values are compared with solves at points that crowd towards edges and seams.
 
-How far q and its derivatives are off is measured cell by cell.  The truth is a second interpolant of the model, through
-more nodes, none of which is a node of the table, and which are not rounded.  What it misses itself is far below what
-the table misses, or as small as the solver's rounding, which both have.  The difference is a smooth function in every
-cell; it is taken at the Chebyshev points of a cell, edges included, where a derivative errs most.
+How far q and its derivatives are off is measured cell by cell.  The truth is a second interpolant
+of the model, through more nodes, none of which is a node of the table, and which are not rounded.
+What it misses itself is far below what the table misses, or as small as the solver's rounding,
+which both have.  The difference is a smooth function in every cell; it is taken at the Chebyshev
+points of a cell, edges included, where a derivative errs most.
 """
 
 import dataclasses
@@ -17,7 +18,13 @@ from numpy.polynomial import chebyshev
 
 from mumacro import Surrogate, charts
 from mumacro.arrays import Array
-from mumacro.cells import WIDTH, cells_2d, chebyshev_coefficients, coefficient_matrix, interpolation_matrix
+from mumacro.cells import (
+    WIDTH,
+    cells_2d,
+    chebyshev_coefficients,
+    coefficient_matrix,
+    interpolation_matrix,
+)
 from mumacro.charts import CHARTS, CONTINUOUS, QUANTITIES, SQRT2, Axis, Chart
 from mumacro.library import kernels
 from mumacro.table import Block
@@ -30,8 +37,8 @@ from .sweep import Sweep
 class BlockErrors(NamedTuple):
     """Largest errors of a block.
 
-    By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in :class:`mumacro.table.Block`.
-    ``absolute``, ``relative``: of mu~.
+    By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in
+    :class:`mumacro.table.Block`. ``absolute``, ``relative``: of mu~.
     """
 
     values: dict[str, float]
@@ -70,28 +77,43 @@ def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, A
 def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:
     """The same table with one error for all that it tabulates, and a share of the border's.
 
-    With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the table's error.
+    With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the
+    table's error.
     """
     table, replace = surrogate.table, dataclasses.replace
-    border = [replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border]
+    border = [
+        replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border
+    ]
     stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
     blocks = [replace(block, errors=stated) for block in table.blocks]
-    return Surrogate(replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads)
+    return Surrogate(
+        replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads
+    )
 
 
 def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:
-    """Largest errors of every block, those of values on ``n`` fresh solves, without those of a neighbour."""
+    """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
+    neighbour."""
     stating = tuple(_stating(surrogate, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
     found = []
     for index, block in enumerate(surrogate.table.blocks):
-        errors = _value_errors(surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n)
-        _, _, *exact = solve_nodes(index, finer((block.a.size, block.b.size)), surrogate.border, sweep)
+        errors = _value_errors(
+            surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n
+        )
+        _, _, *exact = solve_nodes(
+            index, finer((block.a.size, block.b.size)), surrogate.border, sweep
+        )
         found.append(BlockErrors(*errors, cell_errors(index, block, *exact)))
     return found
 
 
 def _value_errors(
-    surrogate: Surrogate, stating: tuple[Surrogate, ...], sweep: Sweep, index: int, rng: np.random.Generator, n: int
+    surrogate: Surrogate,
+    stating: tuple[Surrogate, ...],
+    sweep: Sweep,
+    index: int,
+    rng: np.random.Generator,
+    n: int,
 ) -> tuple[dict[str, float], float, float]:
     """Of what is tabulated by quantity; absolute and relative of mu~."""
     chart = CHARTS[index]
@@ -106,8 +128,11 @@ def _value_errors(
     for name in surrogate.table.blocks[index].nodes:
         value, *_ = surrogate.quantity(name, v, y)
         scale, beside, rounding = (table.quantity(name, v, y)[1] for table in stating)
-        # what the bound allows anyway: half of rounding, and what the border's error does, of which it states twice
-        noise = solver_noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
+        # what the bound allows anyway: half of rounding, and what the border's error does, of which
+        # it states twice
+        noise = (
+            solver_noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
+        )
         errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
     return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
 
@@ -117,16 +142,19 @@ def _crowded(rng: np.random.Generator, axis: Axis, n: int) -> Array:
     low, high = axis.low, axis.high
     if axis.name == "radius":
         half = n // 2
-        return np.concatenate([10.0 ** rng.uniform(-5.0, math.log10(high), half), high * rng.beta(0.5, 0.5, n - half)])
+        return np.concatenate(
+            [10.0 ** rng.uniform(-5.0, math.log10(high), half), high * rng.beta(0.5, 0.5, n - half)]
+        )
     t = rng.beta(0.5, 0.5, n)
     edge = 10.0 ** rng.uniform(-6.0, -1.0, n // 4)
     t[: edge.size] = np.where(rng.random(edge.size) < 0.5, edge, 1.0 - edge)
     return low + (high - low) * np.clip(t, 1e-7, 1.0 - 1e-7)
 
 
-# --- cell by cell ----------------------------------------------------------------------------------------------------
+# --- cell by cell ---------------------------------------------------------------------------------
 
-POINTS = 17  # along either side of a cell: a polynomial of that degree is what an error of T_8 to T_16 is
+# along either side of a cell: a polynomial of that degree is what an error of T_8 to T_16 is
+POINTS = 17
 _AT = -np.cos(np.arange(POINTS) * math.pi / (POINTS - 1))
 _TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_AT, POINTS - 1))
 _TO_DERIVATIVE = chebyshev.chebvander(_AT, POINTS - 2) @ chebyshev.chebder(_TO_COEFFICIENTS)
@@ -152,31 +180,44 @@ class _Along:
         self.x = low[:, None] + 0.5 * (1.0 + _AT) * self.wide[:, None]
         local = 2.0 * (self.x - edges[:-1, None]) * cells / (stop - start) - 1.0
         self.powers = local[..., None] ** np.arange(WIDTH - 1, -1, -1)
-        self.shares, at_border = (x.reshape(local.shape) for x in kernels[-1].cell_shares(local.ravel()))
+        self.shares, at_border = (
+            x.reshape(local.shape) for x in kernels[-1].cell_shares(local.ravel())
+        )
         self.share_at_border = at_border[-1]
         at = np.clip(axis.to_file(self.x.ravel()), axis.low, axis.high)
-        self.follow = interpolation_matrix(nodes, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low))
+        self.follow = interpolation_matrix(
+            nodes, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
+        )
         scale = np.divide(2.0, self.wide, out=np.zeros(cells), where=self.wide > 0.0)
         self.to_derivative = scale[:, None, None] * _TO_DERIVATIVE
 
 
-def _difference(chart: Chart, block: Block, values: Array, exact: Array, noise: Array) -> tuple[Array, _Along, _Along]:
-    """Cells through node ``values`` minus the interpolant through ``exact``, (cells a, POINTS, cells b, POINTS)."""
-    a, b = (_Along(axis, n, m) for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True))
+def _difference(
+    chart: Chart, block: Block, values: Array, exact: Array, noise: Array
+) -> tuple[Array, _Along, _Along]:
+    """Cells through node ``values`` minus the interpolant through ``exact``, (cells a, POINTS,
+    cells b, POINTS)."""
+    a, b = (
+        _Along(axis, n, m)
+        for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
+    )
     own = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
     found = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
     return found - (a.follow @ _without_noise(exact, noise) @ b.follow.T).reshape(found.shape), a, b
 
 
-#: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to reach 2.6 of them
+#: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to
+#: reach 2.6 of them
 DEVIATIONS = 4.0
 
 
 def _without_noise(exact: Array, noise: Array) -> Array:
-    """Chebyshev coefficients of the interpolant through ``exact``, without those that are the solver's rounding.
+    """Chebyshev coefficients of the interpolant through ``exact``, without those that are the
+    solver's rounding.
 
-    At an edge a second derivative multiplies them by the fourth power of their number, which would hide what the table
-    errs by.  They are those at the level of the last ones, and those that the ``noise`` of the nodes explains.
+    At an edge a second derivative multiplies them by the fourth power of their number, which would
+    hide what the table errs by.  They are those at the level of the last ones, and those that the
+    ``noise`` of the nodes explains.
 
     The last ones do not tell the second: a node next to an edge has hardly a share in them.
     """
@@ -189,10 +230,12 @@ def _without_noise(exact: Array, noise: Array) -> Array:
 
 
 def _without_edge(off: Array, b: _Along, cells: int) -> None:
-    """Errors along b of the last cells below the border as evaluation has them, see ``mumacro/kernel/points.c``.
+    """Errors along b of the last cells below the border as evaluation has them, see
+    ``mumacro/kernel/points.c``.
 
-    It takes the derivative at the border out of them.  What is left is linear in the distance to the border, by which
-    the chain rule divides; the bound counts it at most half the number of cells per unit of b times.
+    It takes the derivative at the border out of them.  What is left is linear in the distance to
+    the border, by which the chain rule divides; the bound counts it at most half the number of
+    cells per unit of b times.
     """
     root = SQRT2 - b.x[-1, :-1]
     weight = np.maximum(1.0, (1.0 - root * root) / root / (cells / SQRT2))
@@ -201,10 +244,14 @@ def _without_edge(off: Array, b: _Along, cells: int) -> None:
     off[:, :, -1, -1] = off[:, :, -1, -2]
 
 
-def cell_errors(index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]) -> dict[str, Array]:
-    """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and along b.
+def cell_errors(
+    index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
+) -> dict[str, Array]:
+    """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and
+    along b.
 
-    ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`; ``noise`` their rounding.
+    ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`;
+    ``noise`` their rounding.
     """
     chart, found = CHARTS[index], {}
     for quantity in QUANTITIES:
@@ -217,6 +264,8 @@ def cell_errors(index: int, block: Block, exact: dict[str, Array], noise: dict[s
                 _without_edge(along_b, b, block.cells[1])
             along_a /= a.shares[:, :, None, None]
             along_b /= b.shares
-            largest = np.stack([np.abs(x).max(axis=(1, 3)) for x in (off, along_a, along_b)], axis=-1)
+            largest = np.stack(
+                [np.abs(x).max(axis=(1, 3)) for x in (off, along_a, along_b)], axis=-1
+            )
             found[quantity.name] = largest.reshape(-1, 3)
     return found

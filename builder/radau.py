@@ -1,4 +1,5 @@
-"""One stiff step of slip by Radau IIA collocation, with nodes, weights and derivatives from NumPy's Legendre series.
+"""One stiff step of slip by Radau IIA collocation, with nodes, weights and derivatives from NumPy's
+Legendre series.
 
 Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols and charts as in :mod:`.model`.
 """
@@ -11,22 +12,28 @@ from numpy.typing import NDArray
 
 from .compiled import solver_kernel
 
-STAGES = 20  # 5.8**-20 = 5e-16: the decay on a step whose length is half the distance to the turn of the shaker
+# 5.8**-20 = 5e-16: the decay on a step whose length is half the distance to the turn of the shaker
+STAGES = 20
 
 
 def _radau(n: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Nodes (n,) in (0, 1], weights (n,), and d/dc of the interpolant through (0, nodes) at the nodes, (n, n + 1)."""
+    """Nodes (n,) in (0, 1], weights (n,), and d/dc of the interpolant through (0, nodes) at the
+    nodes, (n, n + 1)."""
     series = np.array([0.0] * (n - 1) + [-1.0, 1.0])
     roots, slope = np.sort(legendre.legroots(series).real), legendre.legder(series)
     for _ in range(3):
         roots = roots - legendre.legval(roots, series) / legendre.legval(roots, slope)
     roots[-1] = 1.0
     nodes = 0.5 * (1.0 + roots)
-    # interpolatory weights: int_0^1 of the Lagrange polynomials, by a Gauss rule that is exact for them
+    # interpolatory weights: int_0^1 of the Lagrange polynomials, by a Gauss rule that is exact for
+    # them
     points, gauss = legendre.leggauss(n)
     points = 0.5 * (1.0 + points)
     weights = np.array(
-        [0.5 * np.sum(gauss * np.prod([(points - c) / (a - c) for c in nodes if c != a], axis=0)) for a in nodes]
+        [
+            0.5 * np.sum(gauss * np.prod([(points - c) / (a - c) for c in nodes if c != a], axis=0))
+            for a in nodes
+        ]
     )
     full = np.concatenate(([0.0], nodes))
     bary = np.array([1.0 / np.prod([a - c for c in full if c != a]) for a in full])
@@ -45,7 +52,8 @@ RADAU_NODES, RADAU_WEIGHTS, RADAU_DIFF = _radau(STAGES)
 def _solve_in_place(a: np.ndarray, b: np.ndarray) -> None:
     """x of a x = b by elimination with row pivots, into ``b`` (n,); ``a`` (n, n) is lost.
 
-    In place of np.linalg.solve, which takes 5 s to compile and 3 times as long to run on 20 unknowns.
+    In place of np.linalg.solve, which takes 5 s to compile and 3 times as long to run on 20
+    unknowns.
     """
     n = b.size
     for k in range(n):
@@ -78,13 +86,21 @@ def _direction(x: float, chart: int) -> tuple[float, float, float]:
 
 @solver_kernel
 def collocate(
-    v: float, y: float, sign: float, sigma: float, x0: float, chart: int, length: float, sums: np.ndarray
+    v: float,
+    y: float,
+    sign: float,
+    sigma: float,
+    x0: float,
+    chart: int,
+    length: float,
+    sums: np.ndarray,
 ) -> tuple[float, float]:
-    """One step of ``length`` [rad] from (sigma, chart base + x0), started on the slow manifold tan th = y cos tau / v.
+    """One step of ``length`` [rad] from (sigma, chart base + x0), started on the slow manifold tan
+    th = y cos tau / v.
 
-    cos tau = sign sin sigma.  Adds the integrals of u_x, 1 - u_x, lam and y cos tau u_y to ``sums`` (4,).  Returns the
-    local angle at the end [rad], NaN without convergence, and the smallest lam at the nodes, at most 0.1 % above the
-    one between them.
+    cos tau = sign sin sigma.  Adds the integrals of u_x, 1 - u_x, lam and y cos tau u_y to ``sums``
+    (4,).  Returns the local angle at the end [rad], NaN without convergence, and the smallest lam
+    at the nodes, at most 0.1 % above the one between them.
     """
     xs, c = np.empty(STAGES), np.empty(STAGES)
     for i in range(STAGES):

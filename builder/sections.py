@@ -2,10 +2,11 @@
 
 Two sections are used, because neither is well conditioned everywhere:
 
-* the *angle section*: unknown th0, the angle at which slip stops (lam = 0 ties sigma0 to it); used from the border down
-  and for y~ > 1;
-* the *time section*: unknown sigma1 < 0, the instant at which slip starts; used at creeping speeds for y~ <= 1 and in
-  the corner, where the window in which |u| > 1 is far shorter than any scan step and th0 hardly moves.
+* the *angle section*: unknown th0, the angle at which slip stops (lam = 0 ties sigma0 to it); used
+  from the border down and for y~ > 1;
+* the *time section*: unknown sigma1 < 0, the instant at which slip starts; used at creeping speeds
+  for y~ <= 1 and in the corner, where the window in which |u| > 1 is far shorter than any scan step
+  and th0 hardly moves.
 
 ``eta`` = y~ - 1 is a separate argument: next to the corner rounding y~ to double costs 1e-16 / mu~.
 v = v~ [-], y = y~ [-]; angles and charts as in :mod:`.model`.
@@ -24,20 +25,22 @@ BORDER_SLOPE = 0.4765728  # v~crit / sqrt(y~) for y~ -> infinity
 NOT_CONVERGED = 10
 ANGLE_SECTION, TIME_SECTION = 0, 1
 
-# What a section leaves in ``orbit`` (6,): duration of stick [rad]; cos, 1 - cos and sin of the angle th0 where slip
-# stops; sigma where stick starts and where it ends, less pi [rad].
+# What a section leaves in ``orbit`` (6,): duration of stick [rad]; cos, 1 - cos and sin of the
+# angle th0 where slip stops; sigma where stick starts and where it ends, less pi [rad].
 DURATION, COS_0, DEFICIT_0, SIN_0, SIGMA_0, SIGMA_1 = range(6)
 
 
 @solver_kernel
 def border_guess(y: float) -> float:
-    """v~crit [-] to about 15 %: the harmonic blend of both ends, eqs. (24), (26) with the exact constant."""
+    """v~crit [-] to about 15 %: the harmonic blend of both ends, eqs. (24), (26) with the exact
+    constant."""
     return 1.0 / (2.0 / (y * y) + 1.0 / (BORDER_SLOPE * math.sqrt(y)))
 
 
 @solver_kernel
 def _direction(x0: float, chart: int) -> tuple[float, float, float]:
-    """cos, sin and 1 - cos [-] of the angle th0 = ``x0`` [rad] where slip stops, in chart 1 pi/2 - ``x0``."""
+    """cos, sin and 1 - cos [-] of the angle th0 = ``x0`` [rad] where slip stops, in chart 1 pi/2 -
+    ``x0``."""
     half = math.sin(0.5 * x0)
     c, s = math.cos(x0), math.sin(x0)
     return (c, s, 2.0 * half * half) if chart == 0 else (s, c, 1.0 - s)
@@ -52,9 +55,17 @@ def _keep(orbit: np.ndarray, duration: float, s0: float, s1: float, x0: float, c
 
 @solver_kernel
 def _angle_section(
-    v: float, y: float, eta: float, x0: float, chart: int, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
+    v: float,
+    y: float,
+    eta: float,
+    x0: float,
+    chart: int,
+    w: np.ndarray,
+    out: np.ndarray,
+    orbit: np.ndarray,
 ) -> tuple[float, int]:
-    """Return map's residual th_end - th0 [rad] and status, for slip that stops at th0 = base + x0; in chart 1 x0 = -x.
+    """Return map's residual th_end - th0 [rad] and status, for slip that stops at th0 = base + x0;
+    in chart 1 x0 = -x.
 
     ``w`` and ``out`` as in :func:`.model.slip`; ``orbit`` (6,) receives the stick phase.
     """
@@ -73,7 +84,9 @@ def _angle_section(
         d1 = math.asin(min(ux, 1.0))
         # 2 B = delta1 - delta0 from sin delta1 - sin delta0 = v d, free of cancellation
         b = math.asin(min(1.0, 0.5 * v * d / math.cos(0.5 * (x0 + d1))))
-        status = slip(v, y, near, turn, -(x0 + 2.0 * b), model.SIDE, 0.5 * math.pi, model.TO_STICK, w, out)
+        status = slip(
+            v, y, near, turn, -(x0 + 2.0 * b), model.SIDE, 0.5 * math.pi, model.TO_STICK, w, out
+        )
         return out[model.TURNED] - 2.0 * b, status
     th1 = math.atan2(uy, ux)
     status = slip(v, y, near, turn, th1, model.FRONT, 0.5 * math.pi, model.TO_STICK, w, out)
@@ -85,12 +98,21 @@ def _angle_section(
 
 @solver_kernel
 def _time_section(
-    v: float, y: float, eta: float, s1: float, chart: int, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
+    v: float,
+    y: float,
+    eta: float,
+    s1: float,
+    chart: int,
+    w: np.ndarray,
+    out: np.ndarray,
+    orbit: np.ndarray,
 ) -> tuple[float, int]:
-    """Residual of the angle turned [rad] and status, for slip that starts at sigma1 = ``s1`` < 0 and closes the stick.
+    """Residual of the angle turned [rad] and status, for slip that starts at sigma1 = ``s1`` < 0
+    and closes the stick.
 
-    With A, B = (th0 +- th1)/2 the stick phase closes where 2 sin A sin B = v (pi - slip duration) and
-    sin A cos B = y cos((s0 + s1)/2) cos((s0 - s1)/2); both are explicit once sigma0 is known, and sigma0 is small.
+    With A, B = (th0 +- th1)/2 the stick phase closes where 2 sin A sin B = v (pi - slip duration)
+    and sin A cos B = y cos((s0 + s1)/2) cos((s0 - s1)/2); both are explicit once sigma0 is known,
+    and sigma0 is small.
     """
     s0 = 0.0
     th0 = b = a_ang = 0.0
@@ -122,12 +144,22 @@ def _time_section(
 
 @solver_kernel
 def section(
-    kind: int, v: float, y: float, eta: float, z: float, chart: int, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
+    kind: int,
+    v: float,
+    y: float,
+    eta: float,
+    z: float,
+    chart: int,
+    w: np.ndarray,
+    out: np.ndarray,
+    orbit: np.ndarray,
 ) -> tuple[float, int]:
-    """Residual [rad], increasing in the unknown z > 0 [rad] for every section and chart, and status."""
+    """Residual [rad], increasing in the unknown z > 0 [rad] for every section and chart, and
+    status."""
     if kind == ANGLE_SECTION:
         r, status = _angle_section(v, y, eta, z, chart, w, out, orbit)
-        # in chart 0 the residual th_end - th0 falls with th0; delta = pi/2 - th0 turns the sign of z but not of r
+        # in chart 0 the residual th_end - th0 falls with th0; delta = pi/2 - th0 turns the sign of
+        # z but not of r
         return (-r if chart == 0 else r), status
     r, status = _time_section(v, y, eta, -z, chart, w, out, orbit)
     return -r, status
@@ -135,9 +167,11 @@ def section(
 
 @solver_kernel
 def _choose(v: float, y: float, eta: float, hint: float) -> tuple[int, int, float]:
-    """Section, chart and first guess of its unknown z [rad] from the limits; ``hint`` = th0 if known, else NaN."""
+    """Section, chart and first guess of its unknown z [rad] from the limits; ``hint`` = th0 if
+    known, else NaN."""
     ratio = v / border_guess(y)
-    # phi: the positive root of phi^3 - (1 - y^2) phi = pi v, the normal form of the corner and exact for v -> 0, y < 1
+    # phi: the positive root of phi^3 - (1 - y^2) phi = pi v, the normal form of the corner and
+    # exact for v -> 0, y < 1
     gap = -eta * (2.0 + eta)
     phi = math.sqrt(max(gap, 0.0)) + (math.pi * v) ** (1.0 / 3.0)
     for _ in range(60):
@@ -157,7 +191,8 @@ def _choose(v: float, y: float, eta: float, hint: float) -> tuple[int, int, floa
 
 @solver_kernel
 def _edge(v: float, y: float) -> float:
-    """Angle th0 [rad] below which no stick starts: lam = 0 = lam' there, (v / sin th)^2 = y sin th cos sigma0."""
+    """Angle th0 [rad] below which no stick starts: lam = 0 = lam' there, (v / sin th)^2 = y sin th
+    cos sigma0."""
     a, b = math.atan(v / y), 0.5 * math.pi
     for _ in range(60):
         m = 0.5 * (a + b)
@@ -171,8 +206,11 @@ def _edge(v: float, y: float) -> float:
 
 
 @solver_kernel
-def stick_slip(v: float, y: float, eta: float, hint: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray) -> int:
-    """Steady stick-slip orbit into ``out`` and ``orbit`` by the bracketed secant method; returns a status.
+def stick_slip(
+    v: float, y: float, eta: float, hint: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
+) -> int:
+    """Steady stick-slip orbit into ``out`` and ``orbit`` by the bracketed secant method; returns a
+    status.
 
     ``hint`` = th0 [rad] if something is known of it, as next to the border, else NaN.
     """
@@ -185,8 +223,9 @@ def stick_slip(v: float, y: float, eta: float, hint: float, w: np.ndarray, out: 
     for it in range(200):
         f, status = section(kind, v, y, eta, z, chart, w, out, orbit)
         if status in (model.NO_SLIP, model.NO_STICK):
-            # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border slip misses lam = 0
-            # when th0 is too large, since the half-period map turns the order of orbits round there
+            # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border
+            # slip misses lam = 0 when th0 is too large, since the half-period map turns the order
+            # of orbits round there
             lo, hi = (lo, z) if kind == ANGLE_SECTION and chart == 0 else (z, hi)
             z, f_old = 0.5 * (lo + hi), math.inf
             continue
@@ -194,7 +233,8 @@ def stick_slip(v: float, y: float, eta: float, hint: float, w: np.ndarray, out: 
             return status
         lo, hi = (lo, z) if f > 0.0 else (z, hi)
         if f == 0.0 or spread * before < 1e-17:
-            # the secant method's error is about the product of its last two steps: this evaluation is the result
+            # the secant method's error is about the product of its last two steps: this evaluation
+            # is the result
             return OK
         secant = f_old < math.inf and f != f_old
         if secant:
@@ -202,7 +242,8 @@ def stick_slip(v: float, y: float, eta: float, hint: float, w: np.ndarray, out: 
         elif f_old < math.inf:
             new = z
         elif kind == ANGLE_SECTION and (near or abs(f) > 1e-3 * z):
-            # the map contracts: its own image is the next trial; next to the border it also turns orbits round
+            # the map contracts: its own image is the next trial; next to the border it also turns
+            # orbits round
             new = z - (0.6 * f if near else f)
         else:
             new = z * (0.98 if f > 0.0 else 1.02)

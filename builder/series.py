@@ -1,7 +1,9 @@
-"""Taylor series of the slip orbit over one step, and the operations on them: values, integrals, roots.
+"""Taylor series of the slip orbit over one step, and the operations on them: values, integrals,
+roots.
 
-Every polynomial is a row (ORDER + 2,) of the workspace ``w``, its coefficients in powers of the time [rad] since the
-start of the step.  Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols as in :mod:`.model`.
+Every polynomial is a row (ORDER + 2,) of the workspace ``w``, its coefficients in powers of the
+time [rad] since the start of the step.  Equations: Benad, Nakano, Popov, Popov (2018), (11), (12);
+symbols as in :mod:`.model`.
 """
 
 import math
@@ -13,7 +15,8 @@ from .compiled import solver_kernel
 ORDER = 24  # of the Taylor series; 20 to 28 cost the same within 10 %, see benchmarks/solver.py
 TRUNCATION = 2e-17  # last Taylor term relative to the increment over the step
 
-# Rows of ``w`` (9, ORDER + 2): x, sin x, 1 - cos x, x', C = cos tau, C sin x, C cos x, lam; lam' by derivative() only.
+# Rows of ``w`` (9, ORDER + 2): x, sin x, 1 - cos x, x', C = cos tau, C sin x, C cos x, lam; lam' by
+# derivative() only.
 X, SIN_X, DEFICIT_X, RATE, COS_TAU, C_SIN, C_COS, SPEED, SPEED_RATE = range(9)
 
 _INV = np.array([0.0] + [1.0 / k for k in range(1, ORDER + 3)])
@@ -21,11 +24,21 @@ _INV = np.array([0.0] + [1.0 / k for k in range(1, ORDER + 3)])
 
 @solver_kernel
 def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np.ndarray) -> None:
-    """Taylor coefficients at one point of the slip orbit, eqs. (11), (12), into the rows of ``w`` (9, ORDER + 2).
+    """Taylor coefficients at one point of the slip orbit, eqs. (11), (12), into the rows of ``w``
+    (9, ORDER + 2).
 
     ``x`` [rad] is the local angle in ``chart``; c0, c1 [-] = cos tau and its derivative there.
     """
-    x_, S, D, XP, C, CS, CD, L = w[X], w[SIN_X], w[DEFICIT_X], w[RATE], w[COS_TAU], w[C_SIN], w[C_COS], w[SPEED]
+    x_, S, D, XP, C, CS, CD, L = (
+        w[X],
+        w[SIN_X],
+        w[DEFICIT_X],
+        w[RATE],
+        w[COS_TAU],
+        w[C_SIN],
+        w[C_COS],
+        w[SPEED],
+    )
     half = math.sin(0.5 * x)
     x_[0], S[0], D[0], C[0], C[1] = x, math.sin(x), 2.0 * half * half, c0, c1
     for k in range(ORDER - 1):
@@ -37,7 +50,9 @@ def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np
             cs += C[j] * S[k - j]
             cd -= C[j] * D[k - j]
         along, across = v * ((1.0 if k == 0 else 0.0) - D[k]) + y * cs, y * cd - v * S[k]
-        xp, speed = (across, along) if chart == 0 else (-along, across) if chart > 0 else (along, -across)
+        xp, speed = (
+            (across, along) if chart == 0 else (-along, across) if chart > 0 else (along, -across)
+        )
         CS[k], CD[k], XP[k], L[k] = cs, cd, xp, speed
         if k < ORDER:
             sn, dn = xp, 0.0
@@ -49,7 +64,8 @@ def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np
 
 @solver_kernel
 def increment(p: np.ndarray, t: float) -> float:
-    """p(t) - p(0), not a difference, of the Taylor coefficients ``p`` (ORDER + 2,) a time ``t`` [rad] into the step."""
+    """p(t) - p(0), not a difference, of the Taylor coefficients ``p`` (ORDER + 2,) a time ``t``
+    [rad] into the step."""
     r: float = p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + p[k]
@@ -98,7 +114,8 @@ def root(p: np.ndarray, lo: float, hi: float) -> float:
     """Root of p in [lo, hi], where the sign changes: Newton kept inside the bracket."""
     up = value(p, hi) > 0.0
     t = 0.5 * (lo + hi)
-    for _ in range(300):  # the window of slip may be as short as 1e-30: bisection alone must get there
+    # the window of slip may be as short as 1e-30: bisection alone must get there
+    for _ in range(300):
         f = value(p, t)
         lo, hi = (lo, t) if (f > 0.0) == up else (t, hi)
         g = slope(p, t)
@@ -121,9 +138,11 @@ def derivative(p: np.ndarray, q: np.ndarray) -> None:
 
 @solver_kernel
 def step_length(w: np.ndarray, layer: float, lam: float) -> float:
-    """Step [rad] for which the last terms are below TRUNCATION and the explicit series stays stable at ``lam`` [-].
+    """Step [rad] for which the last terms are below TRUNCATION and the explicit series stays stable
+    at ``lam`` [-].
 
-    Where x' passes zero the increment is judged by x'' and the time ``layer`` [rad], at most that of the layers.
+    Where x' passes zero the increment is judged by x'' and the time ``layer`` [rad], at most that
+    of the layers.
     """
     x, h = w[X], 0.9
     scale = max(abs(x[1]), layer * abs(x[2]))

@@ -1,11 +1,13 @@
 """The steady cycle at one (v~, y~) by root-finding on half a period; never by marching cycles.
 
-Continuous sliding is a fixed point of the half-period map, th(tau + pi) = -th(tau), found by Newton's method with
-d th_end / d th_start = exp(-integral of lam).  Stick-slip is a root on a section, :mod:`.sections`.
+Continuous sliding is a fixed point of the half-period map, th(tau + pi) = -th(tau), found by
+Newton's method with d th_end / d th_start = exp(-integral of lam).  Stick-slip is a root on a
+section, :mod:`.sections`.
 
-The solver's range is 1e-60 <= v~ <= 1e10, 1e-15 <= y~ <= 1e14; beyond it :func:`check_range` refuses.  Below it
-products underflow.  Above y~ = 1e14 the section's root is lost in rounding, and at v~ = 1e12 some points need too many
-steps.  The limits of the model hold to rounding there, so a table answers for every v~ and y~.
+The solver's range is 1e-60 <= v~ <= 1e10, 1e-15 <= y~ <= 1e14; beyond it :func:`check_range`
+refuses.  Below it products underflow.  Above y~ = 1e14 the section's root is lost in rounding, and
+at v~ = 1e12 some points need too many steps.  The limits of the model hold to rounding there, so a
+table answers for every v~ and y~.
 """
 
 import math
@@ -19,25 +21,49 @@ from mumacro.errors import InputError
 from . import model
 from .compiled import solver_kernel
 from .model import OK, rechart, slip
-from .sections import COS_0, DEFICIT_0, DURATION, NOT_CONVERGED, SIGMA_0, SIN_0, border_guess, stick_slip
+from .sections import (
+    COS_0,
+    DEFICIT_0,
+    DURATION,
+    NOT_CONVERGED,
+    SIGMA_0,
+    SIN_0,
+    border_guess,
+    stick_slip,
+)
 from .series import ORDER
 
 CONTINUOUS, STICK_SLIP = 0, 1
 REGIMES = ("continuous", "stick_slip")
 
-_LOST = "the solver failed here, which is a defect of the solver: use a v~ that differs in the tenth digit"
+_LOST = (
+    "the solver failed here, which is a defect of the solver: use a v~ that differs in the "
+    "tenth digit"
+)
 ADVICE = {
     OK: "solved",
     model.NO_SLIP: "the stick phase never reaches the friction limit: " + _LOST,
-    model.NO_STICK: "slip does not end within a period although the continuous orbit is not admissible: " + _LOST,
+    model.NO_STICK: "slip does not end within a period although the continuous orbit is not "
+    "admissible: " + _LOST,
     model.TOO_MANY_STEPS: "more than 10,000 Taylor steps in one half period: " + _LOST,
     model.DIVERGED: "the stiff step did not converge: " + _LOST,
     NOT_CONVERGED: "the section's root was not found to rounding: " + _LOST,
 }
 
-#: results of solve_raw in ``res``, named as in Steady; those before the regime are columns of a sweep
-RESULTS = ("mu_ratio", "deficit", "stick_fraction", "power", "regime", "slip_speed", "min_slip_speed")
-MU_RATIO, DEFICIT, STICK_FRACTION, POWER, REGIME, SLIP_SPEED, MIN_SLIP_SPEED = range(N_RESULTS := len(RESULTS))
+#: results of solve_raw in ``res``, named as in Steady; those before the regime are columns of a
+#: sweep
+RESULTS = (
+    "mu_ratio",
+    "deficit",
+    "stick_fraction",
+    "power",
+    "regime",
+    "slip_speed",
+    "min_slip_speed",
+)
+MU_RATIO, DEFICIT, STICK_FRACTION, POWER, REGIME, SLIP_SPEED, MIN_SLIP_SPEED = range(
+    N_RESULTS := len(RESULTS)
+)
 
 V_RANGE, Y_RANGE = (1e-60, 1e10), (1e-15, 1e14)  # of v~ and y~, dimensionless
 MEAN = 1.0 / math.pi  # of an integral over half a period
@@ -48,15 +74,16 @@ RELATIVE_ERROR = 3e-15  # of the smaller of mu~ and 1 - mu~, see error_estimate
 def error_estimate(mu: float, deficit: float) -> float:
     """Largest absolute error of mu~ [-] to be expected; mu~ and 1 - mu~ are solved for.
 
-    No larger one was found to points in quadruple precision, between neighbouring doubles and to the laws at the ends
-    of the range: tests/test_steady.py and tests/test_extremes.py look.
+    No larger one was found to points in quadruple precision, between neighbouring doubles and to
+    the laws at the ends of the range: tests/test_steady.py and tests/test_extremes.py look.
     """
     return RELATIVE_ERROR * min(mu, deficit) + 2.3e-16 * mu + 5e-324
 
 
 @solver_kernel
 def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
-    """Continuous orbit over sigma in [-pi/2, pi/2], eq. (11); ``w`` and ``out`` as in :func:`.model.slip`; a status."""
+    """Continuous orbit over sigma in [-pi/2, pi/2], eq. (11); ``w`` and ``out`` as in
+    :func:`.model.slip`; a status."""
     th, half, done = math.atan(v * y / (1.0 + v * v)), 0.5 * math.pi, False
     for _ in range(60):
         chart = 1 if th > 0.75 else 0
@@ -65,7 +92,8 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
         if status != OK:
             return status
         x_end, chart_end = out[model.ANGLE], int(out[model.CHART])
-        # residual th_end + th_start, formed in the mirrored chart so that small angles keep their digits
+        # residual th_end + th_start, formed in the mirrored chart so that small angles keep their
+        # digits
         res = rechart(x_end, chart_end, -chart) + x
         if done:
             return OK
@@ -82,7 +110,8 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
 
 @solver_kernel
 def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, int]:
-    """(v~crit, mu~ there, status): where the smallest slip speed of the continuous orbit reaches zero."""
+    """(v~crit, mu~ there, status): where the smallest slip speed of the continuous orbit reaches
+    zero."""
     guess = border_guess(y)
     lo, hi = 0.7 * guess, 1.4 * guess
     z, z_old, f_old = 1.02 * guess, 0.0, math.inf
@@ -97,7 +126,11 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
                 z -= f * (z - z_old) / (f - f_old)
             mu = out[model.SUM_UX] / math.pi
             return z, (1.0 - out[model.SUM_DEFICIT] / math.pi if mu > 0.5 else mu), OK
-        new = z - f * (z - z_old) / (f - f_old) if f_old < math.inf else z * (0.99 if f > 0.0 else 1.01)
+        new = (
+            z - f * (z - z_old) / (f - f_old)
+            if f_old < math.inf
+            else z * (0.99 if f > 0.0 else 1.01)
+        )
         if not (lo < new < hi):
             new = 0.5 * (lo + hi)
         z_old, f_old, z = z, f, new
@@ -106,14 +139,20 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
 
 @solver_kernel
 def _finish(v: float, y: float, regime: int, out: np.ndarray, res: np.ndarray) -> None:
-    """The rest of the results (7,): of mu~ and 1 - mu~ the smaller has the digits; the slip speed; a small power."""
-    res[REGIME], res[SLIP_SPEED], res[MIN_SLIP_SPEED] = regime, out[model.PATH] * MEAN, out[model.MIN_SPEED]
+    """The rest of the results (7,): of mu~ and 1 - mu~ the smaller has the digits; the slip speed;
+    a small power."""
+    res[REGIME], res[SLIP_SPEED], res[MIN_SLIP_SPEED] = (
+        regime,
+        out[model.PATH] * MEAN,
+        out[model.MIN_SPEED],
+    )
     if res[DEFICIT] < 0.5:
         res[MU_RATIO] = 1.0 - res[DEFICIT]
     else:
         res[DEFICIT] = 1.0 - res[MU_RATIO]
     if v < model.SMALL_V and y < model.SMALL_Y:
-        # <lam> - v~ mu~ with nothing subtracted: <lam u_x> = v~ is the foot's mean velocity along the drive
+        # <lam> - v~ mu~ with nothing subtracted: <lam u_x> = v~ is the foot's mean velocity along
+        # the drive
         res[POWER] = out[model.EXCESS] / math.pi + v * res[DEFICIT]
 
 
@@ -127,26 +166,39 @@ def sliding(v: float, y: float, out: np.ndarray, res: np.ndarray) -> None:
 
 @solver_kernel
 def _sticking(v: float, y: float, out: np.ndarray, orbit: np.ndarray, res: np.ndarray) -> None:
-    """Results (7,) of stick-slip from what :func:`stick_slip` left in ``out`` and ``orbit``, eq. (15)."""
+    """Results (7,) of stick-slip from what :func:`stick_slip` left in ``out`` and ``orbit``, eq.
+    (15)."""
     d, cth, deficit = orbit[DURATION], orbit[COS_0], orbit[DEFICIT_0]
-    # Next to the border lam grazes zero and the end of slip is known to 1e-16/sqrt(1 - v~/v~crit) only; the state there
-    # is known far better, so the surplus is taken out and stick and slip together last exactly half a period.
+    # Next to the border lam grazes zero and the end of slip is known to 1e-16/sqrt(1 - v~/v~crit)
+    # only; the state there is known far better, so the surplus is taken out and stick and slip
+    # together last exactly half a period.
     surplus = out[model.SIGMA] - orbit[SIGMA_0]
     out[model.SUM_UX] -= surplus * cth
     out[model.SUM_DEFICIT] -= surplus * deficit
     out[model.WORK] += surplus * y * math.sin(orbit[SIGMA_0]) * orbit[SIN_0]
     res[MU_RATIO] = (d * (cth + 0.5 * v * d) + out[model.SUM_UX]) * MEAN
     res[DEFICIT] = (d * (deficit - 0.5 * v * d) + out[model.SUM_DEFICIT]) * MEAN
-    # during stick the spring takes up and returns the same energy, so the shaker's work is minus the drive's
-    res[STICK_FRACTION], res[POWER] = d * MEAN, (out[model.WORK] - v * d * (cth + 0.5 * v * d)) * MEAN
+    # during stick the spring takes up and returns the same energy, so the shaker's work is minus
+    # the drive's
+    res[STICK_FRACTION], res[POWER] = (
+        d * MEAN,
+        (out[model.WORK] - v * d * (cth + 0.5 * v * d)) * MEAN,
+    )
     _finish(v, y, STICK_SLIP, out, res)
 
 
 @solver_kernel
 def solve_raw(
-    v: float, y: float, eta: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray, res: np.ndarray
+    v: float,
+    y: float,
+    eta: float,
+    w: np.ndarray,
+    out: np.ndarray,
+    orbit: np.ndarray,
+    res: np.ndarray,
 ) -> int:
-    """Steady state at v~ = ``v``, y~ = ``y``, eta = y~ - 1 [-] into ``res`` (7,); the rest is workspace; a status."""
+    """Steady state at v~ = ``v``, y~ = ``y``, eta = y~ - 1 [-] into ``res`` (7,); the rest is
+    workspace; a status."""
     res[:] = math.nan
     hint = least = math.nan
     if v > 0.75 * border_guess(y):
@@ -161,7 +213,8 @@ def solve_raw(
             _sticking(v, y, out, orbit, res)
             res[MIN_SLIP_SPEED] = least
             return OK
-        # the last digit below the border: the section ends where its root lies, and the two orbits are one to rounding
+        # the last digit below the border: the section ends where its root lies, and the two orbits
+        # are one to rounding
         if not least > -1e-13 * v or continuous(v, y, w, out) != OK:
             return status
     sliding(v, y, out, res)
@@ -183,8 +236,8 @@ class Steady:
     power: float
     #: <lam>: mean slip path per radian in units of l0; equals v~ mu~ + power
     slip_speed: float
-    #: smallest lam of the continuous orbit; NaN far below the border, where it is not followed; right to 0.1 % where v~
-    #: is so far above the border that stiff steps pass it by
+    #: smallest lam of the continuous orbit; NaN far below the border, where it is not followed;
+    #: right to 0.1 % where v~ is so far above the border that stiff steps pass it by
     min_slip_speed: float
     #: largest absolute error of mu_ratio to be expected, see error_estimate()
     error_estimate: float
@@ -208,9 +261,14 @@ def check_range(v: ArrayLike, y: ArrayLike, eta: ArrayLike) -> None:
     """
     v, y, eta = (np.asarray(values, dtype=np.float64) for values in (v, y, eta))
     for field, values, (low, high) in (("v_tilde", v, V_RANGE), ("y_tilde", y, Y_RANGE)):
-        bound = f"from {low:g} to {high:g}, the range of the solver (Surrogate.mu_ratio of a table answers beyond it)"
+        bound = (
+            f"from {low:g} to {high:g}, the range of the solver (Surrogate.mu_ratio of a "
+            "table answers beyond it)"
+        )
         _refuse(field, values, (low <= values) & (values <= high), bound)
-    _refuse("eta", eta, np.abs(eta - (y - 1.0)) <= 4e-16 * np.maximum(1.0, y), "y_tilde - 1 to rounding")
+    _refuse(
+        "eta", eta, np.abs(eta - (y - 1.0)) <= 4e-16 * np.maximum(1.0, y), "y_tilde - 1 to rounding"
+    )
 
 
 def _refuse(field: str, values: NDArray[np.float64], right: NDArray[np.bool_], bound: str) -> None:
@@ -222,7 +280,8 @@ def _refuse(field: str, values: NDArray[np.float64], right: NDArray[np.bool_], b
 
 @solver_kernel
 def workspace() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Arrays ``w``, ``out``, ``orbit``, ``res`` that :func:`solve_raw` writes to; one set per thread."""
+    """Arrays ``w``, ``out``, ``orbit``, ``res`` that :func:`solve_raw` writes to; one set per
+    thread."""
     return np.zeros((9, ORDER + 2)), np.zeros(12), np.zeros(6), np.zeros(N_RESULTS)
 
 
@@ -232,7 +291,8 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     Parameters
     ----------
     v, y : float
-        Dimensionless speed and amplitude [-], in ``builder.steady.V_RANGE`` and ``builder.steady.Y_RANGE``.
+        Dimensionless speed and amplitude [-], in ``builder.steady.V_RANGE`` and
+        ``builder.steady.Y_RANGE``.
     eta : float, optional
         y~ - 1 [-], to be given where it is known better than ``y`` in double precision.
 
@@ -263,7 +323,8 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
 
 
 def border(y: float) -> tuple[float, float]:
-    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in ``builder.steady.Y_RANGE``.
+    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in
+    ``builder.steady.Y_RANGE``.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """The stick phase in closed form: the time at which the spring reaches the friction limit again.
 
-During stick u moves with the upper point, eqs. (9), (10): |u|^2 - 1 is explicit in the time, its first root ends it.
-Time is sigma = tau - pi/2 [rad]; v = v~ [-], y = y~ [-], eta = y~ - 1 [-]; angles of u as in :mod:`.model`.
+During stick u moves with the upper point, eqs. (9), (10): |u|^2 - 1 is explicit in the time, its
+first root ends it. Time is sigma = tau - pi/2 [rad]; v = v~ [-], y = y~ [-], eta = y~ - 1 [-];
+angles of u as in :mod:`.model`.
 """
 
 import math
@@ -22,15 +23,23 @@ def _third(d: float) -> float:
     """(d - sin d) / d^2."""
     if d < 0.3:
         q = d * d
-        return d * (1 / 6 - q * (1 / 120 - q * (1 / 5040 - q * (1 / 362880 - q * (1 / 39916800 - q / 6227020800)))))
+        return d * (
+            1 / 6
+            - q
+            * (1 / 120 - q * (1 / 5040 - q * (1 / 362880 - q * (1 / 39916800 - q / 6227020800))))
+        )
     return (d - math.sin(d)) / (d * d)
 
 
 @solver_kernel
-def stick_excess(v: float, y: float, eta: float, x0: float, chart: int, s0: float, s1: float, d: float) -> float:
-    """(|u|^2 - 1) / d^2 [-] a time ``d`` [rad] after slip stopped at (s0, chart base + x0); s1 = s0 + d - pi.
+def stick_excess(
+    v: float, y: float, eta: float, x0: float, chart: int, s0: float, s1: float, d: float
+) -> float:
+    """(|u|^2 - 1) / d^2 [-] a time ``d`` [rad] after slip stopped at (s0, chart base + x0); s1 = s0
+    + d - pi.
 
-    The double root at d = 0 is divided out with lam = 0 at the onset; at d = 0 this is d lam/d tau there.
+    The double root at d = 0 is divided out with lam = 0 at the onset; at d = 0 this is d lam/d tau
+    there.
     """
     half = _sinc(0.5 * d)
     h2 = half * half
@@ -47,9 +56,18 @@ def stick_excess(v: float, y: float, eta: float, x0: float, chart: int, s0: floa
 
 @solver_kernel
 def _chandrupatla(
-    v: float, y: float, eta: float, x0: float, chart: int, s0: float,
-    a: float, b: float, fa: float, fb: float, in_sigma: bool,
-) -> float:  # fmt: skip
+    v: float,
+    y: float,
+    eta: float,
+    x0: float,
+    chart: int,
+    s0: float,
+    a: float,
+    b: float,
+    fa: float,
+    fb: float,
+    in_sigma: bool,
+) -> float:
     """Root of stick_excess in d, or in sigma1 if ``in_sigma``, between a and b [rad].
 
     Chandrupatla's bracketed inverse interpolation (Advances in Engineering Software 28, 1997).
@@ -71,7 +89,9 @@ def _chandrupatla(
         xi = (x1 - x2) / (x3 - x2)
         phi = (f1 - f2) / (f3 - f2)
         if phi * phi < xi and (1.0 - phi) * (1.0 - phi) < 1.0 - xi:
-            t = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+            t = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (
+                f3 - f2
+            )
         else:
             t = 0.5
         t = min(max(t, tl), 1.0 - tl)
@@ -79,14 +99,18 @@ def _chandrupatla(
 
 
 @solver_kernel
-def _reached(v: float, y: float, eta: float, x0: float, chart: int, s0: float) -> tuple[float, float]:
-    """Two times since the onset of stick [rad], |u| < 1 at the first, > 1 at the second; (0, -1) if it stays below."""
+def _reached(
+    v: float, y: float, eta: float, x0: float, chart: int, s0: float
+) -> tuple[float, float]:
+    """Two times since the onset of stick [rad], |u| < 1 at the first, > 1 at the second; (0, -1) if
+    it stays below."""
     d = 0.0
     for i in range(1, SCAN + 1):
         lo, d = d, math.pi * i / SCAN
         if stick_excess(v, y, eta, x0, chart, s0, s0 + d - math.pi, d) > 0.0:
             return lo, d
-    # the window of |u| > 1, next to the last sample, may be shorter than the scan: climb by golden section
+    # the window of |u| > 1, next to the last sample, may be shorter than the scan: climb by golden
+    # section
     lo = d - math.pi / SCAN
     a, b = lo, d + math.pi / SCAN
     for _ in range(80):
@@ -100,8 +124,11 @@ def _reached(v: float, y: float, eta: float, x0: float, chart: int, s0: float) -
 
 
 @solver_kernel
-def stick_end(v: float, y: float, eta: float, x0: float, chart: int, s0: float) -> tuple[float, float]:
-    """Duration of stick and sigma at its end, less pi [rad]; (-1, 0) if the limit is not reached in half a period."""
+def stick_end(
+    v: float, y: float, eta: float, x0: float, chart: int, s0: float
+) -> tuple[float, float]:
+    """Duration of stick and sigma at its end, less pi [rad]; (-1, 0) if the limit is not reached in
+    half a period."""
     lo, hi = _reached(v, y, eta, x0, chart, s0)
     if hi < 0.0:
         return -1.0, 0.0

@@ -1,7 +1,7 @@
 """Nodes to solved values: in parallel and resumable.
 
-Work is cut into chunks of points; a chunk is a pure function of its inputs, so the values do not depend on how many
-workers there are or on whether a build was interrupted.
+Work is cut into chunks of points; a chunk is a pure function of its inputs, so the values do not
+depend on how many workers there are or on whether a build was interrupted.
 """
 
 import hashlib
@@ -22,12 +22,14 @@ from .compiled import solver_kernel, source_digest
 from .model import OK
 
 CHUNK = 128  # points; about 10 ms of work
-#: the steady state; the continuous orbit whether or not lam stays positive, analytic across the border; the border,
-#: where the column deficit holds v~crit
+#: the steady state; the continuous orbit whether or not lam stays positive, analytic across the
+#: border; the border, where the column deficit holds v~crit
 KINDS = {"full": 0, "continuous": 1, "border": 2}
 _RESULTS = steady.REGIME
 COLUMNS = (*steady.RESULTS[:_RESULTS], "error_estimate", "status")
-_MU, _DEFICIT, _ERROR, _STATUS = map(COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status"))
+_MU, _DEFICIT, _ERROR, _STATUS = map(
+    COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status")
+)
 
 
 class SolveError(MumacroError):
@@ -58,7 +60,8 @@ def _solve_rows(kind: int, points: Array, out: Array) -> None:
 
 
 def solve_chunk(kind: str, points: Array) -> Array:
-    """Solve ``points`` (n, 3) of v~, y~, y~ - 1 as one of :data:`KINDS`; rows of :data:`COLUMNS`."""
+    """Solve ``points`` (n, 3) of v~, y~, y~ - 1 as one of :data:`KINDS`; rows of
+    :data:`COLUMNS`."""
     out = np.empty((points.shape[0], len(COLUMNS)))
     _solve_rows(KINDS[kind], np.ascontiguousarray(points), out)
     return out
@@ -72,7 +75,8 @@ class Sweep:
     workers : int
         Threads on this machine (the solver releases the interpreter lock).
     checkpoint : Path, optional
-        Folder for finished sweeps; a later build with the same nodes reads them instead of solving again.
+        Folder for finished sweeps; a later build with the same nodes reads them instead of solving
+        again.
     """
 
     def __init__(self, workers: int = 1, checkpoint: Path | None = None) -> None:
@@ -87,7 +91,8 @@ class Sweep:
         self._pool.shutdown(cancel_futures=True)
 
     def solve(self, kind: str, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
-        """Solve at every (v~, y~); returns arrays of the broadcast shape by name of :data:`COLUMNS`.
+        """Solve at every (v~, y~); returns arrays of the broadcast shape by name of
+        :data:`COLUMNS`.
 
         ``eta`` = y~ - 1 may be given where it is known better than ``y``.
 
@@ -99,15 +104,24 @@ class Sweep:
             When any point fails: a table must have no missing node.
         """
         v, y = np.broadcast_arrays(np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64))
-        eta = y - 1.0 if eta is None else np.broadcast_to(np.asarray(eta, dtype=np.float64), y.shape)
+        eta = (
+            y - 1.0 if eta is None else np.broadcast_to(np.asarray(eta, dtype=np.float64), y.shape)
+        )
         steady.check_range(v, y, eta)
         points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
-        out = self._run(kind, points) if self.checkpoint is None else self._kept(self.checkpoint, kind, points)
+        out = (
+            self._run(kind, points)
+            if self.checkpoint is None
+            else self._kept(self.checkpoint, kind, points)
+        )
         self.n_solves += points.shape[0]
         failed = np.flatnonzero(out[:, _STATUS] != OK)
         if failed.size:
             (v_bad, y_bad, _), status = points[failed[0]].tolist(), int(out[failed[0], _STATUS])
-            text = f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, y~={y_bad!r}: "
+            text = (
+                f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, "
+                f"y~={y_bad!r}: "
+            )
             raise SolveError(text + steady.ADVICE[status])
         return {name: out[:, i].reshape(v.shape) for i, name in enumerate(COLUMNS)}
 
@@ -119,7 +133,9 @@ class Sweep:
     def _kept(self, folder: Path, kind: str, points: Array) -> Array:
         """What the checkpoint holds of these points; else they are solved and stored."""
         # the digest of the sources: results of another version of the solver are not reused
-        text = (source_digest() + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
+        text = (source_digest() + kind).encode() + np.ascontiguousarray(
+            points, dtype="<f8"
+        ).tobytes()
         file = folder / f"{kind}-{hashlib.sha256(text).hexdigest()[:32]}.npy"
         with suppress(OSError, ValueError, EOFError):  # a damaged file is solved again
             out: Array = np.load(file, allow_pickle=False)
@@ -132,5 +148,7 @@ class Sweep:
             write_whole(file, content.getvalue())
         except OSError as error:
             why = f"{folder}: finished work cannot be stored: {error.strerror or error}"
-            raise CheckpointError(f"{why}; repair that and give the same command again: it resumes") from error
+            raise CheckpointError(
+                f"{why}; repair that and give the same command again: it resumes"
+            ) from error
         return out

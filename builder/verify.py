@@ -16,13 +16,16 @@ from .measure import log_uniform as _log
 from .quantities import ABS_TO_REL, solver_noise
 from .sweep import Sweep
 
-BESIDE_BORDER = 1e-3  # of v~crit: nearer, slopes of what is not smooth at the border are not compared
+# of v~crit: nearer, slopes of what is not smooth at the border are not compared
+BESIDE_BORDER = 1e-3
 # differences of fresh solves stand for the slopes of the model
 _STENCIL = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 _SIXTH_ORDER = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 _FOURTH_ORDER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
-_STEP = 0.003  # in ln v~ and ln y~: beside the corner 0.01 leaves out more than the finest table errs by
-SLOPE_SHARE = 20  # one point in so many is also compared with differences, which take twelve solves each
+# in ln v~ and ln y~: beside the corner 0.01 leaves out more than the finest table errs by
+_STEP = 0.003
+# one point in so many is also compared with differences, which take twelve solves each
+SLOPE_SHARE = 20
 
 
 def _corner(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
@@ -63,8 +66,11 @@ def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Arr
     return CASES[case][1](np.random.default_rng(seed), n, surrogate)
 
 
-def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of the closed form."""
+def _both_sides(
+    surrogate: Surrogate, n: int, seed: int
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of
+    the closed form."""
     rng = np.random.default_rng(seed)
     low, high = 1 - 1e-13, 1 + 1e-13
     for seam in SEAMS:
@@ -79,21 +85,24 @@ def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array
 
 
 def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
-    """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13 apart."""
+    """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13
+    apart."""
     pairs = _both_sides(surrogate, n, seed)
     sides = ((surrogate.mu_ratio(v1, y1), surrogate.mu_ratio(v2, y2)) for v1, v2, y1, y2 in pairs)
     return max(float((np.abs(one - two) / np.maximum(one, two)).max()) for one, two in sides)
 
 
 def seam_slope_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
-    """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are continuous, too."""
+    """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are
+    continuous, too."""
     pairs = _both_sides(surrogate, n, seed)
     sides = ((surrogate.slopes(v1, y1), surrogate.slopes(v2, y2)) for v1, v2, y1, y2 in pairs)
     return max(float(np.abs(np.subtract(one[1:], two[1:])).max()) for one, two in sides)
 
 
 def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11) -> float:
-    """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across all seams [-]."""
+    """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across
+    all seams [-]."""
     rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
     for fixed in _log(np.random.default_rng(seed), 1e-4, 1e6, lines):
         steps = -np.diff(surrogate.mu_ratio(rise, fixed)), np.diff(surrogate.mu_ratio(fixed, rise))
@@ -111,14 +120,22 @@ class Neighbours:
         self.v, self.y, self.crit, mu = v, y, surrogate.v_tilde_crit(y), surrogate.mu_ratio(v, y)
         gap = np.abs(np.log(v / self.crit))
         stiff = np.maximum(mu * mu, np.abs(1.0 - y * y))
-        self.steps = np.minimum(_STEP, gap / 32.0), np.minimum(np.minimum(_STEP, gap / 64.0), _STEP * stiff)
-        around_v, around_y = (
-            x[:, None] * np.exp(_STENCIL * step[:, None]) for x, step in zip((v, y), self.steps, strict=True)
+        self.steps = (
+            np.minimum(_STEP, gap / 32.0),
+            np.minimum(np.minimum(_STEP, gap / 64.0), _STEP * stiff),
         )
-        self.solved = sweep.solve("full", around_v, y[:, None]), sweep.solve("full", v[:, None], around_y)
+        around_v, around_y = (
+            x[:, None] * np.exp(_STENCIL * step[:, None])
+            for x, step in zip((v, y), self.steps, strict=True)
+        )
+        self.solved = (
+            sweep.solve("full", around_v, y[:, None]),
+            sweep.solve("full", v[:, None], around_y),
+        )
 
     def slopes(self, name: str) -> tuple[Array, Array]:
-        """Slopes along ln v~ and ln y~, (2, n), by central differences, and what these may be wrong by."""
+        """Slopes along ln v~ and ln y~, (2, n), by central differences, and what these may be wrong
+        by."""
         slope, noise = np.empty((2, self.v.size)), np.empty((2, self.v.size))
         sliding = (self.v > self.crit)[:, None]
         for row, (step, solved) in enumerate(zip(self.steps, self.solved, strict=True)):
@@ -131,7 +148,8 @@ class Neighbours:
 
 
 class _Compared(NamedTuple):
-    """Errors, which are beyond the solver's own for all but mu~, the same relative to the value, bounds, sources."""
+    """Errors, which are beyond the solver's own for all but mu~, the same relative to the value,
+    bounds, sources."""
 
     error: Array
     relative: Array
@@ -140,7 +158,9 @@ class _Compared(NamedTuple):
     source: NDArray[np.int8]
 
 
-def _values(surrogate: Surrogate, name: str, v: Array, y: Array, solved: dict[str, Array]) -> _Compared:
+def _values(
+    surrogate: Surrogate, name: str, v: Array, y: Array, solved: dict[str, Array]
+) -> _Compared:
     value, bound, source = surrogate.quantity(name, v, y)
     truth = solved[name]
     noise = solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
@@ -157,7 +177,10 @@ def _slopes(surrogate: Surrogate, around: Neighbours, name: str) -> _Compared:
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
     source = surrogate.ratio_with_bound(v, y)[2]
     _, along_v, along_y, *bounds = surrogate.slopes(v, y, name, bounds=True)
-    off, bound = np.maximum(np.abs(np.stack((along_v, along_y)) - truth) - noise, 0.0), np.stack(bounds)
+    off, bound = (
+        np.maximum(np.abs(np.stack((along_v, along_y)) - truth) - noise, 0.0),
+        np.stack(bounds),
+    )
     # at the border of one that is not smooth there, the last digits of v~crit decide
     keep = np.full(v.shape, True)
     if not QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border:
@@ -180,18 +203,26 @@ def _report(parts: list[_Compared]) -> dict[str, Any]:
     """All together, and by source."""
     whole = _Compared(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     names = sorted((SOURCES[code], code) for code in np.unique(whole.source))
-    return {**_said(whole), "sources": {name: _said(whole, whole.source == code) for name, code in names}}
+    return {
+        **_said(whole),
+        "sources": {name: _said(whole, whole.source == code) for name, code in names},
+    }
 
 
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
-    """Of the report of :func:`verify`: how many values and slopes of each quantity miss their bound."""
+    """Of the report of :func:`verify`: how many values and slopes of each quantity miss their
+    bound."""
     found = {name: report.get(name, report)["not_covered"] for name in report["slopes"]}
-    return found | {f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()}
+    return found | {
+        f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()
+    }
 
 
 def holds(report: dict[str, Any], tolerance: float) -> bool:
     """Whether a report of :func:`verify` keeps the tolerance and every bound."""
-    errors = report["max_abs_error"] <= tolerance and report["max_rel_error"] <= ABS_TO_REL * tolerance
+    errors = (
+        report["max_abs_error"] <= tolerance and report["max_rel_error"] <= ABS_TO_REL * tolerance
+    )
     return errors and not any(uncovered(report).values())
 
 
@@ -201,10 +232,11 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     Returns
     -------
     dict
-        Of mu~: ``points``, ``max_abs_error``, ``max_rel_error``, ``max_bound``, ``not_covered`` (values whose error
-        exceeds their bound), and the same by kind of case in ``cases`` and by block or closed form in ``sources``;
-        ``seam_jump``, ``seam_slope_jump``, ``monotony``.  By name the same of each other quantity, beyond the solver's
-        own error, and in ``slopes`` of the slopes of each along ln v~ and ln y~, absolute, of one point in twenty.
+        Of mu~: ``points``, ``max_abs_error``, ``max_rel_error``, ``max_bound``, ``not_covered``
+        (values whose error exceeds their bound), and the same by kind of case in ``cases`` and by
+        block or closed form in ``sources``; ``seam_jump``, ``seam_slope_jump``, ``monotony``.  By
+        name the same of each other quantity, beyond the solver's own error, and in ``slopes`` of
+        the slopes of each along ln v~ and ln y~, absolute, of one point in twenty.
     """
     names = surrogate.table.quantities
     values: dict[str, list[_Compared]] = {name: [] for name in names}

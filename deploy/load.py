@@ -3,8 +3,9 @@
 
     python3 deploy/load.py URL [--workers 4] [--seconds 20]
 
-Every request must be answered: with 200 and all its cases, or with 503.  Prints one line of counts and the largest
-answer.  Exit code 1 if a request has no answer or another one.  Needs nothing but Python.
+Every request must be answered: with 200 and all its cases, or with 503.  Prints one line of counts
+and the largest answer.  Exit code 1 if a request has no answer or another one.  Needs nothing but
+Python.
 """
 
 import argparse
@@ -36,8 +37,12 @@ def texts() -> list[tuple[str, ...]]:
 def bodies() -> dict[str, tuple[str, bytes]]:
     """Name of a form -> its media type and body."""
     rows = texts()
-    whole = ["{" + ",".join(f'"{n}":{v}' for n, v in zip(NAMES, row, strict=True)) + "}" for row in rows]
-    columns = ",".join(f'"{n}":[{",".join(c)}]' for n, c in zip(NAMES, zip(*rows, strict=True), strict=True))
+    whole = [
+        "{" + ",".join(f'"{n}":{v}' for n, v in zip(NAMES, row, strict=True)) + "}" for row in rows
+    ]
+    columns = ",".join(
+        f'"{n}":[{",".join(c)}]' for n, c in zip(NAMES, zip(*rows, strict=True), strict=True)
+    )
     padding = (LARGEST - sum(map(len, whole)) - CASES - 2) // CASES  # spaces are read too
     padded = f",{' ' * padding}".join(whole)
     made = {
@@ -62,14 +67,18 @@ def ask(address: str, query: str, kind: str, body: bytes) -> tuple[int, int]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("url")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=20.0)
     chosen = parser.parse_args()
     address, forms = urlsplit(chosen.url).netloc, bodies()
     counts, largest = Counter[str](), [0]
-    asked = itertools.cycle(itertools.product(forms, ("", "?include=gradient,power,stick_fraction")))
+    asked = itertools.cycle(
+        itertools.product(forms, ("", "?include=gradient,power,stick_fraction"))
+    )
     lock, stop = threading.Lock(), time.monotonic() + chosen.seconds
 
     def client() -> None:
@@ -96,7 +105,10 @@ def main() -> int:
     right = {"503", *(f"{name} 200" for name in forms)}
     sizes = ", ".join(f"{name} {len(body) / 1e6:.1f} MB" for name, (_, body) in forms.items())
     told = ", ".join(f"{name}: {n}" for name, n in sorted(counts.items()))
-    print(f"{clients} clients; bodies: {sizes}; largest answer {largest[0] / 1e6:.1f} MB; answers: {told}")
+    print(
+        f"{clients} clients; bodies: {sizes}; largest answer {largest[0] / 1e6:.1f} MB; answers: "
+        f"{told}"
+    )
     return 0 if counts.keys() <= right and len(counts) > 1 else 1
 
 

@@ -20,7 +20,8 @@ ROOT = Path(__file__).resolve().parent.parent
 def run(platform: str, *words: str | Path) -> None:
     """One command, which must succeed; ``platform``: of the wheel that it builds."""
     print("---", *words, platform, flush=True)
-    subprocess.run(words, cwd=ROOT, env={**os.environ, "MUMACRO_BUILD_PLATFORM": platform}, check=True)  # noqa: S603
+    env = {**os.environ, "MUMACRO_BUILD_PLATFORM": platform}
+    subprocess.run(words, cwd=ROOT, env=env, check=True)  # noqa: S603
 
 
 def build(folder: Path, platforms: Iterable[str]) -> None:
@@ -28,7 +29,12 @@ def build(folder: Path, platforms: Iterable[str]) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     run("", "hatchling", "build", "-t", "sdist", "-d", folder)
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # each compiles in a folder of its own
-        list(pool.map(lambda platform: run(platform, "hatchling", "build", "-t", "wheel", "-d", folder), platforms))
+        list(
+            pool.map(
+                lambda platform: run(platform, "hatchling", "build", "-t", "wheel", "-d", folder),
+                platforms,
+            )
+        )
     run("", "check-wheel-contents", *folder.glob("*.whl"))
     for wheel in folder.glob("*linux*.whl") if sys.platform == "linux" else ():
         # a folder without libraries: those of this machine must not count

@@ -1,4 +1,5 @@
-"""The documentation as a site: ``python3 dev.py docs``; warnings are errors, links are checked by the build itself."""
+"""The documentation as a site: ``python3 dev.py docs``; warnings are errors, links are checked by
+the build itself."""
 
 import sys
 from pathlib import Path
@@ -24,7 +25,9 @@ html_css_files = ["mathml.css"]
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "interface", "mathml"]
 exclude_patterns = ["_ext", "_static"]
 nitpicky = True  # every reference to a function, a method, a module or a name must lead somewhere
-nitpick_ignore_regex = [("py:(class|exc|obj)", ".*")]  # types are words with shapes, such as "float or ndarray"
+nitpick_ignore_regex = [
+    ("py:(class|exc|obj)", ".*")
+]  # types are words with shapes, such as "float or ndarray"
 
 # Anchors of headings are those that GitHub makes, so that the pages read alike there.
 myst_heading_anchors = 4

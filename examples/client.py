@@ -1,4 +1,5 @@
-"""Ask the service from Python, with nothing but the standard library:  python examples/client.py [ADDRESS]"""
+"""Ask the service from Python, with nothing but the standard library:  python examples/client.py
+[ADDRESS]"""
 
 import json
 import sys
@@ -16,13 +17,18 @@ def get(path: str, **query: Any) -> Any:
 
 
 def post(path: str, body: dict[str, Any]) -> Any:
-    request = Request(f"{BASE}{path}", json.dumps(body).encode(), {"Content-Type": "application/json"})
+    request = Request(
+        f"{BASE}{path}", json.dumps(body).encode(), {"Content-Type": "application/json"}
+    )
     with urlopen(request, timeout=30) as response:
         return json.load(response)
 
 
 answer = get("/v1/mu-macro", **CASE, include="limits")
-print(f"mu_macro = {answer['mu_macro']:.6f} (numerical error {answer['error_bound']:.0e}), {answer['regime']}")
+print(
+    f"mu_macro = {answer['mu_macro']:.6f} (numerical error {answer['error_bound']:.0e}), "
+    f"{answer['regime']}"
+)
 print(f"slides without sticking from v0 = {answer['limits']['v0_crit']:.4g} m/s on")
 
 speeds = [0.001, 0.01, 0.1, 1.0]

@@ -36,7 +36,9 @@ def until_ready(server: subprocess.Popen[bytes], log: Path) -> str:
 def main() -> None:
     """Print question and answer."""
     # the defaults, not the settings of the user's shell
-    variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
+    variables = {
+        name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")
+    }
     with TemporaryDirectory() as folder:
         log = Path(folder) / "log"
         with log.open("wb") as sink:
@@ -44,7 +46,10 @@ def main() -> None:
             server = subprocess.Popen(command, env=variables, stdout=sink, stderr=sink)
         try:
             address = f"{until_ready(server, log)}/v1/mu-macro?{urlencode(CASE)}"
-            print("Question: " + ", ".join(f"{name} = {value} [{UNITS[name]}]" for name, value in CASE.items()))
+            print(
+                "Question: "
+                + ", ".join(f"{name} = {value} [{UNITS[name]}]" for name, value in CASE.items())
+            )
             print(f"GET {address}")
             with urllib.request.urlopen(address, timeout=10) as reply:
                 answer = json.load(reply)

@@ -2,10 +2,10 @@
 
     python examples/least_power.py [TABLE]
 
-A shaker (moving mass m, quality factor Q) brings the friction of a guide from mu0 down to ``TARGET``.  It pays twice:
-for the sliding that it causes in the contact, mu0 Fz l0 omega p(v~, y~), and for its own losses,
-m omega^3 y0^2 / (2 Q).  At low frequency the contact takes more, at high frequency the shaker itself does: the optimum
-lies between.
+A shaker (moving mass m, quality factor Q) brings the friction of a guide from mu0 down to
+``TARGET``.  It pays twice: for the sliding that it causes in the contact, mu0 Fz l0 omega p(v~,
+y~), and for its own losses, m omega^3 y0^2 / (2 Q).  At low frequency the contact takes more, at
+high frequency the shaker itself does: the optimum lies between.
 
 The component, with exact gradients from the table, is that of openmdao_component.py.
 """
@@ -30,12 +30,16 @@ MASS, QUALITY = 0.005, 1000.0  # [kg], [-]
 def optimise(surrogate: Surrogate, target: float = TARGET) -> Any:
     """The finished problem: ``y0`` and ``omega`` at least total power under mu_macro <= target."""
     problem = om.Problem(reports=None)
-    problem.model.add_subsystem("friction", Friction(surrogate=surrogate, power=True), promotes=["*"])
+    problem.model.add_subsystem(
+        "friction", Friction(surrogate=surrogate, power=True), promotes=["*"]
+    )
     losses = om.ExecComp(
         f"total = oscillation_power + {MASS} * omega**3 * y0**2 / (2 * {QUALITY})",
-        total={"units": "W"}, oscillation_power={"units": "W"},
-        omega={"units": "rad/s"}, y0={"units": "m"},
-    )  # fmt: skip
+        total={"units": "W"},
+        oscillation_power={"units": "W"},
+        omega={"units": "rad/s"},
+        y0={"units": "m"},
+    )
     problem.model.add_subsystem("shaker", losses, promotes=["*"])
     for name in ("omega", "y0"):
         problem.model.set_input_defaults(name, INPUTS[name], units=UNITS[name])
@@ -55,7 +59,9 @@ def main() -> None:
     surrogate = Surrogate.open(sys.argv[1] if len(sys.argv) > 1 else TABLE)
     problem = optimise(surrogate)
     y0, omega = problem.get_val("y0")[0], problem.get_val("omega")[0]
-    print(f"mu_macro = {problem.get_val('mu_macro')[0]:.6f} (mu0 = {INPUTS['mu0']}, target {TARGET})")
+    print(
+        f"mu_macro = {problem.get_val('mu_macro')[0]:.6f} (mu0 = {INPUTS['mu0']}, target {TARGET})"
+    )
     print(f"y0 = {1e6 * y0:.4f} um, frequency {omega / (2e3 * np.pi):.4f} kHz")
     total, contact = (1e3 * problem.get_val(name)[0] for name in ("total", "oscillation_power"))
     print(f"power {total:.3f} mW, {contact:.3f} of it in the contact")

@@ -1,5 +1,5 @@
-"""Friction as a component of an OpenMDAO model, with exact partial derivatives; least_power.py uses it.
-A value out of bounds raises AnalysisError, so that a line search steps back.
+"""Friction as a component of an OpenMDAO model, with exact partial derivatives; least_power.py uses
+it. A value out of bounds raises AnalysisError, so that a line search steps back.
 """
 
 from typing import Any
@@ -12,10 +12,13 @@ from mumacro.inputs import FIELDS, UNITS
 
 
 class Friction(om.ExplicitComponent):
-    """Six inputs in SI -> mu_macro [-], with the option ``power`` also oscillation_power [W], that of the shaker."""
+    """Six inputs in SI -> mu_macro [-], with the option ``power`` also oscillation_power [W], that
+    of the shaker."""
 
     def initialize(self) -> None:
-        self.options.declare("surrogate", default=None, types=Surrogate, allow_none=True, recordable=False)
+        self.options.declare(
+            "surrogate", default=None, types=Surrogate, allow_none=True, recordable=False
+        )
         self.options.declare("vec_size", default=1, types=int, lower=1)
         self.options.declare("power", default=False, types=bool)
 
@@ -31,7 +34,9 @@ class Friction(om.ExplicitComponent):
     def answer(self, inputs: Any, gradient: bool = False) -> tuple[Any, Any, Any]:
         case = {name: np.asarray(inputs[name]) for name in FIELDS}
         if self.options["power"] and np.isinf(case["k"]).any():
-            raise om.AnalysisError("the power of a rigid contact is not defined: give a finite k, or power=False")
+            raise om.AnalysisError(
+                "the power of a rigid contact is not defined: give a finite k, or power=False"
+            )
         try:
             found = self.table.evaluate(case, gradient=gradient, groups=True, illegal="raise")
             return found, case["mu0"] * case["Fz"], case["omega"]
@@ -56,7 +61,9 @@ class Friction(om.ExplicitComponent):
             unit, by_force = force * found.length_scale, 2.0 * p - along_v - along_y
             for name in ("mu0", "Fz"):
                 partials["oscillation_power", name] = omega * unit * by_force / inputs[name]
-            partials["oscillation_power", "k"] = omega * unit * (along_v + along_y - p) / inputs["k"]
+            partials["oscillation_power", "k"] = (
+                omega * unit * (along_v + along_y - p) / inputs["k"]
+            )
             partials["oscillation_power", "omega"] = unit * (p - along_v)
             partials["oscillation_power", "y0"] = force * omega * along_y / y
             partials["oscillation_power", "v0"] = force * along_v / v

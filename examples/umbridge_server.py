@@ -1,8 +1,10 @@
-"""Serve mu_macro as a UM-Bridge model: ``python examples/umbridge_server.py PORT``; needs the package ``umbridge``.
+"""Serve mu_macro as a UM-Bridge model: ``python examples/umbridge_server.py PORT``; needs the
+package ``umbridge``.
 
-Inputs [[mu0, Fz, k, y0, omega, v0]] in SI units, output [[mu_macro]], with Gradient and ApplyJacobian.  The model
-mu_macro_log10 takes the decimal logarithms of the inputs, for samplers.  The server of the package listens on every
-interface and has no key and no limits: use it in a trusted network only.
+Inputs [[mu0, Fz, k, y0, omega, v0]] in SI units, output [[mu_macro]], with Gradient and
+ApplyJacobian.  The model mu_macro_log10 takes the decimal logarithms of the inputs, for samplers.
+The server of the package listens on every interface and has no key and no limits: use it in a
+trusted network only.
 """
 
 import math
@@ -53,18 +55,23 @@ class Friction(umbridge.Model):
         """mu_macro; an illegal value raises InputError, which names it."""
         return [[self.surrogate.evaluate(self.case(parameters)).mu_macro]]
 
-    def gradient(self, _out: int, _inp: int, parameters: Any, sens: list[float], _config: Any) -> list[float]:
+    def gradient(
+        self, _out: int, _inp: int, parameters: Any, sens: list[float], _config: Any
+    ) -> list[float]:
         """The slopes times ``sens``; an infinite one (v0 = 0 at y~ = 1) is an error."""
         case = self.case(parameters)
         answer = self.surrogate.evaluate(case, gradient=True)
         slopes = [
-            answer.gradient[name] * sens[0] * (math.log(10.0) * case[name] if self.log10 else 1.0) for name in FIELDS
+            answer.gradient[name] * sens[0] * (math.log(10.0) * case[name] if self.log10 else 1.0)
+            for name in FIELDS
         ]
         if not all(map(math.isfinite, slopes)):
             raise ValueError("a slope is not finite at v0 = 0 and y~ = 1: choose another point")
         return slopes
 
-    def apply_jacobian(self, out: int, inp: int, parameters: Any, vec: list[float], config: Any) -> list[float]:
+    def apply_jacobian(
+        self, out: int, inp: int, parameters: Any, vec: list[float], config: Any
+    ) -> list[float]:
         """The slope in the direction ``vec``."""
         slopes = self.gradient(out, inp, parameters, [1.0], config)
         return [math.fsum(slope * step for slope, step in zip(slopes, vec, strict=True))]

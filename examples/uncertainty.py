@@ -2,8 +2,9 @@
 
 ADDRESS is that of a running `python examples/umbridge_server.py 4242`.
 
-The amplitude, the normal force and the friction coefficient are known to a few percent.  512 Sobol points through the
-model, taken by its logarithms, against the first-order estimate from one gradient.
+The amplitude, the normal force and the friction coefficient are known to a few percent.  512 Sobol
+points through the model, taken by its logarithms, against the first-order estimate from one
+gradient.
 """
 
 import math

@@ -2,8 +2,9 @@
 
     python fuzz/answers.py [--only promises|driven] [--share 0.01] [--write]
 
-Cases are drawn in three ways: any positive double for each input, by its bits; inputs of any size with groups v~ and
-y~ in the range of the table; and a share of inputs at the ends of the double range.
+Cases are drawn in three ways: any positive double for each input, by its bits; inputs of any size
+with groups v~ and y~ in the range of the table; and a share of inputs at the ends of the double
+range.
 """
 
 import math
@@ -27,11 +28,14 @@ from tests.test_driven_bounds import answered, hard, ordinary
 Array = NDArray[np.float64]
 Cases = dict[str, Array]
 N = 1_000_000  # cases for each property in the full run
-ENDS = np.array([5e-324, 2.2250738585072014e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300, 1.7976931348623157e308])
+ENDS = np.array(
+    [5e-324, 2.2250738585072014e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300, 1.7976931348623157e308]
+)
 
 
 def any_bits(rng: np.random.Generator, n: int) -> Array:
-    """Positive finite doubles, all bit patterns equally likely; every tenth at an end of the range."""
+    """Positive finite doubles, all bit patterns equally likely; every tenth at an end of the
+    range."""
     out = rng.integers(1, 0x7FF0000000000000, n, dtype=np.uint64).view(np.float64)
     ends = rng.random(n) < 0.1
     out[ends] = rng.choice(ENDS, int(ends.sum()))
@@ -48,7 +52,14 @@ def draw(n: int, seed: int) -> Cases:
         for low, high in ((-12, 12), (-12, 12), (-3, 1), (-60, 60), (-60, 60), (-60, 60))
     )
     length = mu0 * Fz / k
-    plain = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y * length, "omega": omega, "v0": v * omega * length}
+    plain = {
+        "mu0": mu0,
+        "Fz": Fz,
+        "k": k,
+        "y0": y * length,
+        "omega": omega,
+        "v0": v * omega * length,
+    }
     for name, values in plain.items():
         cases[name][:half] = values
     for name in ("y0", "omega", "v0"):
@@ -79,15 +90,19 @@ class Count:
 
 
 def excess(one: Any, other: Any, change: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Where a change of mu_macro is larger than the sum of both bounds, and the change over that sum.
+    """Where a change of mu_macro is larger than the sum of both bounds, and the change over that
+    sum.
 
-    Below 2.3e-308 doubles are 5e-324 apart: there both numbers, and their bounds, are rounded to a multiple of that.
+    Below 2.3e-308 doubles are 5e-324 apart: there both numbers, and their bounds, are rounded to a
+    multiple of that.
     """
     allowed = one.error_bound + other.error_bound
     rounded = np.minimum(one.mu_macro, other.mu_macro) < 2.3e-308
     allowed = np.where(rounded, allowed + 4 * 5e-324, allowed)
     with np.errstate(all="ignore"):
-        return change > allowed, np.where(change > 0.0, change / np.where(allowed > 0.0, allowed, 5e-324), 0.0)
+        return change > allowed, np.where(
+            change > 0.0, change / np.where(allowed > 0.0, allowed, 5e-324), 0.0
+        )
 
 
 def finite(table: Surrogate, share: float) -> Count:
@@ -95,13 +110,19 @@ def finite(table: Surrogate, share: float) -> Count:
     for _, _, cases in pieces(N, share):
         a = table.evaluate(cases)
         good = np.isfinite(a.mu_macro) & (a.mu_macro >= 0.0) & (a.mu_macro <= cases["mu0"])
-        good &= (a.mu_ratio >= 0.0) & (a.mu_ratio <= 1.0) & np.isfinite(a.error_bound) & (a.error_bound >= 0.0)
+        good &= (
+            (a.mu_ratio >= 0.0)
+            & (a.mu_ratio <= 1.0)
+            & np.isfinite(a.error_bound)
+            & (a.error_bound >= 0.0)
+        )
         count.add(~good)
     return count
 
 
 def monotone(table: Surrogate, share: float) -> Count:
-    """mu_macro does not fall as v0 rises, nor rise as y0 or omega rise, by more than both bounds."""
+    """mu_macro does not fall as v0 rises, nor rise as y0 or omega rise, by more than both
+    bounds."""
     count = Count()
     for n, seed, cases in pieces(N // 3, share):
         rng = np.random.default_rng(seed + 1000)
@@ -109,7 +130,9 @@ def monotone(table: Surrogate, share: float) -> Count:
         for name, sign in (("v0", 1.0), ("y0", -1.0), ("omega", -1.0)):
             with np.errstate(all="ignore"):
                 step = cases[name] * (1.0 + 10.0 ** rng.uniform(-16.0, 1.0, n))
-                step = np.minimum(np.maximum(step, np.nextafter(cases[name], np.inf)), 1.7976931348623157e308)
+                step = np.minimum(
+                    np.maximum(step, np.nextafter(cases[name], np.inf)), 1.7976931348623157e308
+                )
             other = table.evaluate({**cases, name: step})
             # omega = 0 means no oscillation for any v0: a separate limit, like y0 = 0
             count.add(*excess(one, other, sign * (one.mu_macro - other.mu_macro)))
@@ -117,7 +140,8 @@ def monotone(table: Surrogate, share: float) -> Count:
 
 
 def scaled(table: Surrogate, share: float, by_twos: bool) -> Count:
-    """(Fz, k) and (v0, omega) by one power of two: the same bits; by any factor: within both bounds."""
+    """(Fz, k) and (v0, omega) by one power of two: the same bits; by any factor: within both
+    bounds."""
     count = Count()
     for n, seed, cases in pieces(N // 2, share):
         rng = np.random.default_rng(seed + 2000)
@@ -125,7 +149,8 @@ def scaled(table: Surrogate, share: float, by_twos: bool) -> Count:
             factor = 2.0 ** rng.integers(-60, 60, n) if by_twos else 10.0 ** rng.uniform(-20, 20, n)
             with np.errstate(all="ignore"):
                 moved = {name: cases[name] * factor for name in pair}
-            kept = np.ones(n, np.bool_)  # outside the normal range the scaled input itself is rounded
+            # outside the normal range the scaled input itself is rounded
+            kept = np.ones(n, np.bool_)
             for name in pair:
                 normal = (moved[name] >= 1e-305) & (moved[name] < 1e305) & (cases[name] >= 1e-305)
                 kept &= normal | (cases[name] == 0.0) | np.isinf(cases[name])
@@ -144,13 +169,15 @@ def neighbours(table: Surrogate, share: float) -> Count:
     for _, _, cases in pieces(N // 6, share):
         one = table.evaluate(cases)
         for name in FIELDS:
-            # zero is a separate limit, and the last digit of a denormal number is a large part of it
+            # zero is a separate limit, and the last digit of a denormal number is a large part of
+            # it
             ordinary = (cases[name] > 1e-300) & (cases[name] < 1e300)
             moved = np.where(ordinary, np.nextafter(cases[name], 1.7e308), cases[name])
             other = table.evaluate({**cases, name: moved})
             change = np.abs(one.mu_macro - other.mu_macro)
             if name == "mu0":
-                change = np.maximum(change - 2.3e-16 * one.mu_macro, 0.0)  # mu_macro is proportional to it
+                # mu_macro is proportional to it
+                change = np.maximum(change - 2.3e-16 * one.mu_macro, 0.0)
             count.add(*excess(one, other, change))
     return count
 
@@ -185,52 +212,101 @@ def on_any_processor(table: Surrogate, share: float) -> Count:
         (here, source), (there, other) = found
         change, allowed = np.abs(here[0] - there[0]), here[2] + there[2]
         with np.errstate(all="ignore"):
-            count.add((change > allowed) | (source != other), np.where(change > 0.0, change / allowed, 0.0))
+            count.add(
+                (change > allowed) | (source != other),
+                np.where(change > 0.0, change / allowed, 0.0),
+            )
     return count
 
 
 def nearby(rng: np.random.Generator, v: Array, y: Array, size: float) -> tuple[Array, Array]:
-    """Points around others, with v~ < y~: the amplitude and the distance to v~ = y~ moved by a factor."""
+    """Points around others, with v~ < y~: the amplitude and the distance to v~ = y~ moved by a
+    factor."""
     moved = y * np.exp(size * rng.standard_normal(y.size))
     x, gap = v / y, (y - v) / y
     with np.errstate(all="ignore"):
-        x, gap = x * np.exp(size * rng.standard_normal(y.size)), gap * np.exp(size * rng.standard_normal(y.size))
-    slow = np.where(v / y < 0.5, moved * np.minimum(x, 0.999), moved * (1.0 - np.minimum(gap, 0.999)))
+        x, gap = (
+            x * np.exp(size * rng.standard_normal(y.size)),
+            gap * np.exp(size * rng.standard_normal(y.size)),
+        )
+    slow = np.where(
+        v / y < 0.5, moved * np.minimum(x, 0.999), moved * (1.0 - np.minimum(gap, 0.999))
+    )
     return np.where(slow < moved, slow, v), np.where(slow < moved, moved, y)
 
 
 def driven(share: float) -> str:
-    """Bounds of oscillation along and of the normal force, against more digits: random, hard, around the worst."""
+    """Bounds of oscillation along and of the normal force, against more digits: random, hard,
+    around the worst."""
     if not extended.HAS_EXTENDED:
         return "numpy.longdouble has the digits of a double on this machine: no reference."
     table, rng, rows = Surrogate.open(1e-10), np.random.default_rng(21), []
-    for contact, direction, n in (("spring", "along", N), ("spring", "normal", N), ("ball", "along", N // 50)):
+    for contact, direction, n in (
+        ("spring", "along", N),
+        ("spring", "normal", N),
+        ("ball", "along", N // 50),
+    ):
         normal, count = direction == "normal", max(500, int(n * share))
 
         def exact(v: Array, y: Array, contact: str = contact, normal: bool = normal) -> Any:
-            return extended.ball(v, y, 48) if contact == "ball" else extended.spring(v, y, not normal)
+            return (
+                extended.ball(v, y, 48) if contact == "ball" else extended.spring(v, y, not normal)
+            )
 
-        def shares(v: Array, y: Array, contact: str = contact, direction: str = direction, exact: Any = exact) -> Any:
+        def shares(
+            v: Array,
+            y: Array,
+            contact: str = contact,
+            direction: str = direction,
+            exact: Any = exact,
+        ) -> Any:
             parts = [slice(low, low + 20_000) for low in range(0, v.size, 20_000)]
-            found = [(answered(table, v[part], y[part], contact, direction), exact(v[part], y[part])) for part in parts]
-            error = np.concatenate([np.abs(rows[:, 0].astype(np.longdouble) - true) for rows, true in found], axis=1)
+            found = [
+                (answered(table, v[part], y[part], contact, direction), exact(v[part], y[part]))
+                for part in parts
+            ]
+            error = np.concatenate(
+                [np.abs(rows[:, 0].astype(np.longdouble) - true) for rows, true in found], axis=1
+            )
             bound = np.concatenate([rows[:, 1] for rows, _ in found], axis=1)
             return np.nan_to_num((error / np.maximum(bound, 1e-300)).astype(float))
 
         v, y = ordinary(count, 22, normal)
         worst = shares(v, y)
-        medians = [float(np.median(1.0 / row[row > 0])) if (row > 0).any() else math.nan for row in worst]
+        medians = [
+            float(np.median(1.0 / row[row > 0])) if (row > 0).any() else math.nan for row in worst
+        ]
         if not normal:
             hard_v, hard_y = hard(count // 20, 23)
-            v, y, worst = np.append(v, hard_v), np.append(y, hard_y), np.hstack([worst, shares(hard_v, hard_y)])
+            v, y, worst = (
+                np.append(v, hard_v),
+                np.append(y, hard_y),
+                np.hstack([worst, shares(hard_v, hard_y)]),
+            )
         for size in (0.3, 0.03, 0.003):
             best = np.argsort(worst.max(axis=0))[-max(50, int(1000 * share)) :]
             close_v, close_y = nearby(rng, np.repeat(v[best], 4), np.repeat(y[best], 4), size)
-            v, y, worst = np.append(v, close_v), np.append(y, close_y), np.hstack([worst, shares(close_v, close_y)])
+            v, y, worst = (
+                np.append(v, close_v),
+                np.append(y, close_y),
+                np.hstack([worst, shares(close_v, close_y)]),
+            )
         for name, row, median in zip(extended.ROWS, worst, medians, strict=True):
             if not math.isnan(median):  # direction normal has no power
-                rows.append([contact, direction, name, f"{v.size:,}", f"{row.max():.2f}", quantity(median)])
-    return markdown(("contact", "direction", "row", "points", "largest error, bound = 1", "median bound / error"), rows)
+                rows.append(
+                    [contact, direction, name, f"{v.size:,}", f"{row.max():.2f}", quantity(median)]
+                )
+    return markdown(
+        (
+            "contact",
+            "direction",
+            "row",
+            "points",
+            "largest error, bound = 1",
+            "median bound / error",
+        ),
+        rows,
+    )
 
 
 PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
@@ -251,7 +327,9 @@ def promises(share: float) -> str:
             found = check(Surrogate.open(tolerance), share)
             worst = quantity(found.worst) if found.worst else ""
             rows.append([name, f"{tolerance:g}", f"{found.tried:,}", f"{found.broken:,}", worst])
-    return markdown(("property", "table", "tried", "broken", "largest change or error, bound = 1"), rows)
+    return markdown(
+        ("property", "table", "tried", "broken", "largest change or error, bound = 1"), rows
+    )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Every limit of the service at its maximum count: as many clients as are allowed do their worst at the same time.
+"""Every limit of the service at its maximum count: as many clients as are allowed do their worst at
+the same time.
 
     python fuzz/attacks.py [--only attacks] [--share 0.2] [--write]
 
-Beside each attack another client asks ``/livez``, one new connection after another.  Seen are the most memory of the
-process, and the longest of these waits.
+Beside each attack another client asks ``/livez``, one new connection after another.  Seen are the
+most memory of the process, and the longest of these waits.
 """
 
 import json
@@ -17,11 +18,14 @@ from http.client import HTTPException
 from benchmarks.measuring import main, markdown, sections
 from tests.serving import CASE, Server, asking, connect, head, serving
 
-CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
+# the defaults; a few connections are left
+CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20
 EVERYTHING = ["groups", "limits", "gradient", "stick_fraction", "power", "settling"]
 
 
-def held(server: Server, share: float, text: bytes, then: Callable[[], object] = lambda: time.sleep(3.0)) -> None:
+def held(
+    server: Server, share: float, text: bytes, then: Callable[[], object] = lambda: time.sleep(3.0)
+) -> None:
     """Send the same bytes on as many connections as are allowed, and hold these."""
     with ExitStack() as stack:
         for _ in range(round(CONNECTIONS * share)):
@@ -60,7 +64,9 @@ def strange_words(server: Server, share: float) -> None:
 def idle_streams(server: Server, share: float) -> None:
     def law() -> None:
         given = {name: value for name, value in CASE.items() if name != "v0"}
-        status, _, _ = server.ask("POST", "/v1/law", json.dumps({**given, "start": 1e-4, "stop": 1.0}))
+        status, _, _ = server.ask(
+            "POST", "/v1/law", json.dumps({**given, "start": 1e-4, "stop": 1.0})
+        )
         assert status == 200, f"/v1/law: {status}"
 
     held(server, share, head("/v1/mu-macro/batch", None, "application/x-ndjson"), law)
@@ -69,14 +75,21 @@ def idle_streams(server: Server, share: float) -> None:
 def descriptions(server: Server, share: float) -> None:
     number = max(4, round(8 * share))
     with ThreadPoolExecutor(number) as pool:
-        statuses = {answer[0] for answer in pool.map(lambda _: server.ask("GET", "/openapi.json"), range(number))}
+        statuses = {
+            answer[0]
+            for answer in pool.map(lambda _: server.ask("GET", "/openapi.json"), range(number))
+        }
     assert statuses == {200}, statuses
 
 
 def brackets(server: Server, share: float) -> None:
     units = (b"[],", b"0,", b'{"":0},')
-    posted(server, "application/json", *(b"[" + u * round((BODY - 100) / len(u) * share) + b"0]" for u in units),
-           number=2 * BATCHES)  # fmt: skip
+    posted(
+        server,
+        "application/json",
+        *(b"[" + u * round((BODY - 100) / len(u) * share) + b"0]" for u in units),
+        number=2 * BATCHES,
+    )
 
 
 Attack = Callable[[Server, float], None]
@@ -95,12 +108,16 @@ def csv_of(start: bytes, line: bytes) -> Attack:
 
 
 ATTACKS: dict[str, Attack] = {
-    "Heads without an end, of 64 KB of the smallest fields":
-        holding(b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a:b\r\n" * 13_000),
-    "16 KB of the smallest requests on each connection, whose answers are not read":
-        holding(b"GET /x HTTP/1.1\r\nHost:x\r\n\r\n" * 600),
+    "Heads without an end, of 64 KB of the smallest fields": holding(
+        b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a:b\r\n" * 13_000
+    ),
+    "16 KB of the smallest requests on each connection, whose answers are not read": holding(
+        b"GET /x HTTP/1.1\r\nHost:x\r\n\r\n" * 600
+    ),
     "More connections without a byte than are allowed": holding(b"", 1.5),
-    "Bodies of 64 KB that lack their last byte": holding(head("/v1/mu-macro", 65_000) + b" " * 64_999),
+    "Bodies of 64 KB that lack their last byte": holding(
+        head("/v1/mu-macro", 65_000) + b" " * 64_999
+    ),
     "A CSV whose first line is as long as a body may be": csv_of(b"", b"a,"),
     "A CSV of blank lines": csv_of(b"mu0,Fz,k,y0,omega,v0\n", b"\n"),
     "JSON of the smallest values and lists": brackets,
@@ -108,11 +125,12 @@ ATTACKS: dict[str, Attack] = {
     "Columns of words and of nulls, which Python reads one by one": strange_words,
     "Streams without a line; the question of a person is answered beside them": idle_streams,
     "Many at once ask for /openapi.json for the first time": descriptions,
-}  # fmt: skip
+}
 
 
 def tried(attack: Attack, share: float) -> tuple[float, float]:
-    """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve afterwards."""
+    """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve
+    afterwards."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(8192, most), most))
     with serving() as server:

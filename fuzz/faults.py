@@ -2,8 +2,8 @@
 
     python fuzz/faults.py [--write]
 
-Small disks are mounted as tmpfs and permissions are removed for another user; both need root.  A trial
-that cannot be made on this machine is reported as "not tried".
+Small disks are mounted as tmpfs and permissions are removed for another user; both need root.  A
+trial that cannot be made on this machine is reported as "not tried".
 """
 
 import os
@@ -24,7 +24,8 @@ from mumacro.writing import alone_in
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
 TOLERANCE = "1e-2"
-AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")  # a user that owns nothing
+# a user that owns nothing
+AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")
 
 
 class NotTriedError(Exception):
@@ -34,7 +35,15 @@ class NotTriedError(Exception):
 def run(*words: object, nobody: bool = False, code: int = 0) -> str:
     """Run a command of the project and return its last output: one line if it fails."""
     command = (*(AS_NOBODY if nobody else ()), sys.executable, *map(str, words))
-    done = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=1800, check=False)
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        timeout=1800,
+        check=False,
+    )
     assert "Traceback" not in done.stderr, done.stderr
     assert done.returncode == code, f"exit code {done.returncode}: {done.stderr or done.stdout}"
     lines = (done.stderr if done.returncode in (1, 2) else done.stdout).strip().splitlines()
@@ -86,7 +95,10 @@ def left(folder: Path) -> list[str]:
 def full_disk_in_a_build(folder: Path) -> str:
     with small_disk(folder, "96k") as disk:
         said = run(*build(disk / "rough.nc"), code=1)
-        assert "No space left on device; repair that and give the same command again: it resumes" in said, said
+        assert (
+            "No space left on device; repair that and give the same command again: it resumes"
+            in said
+        ), said
         assert not [name for name in left(disk) if name.endswith(".growing")], left(disk)
         kept = len(left(disk))
         subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
@@ -94,7 +106,10 @@ def full_disk_in_a_build(folder: Path) -> str:
         assert left(disk) == ["rough.nc"]
         run(*build(folder / "whole.nc"))
         assert checksum(disk / "rough.nc") == checksum(folder / "whole.nc")
-    return f"one line; {kept} finished parts kept; with more space the same command gives the same table"
+    return (
+        f"one line; {kept} finished parts kept; with more space the same command gives the "
+        "same table"
+    )
 
 
 def lost_permission(folder: Path) -> str:
@@ -102,13 +117,16 @@ def lost_permission(folder: Path) -> str:
     shut, source = closed(folder), folder / "cases.csv"
     source.write_text("mu0,Fz,k,y0,omega,v0\n0.3,10,1e6,2e-6,1.3e5,0.01\n")
     program = (
-        "import sys, mumacro\nfrom mumacro.table import read_table, write_table\ntable = read_table(sys.argv[1])\n"
-        "try:\n    write_table(table, sys.argv[2])\nexcept mumacro.TableError as error:\n    sys.exit(error.reason)"
+        "import sys, mumacro\nfrom mumacro.table import read_table, write_table\ntable = "
+        "read_table(sys.argv[1])\n"
+        "try:\n    write_table(table, sys.argv[2])\nexcept mumacro.TableError as error:\n    "
+        "sys.exit(error.reason)"
     )
     for words in (
-        build(shut / "rough.nc"), ("-c", program, SMALLEST, shut / "new.nc"),
+        build(shut / "rough.nc"),
+        ("-c", program, SMALLEST, shut / "new.nc"),
         ("-m", "mumacro", "eval", source, "-o", shut / "out.csv"),
-    ):  # fmt: skip
+    ):
         found = run(*words, nobody=True, code=1)
         assert "Permission denied" in found, found
         assert left(shut) == []
@@ -118,7 +136,9 @@ def lost_permission(folder: Path) -> str:
 def two_builds_to_one_output(folder: Path) -> str:
     with alone_in(folder / "rough.nc.checkpoint"):
         said = run(*build(folder / "rough.nc"), code=1)
-    assert "rough.nc.checkpoint: another process is at work here; wait for it, or stop it" in said, said
+    assert (
+        "rough.nc.checkpoint: another process is at work here; wait for it, or stop it" in said
+    ), said
     assert left(folder) == []
     return "the second is refused with one line"
 
@@ -136,7 +156,9 @@ def killed_builds(folder: Path, kills: int = 20) -> str:
     for i in range(kills):
         before = parts()
         done += out.exists()
-        process = subprocess.Popen([sys.executable, *build(out)], cwd=ROOT, env=ENVIRONMENT, stdout=-3, stderr=-3)
+        process = subprocess.Popen(
+            [sys.executable, *build(out)], cwd=ROOT, env=ENVIRONMENT, stdout=-3, stderr=-3
+        )
         while i % 2 == 0 and process.poll() is None and parts() <= before:
             time.sleep(0.01)
         with suppress(subprocess.TimeoutExpired):
@@ -147,7 +169,10 @@ def killed_builds(folder: Path, kills: int = 20) -> str:
     run(*build(out))
     assert checksum(out) == checksum(folder / "whole.nc")
     assert left(folder) == ["rough.nc", "whole.nc"], left(folder)
-    return f"{kills} kills, {resumed} starts from finished parts, {done} after an end: the same data, no file left"
+    return (
+        f"{kills} kills, {resumed} starts from finished parts, {done} after an end: the same "
+        "data, no file left"
+    )
 
 
 FAULTS: dict[str, Callable[[Path], str]] = {

@@ -2,7 +2,8 @@
 
     python fuzz/framing.py [--share 0.01] [--write]
 
-A request that another reader does not see could hide behind one (request smuggling).  A text's seed is its number.
+A request that another reader does not see could hide behind one (request smuggling).  A text's seed
+is its number.
 """
 
 import json
@@ -21,17 +22,30 @@ from tests.serving import CASE, Server, chunk, connect, serving, to_end
 TABLE, TOTAL = ROOT / "tables" / "mumacro-1e-4.nc", 200_000
 BODY = json.dumps(CASE).encode()
 LENGTH, CHUNKED = b"Content-Length: %d\r\n" % len(BODY), b"Transfer-Encoding: chunked\r\n"
-POST, SECOND = b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\n", b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
+POST, SECOND = (
+    b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\n",
+    b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n",
+)
 TEXTS = [
     POST + LENGTH + b"\r\n" + BODY, POST + LENGTH + CHUNKED + b"\r\n" + chunk(BODY) + chunk(b""),
     POST + CHUNKED + b"\r\n" + chunk(BODY[:20]) + chunk(BODY[20:]) + chunk(b""),
     b"GET /v1/mu-macro?mu0=0.3&Fz=10&k=1e6&y0=2e-6&omega=1e5&v0=0.01 HTTP/1.1\r\nHost: x\r\n\r\n",
 ]  # fmt: skip
 PIECES = [
-    *(bytes([byte]) for byte in b" \t\r\n\0:;,x05-+/\x0b\x7f\xff"), b"", b"\r\n", b"chunked", LENGTH, CHUNKED,
-    b"Content-Length: 5\r\n", b"Host: x\r\n", b"0\r\n\r\n", b"HTTP/1.1", b"5;a=b\r\n", b"fffffffffffffffff\r\n",
+    *(bytes([byte]) for byte in b" \t\r\n\0:;,x05-+/\x0b\x7f\xff"),
+    b"",
+    b"\r\n",
+    b"chunked",
+    LENGTH,
+    CHUNKED,
+    b"Content-Length: 5\r\n",
+    b"Host: x\r\n",
+    b"0\r\n\r\n",
+    b"HTTP/1.1",
+    b"5;a=b\r\n",
+    b"fffffffffffffffff\r\n",
     b"Transfer-Encoding: gzip, chunked\r\n",
-]  # fmt: skip
+]
 Request = tuple[bytes, bytes, bytes | None]  # method, target, body
 
 
@@ -46,7 +60,8 @@ def changed(text: bytes, chance: random.Random) -> bytes:
 def by_h11(text: bytes) -> list[Request]:
     """The requests that h11 reads; the last one without a body where that is not whole.
 
-    Without what RFC 9112 (2.2, 3) and RFC 9110 (5.6.1) let a server ignore: empty lines, spaces, elements of a list.
+    Without what RFC 9112 (2.2, 3) and RFC 9110 (5.6.1) let a server ignore: empty lines, spaces,
+    elements of a list.
     """
     found: list[Request] = []
     with suppress(h11.RemoteProtocolError):
@@ -98,8 +113,12 @@ def compared(server: Server, seed: int) -> str:
         known = expected[count] if count < len(expected) else (b"", b"", None)
         plain = answer_to(server, known) if known[0] else (0, b"")
         early = known[0] == b"POST" and known[2] is None and status < 400
-        if early or status != plain[0] or (status < 400 and body != plain[1]):  # a problem has the id of its request
-            return f"OTHER {seed}: {text!r} has the answer {status} {body[:100]!r}, h11 reads {expected}"
+        # a problem has the id of its request
+        if early or status != plain[0] or (status < 400 and body != plain[1]):
+            return (
+                f"OTHER {seed}: {text!r} has the answer {status} {body[:100]!r}, h11 reads "
+                f"{expected}"
+            )
         count += 1
     return "the same" if count == len(expected) else "fewer here"
 
@@ -111,7 +130,10 @@ def framing(share: float) -> str:
         errors, code = server.errors(), server.stop()
     rows = [(name[:1000], f"{count:,}") for name, count in found.most_common(5)]
     failed = " FAILED" if errors or code or found.keys() - {"the same", "fewer here"} else ""
-    return f"{markdown(('requests', 'texts'), rows)}\n\n{len(errors)} errors in the log, exit code {code}.{failed}"
+    return (
+        f"{markdown(('requests', 'texts'), rows)}\n\n{len(errors)} errors in the log, exit "
+        f"code {code}.{failed}"
+    )
 
 
 if __name__ == "__main__":

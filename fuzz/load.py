@@ -59,13 +59,22 @@ QUESTIONS = {
     "a law": posted("/v1/law", **RIG, start=1e-4, stop=1.0),
     "an inverse": posted("/v1/solve-for", **RIG, unknown="v0", target=0.1),
     "a fit": posted(
-        "/v1/fit", mu0=0.3, unknowns=["k"], Fz=10.0, y0=2e-6, omega=1.3e5, v0=[0.01, 0.1], mu_macro=[0.05, 0.2]
+        "/v1/fit",
+        mu0=0.3,
+        unknowns=["k"],
+        Fz=10.0,
+        y0=2e-6,
+        omega=1.3e5,
+        v0=[0.01, 0.1],
+        mu_macro=[0.05, 0.2],
     ),
 }
 
 
 def ask(connection: HTTPConnection, question: Question) -> tuple[int, bytes]:
-    connection.request(question.method, question.path, question.body, {"Content-Type": question.kind})
+    connection.request(
+        question.method, question.path, question.body, {"Content-Type": question.kind}
+    )
     reply = connection.getresponse()
     return reply.status, reply.read()
 
@@ -102,11 +111,17 @@ def mixed_load(minutes: float) -> str:
         right = expected(server)
 
         def loop(number: int, stop: threading.Event) -> None:
-            connection, names = connected(server), cycle([*QUESTIONS][number:] + [*QUESTIONS][:number])
+            connection, names = (
+                connected(server),
+                cycle([*QUESTIONS][number:] + [*QUESTIONS][:number]),
+            )
             while not stop.is_set():
                 name = next(names)
                 status, body = ask(connection, QUESTIONS[name])
-                counts[name, "refused" if status == 503 else "right" if body == right[name] else "wrong"] += 1
+                counts[
+                    name,
+                    "refused" if status == 503 else "right" if body == right[name] else "wrong",
+                ] += 1
 
         with asking(server) as waits, clients(loop):
             time.sleep(6.0 * minutes)
@@ -115,14 +130,20 @@ def mixed_load(minutes: float) -> str:
             grown = server.memory() - before
         assert not server.errors(), server.errors()[:1]
         code = server.stop()
-    rows = [[name, *(f"{counts[name, what]:,}" for what in ("right", "refused", "wrong"))] for name in QUESTIONS]
+    rows = [
+        [name, *(f"{counts[name, what]:,}" for what in ("right", "refused", "wrong"))]
+        for name in QUESTIONS
+    ]
     table = markdown(("question", "right", "refused (503)", "wrong"), rows)
-    return (f"{table}\n\nLongest wait of /livez {1e3 * max(waits):.0f} ms; {grown:.0f} MB more at the end than after a "
-            f"tenth of the time; exit code {code}.")  # fmt: skip
+    return (
+        f"{table}\n\nLongest wait of /livez {1e3 * max(waits):.0f} ms; {grown:.0f} MB more at the "
+        f"end than after a tenth of the time; exit code {code}."
+    )
 
 
 def overload(minutes: float) -> str:
-    """Four times as many clients with large batches as there are slots; one with short requests beside them."""
+    """Four times as many clients with large batches as there are slots; one with short requests
+    beside them."""
     counts: Counter[tuple[str, str]] = Counter()
     waits = list[float]()
     with serving(TABLE) as server:
@@ -138,17 +159,23 @@ def overload(minutes: float) -> str:
                 if number == 0:
                     waits.append(time.perf_counter() - started)
                 refused = status == 503 and headers["retry-after"] == "1"
-                counts[name, "refused" if refused else "right" if body == right[name] else "wrong"] += 1
+                counts[
+                    name, "refused" if refused else "right" if body == right[name] else "wrong"
+                ] += 1
 
         with clients(loop, 17):
             time.sleep(60.0 * minutes)
         most, code = server.memory("VmHWM"), server.stop()
     told = "; ".join(f"{name}, {what}: {n:,}" for (name, what), n in sorted(counts.items()))
-    return f"{told}. Longest wait of one case {1e3 * max(waits):.0f} ms, most memory {most:.0f} MB, exit code {code}."
+    return (
+        f"{told}. Longest wait of one case {1e3 * max(waits):.0f} ms, most memory {most:.0f} "
+        f"MB, exit code {code}."
+    )
 
 
 def rolling_restart(minutes: float) -> str:
-    """One of two services after the other is replaced beside clients, who ask the other one again if one closes."""
+    """One of two services after the other is replaced beside clients, who ask the other one again
+    if one closes."""
     counts: Counter[str] = Counter()
     with ExitStack() as stack:
         servers = [stack.enter_context(serving(TABLE)) for _ in range(SERVERS)]
@@ -159,7 +186,9 @@ def rolling_restart(minutes: float) -> str:
             while not stop.is_set():
                 for server in [*servers[number % 2 :], *servers[: number % 2]] * 2:
                     try:
-                        status, body = ask(connections.setdefault(server.port, connected(server)), SHORT)
+                        status, body = ask(
+                            connections.setdefault(server.port, connected(server)), SHORT
+                        )
                     except (OSError, HTTPException):  # the service has closed before it answered
                         connections.pop(server.port).close()
                         counts["asked again"] += 1

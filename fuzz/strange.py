@@ -2,8 +2,8 @@
 
     python fuzz/strange.py [--only strange_requests] [--share 0.001] [--write]
 
-They go over sockets to a running service.  The seed of a share of the work is its number, so that a failure can be
-reproduced: ``--again NUMBER`` sends one share and prints the failing requests.
+They go over sockets to a running service.  The seed of a share of the work is its number, so that a
+failure can be reproduced: ``--again NUMBER`` sends one share and prints the failing requests.
 """
 
 import gzip
@@ -47,7 +47,14 @@ class Request(NamedTuple):
 
 def case(chance: random.Random) -> dict[str, float]:
     """A random case inside the table's range or near it."""
-    spans = {"mu0": (-1, 0), "Fz": (0, 3), "k": (4, 8), "y0": (-8, -4), "omega": (3, 6), "v0": (-5, 1)}
+    spans = {
+        "mu0": (-1, 0),
+        "Fz": (0, 3),
+        "k": (4, 8),
+        "y0": (-8, -4),
+        "omega": (3, 6),
+        "v0": (-5, 1),
+    }
     return {name: 10.0 ** chance.uniform(*span) for name, span in spans.items()}
 
 
@@ -66,7 +73,11 @@ def document(chance: random.Random) -> tuple[str, Any]:
         one["f"] = one.pop("omega")
     one |= {} if chance.random() < 0.9 else {"k": chance.choice([None, "rigid"])}
     one |= {} if chance.random() < 0.9 else {"tolerance": 1e-3}
-    one |= {} if chance.random() < 0.7 else {"contact": chance.choice(CONTACTS), "direction": chance.choice(DIRECTIONS)}
+    one |= (
+        {}
+        if chance.random() < 0.7
+        else {"contact": chance.choice(CONTACTS), "direction": chance.choice(DIRECTIONS)}
+    )
     if one.get("direction") == "normal":
         del one["y0"]
         one["Fz_amplitude"] = one["Fz"] * chance.random()
@@ -74,21 +85,53 @@ def document(chance: random.Random) -> tuple[str, Any]:
         one["k_range"] = [one["k"], one.pop("k") * 10.0 ** chance.uniform(0, 2)]
     rest = {name: value for name, value in one.items() if name != "v0"}
     speeds = sorted(10.0 ** chance.uniform(-5, 1) for _ in range(chance.choice([1, 3, 6])))
-    measured = {"Fz": 10.0, "omega": 6e5, "v0": speeds, "mu_macro": [0.3 * v / (v + 0.1) for v in speeds]}
+    measured = {
+        "Fz": 10.0,
+        "omega": 6e5,
+        "v0": speeds,
+        "mu_macro": [0.3 * v / (v + 0.1) for v in speeds],
+    }
     measured["y0"] = chance.choice([2e-6, [2e-6] * len(speeds)])
     half = {"unknowns": ["k"], "mu0": 0.3}
     geometry = chance.choice([*GEOMETRIES])
-    bodies: dict[str, Any] = {"geometry": geometry, "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3}
+    bodies: dict[str, Any] = {
+        "geometry": geometry,
+        "radius": 5e-3,
+        "Fz": 10.0,
+        "E": 210e9,
+        "nu": 0.3,
+    }
     bodies |= {"length": 0.01, "oscillation": chance.choice(AXES)} if geometry == "cylinder" else {}
-    return chance.choice((
-        ("/v1/mu-macro", one),
-        (BATCH, {**one, "v0": [10.0 ** chance.uniform(-5, 1) for _ in range(chance.choice([0, 1, 2, 5, 300]))]}),
-        (BATCH, [case(chance) for _ in range(chance.choice([0, 1, 2, 5, 60]))]),
-        ("/v1/solve-for", {**rest, "unknown": "v0", "target": chance.choice([0.1, 0.5, [0.01, 0.2]])}),
-        ("/v1/law", {**rest, "start": 1e-4, "stop": 1.0, "points": chance.choice([2, 5, 50])}),
-        ("/v1/fit", {**measured, **({} if chance.random() < 0.5 else half), "contact": chance.choice(CONTACTS)}),
-        ("/v1/stiffness", bodies),
-    ))  # fmt: skip
+    return chance.choice(
+        (
+            ("/v1/mu-macro", one),
+            (
+                BATCH,
+                {
+                    **one,
+                    "v0": [
+                        10.0 ** chance.uniform(-5, 1)
+                        for _ in range(chance.choice([0, 1, 2, 5, 300]))
+                    ],
+                },
+            ),
+            (BATCH, [case(chance) for _ in range(chance.choice([0, 1, 2, 5, 60]))]),
+            (
+                "/v1/solve-for",
+                {**rest, "unknown": "v0", "target": chance.choice([0.1, 0.5, [0.01, 0.2]])},
+            ),
+            ("/v1/law", {**rest, "start": 1e-4, "stop": 1.0, "points": chance.choice([2, 5, 50])}),
+            (
+                "/v1/fit",
+                {
+                    **measured,
+                    **({} if chance.random() < 0.5 else half),
+                    "contact": chance.choice(CONTACTS),
+                },
+            ),
+            ("/v1/stiffness", bodies),
+        )
+    )
 
 
 def arrow(chance: random.Random) -> bytes:
@@ -96,7 +139,10 @@ def arrow(chance: random.Random) -> bytes:
     rng = np.random.default_rng(chance.randrange(1 << 30))
     kinds = [pa.float64()] * 8 + [pa.float32(), pa.int64(), pa.uint8(), pa.float16()]
     columns = {name: 10.0 ** rng.uniform(-1, 1, n) for name in CASE}
-    made = {name: pa.array(x, mask=x > 8.0).cast(chance.choice(kinds), safe=False) for name, x in columns.items()}
+    made = {
+        name: pa.array(x, mask=x > 8.0).cast(chance.choice(kinds), safe=False)
+        for name, x in columns.items()
+    }
     table, sink = pa.table(made), pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, table.schema) as writer:
         for _ in range(chance.choice([1, 1, 2])):
@@ -106,19 +152,90 @@ def arrow(chance: random.Random) -> bytes:
 
 #: texts that replace a value
 NUMBERS = (
-    "0", "-0", "-1", "1e308", "1e309", "-1e400", "5e-324", "1e-400", "0.1" + "0" * 400, "9" * 400, "1" + "0" * 5000,
-    "NaN", "Infinity", "-Infinity", "nan", "0x10", "1_000", "01", "+1", ".5", "1.", "1e", "1e+", "--1", "1d5", "1,5",
-)  # fmt: skip
+    "0",
+    "-0",
+    "-1",
+    "1e308",
+    "1e309",
+    "-1e400",
+    "5e-324",
+    "1e-400",
+    "0.1" + "0" * 400,
+    "9" * 400,
+    "1" + "0" * 5000,
+    "NaN",
+    "Infinity",
+    "-Infinity",
+    "nan",
+    "0x10",
+    "1_000",
+    "01",
+    "+1",
+    ".5",
+    "1.",
+    "1e",
+    "1e+",
+    "--1",
+    "1d5",
+    "1,5",
+)
 VALUES = (
-    "null", "true", "false", '""', '"rigid"', '"0.1"', '"NaN"', "[]", "{}", "[[]]", "[null]", '{"":1}', '"\\u0000"',
-    '"\\ud800"', '"\\ud83d\\ude00"', "[1,[2,[3]]]", "[" * 300 + "]" * 300, '{"a":' * 200 + "1" + "}" * 200,
-    '"' + "x" * 3000 + '"', "[" + "1," * 2000 + "1]", "/*1*/", "'1'", "undefined", "", ",", "\ufeff1", "\u2028",
-)  # fmt: skip
+    "null",
+    "true",
+    "false",
+    '""',
+    '"rigid"',
+    '"0.1"',
+    '"NaN"',
+    "[]",
+    "{}",
+    "[[]]",
+    "[null]",
+    '{"":1}',
+    '"\\u0000"',
+    '"\\ud800"',
+    '"\\ud83d\\ude00"',
+    "[1,[2,[3]]]",
+    "[" * 300 + "]" * 300,
+    '{"a":' * 200 + "1" + "}" * 200,
+    '"' + "x" * 3000 + '"',
+    "[" + "1," * 2000 + "1]",
+    "/*1*/",
+    "'1'",
+    "undefined",
+    "",
+    ",",
+    "\ufeff1",
+    "\u2028",
+)
 NAMES = (
-    *CASE, "f", "include", "std", "tolerance", "target", "unknown", "points", "name", "input", "contact", "k_range",
-    "k_low", "k_high", "geometry", "radius", "unknowns", "mu_macro", "mu_macro_std", "", "\u00e9",
-    "__proto__", "mu0 ", "MU0", "constructor", "x" * 2000,
-)  # fmt: skip
+    *CASE,
+    "f",
+    "include",
+    "std",
+    "tolerance",
+    "target",
+    "unknown",
+    "points",
+    "name",
+    "input",
+    "contact",
+    "k_range",
+    "k_low",
+    "k_high",
+    "geometry",
+    "radius",
+    "unknowns",
+    "mu_macro",
+    "mu_macro_std",
+    "",
+    "\u00e9",
+    "__proto__",
+    "mu0 ",
+    "MU0",
+    "constructor",
+    "x" * 2000,
+)
 
 
 def text_of(value: Any, chance: random.Random, rate: float) -> str:
@@ -137,26 +254,45 @@ def text_of(value: Any, chance: random.Random, rate: float) -> str:
                 members.append(members[-1])
         return "{" + ",".join(members) + space + "}"
     if isinstance(value, list):
-        return "[" + ",".join(text_of(inner, chance, rate / (1 + len(value) / 8)) for inner in value) + space + "]"
+        return (
+            "["
+            + ",".join(text_of(inner, chance, rate / (1 + len(value) / 8)) for inner in value)
+            + space
+            + "]"
+        )
     return json.dumps(value)
 
 
 def spoil(text: bytes, chance: random.Random) -> bytes:
-    """Some bytes flipped, overwritten, removed, inserted, replaced by a wrong number, or doubled."""
+    """Some bytes flipped, overwritten, removed, inserted, replaced by a wrong number, or
+    doubled."""
     changed = bytearray(text)
     for _ in range(chance.choice([1, 1, 1, 2, 3, 8])):
         if not changed:
             break
         i, j = sorted((chance.randrange(len(changed)), chance.randrange(len(changed))))
-        word, lie = i - i % 4, chance.choice([-1, 0, 1, 1 << 24, (1 << 31) - 1, -(1 << 31), chance.randrange(1 << 31)])
-        start, stop, new = chance.choice((
-            (i, i + 1, bytes([changed[i] ^ 1 << chance.randrange(8)])),
-            (i, i + 1, bytes([chance.randrange(256)])),
-            (i, i + chance.choice([1, 2, 10, j - i]), b""),
-            (i, i, chance.choice([b"\0", b"\xff", b'"', b"{", b"[", b",", b"\n", b"\r\n", b"\\", b"1e999"])),
-            (word, word + 4, struct.pack("<i", lie)),
-            (j, j, bytes(changed[i : min(j, i + 2000)])),
-        ))  # fmt: skip
+        word, lie = (
+            i - i % 4,
+            chance.choice(
+                [-1, 0, 1, 1 << 24, (1 << 31) - 1, -(1 << 31), chance.randrange(1 << 31)]
+            ),
+        )
+        start, stop, new = chance.choice(
+            (
+                (i, i + 1, bytes([changed[i] ^ 1 << chance.randrange(8)])),
+                (i, i + 1, bytes([chance.randrange(256)])),
+                (i, i + chance.choice([1, 2, 10, j - i]), b""),
+                (
+                    i,
+                    i,
+                    chance.choice(
+                        [b"\0", b"\xff", b'"', b"{", b"[", b",", b"\n", b"\r\n", b"\\", b"1e999"]
+                    ),
+                ),
+                (word, word + 4, struct.pack("<i", lie)),
+                (j, j, bytes(changed[i : min(j, i + 2000)])),
+            )
+        )
         changed[start:stop] = new
     return bytes(changed)
 
@@ -164,7 +300,9 @@ def spoil(text: bytes, chance: random.Random) -> bytes:
 def posted(path: str, kind: str, body: bytes, chance: random.Random, share: float = 0.3) -> Request:
     """A POST, whose body is spoiled in this share of all."""
     headers = [(b"host", b"x"), (b"content-type", kind.encode())]
-    return Request("POST", path, b"", headers, spoil(body, chance) if chance.random() < share else body)
+    return Request(
+        "POST", path, b"", headers, spoil(body, chance) if chance.random() < share else body
+    )
 
 
 def json_request(chance: random.Random) -> Request:
@@ -174,10 +312,17 @@ def json_request(chance: random.Random) -> Request:
 
 
 def lines_request(chance: random.Random) -> Request:
-    cases = [{**case(chance), **({"v0": [0.1, 0.2]} if chance.random() < 0.2 else {})} for _ in range(20)]
-    texts = (text_of(one, chance, chance.choice([0.0, 0.05])) for one in cases[: chance.choice([0, 1, 2, 5, 20])])
+    cases = [
+        {**case(chance), **({"v0": [0.1, 0.2]} if chance.random() < 0.2 else {})} for _ in range(20)
+    ]
+    texts = (
+        text_of(one, chance, chance.choice([0.0, 0.05]))
+        for one in cases[: chance.choice([0, 1, 2, 5, 20])]
+    )
     lines = [text.encode("utf-8", "surrogatepass") for text in texts]
-    text = chance.choice([b"\n", b"\n", b"\r\n", b"\n\n", b"\r"]).join(lines) + chance.choice([b"", b"\n"])
+    text = chance.choice([b"\n", b"\n", b"\r\n", b"\n\n", b"\r"]).join(lines) + chance.choice(
+        [b"", b"\n"]
+    )
     return posted(BATCH, LINES, text, chance)
 
 
@@ -190,9 +335,13 @@ def csv_request(chance: random.Random) -> Request:
     for _ in range(chance.choice([0, 1, 3, 20])):
         row = [repr(value) for value in case(chance).values()]
         if chance.random() < 0.2:
-            row[chance.randrange(6)] = chance.choice([*NUMBERS, "", '"', "rigid", '"0.1"', ";", "=1+1"])
+            row[chance.randrange(6)] = chance.choice(
+                [*NUMBERS, "", '"', "rigid", '"0.1"', ";", "=1+1"]
+            )
         rows.append(",".join(row))
-    text = chance.choice(["\n", "\r\n"]).join(rows).encode("utf-8", "surrogatepass") + chance.choice([b"", b"\n"])
+    text = chance.choice(["\n", "\r\n"]).join(rows).encode(
+        "utf-8", "surrogatepass"
+    ) + chance.choice([b"", b"\n"])
     return posted(BATCH, CSV, text, chance)
 
 
@@ -204,7 +353,9 @@ def arrow_request(chance: random.Random) -> Request:
 
 
 def of_table(chance: random.Random) -> list[tuple[str, str]]:
-    return [chance.choice([("id", "mumacro-1e-4"), ("tolerance", "1e-3"), ("id", "../x")])][: chance.randrange(2)]
+    return [chance.choice([("id", "mumacro-1e-4"), ("tolerance", "1e-3"), ("id", "../x")])][
+        : chance.randrange(2)
+    ]
 
 
 def of_case(chance: random.Random) -> list[tuple[str, str]]:
@@ -212,11 +363,21 @@ def of_case(chance: random.Random) -> list[tuple[str, str]]:
 
 
 def of_law(chance: random.Random) -> list[tuple[str, str]]:
-    return [*of_case(chance)[:5], ("start", "1e-4"), ("stop", "1"), ("points", chance.choice(["2", "20"]))]
+    return [
+        *of_case(chance)[:5],
+        ("start", "1e-4"),
+        ("stop", "1"),
+        ("points", chance.choice(["2", "20"])),
+    ]
 
 
-GETS = {"/v1/mu-macro": of_case, "/v1/mu-macro.txt": of_case, "/v1/law.csv": of_law, "/v1/table": of_table,
-        "/v1/table.nc": of_table}  # fmt: skip
+GETS = {
+    "/v1/mu-macro": of_case,
+    "/v1/mu-macro.txt": of_case,
+    "/v1/law.csv": of_law,
+    "/v1/table": of_table,
+    "/v1/table.nc": of_table,
+}
 
 
 def query_request(chance: random.Random) -> Request:
@@ -225,7 +386,10 @@ def query_request(chance: random.Random) -> Request:
     if chance.random() < 0.3:
         pairs.append(("include", ",".join(chance.sample(INCLUDED, chance.randrange(3)))))
     for _ in range(chance.choice([0, 0, 1, 2]) if pairs else 0):
-        i, wrong = chance.randrange(len(pairs)), chance.choice(chance.choice([NUMBERS, VALUES]))[:2000]
+        i, wrong = (
+            chance.randrange(len(pairs)),
+            chance.choice(chance.choice([NUMBERS, VALUES]))[:2000],
+        )
         pairs[i] = (chance.choice([pairs[i][0], chance.choice(NAMES)]), wrong)
         pairs += chance.sample(pairs, chance.random() < 0.3)
     raw = urlencode(pairs, errors="replace").encode("ascii")
@@ -237,22 +401,50 @@ def query_request(chance: random.Random) -> Request:
 FIELDS = (
     (b"accept", (b"text/plain", b"text/csv", b"*/*", b"application/json;q=0", b"\xff")),
     (b"accept-encoding", (b"gzip", b"gzip;q=0", b"*", b"br;q=nan", b",,,")),
-    (b"range", (b"bytes=0-10", b"bytes=-5", b"bytes=9-1", b"bytes=0-0,5-9", b"bytes=99999999999999999999-", b"x")),
+    (
+        b"range",
+        (
+            b"bytes=0-10",
+            b"bytes=-5",
+            b"bytes=9-1",
+            b"bytes=0-0,5-9",
+            b"bytes=99999999999999999999-",
+            b"x",
+        ),
+    ),
     (b"if-none-match", (b"*", b'"x"', b'W/"x", "y"', b"\xff", b"," * 1000)),
     (b"if-range", (b'"x"', b"Sun, 22 Nov 2026 10:00:00 GMT", b"yesterday")),
     (b"x-request-id", (b"abc", b"\xff", b"a" * 500, b"a b")),
     (b"x-forwarded-for", (b"1.2.3.4", b'a"b', b"\xff", b",", b"::1")),
-    (b"content-type", (b"application/json", b"text/csv", b"\xff", b"application/json; charset=utf-16", b"", b";")),
+    (
+        b"content-type",
+        (b"application/json", b"text/csv", b"\xff", b"application/json; charset=utf-16", b"", b";"),
+    ),
     (b"content-encoding", (b"gzip", b"identity", b"")),
     (b"authorization", (b"Bearer x", b"Basic =", b"\xff")),
     (b"origin", (b"https://a.example", b"null", b"\xff")),
     (b"expect", (b"x",)),
 )
 PATHS = (
-    *GETS, "/", "/docs", "/livez", "/readyz", "/healthz", "/metrics", "/openapi.json", "/Info", "/nowhere", "/v1/",
-    "//", "/static/page/main.js", "/static/page/map.json", "/static/page/../x", "/v1/mu-macro/batch/csv", "/%00",
+    *GETS,
+    "/",
+    "/docs",
+    "/livez",
+    "/readyz",
+    "/healthz",
+    "/metrics",
+    "/openapi.json",
+    "/Info",
+    "/nowhere",
+    "/v1/",
+    "//",
+    "/static/page/main.js",
+    "/static/page/map.json",
+    "/static/page/../x",
+    "/v1/mu-macro/batch/csv",
+    "/%00",
     "/\u00e9",
-)  # fmt: skip
+)
 
 
 def head_request(chance: random.Random) -> Request:
@@ -262,13 +454,23 @@ def head_request(chance: random.Random) -> Request:
         if chance.random() < 0.1:
             headers.append(headers[-1])
     method = chance.choice(["GET", "GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "PATCH"])
-    return Request(method, chance.choice(PATHS), chance.choice([b"", b"", b"mu0=1", b"?", b"&&&", b"%"]), headers, b"")
+    return Request(
+        method,
+        chance.choice(PATHS),
+        chance.choice([b"", b"", b"mu0=1", b"?", b"&&&", b"%"]),
+        headers,
+        b"",
+    )
 
 
 KINDS: dict[str, tuple[int, Callable[[random.Random], Request]]] = {
-    "JSON": (35, json_request), "lines": (15, lines_request), "CSV": (10, csv_request), "Arrow": (15, arrow_request),
-    "queries": (15, query_request), "methods, paths and headers": (10, head_request),
-}  # fmt: skip
+    "JSON": (35, json_request),
+    "lines": (15, lines_request),
+    "CSV": (10, csv_request),
+    "Arrow": (15, arrow_request),
+    "queries": (15, query_request),
+    "methods, paths and headers": (10, head_request),
+}
 
 
 def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
@@ -280,14 +482,19 @@ def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
 
 
 def wire(request: Request) -> bytes:
-    target = quote(request.path, safe="/%.") + ("?" + request.query.decode("latin-1") if request.query else "")
+    target = quote(request.path, safe="/%.") + (
+        "?" + request.query.decode("latin-1") if request.query else ""
+    )
     lines = [f"{request.method} {target} HTTP/1.1".encode("latin-1", "replace")]
     lines += [name + b": " + value for name, value in request.headers]
-    return b"\r\n".join([*lines, b"content-length: %d" % len(request.body), b"", b""]) + request.body
+    return (
+        b"\r\n".join([*lines, b"content-length: %d" % len(request.body), b"", b""]) + request.body
+    )
 
 
 def asked(raw: socket.socket, request: Request) -> tuple[int, bool, str]:
-    """Status, whether the connection stays open, and what is wrong with the response, empty if nothing is."""
+    """Status, whether the connection stays open, and what is wrong with the response, empty if
+    nothing is."""
     try:
         raw.sendall(wire(request))
         reply = HTTPResponse(raw, method=request.method)
@@ -299,14 +506,19 @@ def asked(raw: socket.socket, request: Request) -> tuple[int, bool, str]:
             orjson.loads(body)
     except (OSError, HTTPException, ValueError) as error:
         return 0, False, f"{type(error).__name__}: {error}"
-    return reply.status, not reply.will_close, "" if reply.status in FINE else f"status {reply.status}"
+    return (
+        reply.status,
+        not reply.will_close,
+        "" if reply.status in FINE else f"status {reply.status}",
+    )
 
 
 class Found:
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.statuses: Counter[int] = Counter()
-        self.slowest = 0.0  # processor time of the service [s], of those whose answer took longer by the clock
+        # processor time of the service [s], of those whose answer took longer by the clock
+        self.slowest = 0.0
         self.bad: list[tuple[str, str]] = []
 
     def ask(self, server: Server, seed: int, count: int) -> None:
@@ -323,7 +535,9 @@ class Found:
                         # what a first request of its kind imports takes long, too
                         if time.perf_counter() - started > HANG_S and self.counts.total() >= PART:
                             self.slowest = max(self.slowest, server.busy() - busy)
-                            fault = fault or (f"took {self.slowest:.1f} s" if self.slowest > HANG_S else "")
+                            fault = fault or (
+                                f"took {self.slowest:.1f} s" if self.slowest > HANG_S else ""
+                            )
                         self.counts[name] += 1
                         self.statuses[status] += 1
                         if fault:
@@ -344,9 +558,9 @@ def strange_requests(share: float, again: int = 0) -> str:
         progress(f"{fault}: {text}")
     told = ", ".join(f"{status}: {count:,}" for status, count in sorted(found.statuses.items()))
     text = (
-        f"Statuses: {told}. Wrong responses, crashes and responses that took more than {HANG_S:.0f} s: "
-        f"{len(found.bad)}. The service took {grown:.0f} MB more than after its first thousand; {len(errors)} "
-        f"unexpected errors in its log, exit code {code}."
+        f"Statuses: {told}. Wrong responses, crashes and responses that took more than "
+        f"{HANG_S:.0f} s: {len(found.bad)}. The service took {grown:.0f} MB more than after its "
+        f"first thousand; {len(errors)} unexpected errors in its log, exit code {code}."
     )
     if found.bad or errors or code:
         text += f" FAILED: {Counter(fault for fault, _ in found.bad)} {errors[:3]}"

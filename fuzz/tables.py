@@ -2,8 +2,8 @@
 
     python fuzz/tables.py [--only damaged_tables] [--share 0.01] [--write]
 
-Files are opened by other processes (``python fuzz/tables.py open``), which may use 256 MB more than they have after
-opening the intact table; a process that crashes is a failure.
+Files are opened by other processes (``python fuzz/tables.py open``), which may use 256 MB more than
+they have after opening the intact table; a process that crashes is a failure.
 """
 
 import functools
@@ -37,15 +37,33 @@ STEP = 256  # bytes between truncations
 MORE = 256 * 2**20  # bytes of memory allowed for opening a file
 PATIENCE = 3600.0  # seconds for one share of work
 
-HEAD = ("the smallest table", "files", "refused", "same answers", "same answers, other texts",
-        "other answers, or a crash", "slowest [s]", "memory [MB]")  # fmt: skip
-CHANGES = {"cut": f"cut at every {STEP} bytes", "flip": "every byte in turn, some of its bits flipped"}
-REFUSED, SAME, TEXTS, DIFFERS, ESCAPED, DIED = "refused", "same", "texts", "differs", "escaped", "died"
+HEAD = (
+    "the smallest table",
+    "files",
+    "refused",
+    "same answers",
+    "same answers, other texts",
+    "other answers, or a crash",
+    "slowest [s]",
+    "memory [MB]",
+)
+CHANGES = {
+    "cut": f"cut at every {STEP} bytes",
+    "flip": "every byte in turn, some of its bits flipped",
+}
+REFUSED, SAME, TEXTS, DIFFERS, ESCAPED, DIED = (
+    "refused",
+    "same",
+    "texts",
+    "differs",
+    "escaped",
+    "died",
+)
 
 
 class Outcome(NamedTuple):
-    """Result for a file: one of the words above, the message, processor time [s], memory [MB] beyond that of the
-    intact table.
+    """Result for a file: one of the words above, the message, processor time [s], memory [MB]
+    beyond that of the intact table.
     """
 
     what: str
@@ -55,7 +73,8 @@ class Outcome(NamedTuple):
 
 
 def work(start: int, count: int, change: str, stride: int = 1) -> Iterator[tuple[int, bytes]]:
-    """Changed copies of the smallest table: at every ``stride``-th of ``count`` offsets from ``start``."""
+    """Changed copies of the smallest table: at every ``stride``-th of ``count`` offsets from
+    ``start``."""
     whole = SMALLEST.read_bytes()
     for offset in range(start, min(start + count, len(whole)), stride):
         if change == "cut":
@@ -70,14 +89,19 @@ def work(start: int, count: int, change: str, stride: int = 1) -> Iterator[tuple
 def in_other_process(*arguments: object) -> list[Outcome]:
     """Results of the other process, one a line; the last is :data:`DIED` if it crashed."""
     command = [sys.executable, "-m", "fuzz.tables", "open", *map(str, arguments)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
     found = [Outcome(*json.loads(line)) for line in done.stdout.splitlines()]
     return found if done.returncode == 0 else [*found, Outcome(DIED, done.stderr[-300:], 0.0, 0.0)]
 
 
 def ask(table: Surrogate) -> None:
-    """Evaluate all quantities of a table over the whole range: any answer is allowed, but no crash."""
-    v, y = np.meshgrid(*2 * [np.concatenate([[0.0, 5e-324, 1e300, np.inf], np.geomspace(1e-6, 1e6, 60)])])
+    """Evaluate all quantities of a table over the whole range: any answer is allowed, but no
+    crash."""
+    v, y = np.meshgrid(
+        *2 * [np.concatenate([[0.0, 5e-324, 1e300, np.inf], np.geomspace(1e-6, 1e6, 60)])]
+    )
     for quantity in ("mu_ratio", "power", "stick_fraction"):
         table.slopes(v, y, quantity, bounds=True)
     table.evaluate(mu0=0.3, Fz=10.0, k=1e6, y0=1e-5 * y, omega=1e3, v0=1e-2 * v, gradient=True)
@@ -103,7 +127,11 @@ def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
             ask(Surrogate(table, path))
             what = DIFFERS
         elif table.attributes != expected.table.attributes:
-            names = [n for n, value in expected.table.attributes.items() if table.attributes.get(n) != value]
+            names = [
+                n
+                for n, value in expected.table.attributes.items()
+                if table.attributes.get(n) != value
+            ]
             what, said = TEXTS, ", ".join(names)
     except TableError as error:
         what, said = REFUSED, error.reason
@@ -128,7 +156,8 @@ def open_all(arguments: Sequence[str]) -> None:
 
 
 def damaged(share: float, change: str) -> list[Outcome]:
-    """Every copy of the smallest table with one change; if ``share`` is less than 1, bytes are skipped."""
+    """Every copy of the smallest table with one change; if ``share`` is less than 1, bytes are
+    skipped."""
     stride = 1 if change == "cut" else round(1.0 / share)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         starts = range(0, SMALLEST.stat().st_size, 4096)
@@ -146,11 +175,16 @@ def row(name: str, found: Sequence[Outcome]) -> list[str]:
 
 def damaged_tables(share: float) -> str:
     rows = [row(name, damaged(share, change)) for change, name in CHANGES.items()]
-    left_out = "" if share == 1.0 else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
+    left_out = (
+        ""
+        if share == 1.0
+        else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
+    )
     return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time."
 
 
-# --- files made to harm the program that opens them: memory, time, stack, other files, wrong types -----------
+# --- files made to harm the program that opens them: memory, time, stack, other files, wrong types
+# -----------
 
 Make = Callable[[Path], None]
 
@@ -178,14 +212,21 @@ def signed(change: Callable[[Table], Any]) -> Make:
 
 
 def zeros(n: int) -> bytes:
-    """``n`` zeros, a whole number of MiB, compressed: one compressed MiB repeated, and the checksum of all."""
+    """``n`` zeros, a whole number of MiB, compressed: one compressed MiB repeated, and the checksum
+    of all."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     block = packer.compress(bytes(2**20)) + packer.flush(zlib.Z_FULL_FLUSH)
-    return b"\x78\xda" + block * (n >> 20) + packer.flush() + ((n % 65521 << 16) + 1).to_bytes(4, "big")
+    return (
+        b"\x78\xda"
+        + block * (n >> 20)
+        + packer.flush()
+        + ((n % 65521 << 16) + 1).to_bytes(4, "big")
+    )
 
 
 def replaced(file: h5py.File, name: str, packed: bytes, **options: Any) -> None:
-    """Replace the variable of this name; its only chunk is written as the given bytes, if there are any."""
+    """Replace the variable of this name; its only chunk is written as the given bytes, if there are
+    any."""
     del file[name]
     made = file.create_dataset(name, dtype="f8", **options)
     if packed:
@@ -211,7 +252,9 @@ def huge_numbers(table: Table) -> None:
 
 def shuffled(table: Table) -> None:
     for block in table.blocks:
-        block.nodes["mu_ratio"] = np.random.default_rng(1).normal(size=block.nodes["mu_ratio"].shape) * 1e100
+        block.nodes["mu_ratio"] = (
+            np.random.default_rng(1).normal(size=block.nodes["mu_ratio"].shape) * 1e100
+        )
 
 
 def deep(file: h5py.File) -> None:
@@ -233,30 +276,56 @@ def variable(name: str, packed: Callable[[], bytes] = bytes, **options: Any) -> 
     return edited(lambda file: replaced(file, name, packed(), **options))
 
 
-ZEROS, TEN = functools.partial(zeros, 2**31), {"shape": (10,), "chunks": (10,), "compression": "gzip"}
+ZEROS, TEN = (
+    functools.partial(zeros, 2**31),
+    {"shape": (10,), "chunks": (10,), "compression": "gzip"},
+)
 HOSTILE: dict[str, Make] = {
-    "a group that contains itself": edited(lambda file: file.__setitem__("border/again", file["border"])),
-    "a group that contains the root": edited(lambda file: file.__setitem__("border/blocks/root", file["/"])),
+    "a group that contains itself": edited(
+        lambda file: file.__setitem__("border/again", file["border"])
+    ),
+    "a group that contains the root": edited(
+        lambda file: file.__setitem__("border/blocks/root", file["/"])
+    ),
     "3,000 nested groups": edited(deep),
     "3,000 groups among the blocks": edited(
-        lambda file: [file.create_group(f"border/blocks/g{i}") for i in range(3000)]),
-    "2 GB of zeros in a chunk of 2 GB": variable("mu_ratio", ZEROS, **{**TEN, "maxshape": (None,), "chunks": (2**28,)}),
+        lambda file: [file.create_group(f"border/blocks/g{i}") for i in range(3000)]
+    ),
+    "2 GB of zeros in a chunk of 2 GB": variable(
+        "mu_ratio", ZEROS, **{**TEN, "maxshape": (None,), "chunks": (2**28,)}
+    ),
     "2 GB of zeros in a chunk of 80 bytes": variable("v_tilde", ZEROS, **TEN),
-    "2 GB of zeros, compressed twice": variable("v_tilde", lambda: zlib.compress(ZEROS(), 9), **TEN),
+    "2 GB of zeros, compressed twice": variable(
+        "v_tilde", lambda: zlib.compress(ZEROS(), 9), **TEN
+    ),
     "a variable of 160 GB without stored data": variable(
-        "mu_ratio", shape=(2_000_000_000, 10), chunks=(1000, 10), compression="gzip"),
+        "mu_ratio", shape=(2_000_000_000, 10), chunks=(1000, 10), compression="gzip"
+    ),
     "a variable of 31 dimensions": variable("v_tilde", shape=(2,) * 31, chunks=(1,) * 31),
-    "a variable in another file": variable("v_tilde", shape=(31,), external=[("/dev/zero", 0, 31 * 8)]),
-    "a variable with another filter": variable("v_tilde", shape=(31,), chunks=(31,), compression="lzf"),
+    "a variable in another file": variable(
+        "v_tilde", shape=(31,), external=[("/dev/zero", 0, 31 * 8)]
+    ),
+    "a variable with another filter": variable(
+        "v_tilde", shape=(31,), chunks=(31,), compression="lzf"
+    ),
     "a grid of another shape": variable("mu_ratio", shape=(3, 3)),
-    "a link to another file": edited(lambda file: links(file, h5py.ExternalLink(SMALLEST, "/border/blocks/corner"))),
+    "a link to another file": edited(
+        lambda file: links(file, h5py.ExternalLink(SMALLEST, "/border/blocks/corner"))
+    ),
     "a link to itself": edited(lambda file: links(file, h5py.SoftLink("/border/blocks/corner"))),
     "a variable in place of a group": edited(lambda file: links(file, np.zeros(3))),
     "a type in place of a group": edited(lambda file: links(file, np.dtype("f8"))),
-    "60 kB of text in an attribute": edited(lambda file: file.attrs.create(
-        "many", np.array(["x" * 1000] * 60, dtype=object), dtype=h5py.string_dtype())),
-    "50 attributes of 60 kB": edited(lambda file: [file.attrs.__setitem__(f"a{i}", "x" * 60_000) for i in range(50)]),
-    "5,000 attributes": edited(lambda file: [file.attrs.__setitem__(f"a{i}", i) for i in range(5000)]),
+    "60 kB of text in an attribute": edited(
+        lambda file: file.attrs.create(
+            "many", np.array(["x" * 1000] * 60, dtype=object), dtype=h5py.string_dtype()
+        )
+    ),
+    "50 attributes of 60 kB": edited(
+        lambda file: [file.attrs.__setitem__(f"a{i}", "x" * 60_000) for i in range(50)]
+    ),
+    "5,000 attributes": edited(
+        lambda file: [file.attrs.__setitem__(f"a{i}", i) for i in range(5000)]
+    ),
     "a tolerance that is text": attribute("tolerance", "1e-4"),
     "a tolerance of three numbers": attribute("tolerance", np.zeros(3)),
     "a tolerance that is not finite": attribute("tolerance", np.nan),
@@ -265,7 +334,9 @@ HOSTILE: dict[str, Make] = {
     "options that are not JSON": attribute("builder_options", "{"),
     "options nested too deeply": attribute("builder_options", "[" * 60_000),
     "a version of two numbers": attribute("format_version", np.array([3, 3])),
-    "cells of a compound type": attribute("cells", np.zeros(1, [("a", "i4")]), "border/blocks/corner"),
+    "cells of a compound type": attribute(
+        "cells", np.zeros(1, [("a", "i4")]), "border/blocks/corner"
+    ),
     "errors that are complex": attribute("errors", np.zeros(9, complex), "border/blocks/corner"),
     "text that is not UTF-8": attribute("title", np.bytes_(b"\xff\xfe")),
     "20,000 nodes, checksum right": signed(many_nodes),
@@ -273,9 +344,13 @@ HOSTILE: dict[str, Make] = {
     "numbers of 1.7e308, checksum right": signed(huge_numbers),
     "random numbers of 1e100, checksum right": signed(shuffled),
     "a border of 1e300, checksum right": signed(lambda table: table.border[1].values.fill(1e300)),
-    "amplitudes of 1e300, checksum right": signed(lambda table: setattr(table, "y_tilde", table.y_tilde * 1e300)),
-    "errors of 1e308, checksum right": signed(lambda table: table.blocks[0].errors["mu_ratio"].fill(1e308)),
-}  # fmt: skip
+    "amplitudes of 1e300, checksum right": signed(
+        lambda table: setattr(table, "y_tilde", table.y_tilde * 1e300)
+    ),
+    "errors of 1e308, checksum right": signed(
+        lambda table: table.blocks[0].errors["mu_ratio"].fill(1e308)
+    ),
+}
 #: a table with other numbers and a matching checksum is a different table; any answer is allowed
 ANOTHER = {
     "numbers of 1.7e308, checksum right", "random numbers of 1e100, checksum right",
@@ -303,10 +378,18 @@ def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
     """Crafted files, opened by another process."""
     with tempfile.TemporaryDirectory() as folder:
         rows = [
-            [name, one.what, one.said.replace("|", "/")[:90], f"{one.seconds:.2f}", f"{one.megabytes:.0f}"]
+            [
+                name,
+                one.what,
+                one.said.replace("|", "/")[:90],
+                f"{one.seconds:.2f}",
+                f"{one.megabytes:.0f}",
+            ]
             for name, one in zip(HOSTILE, opened(Path(folder)), strict=True)
         ]
-    return markdown(("content of the file", "result", "reason", "seconds", "memory so far [MB]"), rows, 3)
+    return markdown(
+        ("content of the file", "result", "reason", "seconds", "memory so far [MB]"), rows, 3
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""Friction of a contact that oscillates across its sliding direction: a surrogate of the full stick-slip model."""
+"""Friction of a contact that oscillates across its sliding direction: a surrogate of the full
+stick-slip model."""
 
 import sys as _sys
 
@@ -12,7 +13,8 @@ try:
     from mumacro.surrogate import Surrogate
     from mumacro.version import __version__
 except ImportError as _error:
-    # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing; argv[0] is "-m" meanwhile.
+    # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing; argv[0]
+    # is "-m" meanwhile.
     if _sys.argv[:1] != ["-m"]:
         raise
     from mumacro.extras import missing as _missing
@@ -22,6 +24,16 @@ except ImportError as _error:
 open = Surrogate.open  # noqa: A001 (mumacro.open(), as users of other data libraries expect)
 
 __all__ = [
-    "REGIMES", "SOURCES", "Answer", "Element", "Fit", "InputError", "MumacroError", "Surrogate", "TableError",
-    "__version__", "fit", "open",
-]  # fmt: skip
+    "REGIMES",
+    "SOURCES",
+    "Answer",
+    "Element",
+    "Fit",
+    "InputError",
+    "MumacroError",
+    "Surrogate",
+    "TableError",
+    "__version__",
+    "fit",
+    "open",
+]

@@ -1,7 +1,7 @@
 """The command ``mumacro`` (``python -m mumacro``): macroscopic friction from the command line.
 
-Exit codes: 0 done, 1 no result is possible (a table, a file, a package, a target out of reach), 2 wrong
-arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupted.
+Exit codes: 0 done, 1 no result is possible (a table, a file, a package, a target out of reach), 2
+wrong arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupted.
 """
 
 import difflib
@@ -16,7 +16,15 @@ from typing import Any
 from mumacro import command
 from mumacro.answer import BAND
 from mumacro.bundled import bundled_tables
-from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
+from mumacro.command import (
+    ImpossibleError,
+    OneLineParser,
+    UsageError,
+    as_json,
+    in_columns,
+    open_table,
+    read_case,
+)
 from mumacro.contact import SPRING, Kind
 from mumacro.extras import missing
 from mumacro.inputs import LIKE, NAMES, PER_UNIT
@@ -33,13 +41,14 @@ friction along the speed:  {LAW}
 which amplitude halves it: {SOLVE_FOR}
 everything else:           mumacro --help"""
 OVERVIEW = f"""\
-Macroscopic friction of a contact that oscillates across or along its sliding direction, or normally.
+Macroscopic friction of a contact that oscillates across or along its sliding direction,
+or normally.
 
   mumacro '{CASE}'          one case
-  mumacro eval cases.parquet -o out.parquet                      files of cases: csv, ndjson, parquet
+  mumacro eval cases.parquet -o out.parquet                      files: csv, ndjson, parquet
   mumacro law 'mu0=0.3 ...' --along v0 1mm/s 1m/s -o law.png     mu_macro along one input
   mumacro solve-for y0 'mu0=0.3 ...' --target 0.15               which input gives a wanted mu_macro
-  mumacro map -o map.png                                         mu_macro/mu0 over speed and amplitude
+  mumacro map -o map.png                                         mu_macro/mu0, speed and amplitude
   {FIT}    k and mu0 from measured points
   {STIFFNESS}    k from materials
   mumacro table                                                  the table in use and its errors
@@ -53,7 +62,8 @@ REGIME_WORDS = {
     "continuous": "slips all the time",
     "stick_slip": "sticks during a part of each period",
     "static": "at rest: the limit v0 -> 0",
-    "partial_slip": "the rim of the contact slips all the time, its middle sticks during a part of each period",
+    "partial_slip": "the rim of the contact slips all the time, its middle sticks during a part of "
+    "each period",
     "reverse_slip": "slips forwards and backwards in each period",
 }
 ROW_OF_K = ("k is known", True)  # the answer for an interval tells that already
@@ -63,7 +73,9 @@ def _one_case(words: Sequence[str]) -> str:
     parser = OneLineParser(prog="mumacro", description=OVERVIEW + command.INPUTS)
     command.add_case(parser, "the six inputs, quoted together or apart")
     parser.add_argument("--gradient", action="store_true", help="also d mu_macro / d input")
-    parser.add_argument("--model", action="store_true", help="in JSON, too: what the model leaves out in this case")
+    parser.add_argument(
+        "--model", action="store_true", help="in JSON, too: what the model leaves out in this case"
+    )
     parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
     chosen = parser.parse_intermixed_args(words)
     kind = command.kind_in(chosen)
@@ -82,14 +94,19 @@ def _one_case(words: Sequence[str]) -> str:
         return as_json({**found, "table": command.about(surrogate)})
     lines = [
         ("model", f"{row['row']}: {command.in_words(row['text'], middle)}")
-        for row in rows if (row["row"], "k_range" in case) != ROW_OF_K
-    ]  # fmt: skip
-    text = in_columns(_rows_of(answer, surrogate, case, kind, command.format_for(chosen, surrogate, case, kind)))
+        for row in rows
+        if (row["row"], "k_range" in case) != ROW_OF_K
+    ]
+    text = in_columns(
+        _rows_of(answer, surrogate, case, kind, command.format_for(chosen, surrogate, case, kind))
+    )
     error = f"numerical error  {answer.error_bound:.2g}"
     return "\n".join([text, *([in_columns(lines)] if lines else []), error])
 
 
-def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind, form: str) -> list[Sequence[str]]:
+def _rows_of(
+    answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind, form: str
+) -> list[Sequence[str]]:
     """An answer as rows of name, value, unit, meaning."""
     groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
     rows = [
@@ -105,7 +122,12 @@ def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: K
         middle = f"at k = {command.middle_of(case)['k']:.6g} N/m, the geometric middle"
         rows[:1] = [
             (*rows[0][:3], middle),
-            ("from", f"{answer.mu_macro_low:#{form}}", "[-]", f"the least for k from {low} to {high} N/m"),
+            (
+                "from",
+                f"{answer.mu_macro_low:#{form}}",
+                "[-]",
+                f"the least for k from {low} to {high} N/m",
+            ),
             ("to", f"{answer.mu_macro_high:#{form}}", "[-]", "the most"),
         ]
     for name, slope in (answer.gradient or {}).items():
@@ -123,19 +145,34 @@ def _table(words: Sequence[str]) -> str:
     command.add_table(parser)
     chosen = parser.parse_args(words)
     surrogate = open_table(chosen.table)
-    names = ("verified_max_abs_error", "verified_max_rel_error", "content_sha256", "format_version", "product_version")
+    names = (
+        "verified_max_abs_error",
+        "verified_max_rel_error",
+        "content_sha256",
+        "format_version",
+        "product_version",
+    )
     told = {name: surrogate.attributes.get(name) for name in names}
     told["checksum"] = told.pop("content_sha256")
-    found = {**command.about(surrogate), "path": str(surrogate.path), **told, "bytes": surrogate.path.stat().st_size}
+    found = {
+        **command.about(surrogate),
+        "path": str(surrogate.path),
+        **told,
+        "bytes": surrogate.path.stat().st_size,
+    }
     bundled = [str(path) for path in bundled_tables()]
     if chosen.json:
         return as_json({**found, "bundled": bundled})
-    rows = [(name, f"{value:.3g}" if isinstance(value, float) else str(value)) for name, value in found.items()]
+    rows = [
+        (name, f"{value:.3g}" if isinstance(value, float) else str(value))
+        for name, value in found.items()
+    ]
     return in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
 
 
 def _part(name: str) -> Any:
-    """The command of ``builder`` or ``service``: inside the package when installed, beside it in a checkout."""
+    """The command of ``builder`` or ``service``: inside the package when installed, beside it in a
+    checkout."""
     package = Path(__file__).resolve().parent
     if (package / name).is_dir():
         return importlib.import_module(f"mumacro.{name}.__main__")
@@ -166,9 +203,16 @@ def _serve(words: Sequence[str]) -> int:
 
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
-    "eval": _eval, "law": law, "solve-for": solve, "map": map_, "fit": fit_points, "stiffness": stiffness_of,
-    "table": _table, "export": _export, "serve": _serve,
-}  # fmt: skip
+    "eval": _eval,
+    "law": law,
+    "solve-for": solve,
+    "map": map_,
+    "fit": fit_points,
+    "stiffness": stiffness_of,
+    "table": _table,
+    "export": _export,
+    "serve": _serve,
+}
 
 
 def _no_command(words: Sequence[str]) -> str:

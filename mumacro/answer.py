@@ -28,7 +28,8 @@ _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 
 
 class Answer(Generic[Number]):
-    """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the broadcast shape else.
+    """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the
+    broadcast shape else.
 
     Attributes
     ----------
@@ -39,7 +40,8 @@ class Answer(Generic[Number]):
     error_bound : float or ndarray
         Verified bound of the absolute error of ``mu_macro`` [-].
     source_code : int or ndarray of int8
-        Block or closed form that gave the value, index into :data:`mumacro.SOURCES`; -1 for an illegal case.
+        Block or closed form that gave the value, index into :data:`mumacro.SOURCES`; -1 for an
+        illegal case.
     gradient : dict of str to float or ndarray, or None
         d mu_macro / d input by field name, where requested; infinite for v0 at v0 = 0 on y~ = 1.
     gradient_bound : dict of str to float or ndarray, or None
@@ -54,18 +56,30 @@ class Answer(Generic[Number]):
     """
 
     __slots__ = (
-        "_certain", "_groups", "_look_up", "error_bound", "gradient", "gradient_bound", "mu_macro", "mu_ratio",
+        "_certain",
+        "_groups",
+        "_look_up",
+        "error_bound",
+        "gradient",
+        "gradient_bound",
+        "mu_macro",
+        "mu_ratio",
         "source_code",
-    )  # fmt: skip
+    )
 
     gradient: dict[str, Number] | None
     gradient_bound: dict[str, Number] | None
 
     def __init__(
-        self, mu_macro: Number, mu_ratio: Number, error_bound: Number, source_code: Any,
-        groups: tuple[Number, Number, Number] | None = None, certain: Callable[[Any, Any], Any] | None = None,
+        self,
+        mu_macro: Number,
+        mu_ratio: Number,
+        error_bound: Number,
+        source_code: Any,
+        groups: tuple[Number, Number, Number] | None = None,
+        certain: Callable[[Any, Any], Any] | None = None,
         look_up: Callable[[str, Any, Any], Any] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.mu_macro = mu_macro
         self.mu_ratio = mu_ratio
         self.error_bound = error_bound
@@ -82,12 +96,14 @@ class Answer(Generic[Number]):
 
     @property
     def v_tilde(self) -> Number:
-        """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient were requested."""
+        """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient
+        were requested."""
         return self._group(0)
 
     @property
     def y_tilde(self) -> Number:
-        """Dimensionless amplitude y0 k/(mu0 Fz), for direction normal Fz_amplitude/Fz [-]; as v_tilde."""
+        """Dimensionless amplitude y0 k/(mu0 Fz), for direction normal Fz_amplitude/Fz [-]; as
+        v_tilde."""
         return self._group(1)
 
     @property
@@ -111,21 +127,24 @@ class Answer(Generic[Number]):
     def regime(self) -> Any:
         """One of :data:`mumacro.REGIMES`: str, or ndarray of shared str.
 
-        ``"continuous"``, ``"stick_slip"``, ``"static"`` (v0 = 0); ``"partial_slip"`` where some springs of a ball slide
-        continuously and others do not; ``"reverse_slip"`` where an oscillation along slides backwards, too.
+        ``"continuous"``, ``"stick_slip"``, ``"static"`` (v0 = 0); ``"partial_slip"`` where some
+        springs of a ball slide continuously and others do not; ``"reverse_slip"`` where an
+        oscillation along slides backwards, too.
         """
         return self._by_source("regime", _REGIME_NAMES[_REGIME_CODES])
 
     @property
     def regime_certain(self) -> Any:
-        """Whether the regime is the same for every v~crit within its bound: bool or ndarray of bool; as v_tilde."""
+        """Whether the regime is the same for every v~crit within its bound: bool or ndarray of
+        bool; as v_tilde."""
         if self._certain is None:
             raise AttributeError("regime_certain needs the groups: evaluate(..., groups=True)")
         return self._certain(self.v_tilde, self.y_tilde)
 
     @property
     def source(self) -> Any:
-        """Name of the block or closed form that gave the value: str, or ndarray of shared str, made on request."""
+        """Name of the block or closed form that gave the value: str, or ndarray of shared str, made
+        on request."""
         return self._by_source("source", _SOURCE_NAMES)
 
     def plot(self, axes: Any = None) -> Any:
@@ -135,18 +154,27 @@ class Answer(Generic[Number]):
         return plot_answer(self, axes)
 
     def columns(self) -> dict[str, Any]:
-        """What is known of each case, by name: mu_macro first, then what was requested beside it."""
-        names = ["mu_macro", *(name for name in BAND if hasattr(self, name)), "mu_ratio", "regime", "error_bound"]
+        """What is known of each case, by name: mu_macro first, then what was requested beside
+        it."""
+        names = [
+            "mu_macro",
+            *(name for name in BAND if hasattr(self, name)),
+            "mu_ratio",
+            "regime",
+            "error_bound",
+        ]
         names += ["source", *(GROUPS if self._groups is not None else ())]
         slopes = {f"d_mu_macro_d_{name}": slope for name, slope in (self.gradient or {}).items()}
         return {**{name: getattr(self, name) for name in names}, **slopes}
 
     def to_frame(self) -> Any:
-        """The columns as a DataFrame of pandas, one row a case, in the order of ``ravel``; MumacroError without pandas.
+        """The columns as a DataFrame of pandas, one row a case, in the order of ``ravel``;
+        MumacroError without pandas.
 
         >>> from mumacro import Surrogate
         >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3)
-        >>> Surrogate.open().evaluate(**case, v0=np.array([0.0, 0.01])).to_frame()["regime"].tolist()
+        >>> answer = Surrogate.open().evaluate(**case, v0=np.array([0.0, 0.01]))
+        >>> answer.to_frame()["regime"].tolist()
         ['static', 'stick_slip']
         """
         try:
@@ -154,15 +182,20 @@ class Answer(Generic[Number]):
         except ModuleNotFoundError:
             raise MumacroError("pandas is not installed: pip install pandas") from None
         columns = self.columns().items()
-        return pandas.DataFrame({name: x if hasattr(x, "index") and hasattr(x, "dtype") else np.ravel(x)
-                                 for name, x in columns})  # fmt: skip
+        return pandas.DataFrame(
+            {
+                name: x if hasattr(x, "index") and hasattr(x, "dtype") else np.ravel(x)
+                for name, x in columns
+            }
+        )
 
     def __repr__(self) -> str:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
         names += [name for name in BAND if hasattr(self, name)]
         names += GROUPS if self._groups is not None else ()
         names += ["gradient", "gradient_bound"] if self.gradient is not None else []
-        return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
+        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
+        return f"{type(self).__name__}({values})"
 
 
 class AnswerWithGradient(Answer[Number]):

@@ -1,7 +1,7 @@
 """Arrays: cut into slices, one after another or on several threads.
 
-The kernel releases the interpreter's lock, so several threads can work at once.  They end with the call, so that a
-forked process works and no call waits for another.
+The kernel releases the interpreter's lock, so several threads can work at once.  They end with the
+call, so that a forked process works and no call waits for another.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,8 @@ _KERNEL = kernels[-1]
 
 
 def share_out(n: int, threads: int, work: Callable[[slice], None], cost: int = 1) -> None:
-    """Call ``work`` with every slice of n points, which cost about ``cost`` times as much as those of one spring."""
+    """Call ``work`` with every slice of n points, which cost about ``cost`` times as much as those
+    of one spring."""
     length = SLICE // cost
     if n <= length:
         work(slice(0, n))
@@ -41,7 +42,9 @@ def values(
     value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
 
     def work(part: slice) -> None:
-        _KERNEL.values(data, quantity, v[part], y[part], value[part], bound[part], source[part], kind)
+        _KERNEL.values(
+            data, quantity, v[part], y[part], value[part], bound[part], source[part], kind
+        )
 
     share_out(v.size, threads, work, COST if any(kind) else 1)
     return value, bound, source
@@ -50,25 +53,43 @@ def values(
 def alone(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
     """A quantity at (n,) points without its bound; NaN where illegal."""
     value = np.empty(v.size)
-    share_out(v.size, threads, lambda part: _KERNEL.values(data, quantity, v[part], y[part], value[part], None, None))
+    share_out(
+        v.size,
+        threads,
+        lambda part: _KERNEL.values(data, quantity, v[part], y[part], value[part], None, None),
+    )
     return value
 
 
 def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
     """Value, both logarithmic slopes and their bounds, rows (5, n), of any quantity."""
     rows = np.empty((5, v.size))
-    share_out(v.size, threads, lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start))
+    share_out(
+        v.size,
+        threads,
+        lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start),
+    )
     return rows
 
 
 def cases(
-    data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int, kind: tuple[int, int] = (0, 0)
+    data: Data,
+    columns: Sequence[Array | float],
+    n: int,
+    threads: int,
+    rows: int,
+    kind: tuple[int, int] = (0, 0),
 ) -> tuple[Array, Codes]:
-    """Answers to n cases, see :meth:`mumacro.library.Kernel.cases`: rows (3, 5 or 17, n), and sources (n,)."""
+    """Answers to n cases, see :meth:`mumacro.library.Kernel.cases`: rows (3, 5 or 17, n), and
+    sources (n,)."""
     out, source = np.empty((rows, n)), np.empty(n, np.int8)
 
     def work(part: slice) -> None:
-        six = columns if part.stop - part.start == n else [c if isinstance(c, float) else c[part] for c in columns]
+        six = (
+            columns
+            if part.stop - part.start == n
+            else [c if isinstance(c, float) else c[part] for c in columns]
+        )
         _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start, kind)
 
     share_out(n, threads, work, COST if any(kind) else 1)

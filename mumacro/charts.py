@@ -1,10 +1,11 @@
 """The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of each.
 
-The list of blocks, of pieces of the border and of quantities is in ``kernel/atlas.c`` and ``kernel/records.c``; this
-module reads it.  What a table file calls a coordinate is defined here, with both ways between a chart and (v~, y~).
+The list of blocks, of pieces of the border and of quantities is in ``kernel/atlas.c`` and
+``kernel/records.c``; this module reads it.  What a table file calls a coordinate is defined here,
+with both ways between a chart and (v~, y~).
 
-Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the drive is v~ mu~.
-The stick fraction f is the share of the period during which the contact sticks.
+Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the
+drive is v~ mu~. The stick fraction f is the share of the period during which the contact sticks.
 """
 
 import math
@@ -27,7 +28,9 @@ RHO_MAX, FAST_KAPPA = _ATLAS.rho_max, _ATLAS.fast_kappa
 ROUNDING = _ATLAS.rounding  # of coordinates and sums, relative to the scale of the value
 SQRT2 = math.sqrt(2.0)
 REGIMES = tuple(_text(_ATLAS.regime_name[i]) for i in range(_ATLAS.regimes))
-CONTINUOUS, STICK_SLIP, STATIC = (REGIMES.index(name) for name in ("continuous", "stick_slip", "static"))
+CONTINUOUS, STICK_SLIP, STATIC = (
+    REGIMES.index(name) for name in ("continuous", "stick_slip", "static")
+)
 
 #: coordinate of a table file -> what it is
 COORDINATES = {
@@ -48,9 +51,10 @@ COORDINATES = {
 class Axis:
     """One coordinate of a chart: its name in :data:`COORDINATES` and its range in the table file.
 
-    Evaluation uses a coordinate that costs less than the file's where the two differ: sigma for s and tan(psi/2) for
-    the angle.  sigma is sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = v~/v~crit = 1/2 on: both square-root edges
-    become smooth for one square root, and the knot between the halves is an edge of cells.
+    Evaluation uses a coordinate that costs less than the file's where the two differ: sigma for s
+    and tan(psi/2) for the angle.  sigma is sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho =
+    v~/v~crit = 1/2 on: both square-root edges become smooth for one square root, and the knot
+    between the halves is an edge of cells.
     """
 
     name: str
@@ -93,7 +97,8 @@ class Axis:
 class Quantity:
     """One tabulated quantity: name, variable in a block of a table file, meaning.
 
-    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a jump there.
+    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a
+    jump there.
     """
 
     name: str
@@ -107,7 +112,8 @@ class Quantity:
 class Chart:
     """One block: name, regime, coordinates with their ranges, and what its nodes hold for mu~.
 
-    ``floor`` and ``rounding`` are what the bound of mu~ allows for rounding, absolute and relative to the factor.
+    ``floor`` and ``rounding`` are what the bound of mu~ allows for rounding, absolute and relative
+    to the factor.
     """
 
     name: str
@@ -118,11 +124,13 @@ class Chart:
     floor: float = field(repr=False)
     rounding: float = field(repr=False)
 
-    def point(self, a: Array, b: Array, border_of: Callable[[Array], Array]) -> tuple[Array, Array, Array]:
+    def point(
+        self, a: Array, b: Array, border_of: Callable[[Array], Array]
+    ) -> tuple[Array, Array, Array]:
         """(v~, y~, eta = y~ - 1) at the table file's coordinates ``a``, ``b`` (broadcast together).
 
-        eta is exact in the corner, where rounding y~ to double costs 1e-16/mu~.  ``border_of`` gives v~crit(y~): the
-        stored curve, so that nodes and evaluation use the same one.
+        eta is exact in the corner, where rounding y~ to double costs 1e-16/mu~.  ``border_of``
+        gives v~crit(y~): the stored curve, so that nodes and evaluation use the same one.
         """
         a, b = np.broadcast_arrays(a, b)
         if self.a.name == "radius":
@@ -163,7 +171,8 @@ CHARTS = tuple(
 NAMES = tuple(chart.name for chart in CHARTS)
 #: v~crit in pieces: name, coordinate, what its nodes hold
 BORDER_PIECES = tuple(
-    (_text(p.name), _axis(p.axis), _text(p.tabulated)) for p in (_ATLAS.piece[i] for i in range(_ATLAS.pieces))
+    (_text(p.name), _axis(p.axis), _text(p.tabulated))
+    for p in (_ATLAS.piece[i] for i in range(_ATLAS.pieces))
 )
 QUANTITIES = tuple(_quantity(kernels[-1].quantity(i)) for i in range(_ATLAS.quantities))
 QUANTITY_NAMES = tuple(quantity.name for quantity in QUANTITIES)
@@ -171,4 +180,6 @@ MU, POWER, STICK = map(QUANTITY_NAMES.index, ("mu_ratio", "power", "stick_fracti
 #: where an answer comes from: a block, or a limit in closed form
 SOURCES = tuple(_text(_ATLAS.source_name[i]) for i in range(_ATLAS.sources))
 #: regime code of every source code
-REGIME_OF_SOURCE = np.array([_ATLAS.regime_of_source[i] for i in range(_ATLAS.sources)], dtype=np.int8)
+REGIME_OF_SOURCE = np.array(
+    [_ATLAS.regime_of_source[i] for i in range(_ATLAS.sources)], dtype=np.int8
+)

@@ -1,16 +1,19 @@
-"""Closed forms of the model: the paper's under their equation numbers, and this project's own beside them.
+"""Closed forms of the model: the paper's under their equation numbers, and this project's own
+beside them.
 
-Every function takes and returns dimensionless arrays that broadcast: ``v`` = v~ = v0/(l0 omega), ``y`` = y~ = y0/l0,
-l0 = mu0 Fz/k.  With mu0 and l0 omega as factors they are the paper's dimensional equations: (37) is :func:`outer`,
-(38) is :func:`static_limit`, (39) is :func:`border_24`, (40) is :func:`critical`.  :mod:`mumacro.law` offers them in
-SI units by their numbers.
+Every function takes and returns dimensionless arrays that broadcast: ``v`` = v~ = v0/(l0 omega),
+``y`` = y~ = y0/l0, l0 = mu0 Fz/k.  With mu0 and l0 omega as factors they are the paper's
+dimensional equations: (37) is :func:`outer`, (38) is :func:`static_limit`, (39) is
+:func:`border_24`, (40) is :func:`critical`.  :mod:`mumacro.law` offers them in SI units by their
+numbers.
 
-"Off by" is the largest deviation from the full model.  docs/validation.md has all deviations with the ranges within 1,
-5 and 10 %; ``python benchmarks/validation.py`` measures them.
+"Off by" is the largest deviation from the full model.  docs/validation.md has all deviations with
+the ranges within 1, 5 and 10 %; ``python benchmarks/validation.py`` measures them.
 
 References
 ----------
-Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations", Friction (2018).
+Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations", Friction
+(2018).
 """
 
 from typing import Any
@@ -22,7 +25,8 @@ from mumacro.arrays import Array
 from mumacro.library import kernels
 
 BORDER_CONSTANT = 4.402914  # lim y~ / v~crit^2; the paper rounds it to 4.5 in eq. (26)
-# The blend has both ends of the border built in; this number makes its largest error, y~ from 1e-4 to 1e8, smallest.
+# The blend has both ends of the border built in; this number makes its largest error, y~ from 1e-4
+# to 1e8, smallest.
 _BLEND = 0.786
 
 
@@ -42,12 +46,14 @@ def agm(b: ArrayLike) -> Any:
 
 
 def outer(r: ArrayLike) -> Any:
-    """(2/pi) K(i r) with r = y~/v~ [-], eqs. (35), (37): rigid contact, and the limit v~ -> infinity at fixed r.
+    """(2/pi) K(i r) with r = y~/v~ [-], eqs. (35), (37): rigid contact, and the limit v~ ->
+    infinity at fixed r.
 
     K is the complete elliptic integral of the first kind by its modulus, eq. (36).
 
-    Too low in continuous sliding, by up to 0.23 (y~ = 1.6), 0.056 (8), 0.016 (80), 0.0014 (1e4).  For v~ -> 0 it is too
-    high, by less than 0.01, but its ratio to the exact value grows like ln(y~/v~) without bound.
+    Too low in continuous sliding, by up to 0.23 (y~ = 1.6), 0.056 (8), 0.016 (80), 0.0014 (1e4).
+    For v~ -> 0 it is too high, by less than 0.01, but its ratio to the exact value grows like
+    ln(y~/v~) without bound.
 
     >>> float(outer(1.0)).hex() == float(1.0 / agm(2.0**0.5)).hex()
     True
@@ -58,16 +64,18 @@ def outer(r: ArrayLike) -> Any:
 def second_order(r: ArrayLike) -> Any:
     """Coefficient of 1/v~^2 at fixed r = y~/v~ [-], the first correction to eq. (35).
 
-    With D = 1 + r^2 cos^2 tau it is r^2 <sin^2 tau (1/2 - r^2 cos^2 tau) D^(-7/2)>, from the slow manifold of eq. (11)
-    to second order, reduced to complete elliptic integrals.  The error of (35) with this term is O(v~^-4).
-    Absolute accuracy is rounding; for r << 1 the value tends to r^2/4 and its relative accuracy is 1e-16/r^2.
+    With D = 1 + r^2 cos^2 tau it is r^2 <sin^2 tau (1/2 - r^2 cos^2 tau) D^(-7/2)>, from the slow
+    manifold of eq. (11) to second order, reduced to complete elliptic integrals.  The error of (35)
+    with this term is O(v~^-4). Absolute accuracy is rounding; for r << 1 the value tends to r^2/4
+    and its relative accuracy is 1e-16/r^2.
     """
     r = _float(r)
     return kernels[-1].outer_expansion(r.ravel())[:, 1].reshape(r.shape)[()]
 
 
 def static_limit(y: ArrayLike) -> Any:
-    """mu~ for v~ -> 0 [-]: sqrt(1 - y~^2) for y~ < 1, else 0, eqs. (16), (38).  Exact; error O(v~) for y~ != 1.
+    """mu~ for v~ -> 0 [-]: sqrt(1 - y~^2) for y~ < 1, else 0, eqs. (16), (38).  Exact; error O(v~)
+    for y~ != 1.
 
     >>> float(static_limit(0.6))
     0.8
@@ -77,10 +85,11 @@ def static_limit(y: ArrayLike) -> Any:
 
 
 def small_angle(v: ArrayLike, y: ArrayLike) -> Any:
-    """mu~ of continuous sliding for y~ << 1 [-]: <cos(kappa cos tau)>, kappa = y~ / sqrt(1 + v~^2), eqs. (29), (30).
+    """mu~ of continuous sliding for y~ << 1 [-]: <cos(kappa cos tau)>, kappa = y~ / sqrt(1 + v~^2),
+    eqs. (29), (30).
 
-    This is the Bessel function J0(kappa), here by the trapezoidal rule on 32 points, to rounding for kappa <= 10.
-    Off by 0.05 % (y~ = 0.3), 0.37 % (0.5), 4.8 % (1), always at the border.
+    This is the Bessel function J0(kappa), here by the trapezoidal rule on 32 points, to rounding
+    for kappa <= 10. Off by 0.05 % (y~ = 0.3), 0.37 % (0.5), 4.8 % (1), always at the border.
     """
     kappa = _float(y) / np.hypot(1.0, _float(v))
     # the integrand is even about 0 and pi/2: 32 points on the period are 8 in the quarter
@@ -89,9 +98,11 @@ def small_angle(v: ArrayLike, y: ArrayLike) -> Any:
 
 
 def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
-    """mu~ of continuous sliding for y~ << 1 [-]: 1 - y~^2 / (4 (1 + v~^2)), eq. (31).  Error O(y~^4).
+    """mu~ of continuous sliding for y~ << 1 [-]: 1 - y~^2 / (4 (1 + v~^2)), eq. (31).  Error
+    O(y~^4).
 
-    Off by 0.06 % (y~ = 0.3), 0.47 % (0.5), 6.3 % (1), always at the border.  Meaningless in stick-slip.
+    Off by 0.06 % (y~ = 0.3), 0.47 % (0.5), 6.3 % (1), always at the border.  Meaningless in
+    stick-slip.
     """
     return 1.0 - _float(y) ** 2 / (4.0 * (1.0 + _float(v) ** 2))
 
@@ -99,8 +110,8 @@ def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
 def continuous(v: ArrayLike, y: ArrayLike) -> Any:
     """(2/pi) K(i y~ / sqrt(1 + v~^2)) [-]: this project's one formula for continuous sliding.
 
-    Eq. (31) for y~ -> 0 and eq. (35) for v~ -> infinity, both with their order of error; off by less than 0.0401 in
-    all of continuous sliding.  Meaningless in stick-slip.
+    Eq. (31) for y~ -> 0 and eq. (35) for v~ -> infinity, both with their order of error; off by
+    less than 0.0401 in all of continuous sliding.  Meaningless in stick-slip.
     """
     return outer(_float(y) / np.hypot(1.0, _float(v)))
 
@@ -114,7 +125,8 @@ def critical(y: ArrayLike) -> Any:
 
 
 def critical_next(y: ArrayLike) -> Any:
-    """mu~ at the border with one term more than eq. (32) [-]: 1 - y~^2 / 4 + (5/64) y~^4.  Error O(y~^6).
+    """mu~ at the border with one term more than eq. (32) [-]: 1 - y~^2 / 4 + (5/64) y~^4.  Error
+    O(y~^6).
 
     Off by -0.0023 % (y~ = 0.3), -0.035 % (0.5), -0.14 % (0.7), +0.24 % (1).
     """
@@ -126,11 +138,13 @@ def critical_next(y: ArrayLike) -> Any:
 
 
 def master_curve(x: ArrayLike) -> Any:
-    """(mu~ - static) / (critical - static) at x = v~/v~crit for y~ << 1 [-], eq. (28); NaN for x > 1.
+    """(mu~ - static) / (critical - static) at x = v~/v~crit for y~ << 1 [-], eq. (28); NaN for x >
+    1.
 
-    1 - [(3/4)(x - 1)^2 + (1/4)(x - 1)^4] is a fit to :func:`master_curve_limit`, too low by up to 0.0144 (x = 0.104);
-    against the model too low by up to 0.0142 (y~ = 0.1), 0.0166 (0.5), 0.125 (0.9), too high by at most 0.0019 (near
-    the border at y~ = 0.9).  Beyond x = 1 the polynomial falls.
+    1 - [(3/4)(x - 1)^2 + (1/4)(x - 1)^4] is a fit to :func:`master_curve_limit`, too low by up to
+    0.0144 (x = 0.104); against the model too low by up to 0.0142 (y~ = 0.1), 0.0166 (0.5), 0.125
+    (0.9), too high by at most 0.0019 (near the border at y~ = 0.9).  Beyond x = 1 the polynomial
+    falls.
 
     >>> float(master_curve(0.5))
     0.796875
@@ -142,27 +156,31 @@ def master_curve(x: ArrayLike) -> Any:
 
 
 def master_curve_limit(x: ArrayLike) -> Any:
-    """Limit of the master curve for y~ -> 0, exact [-]: N_0(x), of which eq. (28) is a fit; 1 for x >= 1.
+    """Limit of the master curve for y~ -> 0, exact [-]: N_0(x), of which eq. (28) is a fit; 1 for x
+    >= 1.
 
-    The foot is pulled at the speed x under a limit cos t and sticks from t1 to t2: cos t1 = x (t1 < 0),
-    sin t2 - sin t1 = x (t2 - t1), an equation like Kepler's.  With D = t2 - t1
+    The foot is pulled at the speed x under a limit cos t and sticks from t1 to t2: cos t1 = x (t1 <
+    0), sin t2 - sin t1 = x (t2 - t1), an equation like Kepler's.  With D = t2 - t1
 
         N_0(x) = 1 + [D sin t1 + x D^2/2 + cos t2 - cos t1] / (2 pi),    N_0'(0) = pi.
 
-    Full relative accuracy down to x = 0.  The curves of the model differ from it by 2e-4 (y~ = 0.1), 1.6e-3 (0.3),
-    5e-3 (0.5).  Derived in docs/model.md.
+    Full relative accuracy down to x = 0.  The curves of the model differ from it by 2e-4 (y~ =
+    0.1), 1.6e-3 (0.3), 5e-3 (0.5).  Derived in docs/model.md.
 
     >>> round(float(master_curve_limit(1e-12)) / 1e-12, 4)        # the slope at creep, pi
     3.1416
     """
-    # b = arcsin x, 2 d = duration of slip, 2 h = that of stick: tan b = sin^2 d / (h - sin h cos h), by Newton's method
+    # b = arcsin x, 2 d = duration of slip, 2 h = that of stick: tan b = sin^2 d / (h - sin h cos
+    # h), by Newton's method
     x = np.minimum(_float(x), 1.0)
     b = np.arcsin(x)
     d = np.minimum(0.5 * b + np.sqrt(0.25 * b * b + np.pi * b), np.pi)
     for _ in range(5):
         s, rest = np.sin(d), 0.5 * _minus_sine(2.0 * (np.pi - d))
         slope = 2.0 * s * (np.cos(d) * rest + s**3) / np.maximum(s**4 + rest**2, 1e-200)
-        d = d - np.divide(np.arctan2(s * s, rest) - b, slope, out=np.zeros_like(d), where=slope > 0.0)
+        d = d - np.divide(
+            np.arctan2(s * s, rest) - b, slope, out=np.zeros_like(d), where=slope > 0.0
+        )
     stick = 2.0 * (np.pi - d)
     # integrals of 1 + cos t over stick and slip, every term positive
     pulled = stick * (2.0 * np.sin(0.5 * b) ** 2 + 0.5 * x * stick)
@@ -173,7 +191,9 @@ def master_curve_limit(x: ArrayLike) -> Any:
 def _minus_sine(d: Any) -> Any:
     """D - sin d without cancellation."""
     q = d * d
-    series = d * q / 6.0 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156)))))
+    series = (
+        d * q / 6.0 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156)))))
+    )
     return np.where(d < 0.7, series, d - np.sin(d))
 
 
@@ -183,13 +203,14 @@ def _minus_sine(d: Any) -> Any:
 def border_23(y: ArrayLike) -> Any:
     """v~crit for y~ << 1 [-]: the root of y~^2 = 2 v~ (1 + v~^2) (sqrt(1 + v~^2) + v~), eq. (23).
 
-    With v~ = d / (2 sqrt(1 + d)) it is the cubic d (d + 2)^2 = 4 y~^2 (1 + d), solved by Newton's method.
-    Off by -1.2 % (y~ = 0.5), +0.7 % (1), +12 % (2).
+    With v~ = d / (2 sqrt(1 + d)) it is the cubic d (d + 2)^2 = 4 y~^2 (1 + d), solved by Newton's
+    method. Off by -1.2 % (y~ = 0.5), +0.7 % (1), +12 % (2).
     """
     y = _float(y)
     bounded = np.minimum(y, 1e50)
     square = bounded * bounded
-    d = np.minimum(square, 2.0 * bounded)  # above the root, from where Newton's method falls towards it
+    # above the root, from where Newton's method falls towards it
+    d = np.minimum(square, 2.0 * bounded)
     for _ in range(8):  # the slowest, y~ = 2, takes 7
         f = d * ((d + 4.0) * d + 4.0 - 4.0 * square) - 4.0 * square
         d = d - f / ((3.0 * d + 8.0) * d + 4.0 * (1.0 - square))
@@ -210,7 +231,8 @@ def border_24(y: ArrayLike) -> Any:
 
 
 def border_26(y: ArrayLike) -> Any:
-    """v~crit for y~ >> 1 [-]: sqrt(y~ / 4.5), eq. (26).  Off by -1.08 % for y~ -> infinity, -5 % at y~ = 2.25."""
+    """v~crit for y~ >> 1 [-]: sqrt(y~ / 4.5), eq. (26).  Off by -1.08 % for y~ -> infinity, -5 % at
+    y~ = 2.25."""
     return np.sqrt(_float(y) / 4.5)
 
 
@@ -221,12 +243,14 @@ def border_27(y: ArrayLike) -> Any:
     """
     y = _float(y)
     root = np.sqrt(y)
-    with np.errstate(over="ignore", divide="ignore"):  # divided through by y~^2, so that large y~ does not overflow
+    # divided through by y~^2, so that large y~ does not overflow
+    with np.errstate(over="ignore", divide="ignore"):
         return 0.47 * root / (1.0 + 0.94 / (root * y * (1.0 + y * y)))
 
 
 def border_small_amplitude(y: ArrayLike) -> Any:
-    """v~crit for y~ -> 0, exact to two terms [-]: (y~^2 / 2)(1 - 5 y~^2 / 12).  Relative error O(y~^4).
+    """v~crit for y~ -> 0, exact to two terms [-]: (y~^2 / 2)(1 - 5 y~^2 / 12).  Relative error
+    O(y~^4).
 
     Eqs. (23) and (24) have 1/2 in place of 5/12.
     """
@@ -235,15 +259,17 @@ def border_small_amplitude(y: ArrayLike) -> Any:
 
 
 def border_large_amplitude(y: ArrayLike) -> Any:
-    """v~crit for y~ -> infinity [-]: sqrt(y~ / 4.402914), eq. (26) with the exact constant.  Relative error 0.07/y~."""
+    """v~crit for y~ -> infinity [-]: sqrt(y~ / 4.402914), eq. (26) with the exact constant.
+    Relative error 0.07/y~."""
     return np.sqrt(_float(y) / BORDER_CONSTANT)
 
 
 def border_blend(y: ArrayLike) -> Any:
     """v~crit for every y~ [-] by one formula of this project, relative error below 0.6 percent.
 
-    v~crit = (y~^2 / 2) [(1 + (5/9 + d) w + c d w^2) / (1 + d w)]^(-3/4) with w = y~^2 and c = (4.402914 / 4)^(2/3): two
-    terms of the small amplitudes, the leading one of the large; d is fitted.
+    v~crit = (y~^2 / 2) [(1 + (5/9 + d) w + c d w^2) / (1 + d w)]^(-3/4) with w = y~^2 and c =
+    (4.402914 / 4)^(2/3): two terms of the small amplitudes, the leading one of the large; d is
+    fitted.
     """
     y = _float(y)
     w = np.minimum(y, 1e60) ** 2  # beyond, v~crit grows like the square root to all digits
@@ -253,6 +279,7 @@ def border_blend(y: ArrayLike) -> Any:
 
 
 def corner_root(v: ArrayLike, eta: ArrayLike) -> Any:
-    """Positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to O(mu~^3).  eta = y~ - 1."""
+    """Positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to O(mu~^3).
+    eta = y~ - 1."""
     v, eta = np.broadcast_arrays(_float(v), _float(eta))
     return kernels[-1].normal_form_root(v.ravel(), eta.ravel()).reshape(v.shape)[()]

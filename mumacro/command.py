@@ -1,4 +1,5 @@
-"""What all commands share: one look of the arguments, exit codes, cases and tables as a person writes them."""
+"""What all commands share: one look of the arguments, exit codes, cases and tables as a person
+writes them."""
 
 import argparse
 import csv
@@ -68,47 +69,71 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def question(
-    name: str, told: str, epilog: str, words: str, least: str = "+", first: tuple[str, dict[str, Any]] | None = None
+    name: str,
+    told: str,
+    epilog: str,
+    words: str,
+    least: str = "+",
+    first: tuple[str, dict[str, Any]] | None = None,
 ) -> OneLineParser:
-    """The parser of a command that is given a case and has ``-o``; ``first`` is an argument that stands before it."""
+    """The parser of a command that is given a case and has ``-o``; ``first`` is an argument that
+    stands before it."""
     parser = OneLineParser(prog=f"mumacro {name}", description=told, epilog=epilog)
     if first:
         parser.add_argument(first[0], **first[1])
     add_case(parser, words, least)
-    parser.add_argument("-o", "--out", type=Path, help="write the result there: a picture, .png, .svg or .pdf, or .csv")
+    parser.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        help="write the result there: a picture, .png, .svg or .pdf, or .csv",
+    )
     return parser
 
 
 def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
-    """The inputs, explained by ``words``, the kind of contact, and the options of all commands that answer."""
+    """The inputs, explained by ``words``, the kind of contact, and the options of all commands that
+    answer."""
     parser.add_argument("words", nargs=least, metavar="name=value", help=words)
     add_kind(parser)
     add_table(parser)
 
 
 def add_kind(parser: argparse.ArgumentParser) -> None:
-    """The options for the contact and the direction of its oscillation; :func:`kind_in` reads them."""
+    """The options for the contact and the direction of its oscillation; :func:`kind_in` reads
+    them."""
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
-    text = "of the oscillation to the sliding direction; normal: the normal force oscillates; default: across"
+    text = (
+        "of the oscillation to the sliding direction; normal: the normal force oscillates; "
+        "default: across"
+    )
     parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
 
 
 def kind_in(chosen: argparse.Namespace) -> Kind:
-    """The contact and direction that were chosen; InputError for a ball whose normal force oscillates."""
+    """The contact and direction that were chosen; InputError for a ball whose normal force
+    oscillates."""
     return kind_of(chosen.contact, chosen.direction)
 
 
 def add_table(parser: OneLineParser) -> None:
     """The options of all commands that read a table and answer."""
-    text = "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest one"
+    text = (
+        "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: "
+        "the tightest one"
+    )
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
 
 
 def add_format(parser: OneLineParser) -> None:
     """The options for the form of CSV."""
-    parser.add_argument("--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,")
-    parser.add_argument("--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: .")
+    parser.add_argument(
+        "--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,"
+    )
+    parser.add_argument(
+        "--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: ."
+    )
 
 
 def add_form(parser: argparse.ArgumentParser) -> None:
@@ -119,7 +144,8 @@ def add_form(parser: argparse.ArgumentParser) -> None:
 
 
 def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
-    """Run a command, print the text that it returns, and return the exit code; an error is one line on stderr."""
+    """Run a command, print the text that it returns, and return the exit code; an error is one line
+    on stderr."""
     try:
         found = command(given)
         if isinstance(found, str):
@@ -143,17 +169,23 @@ def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
     return code
 
 
-# --- what a person writes -------------------------------------------------------------------------------
+# --- what a person writes -------------------------------------------------------------------------
 
 
 def read_case(
-    words: Sequence[str], kind: Kind = SPRING, without: Sequence[str] = (), *, one_k: str = "", whole: bool = True
+    words: Sequence[str],
+    kind: Kind = SPRING,
+    without: Sequence[str] = (),
+    *,
+    one_k: str = "",
+    whole: bool = True,
 ) -> dict[str, Any]:
-    """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of ``Surrogate.evaluate``.
+    """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
+    ``Surrogate.evaluate``.
 
-    ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must not be an interval
-    ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all other inputs must be there.  UsageError
-    tells everything that is wrong, in one line.
+    ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
+    not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
+    other inputs must be there.  UsageError tells everything that is wrong, in one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20.69kHz v0=0.01"])["k"]
     1000000.0
@@ -225,7 +257,9 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
     return found
 
 
-def _faults_of_names(case: Mapping[str, Any], kind: Kind, without: Sequence[str], whole: bool) -> list[str]:
+def _faults_of_names(
+    case: Mapping[str, Any], kind: Kind, without: Sequence[str], whole: bool
+) -> list[str]:
     frequencies = {"f", "omega"}
     left_out = {*without} | (frequencies if frequencies & {*without} else set())
     names = " and ".join(without)
@@ -235,7 +269,9 @@ def _faults_of_names(case: Mapping[str, Any], kind: Kind, without: Sequence[str]
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
     given = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
     hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
-    absent = [hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in given]
+    absent = [
+        hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in given
+    ]
     return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
 
 
@@ -254,16 +290,22 @@ def in_words(text: str, case: Mapping[str, Any]) -> str:
     return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}")
 
 
-def format_for(chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING) -> str:
-    """How numbers are printed: with ``--digits``, or as many as the stiffness of a case supports."""
+def format_for(
+    chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING
+) -> str:
+    """How numbers are printed: with ``--digits``, or as many as the stiffness of a case
+    supports."""
     if chosen.digits is not None:
         return f".{chosen.digits}g"
     contact, direction = kind.names.values()
     return f".{digits(k_effect(surrogate, case, contact, direction))}g"
 
 
-def read_values(given: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number) -> list[Any]:
-    """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that are none."""
+def read_values(
+    given: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
+) -> list[Any]:
+    """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
+    are none."""
     values, faults = [], []
     for name, text in given:
         try:
@@ -276,7 +318,8 @@ def read_values(given: Iterable[tuple[str, str]], read: Callable[[str, str], Any
 
 
 def open_table(which: str | None) -> Surrogate:
-    """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled one."""
+    """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled
+    one."""
     try:
         return Surrogate.open(None if which is None else float(which))
     except ValueError:
@@ -285,7 +328,7 @@ def open_table(which: str | None) -> Surrogate:
         return Surrogate.open(Path(which))
 
 
-# --- results --------------------------------------------------------------------------------------------
+# --- results --------------------------------------------------------------------------------------
 
 
 def about(surrogate: Surrogate) -> dict[str, Any]:
@@ -297,17 +340,23 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
     """Rows of cells as text in columns."""
     columns = list(zip_longest(*rows, fillvalue=""))
     widths = [max(map(len, column)) for column in columns]
-    padded = ([cell.ljust(width) for cell in column] for column, width in zip(columns, widths, strict=True))
+    padded = (
+        [cell.ljust(width) for cell in column]
+        for column, width in zip(columns, widths, strict=True)
+    )
     return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
 
 
 def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:
-    """Write ``-o x.csv``, the columns under their heads with all digits, or a picture; a line that names the file."""
+    """Write ``-o x.csv``, the columns under their heads with all digits, or a picture; a line that
+    names the file."""
     if path.suffix == ".csv":
         with path.open("w", encoding="utf-8", newline="") as stream:
             rows = csv.writer(stream, lineterminator="\n")
             rows.writerow(columns)
-            rows.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
+            rows.writerows(
+                zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
+            )
     else:
         plotting.save(path, draw)
     return f"written: {path}"

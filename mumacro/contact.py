@@ -1,10 +1,12 @@
-"""The contact and the direction of the oscillation: what a case may be beside one spring that is shaken across.
+"""The contact and the direction of the oscillation: what a case may be beside one spring that is
+shaken across.
 
-``contact="ball"`` is a sphere on a flat, Hertz under a constant load, as independent springs (method of dimensionality
-reduction): mu~(v~, y~) = (3/2) int_0^1 s mu~_spring(v~/(1.5 s), y~/(1.5 s)) d xi with s = 1 - xi^2 and
-l0 = mu0 Fz / k, where k = 8 a G* is the stiffness before slip.  ``direction="along"`` shakes along the sliding
-direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The formulas are in ``kernel/contact.c`` and
-``kernel/directions.c``; here are the names, and the rules of quadrature, which grow with the table's tolerance.
+``contact="ball"`` is a sphere on a flat, Hertz under a constant load, as independent springs
+(method of dimensionality reduction): mu~(v~, y~) = (3/2) int_0^1 s mu~_spring(v~/(1.5 s), y~/(1.5
+s)) d xi with s = 1 - xi^2 and l0 = mu0 Fz / k, where k = 8 a G* is the stiffness before slip.
+``direction="along"`` shakes along the sliding direction, ``"normal"`` the normal force, Fz +
+Fz_amplitude cos(omega t).  The formulas are in ``kernel/contact.c`` and ``kernel/directions.c``;
+here are the names, and the rules of quadrature, which grow with the table's tolerance.
 """
 
 from collections.abc import Mapping
@@ -24,7 +26,8 @@ DirectionName = Literal["across", "along", "normal"]
 CONTACTS: tuple[ContactName, ...] = ("spring", "ball")
 DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
-_FORCED = tuple(AMPLITUDE if name == "y0" else name for name in FIELDS)  # the fields of direction normal
+# the fields of direction normal
+_FORCED = tuple(AMPLITUDE if name == "y0" else name for name in FIELDS)
 LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of that amplitude
 
 
@@ -41,7 +44,8 @@ class Kind(NamedTuple):
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """The six inputs by name, :data:`mumacro.inputs.FIELDS` with Fz_amplitude in place of y0 for normal."""
+        """The six inputs by name, :data:`mumacro.inputs.FIELDS` with Fz_amplitude in place of y0
+        for normal."""
         return _FORCED if self.normal else FIELDS
 
     @property
@@ -60,7 +64,9 @@ class Kind(NamedTuple):
         if bad.any():
             i = int(np.flatnonzero(bad.ravel())[0])
             value = float(np.broadcast_to(amplitude, bad.shape).flat[i])
-            raise self.refused(InputError("y0", value, "", i if np.ndim(amplitude) or np.ndim(force) else None))
+            raise self.refused(
+                InputError("y0", value, "", i if np.ndim(amplitude) or np.ndim(force) else None)
+            )
 
     def refused(self, error: InputError) -> InputError:
         """``error`` by the name and the bound that the user knows."""
@@ -70,16 +76,22 @@ class Kind(NamedTuple):
         return InputError(AMPLITUDE, error.value, bound, error.index)
 
     def as_six(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Inputs with the amplitude in the place of y0; InputError for one that does not belong to the direction."""
+        """Inputs with the amplitude in the place of y0; InputError for one that does not belong to
+        the direction."""
         wrong, right = ("y0", AMPLITUDE) if self.normal else (AMPLITUDE, "y0")
         if wrong in inputs:
             word = DIRECTIONS[self.direction]
-            raise InputError(wrong, inputs[wrong], f"left out for direction {word}, whose amplitude is {right}")
+            raise InputError(
+                wrong, inputs[wrong], f"left out for direction {word}, whose amplitude is {right}"
+            )
         return {"y0" if name == AMPLITUDE else name: value for name, value in inputs.items()}
 
     def as_given(self, six: Mapping[str, Any]) -> dict[str, Any]:
         """The inputs of :meth:`as_six` by the user's names."""
-        return {AMPLITUDE if name == "y0" and self.normal else name: value for name, value in six.items()}
+        return {
+            AMPLITUDE if name == "y0" and self.normal else name: value
+            for name, value in six.items()
+        }
 
 
 SPRING = Kind(0, 0)
@@ -90,7 +102,8 @@ del _KINDS["ball", "normal"]
 
 
 def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
-    """The codes of a contact and a direction; InputError for unknown names and a ball whose normal force oscillates.
+    """The codes of a contact and a direction; InputError for unknown names and a ball whose normal
+    force oscillates.
 
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
@@ -99,60 +112,87 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
         return _KINDS[contact, direction]
     except (KeyError, TypeError):
         pass  # the reason follows
-    for name, value, known in (("contact", contact, CONTACTS), ("direction", direction, DIRECTIONS)):
+    for name, value, known in (
+        ("contact", contact, CONTACTS),
+        ("direction", direction, DIRECTIONS),
+    ):
         if not isinstance(value, str) or value not in known:
             raise InputError(name, value, f"one of {', '.join(known)}")
-    told = "across or along for a ball: a normal force that oscillates changes its contact radius, not modelled"
+    told = (
+        "across or along for a ball: a normal force that oscillates changes its contact "
+        "radius, not modelled"
+    )
     raise InputError("direction", direction, told)
 
 
-# --- quadrature -----------------------------------------------------------------------------------------
+# --- quadrature -----------------------------------------------------------------------------------
 
-# Gauss's rules after t -> xi with d xi proportional to t^(p - 1) (1 - t)^(q - 1): what ends in a root becomes smooth.
+# Gauss's rules after t -> xi with d xi proportional to t^(p - 1) (1 - t)^(q - 1): what ends in a
+# root becomes smooth.
 _POWERS = ((1, 2), (2, 4), (2, 1), (2, 2), (1, 2))
-#: tolerance of a table -> for each piece of the integral (kernel/contact.c) the number of nodes; the largest errors at
-#: any legal v~ and y~ that a search found, absolute and relative, see mumacro_rule in kernel/data.h, doubled.
-#: ``python benchmarks/contacts.py --only errors`` prints these rows.
+#: tolerance of a table -> for each piece of the integral (kernel/contact.c) the number of nodes;
+#: the largest errors at any legal v~ and y~ that a search found, absolute and relative, see
+#: mumacro_rule in kernel/data.h, doubled. ``python benchmarks/contacts.py --only errors`` prints
+#: these rows.
 _RULES: dict[float, tuple[tuple[int, tuple[float, ...], tuple[float, ...]], ...]] = {
     0.0001: (
         (8, (1.7e-06, 2.1e-07, 0, 3.2e-06, 4.5e-06), (0.72, 2, 0, 0.35, 2)),
         (10, (3.1e-06, 2.1e-07, 4.6e-05, 5.3e-06, 0.00024), (0.49, 1.5, 0.00016, 0.0006, 2)),
         (8, (5.1e-05, 2.6e-06, 0.00021, 0.00014, 0.0022), ()),
-        (8, (1.3e-05, 3.5e-06, 2.7e-05, 2.8e-05, 0.0002), (0.0004, 7.9e-06, 7.6e-05, 0.00039, 0.003)),
+        (
+            8,
+            (1.3e-05, 3.5e-06, 2.7e-05, 2.8e-05, 0.0002),
+            (0.0004, 7.9e-06, 7.6e-05, 0.00039, 0.003),
+        ),
         (8, (5.5e-06, 2.2e-05, 0, 3.2e-05, 5.3e-05), (2.3e-05, 8.6e-05, 0, 0.00013, 0.00018)),
     ),
     1e-07: (
         (14, (3.1e-08, 1e-09, 0, 7.2e-08, 9.4e-08), (0.31, 1.4, 0, 0.28, 1.4)),
         (16, (5.9e-08, 2e-09, 2.1e-06, 1.4e-07, 4.6e-05), (0.62, 0.98, 8.1e-06, 6.3e-05, 1.5)),
         (16, (4.9e-07, 6.9e-09, 2.3e-05, 2e-06, 0.00023), ()),
-        (14, (6.8e-08, 7.3e-09, 8.5e-07, 7.5e-08, 1.3e-06), (8.1e-07, 1.4e-08, 1.9e-06, 8.1e-07, 4.6e-06)),
+        (
+            14,
+            (6.8e-08, 7.3e-09, 8.5e-07, 7.5e-08, 1.3e-06),
+            (8.1e-07, 1.4e-08, 1.9e-06, 8.1e-07, 4.6e-06),
+        ),
         (12, (4.1e-08, 1.7e-07, 0, 3.5e-07, 6.2e-07), (1.7e-07, 6.5e-07, 0, 1.5e-06, 2.1e-06)),
     ),
     1e-10: (
         (26, (2.8e-10, 1.1e-12, 0, 6.8e-10, 8.5e-10), (0.15, 0.89, 0, 0.21, 0.89)),
         (28, (2.5e-10, 2.6e-12, 3.4e-08, 7.1e-10, 5.6e-06), (0.32, 0.53, 1.3e-07, 3.9e-06, 0.94)),
         (28, (4.3e-09, 1.3e-11, 3.2e-06, 2.2e-08, 3e-05), ()),
-        (22, (1.7e-10, 8.1e-12, 6e-08, 2e-10, 3.7e-08), (2.3e-09, 1.5e-11, 6.6e-08, 2.3e-09, 7.2e-09)),
+        (
+            22,
+            (1.7e-10, 8.1e-12, 6e-08, 2e-10, 3.7e-08),
+            (2.3e-09, 1.5e-11, 6.6e-08, 2.3e-09, 7.2e-09),
+        ),
         (18, (4.7e-11, 2.7e-10, 0, 6.1e-10, 9.5e-10), (2e-10, 1.1e-09, 0, 2.6e-09, 3.2e-09)),
     ),
     1e-12: (
         (40, (9.7e-12, 8e-15, 0, 2.7e-11, 2.9e-11), (0.087, 0.62, 0, 0.16, 0.62)),
-        (40, (5.2e-12, 2.1e-14, 2.3e-09, 1.6e-11, 1.4e-06), (2.7e-07, 0.31, 8.5e-09, 6.6e-07, 0.68)),
+        (
+            40,
+            (5.2e-12, 2.1e-14, 2.3e-09, 1.6e-11, 1.4e-06),
+            (2.7e-07, 0.31, 8.5e-09, 6.6e-07, 0.68),
+        ),
         (40, (1.3e-10, 8.6e-14, 8.1e-07, 7.7e-10, 5.1e-06), ()),
         (28, (2.4e-12, 0, 1.4e-08, 8.7e-12, 5.8e-09), (7.3e-11, 0, 1.1e-08, 1.5e-10, 1.5e-10)),
         (22, (1.7e-12, 2.2e-12, 0, 2.6e-11, 4.3e-11), (7e-12, 8.5e-12, 0, 3.1e-10, 1.5e-10)),
     ),
-}  # fmt: skip
+}
 
 
-#: of the rule of oscillation along, for every table: its error is near rounding, and is estimated at the point
+#: of the rule of oscillation along, for every table: its error is near rounding, and is estimated
+#: at the point
 DRIVEN_NODES = 28
 _DRIVEN_PIECE = 3  # whose powers it has
 
 
 def rules(tolerance: float) -> list[tuple[Array, Array]]:
     """Points (nodes, 2) and errors (2, 5) of every piece, for a table of this tolerance."""
-    chosen = _RULES[max((known for known in _RULES if known <= 1.01 * tolerance), default=min(_RULES))]
+    chosen = _RULES[
+        max((known for known in _RULES if known <= 1.01 * tolerance), default=min(_RULES))
+    ]
     found = []
     for piece, (nodes, *stated) in enumerate(chosen):
         errors = np.zeros((2, 5))
@@ -170,19 +210,25 @@ def points(piece: int, nodes: int) -> Array:
     # the share beyond is a polynomial in 1 - t, exact where it is small
     slope = Polynomial([0.0, 1.0]) ** (q - 1) * Polynomial([1.0, -1.0]) ** (p - 1)
     beyond = slope.integ() / slope.integ()(1.0)
-    return np.ascontiguousarray(np.stack([beyond(1.0 - t), 0.5 * weight * beyond.deriv()(1.0 - t)], axis=1))
+    return np.ascontiguousarray(
+        np.stack([beyond(1.0 - t), 0.5 * weight * beyond.deriv()(1.0 - t)], axis=1)
+    )
 
 
 def driven_rule() -> Array:
-    """The rule of oscillation along, (nodes, 5): as :func:`points`, and three null rules on the same nodes.
+    """The rule of oscillation along, (nodes, 5): as :func:`points`, and three null rules on the
+    same nodes.
 
-    A null rule gives the coefficient of one Legendre polynomial in the integrand, of degree nodes - 3 to nodes - 1
-    (Laurie; Berntsen and Espelid): what the rule integrates exactly, and the last that it can tell apart.
+    A null rule gives the coefficient of one Legendre polynomial in the integrand, of degree nodes -
+    3 to nodes - 1 (Laurie; Berntsen and Espelid): what the rule integrates exactly, and the last
+    that it can tell apart.
     """
     x, _ = np.polynomial.legendre.leggauss(DRIVEN_NODES)
     degrees = np.arange(DRIVEN_NODES - 3, DRIVEN_NODES)
     nulls = np.polynomial.legendre.legvander(x, DRIVEN_NODES)[:, degrees] * (2 * degrees + 1)
-    return np.ascontiguousarray(np.concatenate([points(_DRIVEN_PIECE, DRIVEN_NODES), nulls], axis=1))
+    return np.ascontiguousarray(
+        np.concatenate([points(_DRIVEN_PIECE, DRIVEN_NODES), nulls], axis=1)
+    )
 
 
 def put_rules(data: Data, tolerance: float) -> None:

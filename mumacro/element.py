@@ -1,14 +1,17 @@
-"""The contact in the time domain: for programs with dynamics, soft drives, any motion of the upper point.
+"""The contact in the time domain: for programs with dynamics, soft drives, any motion of the upper
+point.
 
-A spring follows the motion of its upper point by f <- P(f + k dw), and P brings a force beyond mu0 Fz back to that
-limit along its own direction: eqs. (9) to (12), one implicit step (Moreau's catching-up).  A ball is many independent
-springs by the method of dimensionality reduction, with the limit 3/2 (1 - xi^2) of the mean one at xi = 0 (middle) to 1
-(rim).  The steps are those of the kernel, ``mumacro/kernel/element.c``; in C they are ``mumacro_element_step``.
+A spring follows the motion of its upper point by f <- P(f + k dw), and P brings a force beyond mu0
+Fz back to that limit along its own direction: eqs. (9) to (12), one implicit step (Moreau's
+catching-up).  A ball is many independent springs by the method of dimensionality reduction, with
+the limit 3/2 (1 - xi^2) of the mean one at xi = 0 (middle) to 1 (rim).  The steps are those of the
+kernel, ``mumacro/kernel/element.c``; in C they are ``mumacro_element_step``.
 
 References
 ----------
-V. L. Popov, M. Hess, "Method of Dimensionality Reduction in Contact Mechanics and Friction", Springer (2015).
-J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert space", J. Differ. Equ. 26 (1977) 347.
+V. L. Popov, M. Hess, "Method of Dimensionality Reduction in Contact Mechanics and Friction",
+Springer (2015). J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert
+space", J. Differ. Equ. 26 (1977) 347.
 """
 
 import math
@@ -41,18 +44,20 @@ class Element:
     contact : str
         "spring", or "ball" under a constant normal force.
     springs : int, optional
-        Springs of a ball, 32 if left out, up to 100,000.  The mean friction of 32 differs from the ball's by at most
-        1.1e-3 mu0, at creeping speeds, by 1e-6 mu0 in the median; of 128 by 6.3e-5 and 7e-8.
+        Springs of a ball, 32 if left out, up to 100,000.  The mean friction of 32 differs from the
+        ball's by at most 1.1e-3 mu0, at creeping speeds, by 1e-6 mu0 in the median; of 128 by
+        6.3e-5 and 7e-8.
 
     Raises
     ------
     InputError
-        A value out of bounds, shapes that do not broadcast, an unknown contact, more than one spring for "spring".
+        A value out of bounds, shapes that do not broadcast, an unknown contact, more than one
+        spring for "spring".
 
     Notes
     -----
-    The error of a motion is proportional to its steps: 1000 steps a period give mean forces to about 1e-3 mu0 Fz.
-    Halving the steps and extrapolating, 2 F(h/2) - F(h), gains two digits.
+    The error of a motion is proportional to its steps: 1000 steps a period give mean forces to
+    about 1e-3 mu0 Fz. Halving the steps and extrapolating, 2 F(h/2) - F(h), gains two digits.
 
     Examples
     --------
@@ -66,16 +71,25 @@ class Element:
     """
 
     def __init__(
-        self, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike, contact: str = "spring", springs: int | None = None
+        self,
+        mu0: ArrayLike,
+        Fz: ArrayLike,
+        k: ArrayLike,
+        contact: str = "spring",
+        springs: int | None = None,
     ) -> None:
         usual, most = (SPRINGS, MOST_SPRINGS) if kind_of(contact).contact else (1, 1)
         springs = usual if springs is None else springs
         if not (type(springs) is int and 1 <= springs <= most):
-            raise InputError("springs", springs, f"a whole number from 1 to {most} for contact={contact!r}")
+            raise InputError(
+                "springs", springs, f"a whole number from 1 to {most} for contact={contact!r}"
+            )
         columns = {"mu0": real("mu0", mu0), "Fz": real("Fz", Fz), "k": real("k", k)}
         check_inputs(columns)
         if np.isinf(columns["k"]).any():
-            raise InputError("k", math.inf, "finite: a rigid contact has no elongation that could be stepped")
+            raise InputError(
+                "k", math.inf, "finite: a rigid contact has no elongation that could be stepped"
+            )
         try:
             mu0_, Fz_, k_ = np.broadcast_arrays(*columns.values())
         except ValueError as error:
@@ -94,13 +108,15 @@ class Element:
         dx, dy : array_like
             The motion during this step [m], finite, of the contacts' shape or broadcast to it.
         Fz : array_like, optional
-            The normal force at the end of this step and until it is given again [N], finite and >= 0; at 0 the
-            contact is open and its force zero.  For one spring only: the radius of a ball would change with it.
+            The normal force at the end of this step and until it is given again [N], finite and >=
+            0; at 0 the contact is open and its force zero.  For one spring only: the radius of a
+            ball would change with it.
 
         Returns
         -------
         Fx, Fy : float, or ndarray of the contacts' shape
-            Force after the step [N]; Fx > 0 where the contact is dragged along x.  InputError moves nothing.
+            Force after the step [N]; Fx > 0 where the contact is dragged along x.  InputError moves
+            nothing.
 
         Examples
         --------
@@ -116,7 +132,9 @@ class Element:
         limit = self._limit
         if Fz is not None:
             if self.contact != "spring":
-                raise InputError("Fz", Fz, "left out for a ball, whose contact radius would change with it")
+                raise InputError(
+                    "Fz", Fz, "left out for a ball, whose contact radius would change with it"
+                )
             limit = self._limits(self._like(Fz, "Fz"))
         along, across = self._like(dx, "dx"), self._like(dy, "dy")
         self._limit, sums = limit, np.empty((self._k.size, 2))
@@ -130,7 +148,8 @@ class Element:
 
     @property
     def state(self) -> Array:
-        """Forces of the springs [N], a copy of shape ``(*contacts, springs, 2)``; may be assigned."""
+        """Forces of the springs [N], a copy of shape ``(*contacts, springs, 2)``; may be
+        assigned."""
         return self._forces.reshape(*self.shape, self.springs, 2).copy()
 
     @state.setter
@@ -148,7 +167,10 @@ class Element:
 
     def __repr__(self) -> str:
         springs = f", {self.springs} springs" if self.contact == "ball" else ""
-        return f"<Element {self.contact}{springs}, {self._k.size} contacts of shape {self.shape}, force {self.force}>"
+        return (
+            f"<Element {self.contact}{springs}, {self._k.size} contacts of shape {self.shape}, "
+            f"force {self.force}>"
+        )
 
     def _limits(self, Fz: Array) -> Array:
         """mu0 Fz [N] of every contact."""
@@ -158,7 +180,9 @@ class Element:
         bad = ~((flat >= 0.0) & np.isfinite(limit))
         if bad.any():
             index = int(np.flatnonzero(bad)[0])
-            raise InputError("Fz", float(flat[index]), "finite and >= 0, with mu0 Fz below 1.8e308", index)
+            raise InputError(
+                "Fz", float(flat[index]), "finite and >= 0, with mu0 Fz below 1.8e308", index
+            )
         return limit
 
     def _like(self, value: ArrayLike, name: str) -> Array:
@@ -169,7 +193,9 @@ class Element:
         try:
             array = np.broadcast_to(given, self.shape).ravel()
         except ValueError as error:
-            raise InputError(name, given.shape, f"of a shape that broadcasts to the contacts' {self.shape}") from error
+            raise InputError(
+                name, given.shape, f"of a shape that broadcasts to the contacts' {self.shape}"
+            ) from error
         if not np.isfinite(array).all():
             raise InputError(name, value, "finite")
         return array

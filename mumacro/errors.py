@@ -20,7 +20,8 @@ class InputError(MumacroError, ValueError):
         super().__init__(f"{field}{where} must be {bound}, got {_shown(value)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild from the parts: an error that a worker process raises must reach the calling process."""
+        """Rebuild from the parts: an error that a worker process raises must reach the calling
+        process."""
         return type(self), (self.field, self.value, self.bound, self.index)
 
 
@@ -29,7 +30,8 @@ class TableError(MumacroError):
 
     def __init__(self, path: str | Path, reason: str) -> None:
         self.path = Path(path)  #: the file
-        self.reason = reason  #: why it is refused: missing, another format version, a wrong checksum, ...
+        #: why it is refused: missing, another format version, a wrong checksum, ...
+        self.reason = reason
         super().__init__(f"{self.path}: {reason}")
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,8 +1,9 @@
-"""Reading HDF5 files from unknown sources: the parts of a netCDF-4 file, by name, with a limit of memory.
+"""Reading HDF5 files from unknown sources: the parts of a netCDF-4 file, by name, with a limit of
+memory.
 
-The netCDF library reads all of a file when it opens it, follows cyclic links until the stack is full, and
-unpacks data beyond their declared size.  Here only the requested parts are read, sizes are checked before
-memory is taken, and numbers are unpacked up to the size that they have.
+The netCDF library reads all of a file when it opens it, follows cyclic links until the stack is
+full, and unpacks data beyond their declared size.  Here only the requested parts are read, sizes
+are checked before memory is taken, and numbers are unpacked up to the size that they have.
 """
 
 import math
@@ -25,7 +26,8 @@ _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
 
 
 class Group:
-    """One group; every method raises what ``refuse`` makes where a part is missing, of another kind or too large."""
+    """One group; every method raises what ``refuse`` makes where a part is missing, of another kind
+    or too large."""
 
     def __init__(self, found: Any, path: str, size: int, refuse: Refuse) -> None:
         self._id, self.path, self._size, self.refuse = found, path, size, refuse
@@ -48,7 +50,7 @@ class Group:
         path = f"{self.path.rstrip('/')}/{name}"
         return Group(self._open(name, h5g.GroupID, "group"), path, self._size, self.refuse)
 
-    # --- attributes ---------------------------------------------------------------------------------
+    # --- attributes -------------------------------------------------------------------------------
 
     def has(self, name: str) -> bool:
         """Whether there is such an attribute."""
@@ -61,18 +63,25 @@ class Group:
         return self._value(name, h5a.open(self._id, name.encode()))
 
     def attributes(self) -> dict[str, Any]:
-        """All attributes but those of the netCDF library itself, in the order in which they were made."""
+        """All attributes but those of the netCDF library itself, in the order in which they were
+        made."""
         count, by_age = h5a.get_num_attrs(self._id), h5py.h5.INDEX_CRT_ORDER
         if count > MOST_ATTRIBUTES:
             raise self.refuse(f"{self.path} has more than {MOST_ATTRIBUTES} attributes")
         found = (h5a.open(self._id, index=i, index_type=by_age) for i in range(count))
         named = {one.name.decode(): one for one in found}
-        return {name: self._value(name, one) for name, one in named.items() if not name.startswith("_")}
+        return {
+            name: self._value(name, one) for name, one in named.items() if not name.startswith("_")
+        }
 
     def numbers(self, name: str, count: int) -> Array:
         """An attribute of ``count`` finite numbers."""
         values = np.atleast_1d(np.asarray(self.attribute(name)))
-        if values.dtype.kind not in "fi" or values.shape != (count,) or not np.all(np.isfinite(values)):
+        if (
+            values.dtype.kind not in "fi"
+            or values.shape != (count,)
+            or not np.all(np.isfinite(values))
+        ):
             raise self.refuse(f"attribute {name!r} of {self.path} is not {count} finite numbers")
         return values.astype(np.float64)
 
@@ -88,15 +97,20 @@ class Group:
         first = values.reshape(-1)[0] if values.size == 1 else values
         return first.decode() if isinstance(first, bytes) else str(first) if is_text else first
 
-    # --- numbers ------------------------------------------------------------------------------------
+    # --- numbers ----------------------------------------------------------------------------------
 
     def array(self, name: str, most: int, shape: tuple[int, ...] | None = None) -> Array:
-        """A variable of finite float64, of at most ``most`` numbers, as the netCDF library stores numbers."""
+        """A variable of finite float64, of at most ``most`` numbers, as the netCDF library stores
+        numbers."""
         found = self._open(name, h5d.DatasetID, "variable")
         space, stored = found.get_space(), found.get_create_plist()
-        is_double = space.get_simple_extent_type() == h5s.SIMPLE and found.get_type().equal(h5t.IEEE_F64LE)
+        is_double = space.get_simple_extent_type() == h5s.SIMPLE and found.get_type().equal(
+            h5t.IEEE_F64LE
+        )
         if not is_double or math.prod(space.shape) > most:
-            raise self.refuse(f"variable {name!r} in {self.path} is no float64 array of at most {most} numbers")
+            raise self.refuse(
+                f"variable {name!r} in {self.path} is no float64 array of at most {most} numbers"
+            )
         if shape is not None and space.shape != shape:
             raise self.refuse(f"{self.path}: the shape of {name!r} is {space.shape}, not {shape}")
         layout = stored.get_layout()
@@ -115,7 +129,11 @@ class Group:
     def _unpacked(self, found: Any, name: str, filters: tuple[int, ...]) -> Array:
         """The one chunk of a variable, unpacked here with a limit: HDF5 itself has none."""
         size = 8 * math.prod(found.shape)
-        if found.get_num_chunks() != 1 or (chunk := found.get_chunk_info(0)).size > self._size or chunk.filter_mask:
+        if (
+            found.get_num_chunks() != 1
+            or (chunk := found.get_chunk_info(0)).size > self._size
+            or chunk.filter_mask
+        ):
             raise self.refuse(f"variable {name!r} in {self.path} is stored in an unknown way")
         data = found.read_direct_chunk(chunk.chunk_offset)[1]
         if h5z.FILTER_DEFLATE in filters:

@@ -1,11 +1,13 @@
-"""The six inputs of a case: names, units, bounds, other names, and what may stand for them.  The one truth of a case.
+"""The six inputs of a case: names, units, bounds, other names, and what may stand for them.  The
+one truth of a case.
 
-The library, the files, the command line, the service and the exports take their fields from here.  A frequency
-``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one of them.  The stiffness ``k``
-is always said: a positive number, or rigid contact by the word ``rigid`` or by infinity.
+The library, the files, the command line, the service and the exports take their fields from here.
+A frequency ``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one
+of them.  The stiffness ``k`` is always said: a positive number, or rigid contact by the word
+``rigid`` or by infinity.
 
-**A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column ``k`` makes its case
-illegal, see :data:`GAP`.
+**A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column
+``k`` makes its case illegal, see :data:`GAP`.
 """
 
 import difflib
@@ -30,14 +32,18 @@ SI = {
     "f": ("Hz", "hertz"),
     "v0": ("m/s", "metres per second"),
 }
-#: what may stand for an input, and the input that has its unit: the amplitude of the normal force, the ends of k
+#: what may stand for an input, and the input that has its unit: the amplitude of the normal force,
+#: the ends of k
 LIKE = {"Fz_amplitude": "Fz", "k_low": "k", "k_high": "k"}
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
 UNITS = {name: SI[name][0] for name in FIELDS}
-PER_UNIT = {"mu0": "-", "Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}  # of a slope along each
+# of a slope along each
+PER_UNIT = {"mu0": "-", "Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}
 POSITIVE = ("mu0", "Fz", "k", "k_low", "k_high")
-BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in (*NAMES, *LIKE)}
+BOUNDS = {
+    name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in (*NAMES, *LIKE)
+}
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
 RIGID = "rigid"  # the word for a stiffness without bound
 GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
@@ -46,11 +52,12 @@ STIFFNESS = 'a number > 0 [N/m], or for a rigid contact "rigid" or math.inf'
 MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
 
 
-# --- names and units as text ----------------------------------------------------------------------------
+# --- names and units as text ----------------------------------------------------------------------
 
 
 class Scale(NamedTuple):
-    """A unit in SI: value * times / over.  Small powers of ten stand in ``over``: 2 um are 2 / 1e6, rounded once."""
+    """A unit in SI: value * times / over.  Small powers of ten stand in ``over``: 2 um are 2 / 1e6,
+    rounded once."""
 
     times: float = 1.0
     over: float = 1.0
@@ -61,11 +68,24 @@ class Scale(NamedTuple):
 
 
 _LENGTH = {
-    "m": Scale(), "cm": Scale(over=1e2), "mm": Scale(over=1e3), "um": Scale(over=1e6), "µm": Scale(over=1e6),
-    "μm": Scale(over=1e6), "nm": Scale(over=1e9), "pm": Scale(over=1e12), "in": Scale(254.0, 1e4),
-}  # fmt: skip
-_FORCE = {"N": Scale(), "mN": Scale(over=1e3), "uN": Scale(over=1e6), "kN": Scale(1e3), "MN": Scale(1e6),
-          "lbf": Scale(4.4482216152605)}  # fmt: skip
+    "m": Scale(),
+    "cm": Scale(over=1e2),
+    "mm": Scale(over=1e3),
+    "um": Scale(over=1e6),
+    "µm": Scale(over=1e6),
+    "μm": Scale(over=1e6),
+    "nm": Scale(over=1e9),
+    "pm": Scale(over=1e12),
+    "in": Scale(254.0, 1e4),
+}
+_FORCE = {
+    "N": Scale(),
+    "mN": Scale(over=1e3),
+    "uN": Scale(over=1e6),
+    "kN": Scale(1e3),
+    "MN": Scale(1e6),
+    "lbf": Scale(4.4482216152605),
+}
 _TIME = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 #: input -> unit -> scale; the only table of units
@@ -79,35 +99,82 @@ UNITS_OF: dict[str, dict[str, Scale]] = {
     },
     "y0": _LENGTH,
     "omega": {
-        "rad/s": Scale(), "1/s": Scale(), "krad/s": Scale(1e3), "rpm": Scale(RAD_PER_CYCLE, 60.0),
-        "1/min": Scale(RAD_PER_CYCLE, 60.0), "deg/s": Scale(RAD_PER_CYCLE, 360.0),
+        "rad/s": Scale(),
+        "1/s": Scale(),
+        "krad/s": Scale(1e3),
+        "rpm": Scale(RAD_PER_CYCLE, 60.0),
+        "1/min": Scale(RAD_PER_CYCLE, 60.0),
+        "deg/s": Scale(RAD_PER_CYCLE, 360.0),
     },
-    "f": {"Hz": Scale(), "1/s": Scale(), "mHz": Scale(over=1e3), "kHz": Scale(1e3), "MHz": Scale(1e6)},
+    "f": {
+        "Hz": Scale(),
+        "1/s": Scale(),
+        "mHz": Scale(over=1e3),
+        "kHz": Scale(1e3),
+        "MHz": Scale(1e6),
+    },
     "v0": {
         f"{length}/{time}": Scale(scale.times, scale.over * seconds)
         for length, scale in {**_LENGTH, "km": Scale(1e3)}.items()
         for time, seconds in _TIME.items()
     },
-}  # fmt: skip
+}
 
-# Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a file that has one of
-# them while the input itself is missing is refused.
+# Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a
+# file that has one of them while the input itself is missing is refused.
 _OTHER_NAMES = {
-    "mu": "mu0", "mus": "mu0", "muk": "mu0", "mucoulomb": "mu0", "frictioncoefficient": "mu0",
-    "coefficientoffriction": "mu0", "cof": "mu0", "µ": "mu0", "µ0": "mu0", "μ": "mu0", "μ0": "mu0",
-    "fn": "Fz", "n": "Fz", "force": "Fz", "normalforce": "Fz", "load": "Fz", "normalload": "Fz",
-    "kx": "k", "kt": "k", "ktangential": "k", "stiffness": "k", "tangentialstiffness": "k", "contactstiffness": "k",
-    "y": "y0", "amplitude": "y0", "ampl": "y0", "amp": "y0", "a": "y0", "a0": "y0",
-    "w": "omega", "om": "omega", "ω": "omega", "angularfrequency": "omega", "angularvelocity": "omega",
-    "freq": "f", "frequency": "f", "hz": "f", "f0": "f",
-    "v": "v0", "vx": "v0", "speed": "v0", "velocity": "v0", "slidingspeed": "v0", "slidingvelocity": "v0",
-}  # fmt: skip
+    "mu": "mu0",
+    "mus": "mu0",
+    "muk": "mu0",
+    "mucoulomb": "mu0",
+    "frictioncoefficient": "mu0",
+    "coefficientoffriction": "mu0",
+    "cof": "mu0",
+    "µ": "mu0",
+    "µ0": "mu0",
+    "μ": "mu0",
+    "μ0": "mu0",
+    "fn": "Fz",
+    "n": "Fz",
+    "force": "Fz",
+    "normalforce": "Fz",
+    "load": "Fz",
+    "normalload": "Fz",
+    "kx": "k",
+    "kt": "k",
+    "ktangential": "k",
+    "stiffness": "k",
+    "tangentialstiffness": "k",
+    "contactstiffness": "k",
+    "y": "y0",
+    "amplitude": "y0",
+    "ampl": "y0",
+    "amp": "y0",
+    "a": "y0",
+    "a0": "y0",
+    "w": "omega",
+    "om": "omega",
+    "ω": "omega",
+    "angularfrequency": "omega",
+    "angularvelocity": "omega",
+    "freq": "f",
+    "frequency": "f",
+    "hz": "f",
+    "f0": "f",
+    "v": "v0",
+    "vx": "v0",
+    "speed": "v0",
+    "velocity": "v0",
+    "slidingspeed": "v0",
+    "slidingvelocity": "v0",
+}
 _OTHER_NAMES |= {name.lower(): name for name in NAMES}
 
 _IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
-_DASHED = re.compile(rf"({_NUMBER})\s*(?:-|–|to)\s*({_NUMBER})\s*(\D.*)?")  # an interval, as people write it
+# an interval, as people write it
+_DASHED = re.compile(rf"({_NUMBER})\s*(?:-|–|to)\s*({_NUMBER})\s*(\D.*)?")
 PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 
 
@@ -121,7 +188,8 @@ def is_rigid(text: str) -> bool:
 
 
 def refusal(name: str, value: float) -> str:
-    """Why ``value`` is no legal value of an input; NaN stands for a gap, which is never a rigid contact.
+    """Why ``value`` is no legal value of an input; NaN stands for a gap, which is never a rigid
+    contact.
 
     >>> refusal("v0", -1.0), refusal("k", math.nan)
     ('must be finite and >= 0', 'is missing; write rigid or a number')
@@ -134,7 +202,8 @@ def refusal(name: str, value: float) -> str:
 
 
 def split_unit(column: str) -> tuple[str, str | None]:
-    """Name and unit of a heading such as ``k [N/mm]`` or ``k (N/mm)``; the unit is None where there are no brackets.
+    """Name and unit of a heading such as ``k [N/mm]`` or ``k (N/mm)``; the unit is None where there
+    are no brackets.
 
     >>> split_unit("k [N/mm]"), split_unit("v0")
     (('k', 'N/mm'), ('v0', None))
@@ -177,10 +246,11 @@ def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:
 
 
 def suggestion(name: str, *, loosely: bool = True) -> str | None:
-    """The input that ``name`` is taken for, in another case, by another name or (``loosely``) misspelt; None for none.
+    """The input that ``name`` is taken for, in another case, by another name or (``loosely``)
+    misspelt; None for none.
 
-    >>> suggestion("FZ"), suggestion("F"), suggestion("stiffness"), suggestion("omga"), suggestion("temperature")
-    ('Fz', 'Fz', 'k', 'omega', None)
+    >>> [suggestion(name) for name in ("FZ", "F", "stiffness", "omga", "temperature")]
+    ['Fz', 'Fz', 'k', 'omega', None]
     """
     if name.strip() == "F":  # a force; without case it would be the frequency f
         return "Fz"
@@ -210,9 +280,14 @@ def unknown_name(name: str, known: Iterable[str]) -> str:
 def number_hint(name: str, value: object) -> str:
     """Why ``value`` is refused where the number of an input, or another number, should stand.
 
-    >>> number_hint("y0", "2um"), number_hint("y0", "2,5"), number_hint("y0", "2"), number_hint("y0", True)
-    ('must be a number: give metres, 2e-06', 'must be a number with a decimal point: 2.5', \
-'must be a number, not a text: leave out the quotes', 'must be a number')
+    >>> number_hint("y0", "2um")
+    'must be a number: give metres, 2e-06'
+    >>> number_hint("y0", "2,5")
+    'must be a number with a decimal point: 2.5'
+    >>> number_hint("y0", "2")
+    'must be a number, not a text: leave out the quotes'
+    >>> number_hint("y0", True)
+    'must be a number'
     """
     if not isinstance(value, str):
         return GAP if name == "k" and value is None else "must be a number"
@@ -225,7 +300,10 @@ def number_hint(name: str, value: object) -> str:
     if re.fullmatch(r"[+-]?\d+,\d+", text):
         return f"must be a number with a decimal point: {text.replace(',', '.')}"
     if name == "k" and ".." in text:
-        return "must be a number, or rigid; an interval is k_range in JSON, columns k_low and k_high in a file"
+        return (
+            "must be a number, or rigid; an interval is k_range in JSON, columns k_low and "
+            "k_high in a file"
+        )
     found = _WITH_UNIT.fullmatch(text)
     if found is None:
         return "must be a number, or rigid" if name == "k" else "must be a number"
@@ -237,21 +315,26 @@ def number_hint(name: str, value: object) -> str:
 
 
 def read_number(name: str, text: str) -> float:
-    """The value of an input from text, a number in SI or with a unit, in SI; ``rigid`` is an infinite stiffness.
+    """The value of an input from text, a number in SI or with a unit, in SI; ``rigid`` is an
+    infinite stiffness.
 
     >>> read_number("y0", "2e-6"), read_number("k", "1 N/um")
     (2e-06, 1000000.0)
     >>> read_number("y0", "2 N")
     Traceback (most recent call last):
     ...
-    ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um, ...
+    ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um,
+    ...
     """
     like = LIKE.get(name, name)
     return read_quantity(name, text, SI[like][1], UNITS_OF[like], rigid=name == "k")
 
 
-def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False) -> float:
-    """As :func:`read_number`, of any quantity: what it is in ``words``, its ``units``, whether it may be ``rigid``."""
+def read_quantity(
+    name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False
+) -> float:
+    """As :func:`read_number`, of any quantity: what it is in ``words``, its ``units``, whether it
+    may be ``rigid``."""
     text = text.strip()
     if rigid and is_rigid(text):
         return math.inf
@@ -267,11 +350,15 @@ def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], 
         raise ValueError(f"{name}={text}: {meant}")
     known = ", ".join([unit for unit in units if unit][:4])
     hint = ", or rigid" if rigid else ""
-    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {known}, ...{hint}")
+    raise ValueError(
+        f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {known}, "
+        f"...{hint}"
+    )
 
 
 def _meant(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
-    """What was probably meant by a text that is no quantity: an interval, a unit in other case, f for omega.
+    """What was probably meant by a text that is no quantity: an interval, a unit in other case, f
+    for omega.
 
     >>> _meant("k", "0.8-1.2N/um", UNITS_OF["k"]), _meant("omega", "20kHz", UNITS_OF["omega"])
     ('write an interval as k=0.8..1.2N/um', 'did you mean f=20kHz? omega is in rad/s')
@@ -285,13 +372,16 @@ def _meant(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
     other = {"omega": "f", "f": "omega"}.get(name)
     if near:
         return f"did you mean {' or '.join(f'{number}{known}' for known in near)}?"
-    if other and (there := next((known for known in UNITS_OF[other] if known.lower() == unit.lower()), None)):
+    if other and (
+        there := next((known for known in UNITS_OF[other] if known.lower() == unit.lower()), None)
+    ):
         return f"did you mean {other}={number}{there}? {name} is in {SI[name][0]}"
     return None
 
 
 def read_range(name: str, text: str) -> tuple[float, float]:
-    """Both ends of ``low..high`` in SI; a unit behind the second end holds for both.  ValueError as in read_number.
+    """Both ends of ``low..high`` in SI; a unit behind the second end holds for both.  ValueError as
+    in read_number.
 
     >>> read_range("k", "0.8..1.2 N/um")
     (800000.0, 1200000.0)
@@ -306,32 +396,43 @@ def read_range(name: str, text: str) -> tuple[float, float]:
     return ends
 
 
-# --- columns --------------------------------------------------------------------------------------------
+# --- columns --------------------------------------------------------------------------------------
 
 
 def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset has."""
-    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a reader of batches
-        import pyarrow as pa  # its columns come from one reading: a second one may have another order
+    """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset
+    has."""
+    # such as a reader of batches
+    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):
+        # its columns come from one reading: a second one may have another order
+        import pyarrow as pa
 
         cases = pa.table(cases)
     try:
-        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
-        there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
+        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars
+        # have lists of names
+        there = (
+            cases
+            if hasattr(cases, "keys")
+            else getattr(cases, "column_names", None) or cases.columns
+        )
         return {name: cases[name] for name in names if name in there}
     except (AttributeError, TypeError, KeyError) as error:
         kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
         raise InputError(
-            argument, kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
-            "give anything else as {name: array}, what is lazy after its collect() or read_all()"
-        ) from error  # fmt: skip
+            argument,
+            kind,
+            "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
+            "give anything else as {name: array}, what is lazy after its collect() or read_all()",
+        ) from error
 
 
 def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
-    """The six inputs as float64 arrays; InputError where one is missing, given twice, or no real number.
+    """The six inputs as float64 arrays; InputError where one is missing, given twice, or no real
+    number.
 
-    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array or
-    ``rigid``; an array may hold the word, too.
+    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number,
+    an array or ``rigid``; an array may hold the word, too.
     """
     converted: dict[str, Array] = {}
     for name in FIELDS:
@@ -340,7 +441,9 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
             both = given.get("omega") is not None
             if both == (given.get("f") is not None):
                 told = "not both" if both else "one of them"
-                raise InputError("omega", given.get("omega"), f"given or f [Hz] in its place, {told}")
+                raise InputError(
+                    "omega", given.get("omega"), f"given or f [Hz] in its place, {told}"
+                )
             source = "omega" if both else "f"
         if source not in given:
             hint = f": {STIFFNESS}" if name == "k" else f" [{UNITS[name]}]"
@@ -360,7 +463,8 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def _stiffness(value: Any) -> Array:
-    """A stiffness, or an array of them, which may say ``rigid``; InputError with the remedy for a gap."""
+    """A stiffness, or an array of them, which may say ``rigid``; InputError with the remedy for a
+    gap."""
     try:
         return real("k", _rigid_as_infinity(value))
     except InputError as error:
@@ -371,7 +475,9 @@ def _rigid_as_infinity(value: Any) -> Any:
     """A stiffness, or an array of them, with infinity for the word ``rigid``."""
     if isinstance(value, str):
         return math.inf if is_rigid(value) else value
-    if not isinstance(value, (list, tuple)) and getattr(getattr(value, "dtype", None), "kind", "") not in ("O", "U"):
+    if not isinstance(value, (list, tuple)) and getattr(
+        getattr(value, "dtype", None), "kind", ""
+    ) not in ("O", "U"):
         return value
     try:
         texts = np.asarray(value, dtype=object)
@@ -382,17 +488,24 @@ def _rigid_as_infinity(value: Any) -> Any:
 
 
 def real(name: str, value: Any) -> Array:
-    """``value`` as float64; complex numbers, times, text and None are refused, also where numpy would convert them.
+    """``value`` as float64; complex numbers, times, text and None are refused, also where numpy
+    would convert them.
 
     What is masked is unknown: NaN.
     """
     try:
         if isinstance(value, np.ma.MaskedArray):
-            value = np.ma.filled(value.astype(np.float64), math.nan) if value.dtype.kind in "fiub" else value.data
+            value = (
+                np.ma.filled(value.astype(np.float64), math.nan)
+                if value.dtype.kind in "fiub"
+                else value.data
+            )
         array = np.asarray(value)
         if array.dtype.kind in "fiub":
             return array.astype(np.float64, copy=False)
-        if array.dtype.kind == "O" and not any(isinstance(x, (str, bytes)) or x is None for x in array.ravel()):
+        if array.dtype.kind == "O" and not any(
+            isinstance(x, (str, bytes)) or x is None for x in array.ravel()
+        ):
             return array.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
         pass
@@ -400,13 +513,18 @@ def real(name: str, value: Any) -> Array:
 
 
 def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
-    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in place of omega."""
+    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in
+    place of omega."""
     for name, values in columns.items():
         legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
         bad = ~(legal if name == "k" else legal & np.isfinite(values))
         if bad.any():
             i = int(np.flatnonzero(bad.ravel())[0])
-            field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
+            field, told = (
+                ("f", real("f", frequency))
+                if name == "omega" and frequency is not None
+                else (name, values)
+            )
             value = float(told.ravel()[i])
             bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
             bound = STIFFNESS if field == "k" and math.isnan(value) else bound

@@ -1,9 +1,10 @@
 """A stiffness that is known as an interval only: the extremes of mu_macro over it.
 
-mu~ along a ray of k (v~ and y~ are both proportional to it) is not monotone: it falls from 1, may rise again, by up to
-0.0087 per unit of ln k, and falls to its limit of rigid contact.  So the extremes may lie inside; where the slope
-changes its sign between two samples, bisection finds them.  Both turns begin in one point, for one spring at
-y~ = 9.72 v~, so they may stand between two samples, which the cubic through these then shows.
+mu~ along a ray of k (v~ and y~ are both proportional to it) is not monotone: it falls from 1, may
+rise again, by up to 0.0087 per unit of ln k, and falls to its limit of rigid contact.  So the
+extremes may lie inside; where the slope changes its sign between two samples, bisection finds them.
+Both turns begin in one point, for one spring at y~ = 9.72 v~, so they may stand between two
+samples, which the cubic through these then shows.
 """
 
 import math
@@ -23,7 +24,8 @@ HALVINGS = 20  # of a spacing, until mu_macro next to an extreme is flat to 1e-1
 
 
 def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Inputs with :data:`ENDS` for ``k_range``; InputError for k beside it, half an interval, or what is no pair."""
+    """Inputs with :data:`ENDS` for ``k_range``; InputError for k beside it, half an interval, or
+    what is no pair."""
     given = dict(inputs)
     if "k_range" in given:
         if told := [name for name in ("k", *ENDS) if name in given]:
@@ -41,27 +43,37 @@ def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def middle(inputs: Mapping[str, Any], illegal: str) -> tuple[Array, Array, Array]:
-    """Both ends and their geometric middle; for no interval NaN, or InputError as ``illegal`` and one value ask for."""
+    """Both ends and their geometric middle; for no interval NaN, or InputError as ``illegal`` and
+    one value ask for."""
     low, high = (real(name, inputs[name]) for name in ENDS)
     try:
         low, high = np.broadcast_arrays(low, high)
     except ValueError as error:
-        raise InputError("k_range", (low.shape, high.shape), "of shapes that broadcast together") from error
+        raise InputError(
+            "k_range", (low.shape, high.shape), "of shapes that broadcast together"
+        ) from error
     legal = (low > 0.0) & (low <= high) & (high < math.inf)
     if not legal.all() and (illegal == "raise" or not legal.ndim):
         i = int(np.flatnonzero(~legal.ravel())[0])
-        raise InputError("k_range", (float(low.flat[i]), float(high.flat[i])), BOUND, i if legal.ndim else None)
+        raise InputError(
+            "k_range", (float(low.flat[i]), float(high.flat[i])), BOUND, i if legal.ndim else None
+        )
     low, high = (np.where(legal, end, np.nan) for end in (low, high))
     return low, high, np.asarray(np.clip(np.sqrt(low) * np.sqrt(high), low, high))
 
 
-def without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """A case with the middle stiffness, and the ends of an interval of it, if any; there is none where k is swept."""
+def without_interval(
+    case: Mapping[str, Any], along: str
+) -> tuple[Mapping[str, Any], dict[str, Any]]:
+    """A case with the middle stiffness, and the ends of an interval of it, if any; there is none
+    where k is swept."""
     if all(case.get(name) is None for name in ("k_range", *ENDS)):
         return case, {}
     given = as_ends(case)
     if along == "k":
-        raise InputError("k_range", (given["k_low"], given["k_high"]), "left out where k is the swept input")
+        raise InputError(
+            "k_range", (given["k_low"], given["k_high"]), "left out where k is the swept input"
+        )
     between = middle(given, "raise")[2]
     ends = {name: given.pop(name) for name in ENDS}
     return {**given, "k": between}, ends
@@ -70,9 +82,11 @@ def without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, 
 def extremes(
     evaluate: Callable[[Array, Places], tuple[Array, Array, Array]], low: Array, high: Array
 ) -> tuple[Array, Array, Array]:
-    """Smallest and largest mu_macro over [low, high], shapes (n,), and the largest bound of its error met there.
+    """Smallest and largest mu_macro over [low, high], shapes (n,), and the largest bound of its
+    error met there.
 
-    ``evaluate(k, places)`` gives (mu_macro, its bound, d mu_macro / d ln k) of cases ``places`` with stiffnesses ``k``.
+    ``evaluate(k, places)`` gives (mu_macro, its bound, d mu_macro / d ln k) of cases ``places``
+    with stiffnesses ``k``.
     """
     places = np.arange(low.size)
     ratio = np.log(high) - np.log(low)  # high/low may be beyond double range
@@ -101,7 +115,9 @@ def extremes(
         mu, slope = take(here, places)
         turns = np.flatnonzero(slope_before * slope < 0.0)
         close_in(before[turns], here[turns], slope_before[turns], turns)
-        place = _between(mu - mu_before, slope_before * np.log(here / before), slope * np.log(here / before))
+        place = _between(
+            mu - mu_before, slope_before * np.log(here / before), slope * np.log(here / before)
+        )
         pairs = np.flatnonzero(place > 0.0)
         inside = before[pairs] * (here[pairs] / before[pairs]) ** place[pairs]
         turned = take(inside, pairs)[1] * slope[pairs] < 0.0 if pairs.size else pairs > 0
@@ -115,12 +131,19 @@ def extremes(
 
 
 def _between(rise: Array, first: Array, last: Array) -> Array:
-    """Where two turns may hide between samples whose slopes have the same sign: the place of the extreme slope.
+    """Where two turns may hide between samples whose slopes have the same sign: the place of the
+    extreme slope.
 
-    That of the cubic with this rise and these slopes over an interval of 1, where it has the other sign; else 0.
+    That of the cubic with this rise and these slopes over an interval of 1, where it has the other
+    sign; else 0.
     """
     with np.errstate(all="ignore"):
         bend, fall = 3.0 * (first + last - 2.0 * rise), 6.0 * rise - 4.0 * first - 2.0 * last
         place = -0.5 * fall / bend
-        hidden = (first * last > 0.0) & (place > 0.0) & (place < 1.0) & ((first + 0.5 * fall * place) * first < 0.0)
+        hidden = (
+            (first * last > 0.0)
+            & (place > 0.0)
+            & (place < 1.0)
+            & ((first + 0.5 * fall * place) * first < 0.0)
+        )
     return np.where(hidden, place, 0.0)

@@ -1,8 +1,9 @@
 """The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
 
-It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``, ``records.h`` and
-``library.h``.  A call runs without the interpreter's lock.  There is a kernel for every instruction level of the
-processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
+It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``,
+``records.h`` and ``library.h``.  A call runs without the interpreter's lock.  There is a kernel for
+every instruction level of the processor; the best one is used, and those with fused multiply-add
+(AVX2, AVX-512, NEON) give the same bits.
 """
 
 import sys
@@ -20,7 +21,9 @@ BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 
 _HERE = Path(__file__).resolve().parent
 _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
-_DECLARED = "".join((_HERE / "kernel" / name).read_text("ascii") for name in ("data.h", "records.h", "library.h"))
+_DECLARED = "".join(
+    (_HERE / "kernel" / name).read_text("ascii") for name in ("data.h", "records.h", "library.h")
+)
 _FFI = FFI()
 _FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
 _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"))
@@ -37,21 +40,29 @@ def _numbers(array: Array | None) -> Any:
 class Data:
     """A table as the kernel reads it.
 
-    ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3, PIECE_COLUMNS): first cell,
-    offset, step, relative error.  ``blocks`` (sources + 1, BLOCK_COLUMNS): first cell, cells along b, offset and step
-    along a, along b; zero where no cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
+    ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3,
+    PIECE_COLUMNS): first cell, offset, step, relative error.  ``blocks`` (sources + 1,
+    BLOCK_COLUMNS): first cell, cells along b, offset and step along a, along b; zero where no
+    cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
     """
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _new("mumacro_data *")
         self._kept: list[Any] = []
-        #: points (nodes, 2) and errors (2, 5) of the pieces of a ball, see ``mumacro_rule``; none until they are put
+        #: points (nodes, 2) and errors (2, 5) of the pieces of a ball, see ``mumacro_rule``; none
+        #: until they are put
         self.rules: list[tuple[Array, Array]] = []
-        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by code of the quantity
+        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by
+        #: code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
         self.border, self.pieces, self.blocks, self.outer = (
             self._keep(self.pointer, name, array)
-            for name, array in (("border", border), ("pieces", pieces), ("blocks", blocks), ("outer", outer))
+            for name, array in (
+                ("border", border),
+                ("pieces", pieces),
+                ("blocks", blocks),
+                ("outer", outer),
+            )
         )
         self.pointer.border_cells = self.border.shape[0]
 
@@ -85,7 +96,8 @@ class Data:
 
 
 class Kernel:
-    """The functions of one instruction level; arrays are contiguous float64 (sources: int8), of one length.
+    """The functions of one instruction level; arrays are contiguous float64 (sources: int8), of one
+    length.
 
     Illegal points and cases give NaN and the source -1.  See ``kernel/library.h``.
     """
@@ -106,10 +118,18 @@ class Kernel:
         return self._found.quantity(code)
 
     def values(
-        self, data: Data, quantity: int, v: Array, y: Array, value: Array, bound: Array | None, source: Codes | None,
+        self,
+        data: Data,
+        quantity: int,
+        v: Array,
+        y: Array,
+        value: Array,
+        bound: Array | None,
+        source: Codes | None,
         kind: tuple[int, int] = (0, 0),
-    ) -> None:  # fmt: skip
-        """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where wanted.
+    ) -> None:
+        """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where
+        wanted.
 
         Of another ``kind``, see :meth:`cases`, all three are.
         """
@@ -123,19 +143,31 @@ class Kernel:
         self._values(data.pointer, 0, 0, quantity, 1, point, point + 1, point + 2, point + 3, code)
         return point[2], point[3], code[0]
 
-    def slopes(self, data: Data, quantity: int, v: Array, y: Array, rows: Array, start: int = 0) -> None:
-        """Value, slopes along ln v~ and ln y~ and their bounds: ``rows`` (5, N) from column ``start`` on."""
+    def slopes(
+        self, data: Data, quantity: int, v: Array, y: Array, rows: Array, start: int = 0
+    ) -> None:
+        """Value, slopes along ln v~ and ln y~ and their bounds: ``rows`` (5, N) from column
+        ``start`` on."""
         out = _numbers(rows.reshape(-1)[start:])
-        self._found.slopes(data.pointer, quantity, v.size, _numbers(v), _numbers(y), out, rows.shape[1])
+        self._found.slopes(
+            data.pointer, quantity, v.size, _numbers(v), _numbers(y), out, rows.shape[1]
+        )
 
     def cases(
-        self, data: Data, n: int, columns: Sequence[Array | float], rows: Array, source: Codes, start: int = 0,
+        self,
+        data: Data,
+        n: int,
+        columns: Sequence[Array | float],
+        rows: Array,
+        source: Codes,
+        start: int = 0,
         kind: tuple[int, int] = (0, 0),
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Cases ``start`` to ``start`` + n: fill ``rows`` (3, 5 or 17, N) and ``source`` (n,).
 
-        ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~, y~; slopes by input
-        and their bounds.  ``kind``: another contact and direction, see :class:`mumacro.contact.Kind`.
+        ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~,
+        y~; slopes by input and their bounds.  ``kind``: another contact and direction, see
+        :class:`mumacro.contact.Kind`.
         """
         constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
         kept = []
@@ -148,10 +180,13 @@ class Kernel:
                 kept.append(pointer)
         out = _numbers(rows.reshape(-1)[start:] if start else rows)
         codes = _FFI.from_buffer(_CODES, source)
-        self._cases(data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
+        self._cases(
+            data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
+        )
 
     def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:
-        """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""
+        """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also
+        slopes and bounds."""
         out, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six  # named: a call with *six takes longer
         self._one(pointer, mu0, Fz, k, y0, omega, v0, numbers, out)
         return _unpack(out, numbers)  # type: ignore[no-any-return]
@@ -163,36 +198,51 @@ class Kernel:
         return out
 
     def places(self, data: Data, v: Array, y: Array) -> tuple[Codes, Array, Array]:
-        """Blocks of points (n,) with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them."""
+        """Blocks of points (n,) with 0 < v~, y~ < infinity, and their coordinates as evaluation
+        counts them."""
         block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
         codes = _FFI.from_buffer(_CODES, block)
-        self._found.places(data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b))
+        self._found.places(
+            data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
+        )
         return block, a, b
 
-    def element_steps(self, limit: Array, k: Array, dx: Array, dy: Array, forces: Array, sums: Array) -> None:
-        """Move contacts (n,) by (dx, dy): ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
+    def element_steps(
+        self, limit: Array, k: Array, dx: Array, dy: Array, forces: Array, sums: Array
+    ) -> None:
+        """Move contacts (n,) by (dx, dy): ``forces`` (n, springs, 2) in place, ``sums`` (n, 2)
+        filled."""
         given = map(_numbers, (limit, k, dx, dy, forces, sums))
         self._found.element_steps(limit.size, forces.shape[1], *given)
 
-    # --- for the builder ------------------------------------------------------------------------------
+    # --- for the builder --------------------------------------------------------------------------
 
-    def forms(self, quantity: int, block: int, v: Array, y: Array, eta: Array) -> tuple[Array, Array]:
-        """(base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1 counts in the corner."""
+    def forms(
+        self, quantity: int, block: int, v: Array, y: Array, eta: Array
+    ) -> tuple[Array, Array]:
+        """(base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1 counts
+        in the corner."""
         base, factor = np.empty(v.shape), np.empty(v.shape)
         v, y, eta = (np.ascontiguousarray(x, np.float64) for x in (v, y, eta))
         self._found.forms(quantity, block, v.size, *map(_numbers, (v, y, eta, base, factor)))
         return base, factor
 
     def border_scales(self, piece: int, y: Array) -> tuple[Array, Array]:
-        """What node values of a piece of the border, and what its cells, are multiplied by to give v~crit, (n,)."""
+        """What node values of a piece of the border, and what its cells, are multiplied by to give
+        v~crit, (n,)."""
         of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
-        self._found.border_scales(piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells)))
+        self._found.border_scales(
+            piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells))
+        )
         return of_nodes, of_cells
 
     def cell_shares(self, w: Array) -> tuple[Array, Array]:
-        """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below the border, (n,)."""
+        """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below
+        the border, (n,)."""
         inside, at_border = np.empty(w.size), np.empty(w.size)
-        self._found.cell_shares(w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border)))
+        self._found.cell_shares(
+            w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border))
+        )
         return inside, at_border
 
     def normal_form_root(self, v: Array, eta: Array) -> Array:
@@ -202,7 +252,8 @@ class Kernel:
         return out
 
     def outer_expansion(self, r: Array) -> Array:
-        """f, g, r f', r g', r (r f')' of mu~ = f(r) + g(r)/v~^2 + ... at r = y~/v~, shape (n, 5)."""
+        """f, g, r f', r g', r (r f')' of mu~ = f(r) + g(r)/v~^2 + ... at r = y~/v~, shape (n,
+        5)."""
         out = np.empty((r.size, 5))
         self._found.outer_expansion(r.size, _numbers(r), _numbers(out))
         return out
@@ -213,8 +264,9 @@ def _shared() -> Any:
         return _FFI.dlopen(str(_SHARED_OBJECT))
     except OSError as error:
         raise ImportError(
-            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing or does not fit this machine ({error}): "
-            "install a wheel for this platform, or build one with a C compiler or the package ziglang: pip install ."
+            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing or does not fit this "
+            f"machine ({error}): install a wheel for this platform, or build one with a C compiler "
+            "or the package ziglang: pip install ."
         ) from None
 
 

@@ -1,4 +1,5 @@
-"""Pictures of a law, of the map of mu~ and of answers, by matplotlib, which is loaded at the first of them."""
+"""Pictures of a law, of the map of mu~ and of answers, by matplotlib, which is loaded at the first
+of them."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -20,10 +21,18 @@ from mumacro.surrogate import Surrogate
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
 _SYMBOLS = {
-    "mu0": r"$\mu_0$", "Fz": "$F_z$", "k": "$k$", "y0": "$y_0$", "omega": r"$\omega$", "v0": "$v_0$",
+    "mu0": r"$\mu_0$",
+    "Fz": "$F_z$",
+    "k": "$k$",
+    "y0": "$y_0$",
+    "omega": r"$\omega$",
+    "v0": "$v_0$",
     AMPLITUDE: r"$\hat F_z$",
-}  # fmt: skip
-_MARKS = {"reverse_slip": ("-.", "border of reverse slip"), "continuous": ("--", "border of continuous sliding")}
+}
+_MARKS = {
+    "reverse_slip": ("-.", "border of reverse slip"),
+    "continuous": ("--", "border of continuous sliding"),
+}
 
 
 def _loaded(name: str) -> Any:
@@ -41,7 +50,8 @@ def own(axes: Any) -> Any:
 
 
 def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
-    """Write a picture; ``draw`` gets its axes.  InputError where the name does not end in one of :data:`ENDINGS`."""
+    """Write a picture; ``draw`` gets its axes.  InputError where the name does not end in one of
+    :data:`ENDINGS`."""
     path = Path(path)
     if path.suffix not in ENDINGS:
         told = f"a name that ends in {', '.join(ENDINGS)}, or for the command in .csv"
@@ -51,11 +61,15 @@ def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
     figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
-def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None) -> Any:
-    """mu_macro along one input, with the static limit, the borders, the band of k_range, and roots of a target.
+def plot_law(
+    law: Law, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None
+) -> Any:
+    """mu_macro along one input, with the static limit, the borders, the band of k_range, and roots
+    of a target.
 
-    ``roots`` are values of the input [SI] to mark, and ``target`` the mu_macro [-] that they give.  As all pictures
-    this draws on ``axes`` of matplotlib, or new ones, and returns them; MumacroError where it is not installed.
+    ``roots`` are values of the input [SI] to mark, and ``target`` the mu_macro [-] that they give.
+    As all pictures this draws on ``axes`` of matplotlib, or new ones, and returns them;
+    MumacroError where it is not installed.
     """
     axes, x = own(axes), law.values
     axes.plot(x, law.answer.mu_macro, label=r"$\mu_\mathrm{macro}$")
@@ -65,14 +79,18 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
     told = set[str]()
     for crossing in law.border:
         line, label = mark_of(crossing)
-        axes.axvline(crossing.value, ls=line, lw=1.0, color="grey", label=None if label in told else label)
+        axes.axvline(
+            crossing.value, ls=line, lw=1.0, color="grey", label=None if label in told else label
+        )
         told.add(label)
     if target is not None:
         axes.axhline(target, lw=0.8, color="tab:red", label=f"target {target:.6g}")
         axes.plot([*roots], [target] * len([*roots]), "o", color="tab:red")
     if x[0] > 0.0 and x[-1] > 20.0 * x[0]:
         axes.set_xscale("log")
-    axes.set(xlabel=f"{_SYMBOLS[law.along]} [{unit_of(law.along)}]", ylabel=r"$\mu_\mathrm{macro}$ [-]")
+    axes.set(
+        xlabel=f"{_SYMBOLS[law.along]} [{unit_of(law.along)}]", ylabel=r"$\mu_\mathrm{macro}$ [-]"
+    )
     axes.set_ylim(bottom=0.0)
     axes.legend()
     return axes
@@ -88,8 +106,11 @@ def y_range(kind: Kind) -> tuple[float, float]:
     return (Y_RANGE[0], 0.999) if kind.normal else Y_RANGE
 
 
-def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, float] | None = None, **kind: str) -> Any:
-    """mu~ over the dimensionless speed and amplitude, with the border of continuous sliding and a ``point`` (v~, y~).
+def plot_map(
+    surrogate: Surrogate, axes: Any = None, *, point: tuple[float, float] | None = None, **kind: str
+) -> Any:
+    """mu~ over the dimensionless speed and amplitude, with the border of continuous sliding and a
+    ``point`` (v~, y~).
 
     ``contact`` and ``direction`` as in :meth:`mumacro.Surrogate.quantity`.
     """
@@ -109,11 +130,14 @@ def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, floa
 
 
 def plot_answer(answer: Answer[Any], axes: Any = None) -> Any:
-    """The cases of an answer over (v~, y~), one colour a regime; of arrays the groups must have been requested."""
+    """The cases of an answer over (v~, y~), one colour a regime; of arrays the groups must have
+    been requested."""
     from mumacro.closed_forms import border_blend  # an answer has no table
 
     axes = own(axes)
-    v, y, codes = (np.ravel(np.asarray(x)) for x in (answer.v_tilde, answer.y_tilde, answer.regime_code))
+    v, y, codes = (
+        np.ravel(np.asarray(x)) for x in (answer.v_tilde, answer.y_tilde, answer.regime_code)
+    )
     for code, name in enumerate(REGIMES):
         shown = (codes == code) & (v > 0.0) & (y > 0.0) & np.isfinite(v) & np.isfinite(y)
         if shown.any():

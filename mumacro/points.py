@@ -25,8 +25,10 @@ from mumacro.validity import digits
 FIT = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\
 columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:
-  v0 and mu_macro, of each point; what varies of Fz, y0 (or {AMPLITUDE}), omega or f; {STD}: of mu_macro, if known
-  mu0, if it is known at each point, such as from the force without oscillation: then k alone is fitted
+  v0 and mu_macro, of each point; what varies of Fz, y0 (or {AMPLITUDE}), omega or f;
+  {STD}: of mu_macro, if known
+  mu0, if it is known at each point, such as from the force without oscillation: then k
+  alone is fitted
 what is neither a column nor unknown is given as name=value
 
 examples:
@@ -43,23 +45,35 @@ def fit_points(words: Sequence[str]) -> str:
     told = "k and mu0 of a contact from measured friction."
     parser = command.question("fit", told, _COLUMNS, "the other inputs", "*", first)
     parser.add_argument(
-        "--unknown", nargs="+", metavar="NAME", help="k, mu0; default: both, k alone beside a column mu0"
+        "--unknown",
+        nargs="+",
+        metavar="NAME",
+        help="k, mu0; default: both, k alone beside a column mu0",
     )
     command.add_format(parser)
     chosen = parser.parse_intermixed_args(words)
-    unknown, more = ([x for x in chosen.unknown or () if ("=" in x) == given] for given in (False, True))
+    unknown, more = (
+        [x for x in chosen.unknown or () if ("=" in x) == given] for given in (False, True)
+    )
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
     kind = command.kind_in(chosen)
     try:
-        text = sys.stdin.read() if chosen.points == "-" else read_text(Path(chosen.points).read_bytes(), chosen.points)
+        text = (
+            sys.stdin.read()
+            if chosen.points == "-"
+            else read_text(Path(chosen.points).read_bytes(), chosen.points)
+        )
     except ValueError as error:
         raise ImpossibleError(str(error)) from None
     points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
     unknown = unknown or unknowns_beside(points)
     there = [*unknown, *(name for name in points if name in kind.columns)]
     given = command.read_case(
-        [*chosen.words, *more], kind, there, one_k="one k is needed; or leave it out, and it is fitted"
+        [*chosen.words, *more],
+        kind,
+        there,
+        one_k="one k is needed; or leave it out, and it is fitted",
     )
     surrogate = open_table(chosen.table)
     try:
@@ -71,10 +85,17 @@ def fit_points(words: Sequence[str]) -> str:
     except ModuleNotFoundError as error:  # says what to install
         raise ImpossibleError(str(error)) from None
     if chosen.out is not None:
-        heads = [name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]" for name in found.points]
+        heads = [
+            name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]"
+            for name in found.points
+        ]
         columns = dict(zip(heads, found.points.values(), strict=True))
         columns |= {"mu_macro fitted": found.points["mu_macro"] - found.residuals}
-        return command.write_result(chosen.out, columns, found.plot) + "\n" + _told(found, chosen.digits)
+        return (
+            command.write_result(chosen.out, columns, found.plot)
+            + "\n"
+            + _told(found, chosen.digits)
+        )
     if chosen.json:
         whole = {field.name: getattr(found, field.name) for field in fields(found) if field.repr}
         return as_json({**whole, "table": command.about(surrogate)})
@@ -88,11 +109,21 @@ def _told(found: Fit, shown: int | None) -> str:
         off, (low, high) = found.std[name], found.interval[name]
         form = f".{shown or digits(off / value if 0.0 < value < math.inf else 0.0)}g"
         told = "rigid" if math.isinf(value) else f"{value:{form}}"
-        rows.append((name, told, f"[{unit_of(name)}]", f"+- {off:.2g}", f"95 %: {low:{form}} to {high:{form}}"))
+        rows.append(
+            (
+                name,
+                told,
+                f"[{unit_of(name)}]",
+                f"+- {off:.2g}",
+                f"95 %: {low:{form}} to {high:{form}}",
+            )
+        )
     if STD in found.points:
         rows.append(("chi2", f"{found.reduced_chi2:.3g}", "[-]", "over the degrees of freedom"))
     else:
-        rows.append(("scatter", f"{math.sqrt(found.reduced_chi2):.2g}", "[-]", "of mu_macro about the fit"))
+        rows.append(
+            ("scatter", f"{math.sqrt(found.reduced_chi2):.2g}", "[-]", "of mu_macro about the fit")
+        )
     rows.append(("points", str(found.residuals.size), "", f"{found.contact}, {found.direction}"))
     for i, one in enumerate(found.solutions[1:], 2):
         told = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in found.values)
@@ -114,7 +145,9 @@ def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> di
     except ValueError as error:
         raise ImpossibleError(f"{where}: line 1: {error}") from None
     rows = [row for row in csv.reader(lines[1:], delimiter=sep) if any(map(str.strip, row))]
-    places, faults = find_heads(header, {name: name if name in SI else LIKE.get(name, "mu0") for name in _READ})
+    places, faults = find_heads(
+        header, {name: name if name in SI else LIKE.get(name, "mu0") for name in _READ}
+    )
     faults += [absent(name, header) for name in ("v0", "mu_macro") if name not in places]
     columns = {name: np.empty(len(rows)) for name in places}
     for number, row in enumerate(rows, 1):

@@ -1,4 +1,5 @@
-"""The commands that answer more than one case: ``mumacro law``, ``solve-for``, ``map`` and ``stiffness``."""
+"""The commands that answer more than one case: ``mumacro law``, ``solve-for``, ``map`` and
+``stiffness``."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from mumacro import command, plotting
-from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
+from mumacro.command import (
+    ImpossibleError,
+    OneLineParser,
+    UsageError,
+    as_json,
+    in_columns,
+    open_table,
+    read_case,
+)
 from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
 from mumacro.inputs import NAMES, field_of, unit_of
@@ -24,14 +33,21 @@ _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
 
 def law(words: Sequence[str]) -> str:
     """``mumacro law``."""
-    told = "mu_macro over a range of one input, with the static value and the border of continuous sliding."
+    told = (
+        "mu_macro over a range of one input, with the static value and the border of "
+        "continuous sliding."
+    )
     epilog = f"{command.INPUTS}\nexamples:\n  {LAW}\n  {LAW} -o law.png"
     parser = command.question("law", told, epilog, "a case without the swept input", "*")
     text = "the swept input, its first and its last value, in its SI unit or with a unit"
-    parser.add_argument("--along", nargs=3, metavar=("NAME", "LOW", "HIGH"), required=True, help=text)
+    parser.add_argument(
+        "--along", nargs=3, metavar=("NAME", "LOW", "HIGH"), required=True, help=text
+    )
     parser.add_argument("--points", type=int, help="number of values; default: 25, in pictures 400")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
-    parser.add_argument("--approximations", action="store_true", help="also the approximations of the article")
+    parser.add_argument(
+        "--approximations", action="store_true", help="also the approximations of the article"
+    )
     chosen = parser.parse_intermixed_args(words)
     (along, *ends), kind = chosen.along, command.kind_in(chosen)
     if along not in kind.columns:
@@ -40,7 +56,9 @@ def law(words: Sequence[str]) -> str:
     case = read_case(chosen.words, kind, [along])
     start, stop = (scale * end for end in command.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
-    values = sweep_values(inner, start, stop, chosen.points or (CURVE if drawn else 25), chosen.scale)
+    values = sweep_values(
+        inner, start, stop, chosen.points or (CURVE if drawn else 25), chosen.scale
+    )
     surrogate = open_table(chosen.table)
     options: dict[str, Any] = {**kind.names, "refine": drawn}
     found = friction_law(surrogate, inner, values, case, **options)
@@ -48,17 +66,38 @@ def law(words: Sequence[str]) -> str:
     columns = {along: columns.pop(inner) / scale, **columns}
     border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
     if chosen.json:
-        return as_json({"along": along, "unit": unit, **columns, "border": border, "table": command.about(surrogate)})
-    headed = {f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()}
+        return as_json(
+            {
+                "along": along,
+                "unit": unit,
+                **columns,
+                "border": border,
+                "table": command.about(surrogate),
+            }
+        )
+    headed = {
+        f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()
+    }
     form = command.format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
     of_k = ", for the geometric middle of k" if found.band else ""
-    marks = [f"{plotting.mark_of(c)[1]} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border]
+    marks = [
+        f"{plotting.mark_of(c)[1]} at {along} = {c.value / scale:{form}} {unit}{of_k}"
+        for c in found.border
+    ]
     if chosen.out is not None:
         return "\n".join(
-            [command.write_result(chosen.out, headed, lambda axes: plotting.plot_law(found, axes)), *marks]
+            [
+                command.write_result(
+                    chosen.out, headed, lambda axes: plotting.plot_law(found, axes)
+                ),
+                *marks,
+            ]
         )
     del headed["source"]
-    shown = [[cell if isinstance(cell, str) else _shown(cell, form) for cell in x] for x in headed.values()]
+    shown = [
+        [cell if isinstance(cell, str) else _shown(cell, form) for cell in x]
+        for x in headed.values()
+    ]
     return "\n".join([in_columns([[*headed], *zip(*shown, strict=True)]), *marks])
 
 
@@ -69,7 +108,9 @@ def _shown(value: float, form: str) -> str:
 def solve(words: Sequence[str]) -> str:
     """``mumacro solve-for``."""
     told = "Every value of one input at which mu_macro has a wanted value."
-    epilog = f"{command.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {SOLVE_FOR}"
+    epilog = (
+        f"{command.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {SOLVE_FOR}"
+    )
     first = "unknown", {"choices": (*NAMES, AMPLITUDE), "help": "the unknown input"}
     parser = command.question("solve-for", told, epilog, "the other five inputs", first=first)
     parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
@@ -77,39 +118,74 @@ def solve(words: Sequence[str]) -> str:
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     chosen = parser.parse_intermixed_args(words)
-    unknown, (inner, scale), unit = chosen.unknown, field_of(chosen.unknown), unit_of(chosen.unknown)
+    unknown, (inner, scale), unit = (
+        chosen.unknown,
+        field_of(chosen.unknown),
+        unit_of(chosen.unknown),
+    )
     kind = command.kind_in(chosen)
     if unknown not in kind.columns:
-        raise UsageError(f"{unknown} does not belong to --direction {chosen.direction}: {', '.join(kind.columns)} do")
+        raise UsageError(
+            f"{unknown} does not belong to --direction {chosen.direction}: "
+            f"{', '.join(kind.columns)} do"
+        )
     case = read_case(chosen.words, kind, [unknown])
     if chosen.ratio and unknown == "mu0":
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
-    ends = [scale * end for end in command.read_values((unknown, text) for text in chosen.between or ())]
+    ends = [
+        scale * end for end in command.read_values((unknown, text) for text in chosen.between or ())
+    ]
     surrogate = open_table(chosen.table)
-    found = solve_for(surrogate, inner, target, case, (ends[0], ends[1]) if ends else None, **kind.names)
+    found = solve_for(
+        surrogate, inner, target, case, (ends[0], ends[1]) if ends else None, **kind.names
+    )
     reach, two = found.reach, found.ends
     if not found.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
         if found.constant:
-            raise ImpossibleError(f"{unknown} has no influence here: mu_macro is {reach.mu_min:.12g} for {where}")
+            raise ImpossibleError(
+                f"{unknown} has no influence here: mu_macro is {reach.mu_min:.12g} for {where}"
+            )
         raise ImpossibleError(
-            f"mu_macro = {target:.12g} is out of reach: {where} gives {reach.mu_min:.12g} to {reach.mu_max:.12g}"
+            f"mu_macro = {target:.12g} is out of reach: {where} gives {reach.mu_min:.12g} to "
+            f"{reach.mu_max:.12g}"
         )
     places = {command.middle_of(case).get("k"): found}
     if two:
         places = dict(sorted({**places, **dict(zip(case["k_range"], two, strict=True))}.items()))
     roots = [
-        (*((k,) if two else ()), r.value / scale, r.low / scale, r.high / scale, r.mu_macro, r.regime)
-        for k, one in places.items() for r in one.roots[0]
-    ]  # fmt: skip
+        (
+            *((k,) if two else ()),
+            r.value / scale,
+            r.low / scale,
+            r.high / scale,
+            r.mu_macro,
+            r.regime,
+        )
+        for k, one in places.items()
+        for r in one.roots[0]
+    ]
     names = (*(("k",) if two else ()), unknown, "low", "high", "mu_macro", "regime")
     if chosen.json:
         listed = [dict(zip(names, root, strict=True)) for root in roots]
         return as_json(
-            {"unknown": unknown, "unit": unit, "target": target, "roots": listed, "table": command.about(surrogate)}
+            {
+                "unknown": unknown,
+                "unit": unit,
+                "target": target,
+                "roots": listed,
+                "table": command.about(surrogate),
+            }
         )
-    heads = [*(["k [N/m]"] if two else []), f"{unknown} [{unit}]", "between", "and", "mu_macro [-]", "regime"]
+    heads = [
+        *(["k [N/m]"] if two else []),
+        f"{unknown} [{unit}]",
+        "between",
+        "and",
+        "mu_macro [-]",
+        "regime",
+    ]
     if chosen.out is not None:
         at = [root.value for one in places.values() for root in one.roots[0]]
         # a decade around the roots; what is at 0 is shown up to 1
@@ -119,18 +195,29 @@ def solve(words: Sequence[str]) -> str:
         curve = friction_law(surrogate, inner, values, case, **options)
         columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
         return command.write_result(
-            chosen.out, columns, lambda axes: plotting.plot_law(curve, axes, roots=at, target=target)
-        )  # fmt: skip
+            chosen.out,
+            columns,
+            lambda axes: plotting.plot_law(curve, axes, roots=at, target=target),
+        )
     at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
     form = command.format_for(chosen, surrogate, {**case, inner: at_one}, kind)
-    text = in_columns([heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)])
-    none = [f"no {unknown} gives that for k = {k:.6g} N/m" for k, one in places.items() if not one.roots[0]]
+    text = in_columns(
+        [heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)]
+    )
+    none = [
+        f"no {unknown} gives that for k = {k:.6g} N/m"
+        for k, one in places.items()
+        if not one.roots[0]
+    ]
     return "\n".join([text, *none])
 
 
 def map_(words: Sequence[str]) -> str:
     """``mumacro map``."""
-    told = "The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case on it."
+    told = (
+        "The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case "
+        "on it."
+    )
     epilog = f"{command.INPUTS}\nexample:\n  mumacro map -o map.png"
     parser = command.question("map", told, epilog, "a case to mark, if any", "*")
     chosen = parser.parse_intermixed_args(words)
@@ -143,10 +230,18 @@ def map_(words: Sequence[str]) -> str:
         case = surrogate.evaluate(**{**read_case(chosen.words, kind, one_k=one_k), **kind.names})
         point = (case.v_tilde, case.y_tilde)
     ranges = (plotting.V_RANGE, plotting.y_range(kind))
-    v, y = (x.ravel() for x in np.meshgrid(np.geomspace(*ranges[0], 141), np.geomspace(*ranges[1], 101)))
-    columns = {"v_tilde": v, "y_tilde": y, "mu_ratio": surrogate.quantity("mu_ratio", v, y, **kind.names)[0]}
+    v, y = (
+        x.ravel() for x in np.meshgrid(np.geomspace(*ranges[0], 141), np.geomspace(*ranges[1], 101))
+    )
+    columns = {
+        "v_tilde": v,
+        "y_tilde": y,
+        "mu_ratio": surrogate.quantity("mu_ratio", v, y, **kind.names)[0],
+    }
     text = command.write_result(
-        chosen.out, columns, lambda axes: plotting.plot_map(surrogate, axes, point=point, **kind.names)
+        chosen.out,
+        columns,
+        lambda axes: plotting.plot_map(surrogate, axes, point=point, **kind.names),
     )
     if point and not all(low <= x <= high for x, (low, high) in zip(point, ranges, strict=True)):
         text += f"\nthe case lies outside the map: v~ = {point[0]:.6g}, y~ = {point[1]:.6g}"
@@ -157,16 +252,21 @@ def stiffness_of(words: Sequence[str]) -> str:
     """``mumacro stiffness``."""
     parser = OneLineParser(
         prog="mumacro stiffness",
-        description="The tangential stiffness k of a contact from materials and geometry, and the kind of the contact.",
+        description="The tangential stiffness k of a contact from materials and geometry, and the "
+        "kind of the contact.",
         epilog=f"example:\n  {STIFFNESS}\n\nThe arguments of each: mumacro stiffness ball --help.",
     )
     parts = parser.add_subparsers(dest="geometry", required=True, metavar="GEOMETRY")
     for name, geometry in GEOMETRIES.items():
-        part = parts.add_parser(name, help=geometry.meaning, description=f"k of {geometry.meaning}.")
+        part = parts.add_parser(
+            name, help=geometry.meaning, description=f"k of {geometry.meaning}."
+        )
         for argument in (*geometry.arguments, *BODIES):
             about, needed = ARGUMENTS[argument], argument in (*geometry.arguments, *BODIES[:2])
             unit, choices = f" [{about.unit}]" if about.unit else "", about.choices or None
-            part.add_argument(f"--{argument}", required=needed, choices=choices, help=f"{about.meaning}{unit}")
+            part.add_argument(
+                f"--{argument}", required=needed, choices=choices, help=f"{about.meaning}{unit}"
+            )
         command.add_form(part)
     chosen = parser.parse_args(words)
     names = (*GEOMETRIES[chosen.geometry].arguments, *BODIES)

@@ -1,4 +1,5 @@
-"""The surrogate for users.  Value, regime, source, gradient, power and stick fraction, each with its bound."""
+"""The surrogate for users.  Value, regime, source, gradient, power and stick fraction, each with
+its bound."""
 
 import functools
 import math
@@ -16,7 +17,15 @@ from mumacro.bundled import bundled_tables
 from mumacro.cells import Border, block_rows, outer_cells, quantity_cells
 from mumacro.contact import AMPLITUDE, SPRING, ContactName, DirectionName, Kind, kind_of, put_rules
 from mumacro.errors import InputError, MumacroError, TableError
-from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, picked, real
+from mumacro.inputs import (
+    FIELDS,
+    RAD_PER_CYCLE,
+    as_columns,
+    check_inputs,
+    length_scale,
+    picked,
+    real,
+)
 from mumacro.interval import ENDS, as_ends, extremes, middle
 from mumacro.library import Data, kernels
 from mumacro.processors import default_threads
@@ -27,15 +36,17 @@ _ONE = kernels[:2][-1]  # a single point does not fill the widest registers; the
 _RATIO = _ONE.ratio
 _CODES = {name: code for code, name in enumerate(charts.QUANTITY_NAMES)}
 #: types of one real number, which take the short way
-_NUMBERS = frozenset((float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ")))
+_NUMBERS = frozenset(
+    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
+)
 _NUMBERS_OR_ARRAY, _FLOAT = _NUMBERS | {np.ndarray}, np.dtype(np.float64)
 
 
 class Surrogate:
     """mu~(v~, y~) from one table; open it once, share it between threads and processes.
 
-    One policy for all methods: a scalar that is out of bounds raises :class:`InputError`; in an array it gives NaN,
-    with the source code -1.  What is no real number raises in either case.
+    One policy for all methods: a scalar that is out of bounds raises :class:`InputError`; in an
+    array it gives NaN, with the source code -1.  What is no real number raises in either case.
 
     Examples
     --------
@@ -70,11 +81,12 @@ class Surrogate:
         Parameters
         ----------
         table : str, Path, float or None
-            A table file; or a tolerance of mu~ [-], for the smallest bundled table that meets it; or None for the
-            tightest bundled table.
+            A table file; or a tolerance of mu~ [-], for the smallest bundled table that meets it;
+            or None for the tightest bundled table.
         threads : int, optional
-            Threads that large arrays are divided among; 1 never starts one.  Left out: all processors when called from
-            the main thread of a program; one in other threads and in child processes, where work is already divided.
+            Threads that large arrays are divided among; 1 never starts one.  Left out: all
+            processors when called from the main thread of a program; one in other threads and in
+            child processes, where work is already divided.
 
         Raises
         ------
@@ -98,13 +110,21 @@ class Surrogate:
         return found
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle small: a bundled table by name and checksum, valid on another machine, too; another with its bytes."""
+        """Pickle small: a bundled table by name and checksum, valid on another machine, too;
+        another with its bytes."""
         bundled = self.path.resolve() in (path.resolve() for path in bundled_tables())
-        path, image = (self.path.name, None) if bundled else (str(self.path), self._image or read_image(self.path))
+        path, image = (
+            (self.path.name, None)
+            if bundled
+            else (str(self.path), self._image or read_image(self.path))
+        )
         return _reopen, (path, self.checksum, self._asked_threads, image)
 
     def __repr__(self) -> str:
-        return f"<Surrogate {self.id}: tolerance {self.tolerance:g}, error of mu~ at most {self.max_abs_error:.1e}>"
+        return (
+            f"<Surrogate {self.id}: tolerance {self.tolerance:g}, error of mu~ at most "
+            f"{self.max_abs_error:.1e}>"
+        )
 
     def plot(self, axes: Any = None, **more: Any) -> Any:
         """The map of mu~, see ``mumacro.plotting.plot_map``; needs matplotlib."""
@@ -151,16 +171,23 @@ class Surrogate:
     def memory(self) -> int:
         """Bytes of the cells that an evaluation of mu~ reads."""
         data = self._data
-        return sum(array.nbytes for array in (data.border, data.pieces, data.blocks, *data.quantities[charts.MU]))
+        return sum(
+            array.nbytes
+            for array in (data.border, data.pieces, data.blocks, *data.quantities[charts.MU])
+        )
 
     def self_check(self) -> None:
-        """Compare known answers with the table; raises :class:`TableError` when one is off by more than its bound."""
+        """Compare known answers with the table; raises :class:`TableError` when one is off by more
+        than its bound."""
         for v, y, expected in ((0.1, 0.5, KNOWN_STICK_SLIP), (2.0, 1.0, KNOWN_CONTINUOUS)):
             mu, bound, _ = self.ratio_with_bound(v, y)
             if not abs(mu - expected) <= bound + 1e-15:
-                raise TableError(self.path, f"known answer at v~={v}, y~={y} is {expected!r}, the table gives {mu!r}")
+                raise TableError(
+                    self.path,
+                    f"known answer at v~={v}, y~={y} is {expected!r}, the table gives {mu!r}",
+                )
 
-    # --- dimensionless --------------------------------------------------------------------------------
+    # --- dimensionless ----------------------------------------------------------------------------
 
     def mu_ratio(self, v_tilde: Any, y_tilde: Any) -> Any:
         """mu~ = mu_macro/mu0 [-], eq. (15): the fast path.
@@ -186,7 +213,9 @@ class Surrogate:
         >>> round(s.mu_ratio(0.1, 0.5), 9)
         0.94200429
         """
-        if type(v_tilde) is float is type(y_tilde) or (type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS):
+        if type(v_tilde) is float is type(y_tilde) or (
+            type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS
+        ):
             try:
                 mu: float = _RATIO(self._pointer, v_tilde, y_tilde)
             except OverflowError:  # a whole number beyond double range
@@ -199,15 +228,22 @@ class Surrogate:
             raise _illegal(v, y)
         return _shaped(found, shape)
 
-    def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any, Any]:
-        """:meth:`quantity` of mu~: the value, the bound of its absolute error, and the source code."""
+    def ratio_with_bound(
+        self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
+    ) -> tuple[Any, Any, Any]:
+        """:meth:`quantity` of mu~: the value, the bound of its absolute error, and the source
+        code."""
         return self.quantity("mu_ratio", v_tilde, y_tilde, **kind)
 
-    def v_tilde_crit(self, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across") -> Any:
-        """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
+    def v_tilde_crit(
+        self, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across"
+    ) -> Any:
+        """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-]
+        >= 0.
 
-        Infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.  For a ball all springs slide
-        from there on; along and normal it is the amplitude itself, for normal below 1.
+        Infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.  For a ball
+        all springs slide from there on; along and normal it is the amplitude itself, for normal
+        below 1.
 
         Examples
         --------
@@ -224,35 +260,42 @@ class Surrogate:
         return _shaped(found, shape)
 
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
-        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega: :meth:`quantity` without bound.
+        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
+        :meth:`quantity` without bound.
 
         Slip turns v~ mu~ plus this power into heat.  An infinite amplitude gives infinite power.
         """
         return self.power_with_bound(v_tilde, y_tilde, **kind)[0]
 
     def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
-        """Share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity` without bound."""
+        """Share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity` without
+        bound."""
         return self.stick_fraction_with_bound(v_tilde, y_tilde, **kind)[0]
 
-    def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
+    def power_with_bound(
+        self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
+    ) -> tuple[Any, Any]:
         """:meth:`power` and the bound of its absolute error."""
         return self.quantity("power", v_tilde, y_tilde, **kind)[:2]
 
-    def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
+    def stick_fraction_with_bound(
+        self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
+    ) -> tuple[Any, Any]:
         """:meth:`stick_fraction` and the bound of its absolute error.
 
-        At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
-        distance to v~crit, and v~crit is known to some digits only.
+        At the border the bound is larger than elsewhere, on both sides: there the fraction is a
+        square root of the distance to v~crit, and v~crit is known to some digits only.
         """
         return self.quantity("stick_fraction", v_tilde, y_tilde, **kind)[:2]
 
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
     ) -> tuple[Any, ...]:
-        """The quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~ d/d y~ [-].
+        """The quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~ d/d y~
+        [-].
 
-        With ``bounds`` also those of the two slopes' absolute errors.  Arguments, shapes and errors as in
-        :meth:`mu_ratio`.
+        With ``bounds`` also those of the two slopes' absolute errors.  Arguments, shapes and errors
+        as in :meth:`mu_ratio`.
 
         Examples
         --------
@@ -271,24 +314,36 @@ class Surrogate:
         code = _CODES[quantity] if quantity in charts.QUANTITY_NAMES else None
         if code not in self._data.quantities:
             if code is None or quantity not in self.table.quantities:
-                raise InputError(argument, quantity, f"one of {', '.join(self.table.quantities)}, which the table has")
+                raise InputError(
+                    argument,
+                    quantity,
+                    f"one of {', '.join(self.table.quantities)}, which the table has",
+                )
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
 
     def derivatives(self, *_: object, **__: object) -> NoReturn:
         raise MumacroError(
-            "Surrogate.derivatives is gone: slopes(v_tilde, y_tilde, of) gives v~ d/dv~ and y~ d/dy~, "
-            "evaluate(..., gradient=True) the slopes by the six inputs"
+            "Surrogate.derivatives is gone: slopes(v_tilde, y_tilde, of) gives v~ d/dv~ and y~ "
+            "d/dy~, evaluate(..., gradient=True) the slopes by the six inputs"
         )
 
     def quantity(
-        self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across"
+        self,
+        name: str,
+        v_tilde: ArrayLike,
+        y_tilde: ArrayLike,
+        *,
+        contact: str = "spring",
+        direction: str = "across",
     ) -> tuple[Any, Any, Any]:
-        """A tabulated quantity, the bound of its absolute error, and the source code (index into SOURCES).
+        """A tabulated quantity, the bound of its absolute error, and the source code (index into
+        SOURCES).
 
-        ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors as in :meth:`mu_ratio`.
-        Of a ball the stick fraction is a share of the load, too.  For direction "normal" ``y_tilde`` is Fz_amplitude/Fz
-        [-], below 1; it has no power, because the model does not know how far the load moves.
+        ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors as
+        in :meth:`mu_ratio`. Of a ball the stick fraction is a share of the load, too.  For
+        direction "normal" ``y_tilde`` is Fz_amplitude/Fz [-], below 1; it has no power, because the
+        model does not know how far the load moves.
 
         Examples
         --------
@@ -305,59 +360,130 @@ class Surrogate:
             except OverflowError:  # a whole number beyond double range
                 pass
         if kind.normal and name == "power":
-            raise InputError("direction", direction, "across or along for the power: the load's path is not modelled")
+            raise InputError(
+                "direction",
+                direction,
+                "across or along for the power: the load's path is not modelled",
+            )
         v, y, shape = _points(v_tilde, y_tilde)
-        value, bound, source = batch.values(_CODES[name], self._data_of(kind), v, y, self.threads, kind)
+        value, bound, source = batch.values(
+            _CODES[name], self._data_of(kind), v, y, self.threads, kind
+        )
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
             raise _illegal(v, y, ">= 0 and < 1" if kind.normal else finite)
         return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
 
-    # --- dimensional ----------------------------------------------------------------------------------
+    # --- dimensional ------------------------------------------------------------------------------
 
     @overload
     def evaluate(
-        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ...,
-        f: float = ..., gradient: Literal[True], groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        self,
+        *,
+        mu0: float,
+        Fz: float,
+        k: float | Literal["rigid"],
+        y0: float,
+        v0: float,
+        omega: float = ...,
+        f: float = ...,
+        gradient: Literal[True],
+        groups: bool = ...,
+        illegal: str = ...,
+        contact: ContactName = ...,
         direction: DirectionName = ...,
-    ) -> AnswerWithGradient[float]: ...  # fmt: skip
+    ) -> AnswerWithGradient[float]: ...
 
     @overload
     def evaluate(
-        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ...,
-        f: float = ..., gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ...,
-        contact: ContactName = ..., direction: DirectionName = ...,
-    ) -> Answer[float]: ...  # fmt: skip
-
-    @overload
-    def evaluate(
-        self, *, mu0: float, Fz: float, k_range: tuple[float, float], y0: float, v0: float, omega: float = ...,
-        f: float = ..., gradient: bool = ..., groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        self,
+        *,
+        mu0: float,
+        Fz: float,
+        k: float | Literal["rigid"],
+        y0: float,
+        v0: float,
+        omega: float = ...,
+        f: float = ...,
+        gradient: Literal[False] = ...,
+        groups: bool = ...,
+        illegal: str = ...,
+        contact: ContactName = ...,
         direction: DirectionName = ...,
-    ) -> IntervalAnswer[float]: ...  # fmt: skip
+    ) -> Answer[float]: ...
 
     @overload
     def evaluate(
-        self, cases: Mapping[str, Any] = ..., /, *, gradient: Literal[True], groups: bool = ..., illegal: str = ...,
-        contact: ContactName = ..., direction: DirectionName = ..., **inputs: ArrayLike | None,
-    ) -> AnswerWithGradient[Array]: ...  # fmt: skip
+        self,
+        *,
+        mu0: float,
+        Fz: float,
+        k_range: tuple[float, float],
+        y0: float,
+        v0: float,
+        omega: float = ...,
+        f: float = ...,
+        gradient: bool = ...,
+        groups: bool = ...,
+        illegal: str = ...,
+        contact: ContactName = ...,
+        direction: DirectionName = ...,
+    ) -> IntervalAnswer[float]: ...
 
     @overload
     def evaluate(
-        self, cases: Mapping[str, Any] = ..., /, *, gradient: Literal[False] = ..., groups: bool = ...,
-        illegal: str = ..., contact: ContactName = ..., direction: DirectionName = ..., **inputs: ArrayLike | None,
-    ) -> Answer[Array]: ...  # fmt: skip
+        self,
+        cases: Mapping[str, Any] = ...,
+        /,
+        *,
+        gradient: Literal[True],
+        groups: bool = ...,
+        illegal: str = ...,
+        contact: ContactName = ...,
+        direction: DirectionName = ...,
+        **inputs: ArrayLike | None,
+    ) -> AnswerWithGradient[Array]: ...
 
     @overload
     def evaluate(
-        self, cases: Any = ..., /, *, gradient: bool = ..., groups: bool = ..., illegal: str = ...,
-        contact: ContactName = ..., direction: DirectionName = ..., **inputs: Any
-    ) -> Any: ...  # fmt: skip
+        self,
+        cases: Mapping[str, Any] = ...,
+        /,
+        *,
+        gradient: Literal[False] = ...,
+        groups: bool = ...,
+        illegal: str = ...,
+        contact: ContactName = ...,
+        direction: DirectionName = ...,
+        **inputs: ArrayLike | None,
+    ) -> Answer[Array]: ...
+
+    @overload
+    def evaluate(
+        self,
+        cases: Any = ...,
+        /,
+        *,
+        gradient: bool = ...,
+        groups: bool = ...,
+        illegal: str = ...,
+        contact: ContactName = ...,
+        direction: DirectionName = ...,
+        **inputs: Any,
+    ) -> Any: ...
 
     def evaluate(  # type: ignore[misc]  # mypy does not match named inputs with **inputs
-        self, cases: Any = None, /, *, gradient: bool = False, groups: bool = False, illegal: str = "nan",
-        contact: str = "spring", direction: str = "across", **inputs: Any
-    ) -> Any:  # fmt: skip
+        self,
+        cases: Any = None,
+        /,
+        *,
+        gradient: bool = False,
+        groups: bool = False,
+        illegal: str = "nan",
+        contact: str = "spring",
+        direction: str = "across",
+        **inputs: Any,
+    ) -> Any:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
         Parameters
@@ -369,7 +495,8 @@ class Surrogate:
         Fz : array_like
             Normal force [N], > 0.
         k : array_like
-            Tangential stiffness [N/m], > 0; "rigid" or infinity is rigid contact, eq. (37).  It must always be given.
+            Tangential stiffness [N/m], > 0; "rigid" or infinity is rigid contact, eq. (37).  It
+            must always be given.
         y0 : array_like
             Amplitude of the transverse oscillation [m], >= 0.
         omega : array_like
@@ -381,30 +508,36 @@ class Surrogate:
         gradient : bool
             Also differentiate with respect to every input, with bounds.
         groups : bool
-            Also keep v~, y~ and l0 of arrays, which takes a quarter of the time again; scalars and gradients have them.
+            Also keep v~, y~ and l0 of arrays, which takes a quarter of the time again; scalars and
+            gradients have them.
         illegal : str
-            Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case, "raise" raises.
+            Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case,
+            "raise" raises.
         contact : str
-            "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip is k = 8 a G*.
+            "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip
+            is k = 8 a G*.
         direction : str
-            "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the force is
-            Fz + Fz_amplitude cos(omega t), for a spring only.
+            "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the
+            force is Fz + Fz_amplitude cos(omega t), for a spring only.
         Fz_amplitude : array_like
-            Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction is "normal".
+            Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction
+            is "normal".
         k_range : pair of array_like
-            Lowest and highest stiffness [N/m] in place of k; or two columns, ``k_low`` and ``k_high``.
+            Lowest and highest stiffness [N/m] in place of k; or two columns, ``k_low`` and
+            ``k_high``.
 
         Returns
         -------
         Answer
-            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k.  Or the container of the inputs: pandas
-            objects give a DataFrame, xarray objects a Dataset, Dask stays lazy (:mod:`mumacro.interop.labels`).
+            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k.  Or the container of
+            the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
+            (:mod:`mumacro.interop.labels`).
 
         Raises
         ------
         InputError
-            A scalar out of bounds; an input that is missing, unknown, given twice or not a number; shapes that do not
-            broadcast.
+            A scalar out of bounds; an input that is missing, unknown, given twice or not a number;
+            shapes that do not broadcast.
 
         Notes
         -----
@@ -424,7 +557,9 @@ class Surrogate:
         True
         """
         if contact != "spring" or direction != "across":
-            return self._evaluate(cases, inputs, gradient, groups, illegal, kind_of(contact, direction))
+            return self._evaluate(
+                cases, inputs, gradient, groups, illegal, kind_of(contact, direction)
+            )
         six = _six(inputs) if cases is None and len(inputs) == 6 else None
         if six is not None and illegal in ("nan", "raise"):
             kinds = set(map(type, six))
@@ -434,7 +569,11 @@ class Surrogate:
                     return answer
             elif illegal == "nan" and kinds <= _NUMBERS_OR_ARRAY:
                 arrays = [x for x in six if type(x) is np.ndarray]
-                if len({x.shape for x in arrays}) == 1 and arrays[0].ndim and {x.dtype for x in arrays} == {_FLOAT}:
+                if (
+                    len({x.shape for x in arrays}) == 1
+                    and arrays[0].ndim
+                    and {x.dtype for x in arrays} == {_FLOAT}
+                ):
                     return self._arrays(six, arrays[0].shape, gradient, gradient or groups)
         return self._evaluate(cases, inputs, gradient, groups, illegal)
 
@@ -447,7 +586,14 @@ class Surrogate:
         if found[6] < 0.0:
             return None
         kind: type[Answer[float]] = AnswerWithGradient if gradient else Answer
-        answer = kind(found[0], found[1], found[2], int(found[6]), (found[3], found[4], found[5]), self._certain)
+        answer = kind(
+            found[0],
+            found[1],
+            found[2],
+            int(found[6]),
+            (found[3], found[4], found[5]),
+            self._certain,
+        )
         if gradient:
             answer.gradient = dict(zip(FIELDS, found[7:13], strict=True))
             answer.gradient_bound = dict(zip(FIELDS, found[13:], strict=True))
@@ -456,29 +602,43 @@ class Surrogate:
     def evaluate_case(
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
     ) -> tuple[float, float, float, int]:
-        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1 if illegal."""
-        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._pointer, (mu0, Fz, k, y0, omega, v0), 7)
+        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1
+        if illegal."""
+        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(
+            self._pointer, (mu0, Fz, k, y0, omega, v0), 7
+        )
         return mu_macro, mu_ratio, bound, int(source)
 
     def _evaluate(
-        self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str, kind: Kind = SPRING
+        self,
+        cases: Any,
+        inputs: dict[str, Any],
+        gradient: bool,
+        groups: bool,
+        illegal: str,
+        kind: Kind = SPRING,
     ) -> Any:
         if illegal not in ("nan", "raise"):
             raise InputError("illegal", illegal, '"nan" or "raise"')
         unknown = inputs.keys() - {*FIELDS, "f", AMPLITUDE, "k_range", *ENDS}
         if unknown:
-            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(kind.fields)} or f")
+            raise InputError(
+                min(unknown), inputs[min(unknown)], f"one of {', '.join(kind.fields)} or f"
+            )
         if cases is not None:
             found = picked("cases", cases, (*kind.columns, *ENDS))
             if twice := found.keys() & inputs.keys():
-                raise InputError(min(twice), inputs[min(twice)], "given once: in the cases or as a keyword")
+                raise InputError(
+                    min(twice), inputs[min(twice)], "given once: in the cases or as a keyword"
+                )
             inputs = {**found, **inputs}
         inputs = kind.as_six({name: _from_arrow(x) for name, x in inputs.items()})
         interval = not inputs.keys().isdisjoint(("k_range", *ENDS))
         if interval:
             inputs = as_ends(inputs)
         if _labelled(inputs, cases):
-            from mumacro.interop.labels import evaluate_labelled  # loads pandas, xarray or Dask only where used
+            # loads pandas, xarray or Dask only where used
+            from mumacro.interop.labels import evaluate_labelled
 
             options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
             return evaluate_labelled(self, cases, kind.as_given(inputs), kind, interval, options)
@@ -488,7 +648,13 @@ class Surrogate:
             raise kind.refused(error) from error.__cause__
 
     def _plain(
-        self, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str, kind: Kind, interval: bool
+        self,
+        inputs: dict[str, Any],
+        gradient: bool,
+        groups: bool,
+        illegal: str,
+        kind: Kind,
+        interval: bool,
     ) -> Answer[Any]:
         """The answer to inputs without labels, the amplitude by the name y0."""
         ends = None
@@ -508,20 +674,33 @@ class Surrogate:
         if not shape and kind == SPRING and ends is None:
             one: Any = self._one(tuple(float(column) for column in columns.values()), gradient)
             return one  # type: ignore[no-any-return]  # legal, so it is no None
-        answer = self._arrays([*columns.values()], shape or (1,), gradient, gradient or groups or not shape, kind)
+        answer = self._arrays(
+            [*columns.values()], shape or (1,), gradient, gradient or groups or not shape, kind
+        )
         if ends is not None:
             answer = self._with_extremes(answer, columns, ends, kind)
         return answer if shape else single(answer)
 
     def _arrays(
-        self, columns: Sequence[Any], shape: tuple[int, ...], gradient: bool, groups: bool, kind: Kind = SPRING
+        self,
+        columns: Sequence[Any],
+        shape: tuple[int, ...],
+        gradient: bool,
+        groups: bool,
+        kind: Kind = SPRING,
     ) -> Answer[Array]:
         # a value that holds for all cases stays one value
         flat = [
-            float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape) for c in columns
+            float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape)
+            for c in columns
         ]
         found, source = batch.cases(
-            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3, kind
+            self._data_of(kind),
+            flat,
+            math.prod(shape),
+            self.threads,
+            17 if gradient else 5 if groups else 3,
+            kind,
         )
         rows = found.reshape(len(found), *shape)
         answer: Answer[Array] = (AnswerWithGradient if gradient else Answer)(
@@ -530,7 +709,9 @@ class Surrogate:
         if groups:
             length = np.where(answer.source_code == -1, np.nan, length_scale(*columns[:3]))
             answer._groups = rows[3], rows[4], length
-            answer._certain = self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
+            answer._certain = (
+                self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
+            )
         if gradient:
             answer.gradient = dict(zip(kind.fields, rows[5:11], strict=True))
             answer.gradient_bound = dict(zip(kind.fields, rows[11:], strict=True))
@@ -544,20 +725,30 @@ class Surrogate:
         flat = {name: _flat(column, shape) for name, column in columns.items()}
 
         def evaluate(k: Array, places: Places) -> tuple[Array, Array, Array]:
-            six = [_contiguous(k if name == "k" else column[places]) for name, column in flat.items()]
+            six = [
+                _contiguous(k if name == "k" else column[places]) for name, column in flat.items()
+            ]
             rows = batch.cases(self._data_of(kind), six, k.size, self.threads, 17, kind)[0]
             return rows[0], rows[2], rows[5 + FIELDS.index("k")] * k
 
-        low, high, bound = extremes(evaluate, *(np.array(np.broadcast_to(end, shape)).ravel() for end in ends))
+        low, high, bound = extremes(
+            evaluate, *(np.array(np.broadcast_to(end, shape)).ravel() for end in ends)
+        )
         out: IntervalAnswer[Array] = IntervalAnswer(
-            answer.mu_macro, answer.mu_ratio, np.maximum(answer.error_bound, bound.reshape(shape)),
-            answer.source_code, answer._groups, answer._certain,
-        )  # fmt: skip
+            answer.mu_macro,
+            answer.mu_ratio,
+            np.maximum(answer.error_bound, bound.reshape(shape)),
+            answer.source_code,
+            answer._groups,
+            answer._certain,
+        )
         if answer.gradient is not None and answer.gradient_bound is not None:
             out.gradient, out.gradient_bound = answer.gradient, answer.gradient_bound
         legal = answer.source_code != -1
         out.mu_macro_low = np.where(legal, np.minimum(low.reshape(shape), answer.mu_macro), np.nan)
-        out.mu_macro_high = np.where(legal, np.maximum(high.reshape(shape), answer.mu_macro), np.nan)
+        out.mu_macro_high = np.where(
+            legal, np.maximum(high.reshape(shape), answer.mu_macro), np.nan
+        )
         return out
 
     def _data_of(self, kind: Kind) -> Data:
@@ -567,9 +758,12 @@ class Surrogate:
         return self._data
 
     def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
-        """Whether v~ is further from v~crit than that is known, and than rounding may move v~ and y~."""
+        """Whether v~ is further from v~crit than that is known, and than rounding may move v~ and
+        y~."""
         v, y = np.asarray(v_tilde), np.asarray(y_tilde)
-        crit = _KERNEL.border(self._data, np.atleast_1d(np.asarray(y, dtype=np.float64)), kind).reshape(y.shape)
+        crit = _KERNEL.border(
+            self._data, np.atleast_1d(np.asarray(y, dtype=np.float64)), kind
+        ).reshape(y.shape)
         margin = self.border.max_rel_error + 4.0 * charts.ROUNDING
         with np.errstate(all="ignore"):
             # groups beyond double range are not near the border, or it cannot be decided
@@ -578,14 +772,18 @@ class Surrogate:
         return certain if certain.ndim else bool(certain)
 
 
-# mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits (tests/test_surrogate.py solves them anew)
+# mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits
+# (tests/test_surrogate.py solves them anew)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
-    """Refuse a stored border whose nodes are not near the formula for every y~: blocks are found with it."""
-    for index, ((name, axis, _), piece) in enumerate(zip(charts.BORDER_PIECES, pieces, strict=True)):
+    """Refuse a stored border whose nodes are not near the formula for every y~: blocks are found
+    with it."""
+    for index, ((name, axis, _), piece) in enumerate(
+        zip(charts.BORDER_PIECES, pieces, strict=True)
+    ):
         y = axis.amplitude(piece.nodes)
         crit = piece.values * _KERNEL.border_scales(index, y)[0]
         if not np.all(np.abs(crit / closed_forms.border_blend(y) - 1.0) < 0.01):
@@ -599,12 +797,18 @@ def _bundled(tolerance: float | None) -> Path:
         raise TableError("mumacro-*.nc", "no table is bundled with this installation; name a file")
     if tolerance is None:
         return tables[min(tables)]
-    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not tolerance > 0.0:
+    if (
+        isinstance(tolerance, bool)
+        or not isinstance(tolerance, (int, float))
+        or not tolerance > 0.0
+    ):
         raise InputError("tolerance", tolerance, "a path, a tolerance > 0, or None")
     fit = [found for found in tables if found <= tolerance]
     if not fit:
         raise InputError(
-            "tolerance", tolerance, f">= {min(tables):g}, the tightest bundled table, or the path of another"
+            "tolerance",
+            tolerance,
+            f">= {min(tables):g}, the tightest bundled table, or the path of another",
         )
     return tables[max(fit)]
 
@@ -614,7 +818,9 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
     """Unpickle: from the bytes, or from the bundled table of that name."""
     if image is not None:
         return Surrogate._of_image(image, Path(path), threads)
-    found = Surrogate.open(next((table for table in bundled_tables() if table.name == path), path), threads)
+    found = Surrogate.open(
+        next((table for table in bundled_tables() if table.name == path), path), threads
+    )
     if found.checksum != checksum:
         told = f"holds {found.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"
         raise TableError(found.path, f"{told}: install the same release on both sides")
@@ -625,9 +831,13 @@ def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
     """The six inputs by name, omega from f; None where one of them is missing."""
     try:
         return (
-            inputs["mu0"], inputs["Fz"], inputs["k"], inputs["y0"],
-            inputs["omega"] if "omega" in inputs else inputs["f"] * RAD_PER_CYCLE, inputs["v0"],
-        )  # fmt: skip
+            inputs["mu0"],
+            inputs["Fz"],
+            inputs["k"],
+            inputs["y0"],
+            inputs["omega"] if "omega" in inputs else inputs["f"] * RAD_PER_CYCLE,
+            inputs["v0"],
+        )
     except (KeyError, TypeError, OverflowError):
         return None
 
@@ -645,14 +855,19 @@ def _labels(x: Any) -> bool:
 
 
 def _from_arrow(x: Any) -> Any:
-    """A column of Arrow, Polars or another library with Arrow's interface as an array, NaN where it is null."""
+    """A column of Arrow, Polars or another library with Arrow's interface as an array, NaN where it
+    is null."""
     arrow = hasattr(type(x), "__arrow_c_stream__") or hasattr(type(x), "__arrow_c_array__")
     return np.asarray(x) if arrow and not _labels(x) else x
 
 
 def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
     """The error of a single point; ``bound`` is that of y~."""
-    return InputError("y_tilde", float(y[0]), bound) if v[0] >= 0.0 else InputError("v_tilde", float(v[0]), ">= 0")
+    return (
+        InputError("y_tilde", float(y[0]), bound)
+        if v[0] >= 0.0
+        else InputError("v_tilde", float(v[0]), ">= 0")
+    )
 
 
 def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
@@ -668,7 +883,9 @@ def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
     try:
         shape = _common_shape((v, y))
     except ValueError as error:
-        raise InputError("y_tilde", y.shape, f"of a shape that broadcasts with that of v_tilde, {v.shape}") from error
+        raise InputError(
+            "y_tilde", y.shape, f"of a shape that broadcasts with that of v_tilde, {v.shape}"
+        ) from error
     return _flat(v, shape), _flat(y, shape), shape
 
 

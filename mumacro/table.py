@@ -1,8 +1,9 @@
-"""The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, checked on reading.
+"""The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, checked on
+reading.
 
-docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``, the blocks inside.
-The netCDF library writes, and is not thread-safe: a lock is held while it works.  For reading see
-``mumacro.hdf5``.
+docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
+the blocks inside. The netCDF library writes, and is not thread-safe: a lock is held while it works.
+For reading see ``mumacro.hdf5``.
 """
 
 import hashlib
@@ -34,11 +35,20 @@ _one_at_a_time = threading.Lock()
 _PLAIN = {
     "v_tilde": ("dimensionless sliding speed, v0 k/(mu0 Fz omega)", ()),
     "y_tilde": ("dimensionless oscillation amplitude, y0 k/(mu0 Fz)", ()),
-    "mu_ratio": ("macroscopic over Coulomb friction coefficient, mu_macro/mu0", ("v_tilde", "y_tilde")),
-    "stick_fraction": ("share of the period during which the contact sticks", ("v_tilde", "y_tilde")),
+    "mu_ratio": (
+        "macroscopic over Coulomb friction coefficient, mu_macro/mu0",
+        ("v_tilde", "y_tilde"),
+    ),
+    "stick_fraction": (
+        "share of the period during which the contact sticks",
+        ("v_tilde", "y_tilde"),
+    ),
     "error_estimate": ("estimated absolute error of mu_ratio", ("v_tilde", "y_tilde")),
-    "v_tilde_crit": ("border of continuous sliding: smallest dimensionless speed without stick", ("y_tilde",)),
-}  # fmt: skip
+    "v_tilde_crit": (
+        "border of continuous sliding: smallest dimensionless speed without stick",
+        ("y_tilde",),
+    ),
+}
 CELL_AXES = ("quantity", "cell", "derivative")
 _NAMED = {quantity.name: quantity for quantity in charts.QUANTITIES}
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
@@ -46,7 +56,8 @@ FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 
 
 @dataclass
 class BorderPiece:
-    """One piece of v~crit: Chebyshev ``nodes`` (n,) of its coordinate, ``values`` (n,), cells for evaluation."""
+    """One piece of v~crit: Chebyshev ``nodes`` (n,) of its coordinate, ``values`` (n,), cells for
+    evaluation."""
 
     nodes: Array
     values: Array
@@ -56,15 +67,20 @@ class BorderPiece:
 
 @dataclass
 class Block:
-    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), cells for evaluation, and what is tabulated."""
+    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), cells for evaluation, and what is
+    tabulated."""
 
     a: Array
     b: Array
     cells: tuple[int, int]
-    #: node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity is zero
+    #: node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity
+    #: is zero
     nodes: dict[str, Array] = field(default_factory=dict)
-    #: by quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a and b, in all cells
-    errors: dict[str, Array] = field(default_factory=lambda: {name: np.zeros(3) for name in charts.QUANTITY_NAMES})
+    #: by quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a
+    #: and b, in all cells
+    errors: dict[str, Array] = field(
+        default_factory=lambda: {name: np.zeros(3) for name in charts.QUANTITY_NAMES}
+    )
     #: the same for every cell (cells, 3), in the order of the cells, for slopes
     cell_errors: dict[str, Array] = field(default_factory=dict)
     max_abs_error: float = 0.0  #: the largest errors of mu~ found
@@ -100,13 +116,18 @@ def _names(attributes: dict[str, Any]) -> list[str]:
 
 
 def _digest(table: Table) -> str:
-    """SHA-256 over every number that affects a value or its bound, the geometry, and the tolerance."""
+    """SHA-256 over every number that affects a value or its bound, the geometry, and the
+    tolerance."""
     h = hashlib.sha256()
 
     def put(*parts: object) -> None:
         for part in parts:
             is_array = isinstance(part, np.ndarray)
-            h.update(np.ascontiguousarray(part, dtype="<f8").tobytes() if is_array else repr(part).encode())
+            h.update(
+                np.ascontiguousarray(part, dtype="<f8").tobytes()
+                if is_array
+                else repr(part).encode()
+            )
 
     put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
     put(*(getattr(table, name) for name in _PLAIN))
@@ -115,14 +136,28 @@ def _digest(table: Table) -> str:
     for chart, block in zip(charts.CHARTS, table.blocks, strict=True):
         put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
         put(*(block.errors[name] for name in table.quantities), block.a, block.b)
-        put(*(part[name] for part in (block.nodes, block.cell_errors) for name in table.quantities if name in part))
+        put(
+            *(
+                part[name]
+                for part in (block.nodes, block.cell_errors)
+                for name in table.quantities
+                if name in part
+            )
+        )
     return h.hexdigest()
 
 
-# --- writing --------------------------------------------------------------------------------------------
+# --- writing --------------------------------------------------------------------------------------
 
 
-def _put(group: Any, name: str, data: Array, long_name: str, axes: tuple[str, ...] = (), **attributes: Any) -> None:
+def _put(
+    group: Any,
+    name: str,
+    data: Array,
+    long_name: str,
+    axes: tuple[str, ...] = (),
+    **attributes: Any,
+) -> None:
     """A float64 variable over ``axes``; without them it is a coordinate itself."""
     if not axes:
         group.createDimension(name, data.size)
@@ -134,15 +169,25 @@ def _put(group: Any, name: str, data: Array, long_name: str, axes: tuple[str, ..
 
 
 def _put_cell_errors(group: Any, table: Table) -> None:
-    """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and a dimension too."""
+    """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and
+    a dimension too."""
 
     def rows(block: Block, name: str) -> Array:
-        return block.cell_errors[name] if name in block.nodes else np.zeros((block.cells[0] * block.cells[1], 3))
+        return (
+            block.cell_errors[name]
+            if name in block.nodes
+            else np.zeros((block.cells[0] * block.cells[1], 3))
+        )
 
-    errors = np.stack([np.concatenate([rows(block, name) for block in table.blocks]) for name in table.quantities])
+    errors = np.stack(
+        [np.concatenate([rows(block, name) for block in table.blocks]) for name in table.quantities]
+    )
     for axis, size in zip(CELL_AXES, errors.shape, strict=True):
         group.createDimension(axis, size)
-    long_name = "errors of what is tabulated, and of its derivatives along both coordinates, in all cells of all blocks"
+    long_name = (
+        "errors of what is tabulated, and of its derivatives along both coordinates, in "
+        "all cells of all blocks"
+    )
     _put(group, "cell_errors", errors, long_name, CELL_AXES)
 
 
@@ -165,9 +210,15 @@ def _fill(root: Any, table: Table) -> None:
         group = border.createGroup(name)
         _put(group, axis.name, piece.nodes, charts.COORDINATES[axis.name])
         _put(group, "value", piece.values, tabulated, (axis.name,))
-        group.setncatts({"cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error,
-                         "range": np.array([axis.low, axis.high])})  # fmt: skip
-    # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"
+        group.setncatts(
+            {
+                "cells": np.int32(piece.cells),
+                "max_rel_error": piece.max_rel_error,
+                "range": np.array([axis.low, axis.high]),
+            }
+        )
+    # inside the border, which they are fitted to: with a second group at the root the CF checker
+    # looks for "time"
     blocks = border.createGroup("blocks")
     if any(block.cell_errors for block in table.blocks):
         _put_cell_errors(blocks, table)
@@ -177,29 +228,44 @@ def _fill(root: Any, table: Table) -> None:
         _put(group, axes[0], block.a, charts.COORDINATES[axes[0]])
         _put(group, axes[1], block.b, charts.COORDINATES[axes[1]])
         for about in table.held(chart):
-            meaning = chart.quantity if about.name == "mu_ratio" else f"{about.meaning}, scaled for this block"
+            meaning = (
+                chart.quantity
+                if about.name == "mu_ratio"
+                else f"{about.meaning}, scaled for this block"
+            )
             _put(group, about.variable, block.nodes[about.name], meaning, axes)
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
-        group.setncatts({
-            **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32),
-            "errors": np.concatenate([block.errors[name] for name in table.quantities]),
-            "verified_max_abs_error": block.max_abs_error, "verified_max_rel_error": block.max_rel_error,
-        })  # fmt: skip
+        group.setncatts(
+            {
+                **_geometry(chart),
+                "cells": np.array(block.cells, dtype=np.int32),
+                "errors": np.concatenate([block.errors[name] for name in table.quantities]),
+                "verified_max_abs_error": block.max_abs_error,
+                "verified_max_rel_error": block.max_rel_error,
+            }
+        )
 
 
 def write_table(table: Table, path: str | Path) -> str:
-    """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return its checksum.
+    """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return
+    its checksum.
 
-    TableError where the folder does not exist or cannot be written, or the disk is full; nothing is left behind.
+    TableError where the folder does not exist or cannot be written, or the disk is full; nothing is
+    left behind.
     """
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
     try:
         image = _image(table)
-    except (OSError, RuntimeError) as error:  # the netCDF library raises RuntimeError where it cannot write
+    except (
+        OSError,
+        RuntimeError,
+    ) as error:  # the netCDF library raises RuntimeError where it cannot write
         where = f"in the folder of temporary files, {tempfile.gettempdir()}"
-        raise TableError(path, f"cannot be made {where}: {getattr(error, 'strerror', None) or error}") from error
+        raise TableError(
+            path, f"cannot be made {where}: {getattr(error, 'strerror', None) or error}"
+        ) from error
     try:
         write_whole(path, image)
     except OSError as error:
@@ -210,8 +276,8 @@ def write_table(table: Table, path: str | Path) -> str:
 def _image(table: Table) -> bytes:
     """The bytes of a file that holds ``table``.
 
-    A temporary file: where the disk is full the netCDF library reports little and keeps the file open.  What
-    it makes in memory holds the time of day.
+    A temporary file: where the disk is full the netCDF library reports little and keeps the file
+    open.  What it makes in memory holds the time of day.
     """
     import netCDF4  # installed only to build tables
 
@@ -222,7 +288,7 @@ def _image(table: Table) -> bytes:
         return path.read_bytes()
 
 
-# --- reading --------------------------------------------------------------------------------------------
+# --- reading --------------------------------------------------------------------------------------
 
 
 def _nodes(group: hdf5.Group, axis: charts.Axis) -> Array:
@@ -233,7 +299,9 @@ def _nodes(group: hdf5.Group, axis: charts.Axis) -> Array:
     # the cosine's last digit differs between mathematical libraries
     off = np.abs(found - nodes(found.size, axis.low, axis.high))
     if np.any(off > 1e-15 * max(abs(axis.low), abs(axis.high))):
-        raise group.refuse(f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart")
+        raise group.refuse(
+            f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart"
+        )
     return found
 
 
@@ -266,7 +334,9 @@ def _check_same(group: hdf5.Group, name: str, wanted: Any) -> None:
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
     """Those of the root: what the program uses of them is of the right kind."""
     if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
-        raise root.refuse("not a mumacro table: format_version, tolerance or content_sha256 is missing")
+        raise root.refuse(
+            "not a mumacro table: format_version, tolerance or content_sha256 is missing"
+        )
     version = root.attribute("format_version")
     if not np.array_equal(version, FORMAT_VERSION):
         raise root.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
@@ -282,7 +352,9 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
         raise root.refuse(f"attribute 'builder_options' is no JSON ({error})") from None
     names = _names(found)
     if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= _NAMED.keys():
-        raise root.refuse(f"attribute 'quantities' is {names}, this program knows {', '.join(_NAMED)}")
+        raise root.refuse(
+            f"attribute 'quantities' is {names}, this program knows {', '.join(_NAMED)}"
+        )
     return found
 
 
@@ -290,7 +362,9 @@ def _border_piece(group: hdf5.Group, axis: charts.Axis) -> BorderPiece:
     _check_same(group, "range", [axis.low, axis.high])
     at = _nodes(group, axis)
     (cells,) = _cells(group, 1)
-    return BorderPiece(at, group.array("value", MOST_NUMBERS, at.shape), cells, _error(group, "max_rel_error"))
+    return BorderPiece(
+        at, group.array("value", MOST_NUMBERS, at.shape), cells, _error(group, "max_rel_error")
+    )
 
 
 def _block(group: hdf5.Group, chart: charts.Chart, names: list[str]) -> Block:
@@ -298,10 +372,14 @@ def _block(group: hdf5.Group, chart: charts.Chart, names: list[str]) -> Block:
         _check_same(group, name, wanted)
     a, b = _nodes(group, chart.a), _nodes(group, chart.b)
     quantities = [_NAMED[name] for name in names if chart.holds(_NAMED[name])]
-    found = {one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities}
+    found = {
+        one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities
+    }
     na, nb = _cells(group, 2)
     block = Block(a, b, (na, nb), found)
-    block.max_abs_error, block.max_rel_error = (_error(group, f"verified_max_{kind}_error") for kind in ("abs", "rel"))
+    block.max_abs_error, block.max_rel_error = (
+        _error(group, f"verified_max_{kind}_error") for kind in ("abs", "rel")
+    )
     errors = _errors(group, "errors", group.numbers("errors", 3 * len(names)))
     block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))
     return block
@@ -321,7 +399,9 @@ def _read(root: hdf5.Group) -> Table:
     names = _names(attributes)
     below_border = root.group("border")
     below_blocks = below_border.group("blocks")
-    border = [_border_piece(below_border.group(name), axis) for name, axis, _ in charts.BORDER_PIECES]
+    border = [
+        _border_piece(below_border.group(name), axis) for name, axis, _ in charts.BORDER_PIECES
+    ]
     blocks = [_block(below_blocks.group(chart.name), chart, names) for chart in charts.CHARTS]
     _add_cell_errors(below_blocks, blocks, names)
     plain: dict[str, Array] = {}
@@ -339,8 +419,9 @@ def read_table(path: str | Path) -> Table:
     Raises
     ------
     TableError
-        Missing, truncated or foreign file, another format version, a missing group or variable, another geometry than
-        the running atlas, non-finite values, a checksum that does not fit; the message names the file and the reason.
+        Missing, truncated or foreign file, another format version, a missing group or variable,
+        another geometry than the running atlas, non-finite values, a checksum that does not fit;
+        the message names the file and the reason.
     """
     return parse_table(read_image(path), path)
 
@@ -353,20 +434,27 @@ def parse_table(image: bytes, path: str | Path) -> Table:
     except TableError:
         raise
     except Exception as error:  # h5py raises nearly any exception
-        raise TableError(path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})") from error
+        raise TableError(
+            path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})"
+        ) from error
     if digest != table.attributes["content_sha256"]:
-        raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
+        raise TableError(
+            path, "checksum does not match the content: the file is damaged or was edited"
+        )
     return table
 
 
 def read_image(path: str | Path) -> bytes:
-    """The bytes of a table file; TableError where it is missing, unreadable, or larger than any table."""
+    """The bytes of a table file; TableError where it is missing, unreadable, or larger than any
+    table."""
     path = Path(path)
     try:
         if not path.is_file():
             raise TableError(path, "no such file")
         if path.stat().st_size > MOST_BYTES:
-            raise TableError(path, f"has {path.stat().st_size} bytes, more than any table ({MOST_BYTES})")
+            raise TableError(
+                path, f"has {path.stat().st_size} bytes, more than any table ({MOST_BYTES})"
+            )
         return path.read_bytes()
     except OSError as error:
         raise TableError(path, f"cannot be read: {error.strerror or error}") from error
@@ -374,7 +462,10 @@ def read_image(path: str | Path) -> bytes:
 
 def json_attributes(table: Table) -> dict[str, object]:
     """Root attributes as plain Python scalars and strings; ``builder_options`` parsed."""
-    out = {key: value.item() if isinstance(value, np.generic) else value for key, value in table.attributes.items()}
+    out = {
+        key: value.item() if isinstance(value, np.generic) else value
+        for key, value in table.attributes.items()
+    }
     if "builder_options" in out:
         out["builder_options"] = json.loads(out["builder_options"])
     return out

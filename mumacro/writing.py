@@ -69,7 +69,9 @@ def alone_in(folder: Path) -> Iterator[None]:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             os.close(handle)
-            raise BusyError(f"{folder}: another process is at work here; wait for it, or stop it") from None
+            raise BusyError(
+                f"{folder}: another process is at work here; wait for it, or stop it"
+            ) from None
         except OSError:  # a file system without locks
             break
         with suppress(FileNotFoundError):

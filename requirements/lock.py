@@ -3,7 +3,8 @@
     python requirements/lock.py [ARGS]     write them (ARGS, e.g. --upgrade, go to uv)
     python requirements/lock.py --check    exit code 1 if pyproject.toml has changed since
 
-test.txt is made first and constrains the others.  No index is named in the result: the installing machine chooses it.
+test.txt is made first and constrains the others.  No index is named in the result: the installing
+machine chooses it.
 """
 
 import hashlib
@@ -26,7 +27,12 @@ BUILD, ZIG = PROJECT["build-system"]["requires"], PROJECT["tool"]["mumacro"]["zi
 def inputs_digest() -> str:
     """Digest of everything that the pins depend on; it is in the second line of every file."""
     names = ("requires-python", "dependencies", "optional-dependencies")
-    inputs = [BUILD, ZIG, PROJECT["dependency-groups"], *(PROJECT["project"][name] for name in names)]
+    inputs = [
+        BUILD,
+        ZIG,
+        PROJECT["dependency-groups"],
+        *(PROJECT["project"][name] for name in names),
+    ]
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -35,7 +41,9 @@ HEADER = f"# Pinned by: python3 dev.py lock\n# inputs: {inputs_digest()}\n"
 
 def stale() -> list[str]:
     """The files that were made from other requirements."""
-    return [path.name for path in FOLDER.glob("*.txt") if not path.read_text("utf-8").startswith(HEADER)]
+    return [
+        path.name for path in FOLDER.glob("*.txt") if not path.read_text("utf-8").startswith(HEADER)
+    ]
 
 
 def lock(folder: Path, arguments: list[str]) -> None:
@@ -46,20 +54,50 @@ def lock(folder: Path, arguments: list[str]) -> None:
     build, zig = folder / "build.in", folder / "zig.in"
     build.write_text("\n".join([*BUILD, "editables"]))  # hatchling needs it to install in place
     zig.write_text(ZIG)
-    test: list[str | Path] = ["pyproject.toml", "--group=test", *(f"--extra={extra}" for extra in EXTRAS), build]
+    test: list[str | Path] = [
+        "pyproject.toml",
+        "--group=test",
+        *(f"--extra={extra}" for extra in EXTRAS),
+        build,
+    ]
     within: list[str | Path] = ["--constraint", FOLDER / "test.txt"]
     sources: dict[str, list[str | Path]] = {
-        "test": test, "tools": ["--group=tools", *within], "service": ["pyproject.toml", "--extra=service", *within],
-        "build": [build, *within], "zig": [zig],
-    }  # fmt: skip
+        "test": test,
+        "tools": ["--group=tools", *within],
+        "service": ["pyproject.toml", "--extra=service", *within],
+        "build": [build, *within],
+        "zig": [zig],
+    }
     for name, source in sources.items():
         out = folder / f"{name}.txt"
         shutil.copyfile(FOLDER / out.name, out)  # uv keeps the pins it finds there
-        options = ["--universal", "--python-version=3.11", "--generate-hashes", "--no-annotate", "--no-header", "-q"]
-        places: list[str | Path] = ["--no-emit-index-url", "--no-emit-find-links", "--output-file", out]
-        command: list[str | Path] = [bin_ / "uv", "pip", "compile", *options, *places, *arguments, *source]
+        options = [
+            "--universal",
+            "--python-version=3.11",
+            "--generate-hashes",
+            "--no-annotate",
+            "--no-header",
+            "-q",
+        ]
+        places: list[str | Path] = [
+            "--no-emit-index-url",
+            "--no-emit-find-links",
+            "--output-file",
+            out,
+        ]
+        command: list[str | Path] = [
+            bin_ / "uv",
+            "pip",
+            "compile",
+            *options,
+            *places,
+            *arguments,
+            *source,
+        ]
         subprocess.run(command, cwd=FOLDER.parent, check=True)  # noqa: S603
-        pins = "".join(line for line in out.read_text("utf-8").splitlines(True) if not line.startswith("#"))
+        pins = "".join(
+            line for line in out.read_text("utf-8").splitlines(True) if not line.startswith("#")
+        )
         if "://" in pins or "file:" in pins or " @ " in pins:
             raise SystemExit(f"the lock for {name} names a place to download from; it must not")
         (FOLDER / out.name).write_text(HEADER + pins, encoding="utf-8", newline="\n")
@@ -69,6 +107,10 @@ def lock(folder: Path, arguments: list[str]) -> None:
 if __name__ == "__main__":
     if sys.argv[1:] == ["--check"]:
         names = stale()
-        raise SystemExit(f"{', '.join(names)}: pyproject.toml has changed; run python3 dev.py lock" if names else 0)
+        raise SystemExit(
+            f"{', '.join(names)}: pyproject.toml has changed; run python3 dev.py lock"
+            if names
+            else 0
+        )
     with tempfile.TemporaryDirectory() as name:
         lock(Path(name), sys.argv[1:])

@@ -1,17 +1,19 @@
 """``python -m service``: serve (from an installed wheel: ``mumacro serve``).
 ``python -m service healthcheck``: check whether a running service is ready.
 
-Exit codes: 0 stopped by a signal (or ready), 1 could not run (or not ready), 2 bad setting or argument.
+Exit codes: 0 stopped by a signal (or ready), 1 could not run (or not ready), 2 bad setting or
+argument.
 """
 
 import os
 import signal
 import sys
 
-# A requested stop is a success, also during the start: exit code 0.  Set before the slow imports, because the first
-# process of a container ignores a signal that has no handler.  Nothing runs yet that would have to be ended, so the
-# process ends at once; an exception could be lost in an import.  A health check that is stopped is no success, and
-# worker processes, which import this file by another name, get the handler of the server.
+# A requested stop is a success, also during the start: exit code 0.  Set before the slow imports,
+# because the first process of a container ignores a signal that has no handler.  Nothing runs yet
+# that would have to be ended, so the process ends at once; an exception could be lost in an import.
+# A health check that is stopped is no success, and worker processes, which import this file by
+# another name, get the handler of the server.
 if __name__ == "__main__" and "healthcheck" not in sys.argv:
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
 
@@ -36,16 +38,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m service",
-        description="Serve macroscopic friction over HTTP.  Every option is also a setting MUMACRO_<OPTION>.",
+        description="Serve macroscopic friction over HTTP.  Every option is also a setting "
+        "MUMACRO_<OPTION>.",
         epilog="Files of cases need no server: mumacro eval --help.",
     )
-    parser.add_argument("command", nargs="?", choices=("serve", "healthcheck"), default="serve", help="default: serve")
+    parser.add_argument(
+        "command",
+        nargs="?",
+        choices=("serve", "healthcheck"),
+        default="serve",
+        help="default: serve",
+    )
     for name in _OPTIONS:
         description = Settings.model_fields[name].description
         parser.add_argument(f"--{name.replace('_', '-')}", metavar=name.upper(), help=description)
     chosen = vars(parser.parse_args(arguments))
     # In the environment, so that worker processes get the same settings.
-    os.environ |= {PREFIX + name.upper(): chosen[name] for name in _OPTIONS if chosen[name] is not None}
+    os.environ |= {
+        PREFIX + name.upper(): chosen[name] for name in _OPTIONS if chosen[name] is not None
+    }
     try:
         settings = load_settings()
     except SettingsError as error:
@@ -55,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _check(settings: Settings) -> int:
-    """Ask /readyz on this machine, without a proxy.  A container needs no other program for its health check."""
+    """Ask /readyz on this machine, without a proxy.  A container needs no other program for its
+    health check."""
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)  # noqa: S104  (compared, never bound)
     url = f"http://{f'[{host}]' if ':' in host else host}:{settings.port}/readyz"
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
@@ -76,19 +88,31 @@ def _serve(settings: Settings) -> int:
 
     from .observe import log_config, shared_counters
 
-    # The server shuts down gracefully, then raises the signal again, which by default would end the process with the
-    # signal's exit status.  From here on there are things to clean up.
+    # The server shuts down gracefully, then raises the signal again, which by default would end the
+    # process with the signal's exit status.  From here on there are things to clean up.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         with shared_counters() if settings.workers > 1 else nullcontext():
-            # By name, so that only worker processes import it, and not their parent.  It reads the headers of proxies.
+            # By name, so that only worker processes import it, and not their parent.  It reads the
+            # headers of proxies.
             uvicorn.run(
-                f"{__package__}.app:create_app", factory=True, http=f"{__package__}.server:Connection", ws="none",
-                host=settings.host, port=settings.port, workers=settings.workers, root_path=settings.root_path,
-                log_config=log_config(settings.log_level), log_level=settings.log_level, access_log=False,
-                server_header=False, proxy_headers=False, timeout_graceful_shutdown=settings.shutdown_grace_s,
-                timeout_worker_healthcheck=30,  # on a busy machine a worker may need more than 5 s to start
-            )  # fmt: skip
+                f"{__package__}.app:create_app",
+                factory=True,
+                http=f"{__package__}.server:Connection",
+                ws="none",
+                host=settings.host,
+                port=settings.port,
+                workers=settings.workers,
+                root_path=settings.root_path,
+                log_config=log_config(settings.log_level),
+                log_level=settings.log_level,
+                access_log=False,
+                server_header=False,
+                proxy_headers=False,
+                timeout_graceful_shutdown=settings.shutdown_grace_s,
+                # on a busy machine a worker may need more than 5 s to start
+                timeout_worker_healthcheck=30,
+            )
     except SystemExit as stop:
         return 1 if stop.code else 0
     return 0

@@ -1,8 +1,9 @@
-"""The registry of what an answer holds: the default outputs, and the quantities that ``include`` adds.
+"""The registry of what an answer holds: the default outputs, and the quantities that ``include``
+adds.
 
-A quantity is one entry: its name, its columns with units and texts, its cost, and how it is computed.  JSON, CSV,
-Arrow, the models of answers, OpenAPI and the estimated cost of a request use the registry; the default outputs are its
-first entry, service/quantities.py has the others.
+A quantity is one entry: its name, its columns with units and texts, its cost, and how it is
+computed.  JSON, CSV, Arrow, the models of answers, OpenAPI and the estimated cost of a request use
+the registry; the default outputs are its first entry, service/quantities.py has the others.
 """
 
 import math
@@ -31,8 +32,8 @@ REGIME_NAMES = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
 class Part:
     """One column of an answer.
 
-    ``path`` is its name in flat formats; in JSON the dot makes an object.  A column of names holds codes, and ``names``
-    has the names by code; -1 is none.
+    ``path`` is its name in flat formats; in JSON the dot makes an object.  A column of names holds
+    codes, and ``names`` has the names by code; -1 is none.
     """
 
     path: str
@@ -53,9 +54,11 @@ class Part:
 
 @dataclass
 class Cases:
-    """Cases that quantities are computed for: arrays (n,), or plain numbers for one; k = inf is rigid contact.
+    """Cases that quantities are computed for: arrays (n,), or plain numbers for one; k = inf is
+    rigid contact.
 
-    The slopes, by name of the input, are there if a requested quantity needs them.  What is not legal is NaN.
+    The slopes, by name of the input, are there if a requested quantity needs them.  What is not
+    legal is NaN.
     """
 
     surrogate: Surrogate
@@ -67,7 +70,11 @@ class Cases:
     def __post_init__(self) -> None:
         answer, columns = self.answer, self.columns
         self.mu_macro, self.error_bound = answer.mu_macro, answer.error_bound
-        self.v_tilde, self.y_tilde, self.length_scale = answer.v_tilde, answer.y_tilde, answer.length_scale
+        self.v_tilde, self.y_tilde, self.length_scale = (
+            answer.v_tilde,
+            answer.y_tilde,
+            answer.length_scale,
+        )
         self.moving = (columns[self.kind.fields[3]] != 0.0) & (columns["omega"] != 0.0)
         self.rigid = columns["k"] == math.inf
         #: elastic, oscillating, with groups within double range
@@ -76,7 +83,9 @@ class Cases:
 
     def at_speed(self, v0: Any) -> Array:
         """mu_macro at another v0, in the same shape; NaN where that is not legal."""
-        columns = {name: np.atleast_1d(column) for name, column in {**self.columns, "v0": v0}.items()}
+        columns = {
+            name: np.atleast_1d(column) for name, column in {**self.columns, "v0": v0}.items()
+        }
         found = self.surrogate.evaluate(columns, **self.words).mu_macro
         shape = np.shape(self.mu_macro)
         return np.broadcast_to(found, shape or (1,)).reshape(shape)
@@ -90,7 +99,13 @@ class Cases:
 
 def where(condition: Any, one: Any, other: Any) -> Any:
     """``np.where``, which takes a microsecond for a single number."""
-    return np.where(condition, one, other) if isinstance(condition, np.ndarray) else one if condition else other
+    return (
+        np.where(condition, one, other)
+        if isinstance(condition, np.ndarray)
+        else one
+        if condition
+        else other
+    )
 
 
 @dataclass(frozen=True)
@@ -112,7 +127,12 @@ DEFAULT = (
     Part("mu_ratio", "-", "mu_macro/mu0, from 0 to 1"),
     Part("regime", "-", "How the contact moves", REGIME_NAMES),
     Part("error_bound", "-", "Bound of the absolute error of mu_macro"),
-    Part("source", "-", "Block of the table, or closed-form tail, that the value came from", tuple(SOURCES)),
+    Part(
+        "source",
+        "-",
+        "Block of the table, or closed-form tail, that the value came from",
+        tuple(SOURCES),
+    ),
 )
 #: what an interval of k adds to it
 INTERVAL = (
@@ -121,13 +141,15 @@ INTERVAL = (
 )
 _NAMES = tuple(part.path for part in DEFAULT)
 _six = itemgetter(*FIELDS)
-_COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}  # in times of one spring, across, at one k
+# in times of one spring, across, at one k
+_COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
 QUANTITIES: dict[str, Quantity] = {}
 _SLOPED = set[str]()  # those that need the gradient
 
 
 def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
-    """Add the quantity that the decorated function computes: by its name, with its docstring as the text."""
+    """Add the quantity that the decorated function computes: by its name, with its docstring as the
+    text."""
 
     def add(compute: Callable[[Cases], Sequence[Any]]) -> Callable[[Cases], Sequence[Any]]:
         name, text = compute.__name__, (compute.__doc__ or "").removesuffix(".")
@@ -140,7 +162,8 @@ def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> C
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is asked of cases: what they are, the quantities beside the default outputs, and deviations for ``std``."""
+    """What is asked of cases: what they are, the quantities beside the default outputs, and
+    deviations for ``std``."""
 
     asked: Asked = PLAIN
     include: tuple[str, ...] = ()
@@ -191,45 +214,67 @@ def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-# --- evaluation ---------------------------------------------------------------------------------------
+# --- evaluation -----------------------------------------------------------------------------------
 
 
-def answer_case(surrogate: Surrogate, case: Mapping[str, Any], wanted: Wanted) -> tuple[dict[str, Any], int]:
-    """The answer to one case as plain Python values, and the code of its source; InputError where it is not legal."""
+def answer_case(
+    surrogate: Surrogate, case: Mapping[str, Any], wanted: Wanted
+) -> tuple[dict[str, Any], int]:
+    """The answer to one case as plain Python values, and the code of its source; InputError where
+    it is not legal."""
     if wanted.asked is PLAIN and not wanted.include:
         macro, ratio, bound, code = surrogate.evaluate_case(*_six(case))
-        return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[code], bound, SOURCES[code]), strict=True)), code
+        return dict(
+            zip(_NAMES, (macro, ratio, REGIME_NAMES[code], bound, SOURCES[code]), strict=True)
+        ), code
     found, more = _evaluated(surrogate, case, wanted)
     code = found.source_code
     values = found.mu_macro, found.mu_ratio, REGIME_NAMES[code], found.error_bound, SOURCES[code]
-    return dict(zip(_NAMES, values, strict=True)) | nested(dict(zip(wanted.more, map(float, more), strict=True))), code
+    return dict(zip(_NAMES, values, strict=True)) | nested(
+        dict(zip(wanted.more, map(float, more), strict=True))
+    ), code
 
 
 def answer_columns(
     surrogate: Surrogate, six: Sequence[Array], n: int, wanted: Wanted
-) -> tuple[dict[str, Any], Codes]:  # fmt: skip
-    """The columns of the answers by path, and the source codes: NaN and -1 for a case that is not legal.
+) -> tuple[dict[str, Any], Codes]:
+    """The columns of the answers by path, and the source codes: NaN and -1 for a case that is not
+    legal.
 
-    ``six`` has n cases in columns of shape (n,) or (1,), in the order of the fields; k = inf is rigid contact.
+    ``six`` has n cases in columns of shape (n,) or (1,), in the order of the fields; k = inf is
+    rigid contact.
     """
-    cases = {name: x if x.size == n else x.item() for name, x in zip(wanted.asked.fields, six, strict=True)}
+    cases = {
+        name: x if x.size == n else x.item()
+        for name, x in zip(wanted.asked.fields, six, strict=True)
+    }
     with np.errstate(all="ignore"):
         found, more = _evaluated(surrogate, cases, wanted)
     codes = found.source_code
-    values = dict(zip(_NAMES, (found.mu_macro, found.mu_ratio, codes, found.error_bound, codes), strict=True))
+    values = dict(
+        zip(_NAMES, (found.mu_macro, found.mu_ratio, codes, found.error_bound, codes), strict=True)
+    )
     legal = codes >= 0
-    return values | {path: np.where(legal, x, np.nan) for path, x in zip(wanted.more, more, strict=True)}, codes
+    return values | {
+        path: np.where(legal, x, np.nan) for path, x in zip(wanted.more, more, strict=True)
+    }, codes
 
 
-def _evaluated(surrogate: Surrogate, cases: Mapping[str, Any], wanted: Wanted) -> tuple[Any, list[Any]]:
+def _evaluated(
+    surrogate: Surrogate, cases: Mapping[str, Any], wanted: Wanted
+) -> tuple[Any, list[Any]]:
     """The library's answer, and the columns beside the default ones."""
     asked, include = wanted.asked, wanted.include
     words: dict[str, Any] = asked.kind.names
-    found = surrogate.evaluate(**cases, **words, gradient=not _SLOPED.isdisjoint(include), groups=bool(include))
+    found = surrogate.evaluate(
+        **cases, **words, gradient=not _SLOPED.isdisjoint(include), groups=bool(include)
+    )
     more = [getattr(found, part.path) for part in INTERVAL] if asked.interval else []
     if include:
         if asked.interval:
-            cases = {name: cases[name] for name in asked.kind.fields if name != "k"} | {"k": middle(cases, "nan")[2]}
+            cases = {name: cases[name] for name in asked.kind.fields if name != "k"} | {
+                "k": middle(cases, "nan")[2]
+            }
         known = Cases(surrogate, cases, found, wanted.std, asked.kind)
         more += [column for name in include for column in QUANTITIES[name].compute(known)]
     return found, more

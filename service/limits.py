@@ -1,7 +1,8 @@
 """Limits: API keys, the head and the body of a request, slots for large requests, time.
 
-A request that may take longer than one case needs a slot and runs in a thread.  Batches and streams share the slots of
-``MUMACRO_MAX_BATCHES``; the questions of a person (law, solve-for, the page) have slots and threads of their own.
+A request that may take longer than one case needs a slot and runs in a thread.  Batches and streams
+share the slots of ``MUMACRO_MAX_BATCHES``; the questions of a person (law, solve-for, the page)
+have slots and threads of their own.
 """
 
 import asyncio
@@ -25,16 +26,23 @@ from .settings import Settings
 
 T = TypeVar("T")
 SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
-AT_ONCE = 4000.0  # largest cost without a thread, in times of a plain case: under half a millisecond
+# largest cost without a thread, in times of a plain case: under half a millisecond
+AT_ONCE = 4000.0
 QUESTIONS = 8  # questions that are answered at the same time
 _NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
-_LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
+# how long, and how many bytes of a refused body are read
+_LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
 _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
 _OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
 _ONCE = (
-    b"host", b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"transfer-encoding",
+    b"host",
+    b"x-api-key",
+    b"authorization",
+    b"content-type",
+    b"content-encoding",
+    b"transfer-encoding",
     b"x-request-id",
-)  # fmt: skip
+)
 
 
 def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
@@ -44,7 +52,9 @@ def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
         scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
         offered = credentials.strip() if scheme.lower() == b"bearer" else b""
     # compares all keys: the time does not depend on the key sent
-    found = [name for key, name in keys.items() if secrets.compare_digest(offered, key.encode("ascii"))]
+    found = [
+        name for key, name in keys.items() if secrets.compare_digest(offered, key.encode("ascii"))
+    ]
     if not found:
         told = "send the API key as X-API-Key or as Authorization: Bearer"
         raise RequestError(Kind.UNAUTHORIZED, told, headers={"WWW-Authenticate": "Bearer"})
@@ -52,7 +62,8 @@ def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
 
 
 def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
-    """Refuse a head that says two things, or asks for another protocol, as which its body would be read."""
+    """Refuse a head that says two things, or asks for another protocol, as which its body would be
+    read."""
     version = scope["http_version"]
     if version not in ("1.0", "1.1") or (version == "1.1" and b"host" not in headers):
         raise RequestError(Kind.MALFORMED_HTTP, "a request is of HTTP/1.1 and has one Host")
@@ -62,9 +73,13 @@ def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
             if names.count(name) > 1:
-                raise RequestError(Kind.MALFORMED_HTTP, f"the header {name.decode()} is given more than once")
+                raise RequestError(
+                    Kind.MALFORMED_HTTP, f"the header {name.decode()} is given more than once"
+                )
     if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
-        raise RequestError(Kind.MALFORMED_HTTP, "this service does not upgrade connections: send no Upgrade")
+        raise RequestError(
+            Kind.MALFORMED_HTTP, "this service does not upgrade connections: send no Upgrade"
+        )
 
 
 def form_of(headers: Mapping[bytes, bytes], known: Mapping[str, T]) -> T:
@@ -83,7 +98,10 @@ def form_of(headers: Mapping[bytes, bytes], known: Mapping[str, T]) -> T:
 
 
 async def read_body(
-    headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
+    headers: Mapping[bytes, bytes],
+    receive: Receive,
+    limit: int,
+    large: Callable[[], None] = lambda: None,
 ) -> bytearray:
     """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
     length = headers.get(b"content-length", b"0").strip()
@@ -92,9 +110,12 @@ async def read_body(
     while True:
         if size > limit:
             told = (
-                "send many cases to /v1/mu-macro/batch, more as NDJSON without a Content-Length, reading while you send"
+                "send many cases to /v1/mu-macro/batch, more as NDJSON without a "
+                "Content-Length, reading while you send"
             )
-            raise RequestError(Kind.BODY_TOO_LARGE, f"a body may have up to {limit} bytes: {told}", max_bytes=limit)
+            raise RequestError(
+                Kind.BODY_TOO_LARGE, f"a body may have up to {limit} bytes: {told}", max_bytes=limit
+            )
         if size > SMALL_BODY:
             large()
         if not more:
@@ -108,7 +129,8 @@ async def read_body(
 
 
 async def drained(receive: Receive) -> None:
-    """Read and drop the rest of a body that is refused, for a while: else many clients see a reset and no reason."""
+    """Read and drop the rest of a body that is refused, for a while: else many clients see a reset
+    and no reason."""
     count, more = 0, True
     with suppress(TimeoutError):
         async with asyncio.timeout(_LINGER_S):
@@ -123,13 +145,16 @@ class Slots:
 
     def __init__(self, number: int, name: str, niceness: int = 0) -> None:
         self.number, self.used, self._name = number, 0, name
-        stand_back = partial(os.nice, niceness) if sys.platform == "linux" else None  # where that is of the thread
+        # where that is of the thread
+        stand_back = partial(os.nice, niceness) if sys.platform == "linux" else None
         self.threads = ThreadPoolExecutor(processors(), name, initializer=stand_back)
 
     def take(self) -> None:
         """Take a slot; the code that called this gives it back."""
         if self.used >= self.number:
-            raise RequestError(Kind.OVERLOADED, f"{self.used} {self._name} are being answered already")
+            raise RequestError(
+                Kind.OVERLOADED, f"{self.used} {self._name} are being answered already"
+            )
         self.used += 1
 
     def give_back(self) -> None:
@@ -151,7 +176,8 @@ class Work:
             slots.threads.shutdown(wait=False, cancel_futures=True)
 
     async def question(self, work: Callable[[], T]) -> T:
-        """Do the work of a question in a thread; its slot is held until it is done, even without a client."""
+        """Do the work of a question in a thread; its slot is held until it is done, even without a
+        client."""
         self.questions.take()
         loop = asyncio.get_running_loop()
         task = self.questions.threads.submit(work)
@@ -167,7 +193,8 @@ class Work:
 
 @asynccontextmanager
 async def within(limit: int, late: Kind = Kind.TOOK_TOO_LONG) -> AsyncIterator[None]:
-    """A time limit: of a whole answer, its reading, computing and sending, or of a client's next move."""
+    """A time limit: of a whole answer, its reading, computing and sending, or of a client's next
+    move."""
     try:
         async with asyncio.timeout(limit):
             yield

@@ -1,4 +1,5 @@
-"""Models for OpenAPI, and those of answers: the columns come from the registry of :mod:`service.answers`."""
+"""Models for OpenAPI, and those of answers: the columns come from the registry of
+:mod:`service.answers`."""
 
 from collections.abc import Callable, Iterable
 from functools import cache
@@ -18,9 +19,14 @@ class Strict(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
 
 
-def model(name: str, text: str, /, *bases: type[BaseModel], example: Any = None, **members: Any) -> Any:
+def model(
+    name: str, text: str, /, *bases: type[BaseModel], example: Any = None, **members: Any
+) -> Any:
     """A model; a member is a type, or what :func:`told` or :func:`optional` gives."""
-    given = {key: member if isinstance(member, tuple) else (member, ...) for key, member in members.items()}
+    given = {
+        key: member if isinstance(member, tuple) else (member, ...)
+        for key, member in members.items()
+    }
     found = _create(name, __base__=bases or None, __doc__=text, **given)
     if example is not None:
         found.model_config["json_schema_extra"] = {"examples": [example]}
@@ -43,26 +49,39 @@ def many(kind: Any) -> Any:
 
 
 TableLabel = model(
-    "TableLabel", "The table that an answer came from.", id=told(str, "Name of the table"),
+    "TableLabel",
+    "The table that an answer came from.",
+    id=told(str, "Name of the table"),
     tolerance=told(float, "The error of mu_macro/mu0 [-] that it was built to"),
-)  # fmt: skip
+)
 Answered = model("Answered", "The fields of every answer.", table=TableLabel, api_version=str)
 BatchFault = model(
-    "BatchFault", "Why one case of a batch has no result.", index=told(int, "Position in the batch, from 0"),
-    field=told(str | None, "The bad field; null when the case as a whole is bad"), reason=str,
-)  # fmt: skip
+    "BatchFault",
+    "Why one case of a batch has no result.",
+    index=told(int, "Position in the batch, from 0"),
+    field=told(str | None, "The bad field; null when the case as a whole is bad"),
+    reason=str,
+)
 _BatchEnd = model(
-    "_BatchEnd", "", Answered,
+    "_BatchEnd",
+    "",
+    Answered,
     errors=told(many(BatchFault), "One entry per bad case, in order; the first 1000 of them"),
     n_errors=told(int, "Number of bad cases, listed or not"),
-)  # fmt: skip
+)
 
 
-# --- columns ------------------------------------------------------------------------------------------
+# --- columns --------------------------------------------------------------------------------------
 
 
 def _member(part: Part, listed: bool, make: Callable[..., Any] = optional) -> Any:
-    kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else str if part.names else float
+    kind: Any = (
+        Literal[tuple(dict.fromkeys(part.names))]
+        if part.path == "regime"
+        else str
+        if part.names
+        else float
+    )
     kind = kind if part in DEFAULT and part.path != "error_bound" and not listed else kind | None
     return make(many(kind) if listed else kind, part.described)
 
@@ -75,15 +94,20 @@ def default(listed: bool) -> dict[str, Any]:
 
 @cache
 def grouped(parts: Iterable[Part], listed: bool, text: str) -> dict[str, Any]:
-    """Columns that are there if requested as members of a model, those with a dot in their path in models of theirs."""
+    """Columns that are there if requested as members of a model, those with a dot in their path in
+    models of theirs."""
     members: dict[str, Any] = {}
     for part in parts:
         either = dict.fromkeys((part, of_amplitude(part)))  # of which there is one
-        members |= {one.path: _member(one, listed, told if len(either) == 1 else optional) for one in either}
+        members |= {
+            one.path: _member(one, listed, told if len(either) == 1 else optional) for one in either
+        }
     fields = nested(members)
     for name, found in fields.items():
         if isinstance(found, dict):
-            title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
+            title = "".join(word.capitalize() for word in name.split("_")) + (
+                "Columns" if listed else ""
+            )
             found = model(title, f"{text}.", **found), Field()
         fields[name] = optional(found[0], found[1].description or "Only if requested")
     return fields
@@ -99,41 +123,79 @@ Result = model("Result", "Answer to one case.", **default(False), **included(Fal
 
 
 ModelRow = model(
-    "ModelRow", "One thing that the model leaves out, see docs/validity.md.", row=told(str, "Its name"),
-    text=told(str, "What it does here"), effect=told(float | None, "Relative change of mu_macro; null: not known"),
-)  # fmt: skip
+    "ModelRow",
+    "One thing that the model leaves out, see docs/validity.md.",
+    row=told(str, "Its name"),
+    text=told(str, "What it does here"),
+    effect=told(float | None, "Relative change of mu_macro; null: not known"),
+)
 CaseAnswer = model(
-    "CaseAnswer", "Answer to one case.", Result, Answered,
+    "CaseAnswer",
+    "Answer to one case.",
+    Result,
+    Answered,
     model=optional(many(ModelRow), "Only if requested. What the model leaves out here"),
     digits=optional(int, "Only with model. Digits of mu_macro that k supports"),
-)  # fmt: skip
+)
 ColumnsAnswer = model(
-    "ColumnsAnswer", "Answer to a batch in columns, order kept; null: a bad case.", _BatchEnd,
-    **default(True), **included(True),
-)  # fmt: skip
+    "ColumnsAnswer",
+    "Answer to a batch in columns, order kept; null: a bad case.",
+    _BatchEnd,
+    **default(True),
+    **included(True),
+)
 RowsAnswer = model(
-    "RowsAnswer", "Answer to a batch in rows, order kept; null where a case is bad.", _BatchEnd,
+    "RowsAnswer",
+    "Answer to a batch in rows, order kept; null where a case is bad.",
+    _BatchEnd,
     results=many(Result | None),
-)  # fmt: skip
+)
 TableAnswer = model(
-    "TableAnswer", "Properties of a table.", Answered, id=str, tolerance=float,
-    checksum=told(str, "SHA-256 of the table's content"), file=str, size_bytes=int,
+    "TableAnswer",
+    "Properties of a table.",
+    Answered,
+    id=str,
+    tolerance=float,
+    checksum=told(str, "SHA-256 of the table's content"),
+    file=str,
+    size_bytes=int,
     max_abs_error=told(float | None, "Largest verified absolute error of mu_macro/mu0 [-]"),
     max_rel_error=told(float | None, "Largest verified relative error of mu_macro [-]"),
-    attributes=told(dict[str, Any], "Root attributes of the file"), blocks=list[dict[str, Any]],
-    loaded=told(many(TableLabel), "All loaded tables, tightest first"), service_version=str,
-)  # fmt: skip
+    attributes=told(dict[str, Any], "Root attributes of the file"),
+    blocks=list[dict[str, Any]],
+    loaded=told(many(TableLabel), "All loaded tables, tightest first"),
+    service_version=str,
+)
 Health = model(
-    "Health", "Answer of a health endpoint.", status=Literal["alive", "ready"], tables=optional(many(TableLabel)),
-    api_version=str, service_version=str,
-)  # fmt: skip
+    "Health",
+    "Answer of a health endpoint.",
+    status=Literal["alive", "ready"],
+    tables=optional(many(TableLabel)),
+    api_version=str,
+    service_version=str,
+)
 FieldProblem = model(
-    "FieldProblem", "One bad field.", pointer=optional(str, "JSON pointer into the body"),
-    parameter=optional(str, "Query parameter"), field=str,
-    value=(Any, Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN")),
-    reason=str, bound=optional(str),
-)  # fmt: skip
+    "FieldProblem",
+    "One bad field.",
+    pointer=optional(str, "JSON pointer into the body"),
+    parameter=optional(str, "Query parameter"),
+    field=str,
+    value=(
+        Any,
+        Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN"),
+    ),
+    reason=str,
+    bound=optional(str),
+)
 Problem = model(
-    "Problem", "Problem details, RFC 9457.", type=str, title=str, status=int, detail=str, instance=str,
-    request_id=optional(str), errors=optional(many(FieldProblem)), n_errors=optional(int),
-)  # fmt: skip
+    "Problem",
+    "Problem details, RFC 9457.",
+    type=str,
+    title=str,
+    status=int,
+    detail=str,
+    instance=str,
+    request_id=optional(str),
+    errors=optional(many(FieldProblem)),
+    n_errors=optional(int),
+)

@@ -1,7 +1,9 @@
-"""What is seen of a request from outside: its id, its log line, its counters, and the answer to an exception.
+"""What is seen of a request from outside: its id, its log line, its counters, and the answer to an
+exception.
 
-Logs are JSON lines on standard output, written by a thread.  Counters are those of prometheus_client; several workers
-share them through its multiprocess mode, in a private folder that is made at the start.
+Logs are JSON lines on standard output, written by a thread.  Counters are those of
+prometheus_client; several workers share them through its multiprocess mode, in a private folder
+that is made at the start.
 """
 
 import asyncio
@@ -22,7 +24,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 import orjson
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics, generate_latest
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    disable_created_metrics,
+    generate_latest,
+)
 from prometheus_client.multiprocess import MultiProcessCollector
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -42,7 +51,24 @@ from .tables import LoadedTable, Tables
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 _METHODS = frozenset({"GET", "HEAD", "POST"})
 _SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
-_BUCKETS_S = (1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
+_BUCKETS_S = (
+    1e-4,
+    2.5e-4,
+    5e-4,
+    1e-3,
+    2.5e-3,
+    5e-3,
+    0.01,
+    0.025,
+    0.05,
+    0.1,
+    0.25,
+    0.5,
+    1.0,
+    2.5,
+    5.0,
+    10.0,
+)
 _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs
 _MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
 _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
@@ -55,10 +81,11 @@ _errors = logging.getLogger("mumacro.error")
 
 
 class LogLines(logging.Handler):
-    """Keeps lines for a thread that writes them twenty times a second: a stalled reader delays no request.
+    """Keeps lines for a thread that writes them twenty times a second: a stalled reader delays no
+    request.
 
-    ``logging.handlers.QueueListener`` would wake its thread for every record; a record takes a tenth of the time of a
-    request, so :class:`Observe` puts its lines here itself.
+    ``logging.handlers.QueueListener`` would wake its thread for every record; a record takes a
+    tenth of the time of a request, so :class:`Observe` puts its lines here itself.
     """
 
     #: the one of this process; without it, under another server, that server says what it answered
@@ -80,15 +107,19 @@ class LogLines(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Keep a record: its time, level, logger, message and ``fields``."""
         line: dict[str, Any] = {
-            "time": datetime.fromtimestamp(record.created, UTC), "level": record.levelname.lower(),
-            "logger": record.name, "message": record.getMessage(), **getattr(record, "fields", {}),
-        }  # fmt: skip
+            "time": datetime.fromtimestamp(record.created, UTC),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **getattr(record, "fields", {}),
+        }
         if record.exc_info:
             line["exception"] = logging.Formatter().formatException(record.exc_info)
         self.put(line)
 
     def _write(self) -> None:
-        """Write by file descriptor: a Python file would hold its lock while the reader of a pipe stalls.
+        """Write by file descriptor: a Python file would hold its lock while the reader of a pipe
+        stalls.
 
         Line breaks within a line are escaped, so that a client cannot forge one.
         """
@@ -99,7 +130,9 @@ class LogLines(logging.Handler):
             lines = [self._waiting.popleft() for _ in range(len(self._waiting))]
             if more := self._dropped - told:
                 told += more
-                _log.warning("%d lines of the log were dropped: standard output was not read in time", more)
+                _log.warning(
+                    "%d lines of the log were dropped: standard output was not read in time", more
+                )
             rest = memoryview(b"".join(map(form, lines)))
             with suppress(OSError):  # the reader is gone
                 while rest:
@@ -114,7 +147,8 @@ class LogLines(logging.Handler):
 
 
 def log_config(level: str) -> dict[str, Any]:
-    """A ``logging.config.dictConfig`` for this process: everything to standard output, as JSON lines."""
+    """A ``logging.config.dictConfig`` for this process: everything to standard output, as JSON
+    lines."""
     return {
         "version": 1,
         "disable_existing_loggers": False,
@@ -126,14 +160,17 @@ def log_config(level: str) -> dict[str, Any]:
 
 @contextmanager
 def shared_counters() -> Iterator[None]:
-    """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end.
+    """A private folder for the counters of all workers, in memory if possible; it is empty, and
+    removed at the end.
 
     Without a writable folder every worker reports its own counters.
     """
     place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108  (a folder of its own is made there)
     with ExitStack() as stack:
         with suppress(OSError):
-            made = tempfile.TemporaryDirectory(prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True)
+            made = tempfile.TemporaryDirectory(
+                prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True
+            )
             os.environ[_SHARED] = stack.enter_context(made)
         yield
 
@@ -145,18 +182,36 @@ class Metrics:
         disable_created_metrics()  # type: ignore[no-untyped-call]
         self._paths = paths
         self.registry = own = CollectorRegistry()
-        requests = Counter("mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own)
+        requests = Counter(
+            "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own
+        )
         told = "From the head of a request to the end of its answer"
-        seconds = Histogram("mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own)
-        cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own)
-        bad = Counter("mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own)
+        seconds = Histogram(
+            "mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own
+        )
+        cases = Counter(
+            "mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own
+        )
+        bad = Counter(
+            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own
+        )
         labels = ["id", "tolerance"]
-        self._info = Gauge("mumacro_table_info", "Loaded tables", labels, registry=own, multiprocess_mode="mostrecent")
+        self._info = Gauge(
+            "mumacro_table_info",
+            "Loaded tables",
+            labels,
+            registry=own,
+            multiprocess_mode="mostrecent",
+        )
         # a look-up of labels takes longer than counting
-        self._of_request = cache(lambda *labels: (requests.labels(*labels).inc, seconds.labels(labels[0]).observe))
+        self._of_request = cache(
+            lambda *labels: (requests.labels(*labels).inc, seconds.labels(labels[0]).observe)
+        )
         self._of_source = cache(
             lambda table, code: (
-                bad.labels(table) if code < 0 else cases.labels(table, SOURCES[code], REGIME_NAMES[code])
+                bad.labels(table)
+                if code < 0
+                else cases.labels(table, SOURCES[code], REGIME_NAMES[code])
             )
         )
 
@@ -168,7 +223,10 @@ class Metrics:
 
     def request(self, path: str, method: str, status: int, seconds: float) -> None:
         """Count one request."""
-        path, method = path if path in self._paths else "other", method if method in _METHODS else "other"
+        path, method = (
+            path if path in self._paths else "other",
+            method if method in _METHODS else "other",
+        )
         count, observe = self._of_request(path, method, status)
         count()
         observe(seconds)
@@ -195,24 +253,39 @@ class Metrics:
 class Observe:
     """Around every answer: id, key, log line, counters, and problem details for every exception.
 
-    Endpoints are found by ``routes``, ``others`` answers what is none.  ``open_paths``, and what is below ``/guide/``,
-    need no key.
+    Endpoints are found by ``routes``, ``others`` answers what is none.  ``open_paths``, and what is
+    below ``/guide/``, need no key.
     """
 
     def __init__(
-        self, routes: Routes, others: ASGIApp, metrics: Metrics, settings: Settings, open_paths: AbstractSet[str]
+        self,
+        routes: Routes,
+        others: ASGIApp,
+        metrics: Metrics,
+        settings: Settings,
+        open_paths: AbstractSet[str],
     ) -> None:
         self._routes, self._others, self._metrics = routes, others, metrics
         self._keys, self._open_paths = settings.keys(), open_paths
-        self._proxies: Any = ProxyHeadersMiddleware(lambda *_: asyncio.sleep(0), settings.trusted_proxies)  # in scope
-        self._stem, self._numbers = os.urandom(8).hex(), itertools.count(int.from_bytes(os.urandom(6)))
+        # in scope
+        self._proxies: Any = ProxyHeadersMiddleware(
+            lambda *_: asyncio.sleep(0), settings.trusted_proxies
+        )
+        self._stem, self._numbers = (
+            os.urandom(8).hex(),
+            itertools.count(int.from_bytes(os.urandom(6))),
+        )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request."""
         started = time.perf_counter()
         headers: dict[bytes, bytes] = dict(scope["headers"])
         offered = headers.get(b"x-request-id", b"")
-        identity = offered.decode() if _ID.fullmatch(offered) else f"{self._stem}{next(self._numbers):016x}"
+        identity = (
+            offered.decode()
+            if _ID.fullmatch(offered)
+            else f"{self._stem}{next(self._numbers):016x}"
+        )
         scope["request_id"] = identity
         if b"x-forwarded-for" in headers or b"x-forwarded-proto" in headers:
             await self._proxies(scope, receive, send)
@@ -222,7 +295,11 @@ class Observe:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                message["headers"] = [*message["headers"], (b"x-request-id", identity.encode()), _NO_SNIFF]
+                message["headers"] = [
+                    *message["headers"],
+                    (b"x-request-id", identity.encode()),
+                    _NO_SNIFF,
+                ]
             await send(message)
 
         try:
@@ -254,9 +331,18 @@ class Observe:
             quiet, lines = status == 200 and path in HEALTH_PATHS, LogLines.running
             if lines is not None and _access.isEnabledFor(logging.DEBUG if quiet else logging.INFO):
                 client = scope.get("client")
-                lines.put({
-                    "time": datetime.now(UTC), "level": "debug" if quiet else "info", "logger": "mumacro.access",
-                    "message": "request", "request_id": identity, "method": scope["method"], "path": path,
-                    "status": status, "duration_ms": round(1e3 * seconds, 3),
-                    "client": client[0][:_MOST_SHOWN] if client else None, **({"key": holder} if holder else {}),
-                })  # fmt: skip
+                lines.put(
+                    {
+                        "time": datetime.now(UTC),
+                        "level": "debug" if quiet else "info",
+                        "logger": "mumacro.access",
+                        "message": "request",
+                        "request_id": identity,
+                        "method": scope["method"],
+                        "path": path,
+                        "status": status,
+                        "duration_ms": round(1e3 * seconds, 3),
+                        "client": client[0][:_MOST_SHOWN] if client else None,
+                        **({"key": holder} if holder else {}),
+                    }
+                )

@@ -1,6 +1,8 @@
-"""The options of a request, and the models that describe cases in OpenAPI; both from :mod:`mumacro.inputs`.
+"""The options of a request, and the models that describe cases in OpenAPI; both from
+:mod:`mumacro.inputs`.
 
-What every endpoint asks beside its case (``include``, ``tolerance``, ``std``) is a field of :class:`Options`.
+What every endpoint asks beside its case (``include``, ``tolerance``, ``std``) is a field of
+:class:`Options`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -11,7 +13,16 @@ from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from mumacro.contact import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, ContactName, DirectionName, Kind, kind_of
+from mumacro.contact import (
+    AMPLITUDE,
+    CONTACTS,
+    DIRECTIONS,
+    SPRING,
+    ContactName,
+    DirectionName,
+    Kind,
+    kind_of,
+)
 from mumacro.errors import InputError
 from mumacro.inputs import BOUNDS, LIKE, MOST_HZ, RAD_PER_CYCLE, RIGID, unit_of
 from mumacro.inputs import NAMES as INPUTS
@@ -43,7 +54,12 @@ example: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega"
 
 def bounded(bound: str, text: str = "", default: Any = ..., **more: Any) -> Any:
     """A field of a model that says what its value must be; errors tell it."""
-    return Field(default, description=f"{text}; {bound}" if text else bound, json_schema_extra={"bound": bound}, **more)
+    return Field(
+        default,
+        description=f"{text}; {bound}" if text else bound,
+        json_schema_extra={"bound": bound},
+        **more,
+    )
 
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -55,18 +71,24 @@ _NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # n
 Model = TypeVar("Model", bound="Choice")
 
 
-# --- options ------------------------------------------------------------------------------------------
+# --- options --------------------------------------------------------------------------------------
 
 
 class Choice(Strict):
     """Which contact and which table."""
 
-    contact: ContactName = bounded(f"one of {', '.join(CONTACTS)}", "One spring, or a ball on a flat (Hertz)", "spring")
+    contact: ContactName = bounded(
+        f"one of {', '.join(CONTACTS)}", "One spring, or a ball on a flat (Hertz)", "spring"
+    )
     direction: DirectionName = bounded(
-        f"one of {', '.join(DIRECTIONS)}", "Direction of the oscillation, to that of sliding", "across"
+        f"one of {', '.join(DIRECTIONS)}",
+        "Direction of the oscillation, to that of sliding",
+        "across",
     )
     tolerance: Positive | None = bounded(
-        "finite and > 0", "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers", None
+        "finite and > 0",
+        "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers",
+        None,
     )
 
     @model_validator(mode="after")
@@ -85,53 +107,82 @@ def includes(word: str, text: str) -> tuple[Any, Any]:
     names = (*INCLUDES, word)
     told = "; ".join(f"{name} ({QUANTITIES[name].text})" for name in INCLUDES)
     kind = Annotated[list[Literal[names]], Field(max_length=2 * len(names))] | None  # type: ignore[valid-type]
-    return kind, bounded(f"a list of names from: {', '.join(names)}", f"More to compute: {told}; {word} ({text})", None)
+    return kind, bounded(
+        f"a list of names from: {', '.join(names)}",
+        f"More to compute: {told}; {word} ({text})",
+        None,
+    )
 
 
 _DEVIATE = [*INPUTS, AMPLITUDE]
-_std: Any = {name: (NotNegative, bounded("finite and >= 0", f"[{unit_of(name)}]", 0.0)) for name in _DEVIATE}
+_std: Any = {
+    name: (NotNegative, bounded("finite and >= 0", f"[{unit_of(name)}]", 0.0)) for name in _DEVIATE
+}
 
 
 class InputStd(model("_InputStd", "", Strict, **_std)):  # type: ignore[misc]
-    """Standard deviations of the inputs, in their units; independent errors are assumed; omega or f."""
+    """Standard deviations of the inputs, in their units; independent errors are assumed; omega or
+    f."""
 
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
         if self.omega and self.f:
-            raise InputError("f", self.f, "left out beside omega: give the deviation of one of them, not of both")
+            raise InputError(
+                "f", self.f, "left out beside omega: give the deviation of one of them, not of both"
+            )
         return self
 
 
-_include: Any = includes(MODEL, "for one case: what the model leaves out here, and the digits that k supports")
+_include: Any = includes(
+    MODEL, "for one case: what the model leaves out here, and the digits that k supports"
+)
 
 
 class Options(model("_Including", "", Choice, include=_include)):  # type: ignore[misc]
     """The options of a request: everything but its cases."""
 
-    std: InputStd | None = bounded("an object of numbers", "Standard deviations of the inputs, for include=std", None)
+    std: InputStd | None = bounded(
+        "an object of numbers", "Standard deviations of the inputs, for include=std", None
+    )
 
     @model_validator(mode="after")
     def _std_where_asked(self) -> Self:
         """Refuse standard deviations without ``std`` in ``include``, and the reverse."""
         if (self.std is None) == ("std" in (self.include or ())):
-            bound = "given if include has std" if self.std is None else "left out: no effect unless include has std"
+            bound = (
+                "given if include has std"
+                if self.std is None
+                else "left out: no effect unless include has std"
+            )
             raise InputError("std", self.std, bound)
         wrong = "y0" if self.kind.normal else AMPLITUDE
         if self.std and getattr(self.std, wrong):
-            raise InputError("std", wrong, f"without {wrong}, which direction {self.direction} does not have")
+            raise InputError(
+                "std", wrong, f"without {wrong}, which direction {self.direction} does not have"
+            )
         return self
 
     def wanted(self, asked: Asked, one: bool = False) -> Wanted:
-        """What is asked of such cases; refused where they do not have it.  ``model`` is for ``one`` case."""
+        """What is asked of such cases; refused where they do not have it.  ``model`` is for ``one``
+        case."""
         if found := self._wanted.get((asked, one)):
             return found
-        faults, include = [], tuple(name for name in INCLUDES if name in (self.include or ()))  # once each, in order
+        # once each, in order
+        faults, include = [], tuple(name for name in INCLUDES if name in (self.include or ()))
         if not one and MODEL in (self.include or ()):
-            faults.append(FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL))
-        lacks = [(name, word, QUANTITIES[name].lacks.get(word)) for word in said(asked) for name in include]
+            faults.append(
+                FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL)
+            )
+        lacks = [
+            (name, word, QUANTITIES[name].lacks.get(word))
+            for word in said(asked)
+            for name in include
+        ]
         for name, word, why in lacks:
             if why is not None:
-                faults.append(FieldFault.of("include", f"{name} is not computed for {word}: {why}", name))
+                faults.append(
+                    FieldFault.of("include", f"{name} is not computed for {word}: {why}", name)
+                )
         if faults:
             refuse(faults)
         std: dict[str, float] = {} if self.std is None else self.std.model_dump()
@@ -150,7 +201,8 @@ OPTIONS = tuple(Options.model_fields)
 def options_of(
     model: type[Model], given: Mapping[str, Any], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
-    """The options of a request, checked by their model; the rest of it, which is its case; and faults."""
+    """The options of a request, checked by their model; the rest of it, which is its case; and
+    faults."""
     fields, own, rest = names_in(model)[0], {}, given
     if not fields.isdisjoint(given):
         rest = dict(given)
@@ -180,19 +232,22 @@ def names_in(model: Any) -> tuple[frozenset[str], tuple[str, ...]]:
 
 
 def kind_in(given: Mapping[str, Any]) -> Kind:
-    """Contact and direction; one spring across where they are bad, which is a fault of the options."""
+    """Contact and direction; one spring across where they are bad, which is a fault of the
+    options."""
     try:
         return kind_of(given.get("contact", "spring"), given.get("direction", "across"))
     except InputError:
         return SPRING
 
 
-# --- models of cases ----------------------------------------------------------------------------------
+# --- models of cases ------------------------------------------------------------------------------
 
 
 def input_fields(
-    optional: Iterable[str] = ("omega", "f", "k", "y0"), listed: bool = False, shown: Iterable[str] = example
-) -> Any:  # fmt: skip
+    optional: Iterable[str] = ("omega", "f", "k", "y0"),
+    listed: bool = False,
+    shown: Iterable[str] = example,
+) -> Any:
     """The inputs as fields of a model; those that are ``shown`` have an example."""
     fields: dict[str, Any] = {}
     for name, text in _TEXTS.items():
@@ -204,20 +259,27 @@ def input_fields(
         default = None if name in optional or name in LIKE else ...
         info = bounded(BOUNDS[name], f"{text} [{unit_of(name)}]", default, **more)
         fields[name] = (kind | list[entry] if listed else kind, info)
-    fields["k_range"] = (list[Positive] | None, bounded(BOUND, "In place of k: [low, high] [N/m]", None))
+    fields["k_range"] = (
+        list[Positive] | None,
+        bounded(BOUND, "In place of k: [low, high] [N/m]", None),
+    )
     return fields
 
 
 _text = "One case, in SI units; omega or f, exactly one of them."
 Case = model("Case", _text, Strict, example=example, **input_fields())
-CaseRequest = model("CaseRequest", "One case and the options of its answer; omega or f.", Options, Case)
+CaseRequest = model(
+    "CaseRequest", "One case and the options of its answer; omega or f.", Options, Case
+)
 #: the inputs of a question about one of them, which is left out
 Five = model("Five", "", **input_fields(INPUTS, shown=[name for name in example if name != "v0"]))
 CaseColumns = model(
-    "CaseColumns", "Cases as columns: lists of one length; a plain number holds for every case.", Options,
+    "CaseColumns",
+    "Cases as columns: lists of one length; a plain number holds for every case.",
+    Options,
     example={**example, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]},
     **input_fields(listed=True, shown=()),
-)  # fmt: skip
+)
 
 
 def query_of(base: type[BaseModel]) -> Any:
@@ -231,7 +293,8 @@ def query_of(base: type[BaseModel]) -> Any:
         null = len(kinds) < len(get_args(info.annotation))
         kind: Any = Union[(*kinds, _NO_NULL)] if null else info.annotation
         fields[key] = (kind | _Range if key == "k" else kind, info)
-        if key in ("contact", "direction"):  # without a default, which clients would send beside that of a body
+        # without a default, which clients would send beside that of a body
+        if key in ("contact", "direction"):
             fields[key] = (kind | _NO_NULL, bounded(str(info.json_schema_extra["bound"]), "", None))  # type: ignore[index]
     fields.pop("k_range", None)
     if fields.pop("std", None):

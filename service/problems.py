@@ -1,8 +1,9 @@
 """Exception -> RFC 9457 problem details.
 
-Every error that leaves the application is ``application/problem+json``: ``type, title, status, detail, instance``, the
-request id, and for bad fields ``errors`` with a JSON pointer (bodies) or a parameter (queries), the value, and what it
-must be.  All faults of a request are reported at once.  No traceback reaches a user.
+Every error that leaves the application is ``application/problem+json``: ``type, title, status,
+detail, instance``, the request id, and for bad fields ``errors`` with a JSON pointer (bodies) or a
+parameter (queries), the value, and what it must be.  All faults of a request are reported at once.
+No traceback reaches a user.
 """
 
 import json
@@ -32,7 +33,8 @@ CLOSE = {"Connection": "close"}
 class FieldFault:
     """One bad field of a request: where it is, what was given, why it is refused.
 
-    ``parameter``: whether it stands in the query; None: as in all of its request (a GET has a query, a POST a body).
+    ``parameter``: whether it stands in the query; None: as in all of its request (a GET has a
+    query, a POST a body).
     """
 
     path: tuple[str | int, ...]
@@ -46,13 +48,17 @@ class FieldFault:
         return cls((name,), reason, value)
 
     def as_json(self, query: bool) -> dict[str, object]:
-        """The entry of ``errors``; the pointer is in RFC 6901's URI fragment form, as in RFC 9457."""
+        """The entry of ``errors``; the pointer is in RFC 6901's URI fragment form, as in RFC
+        9457."""
         names = [step for step in self.path if isinstance(step, str)]
         entry: dict[str, object] = {}
         if query if self.parameter is None else self.parameter:
-            entry["parameter"] = _shown("_".join(names)) if names != ["std"] else "std_mu0"  # one for each input
+            # one for each input
+            entry["parameter"] = _shown("_".join(names)) if names != ["std"] else "std_mu0"
         else:
-            steps = (str(_shown(str(step))).replace("~", "~0").replace("/", "~1") for step in self.path)
+            steps = (
+                str(_shown(str(step))).replace("~", "~0").replace("/", "~1") for step in self.path
+            )
             entry["pointer"] = "#" + "".join(f"/{step}" for step in steps)
         entry["field"] = _shown(names[-1]) if names else "body"
         if self.value is not _NO_VALUE:
@@ -81,16 +87,24 @@ def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
     """Raise the error that reports all of these faults."""
     first = faults[0]
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    raise RequestError(Kind.INVALID_VALUE, f"{first.as_json(False)['field']}: {first.reason}{more}", faults, **members)
+    raise RequestError(
+        Kind.INVALID_VALUE,
+        f"{first.as_json(False)['field']}: {first.reason}{more}",
+        faults,
+        **members,
+    )
 
 
 def faults_of(
-    error: ValidationError, model: type[BaseModel], known: Iterable[str], parameter: bool | None = None
+    error: ValidationError,
+    model: type[BaseModel],
+    known: Iterable[str],
+    parameter: bool | None = None,
 ) -> list[FieldFault]:
     """Pydantic's entries as faults, one per place.
 
-    A field of ``model`` says in its ``json_schema_extra`` what it must be (``bound``); ``known`` are the names that the
-    request may have.
+    A field of ``model`` says in its ``json_schema_extra`` what it must be (``bound``); ``known``
+    are the names that the request may have.
     """
     found: dict[tuple[str | int, ...], FieldFault] = {}
     for entry in error.errors(include_url=False):
@@ -99,12 +113,16 @@ def faults_of(
             value, reason = _NO_VALUE, "is required"
         elif kind == "extra_forbidden":
             reason = unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS)
-        elif kind == "value_error":  # in the relation of several fields: InputError names the one to change
+        elif (
+            kind == "value_error"
+        ):  # in the relation of several fields: InputError names the one to change
             fault: InputError = entry["ctx"]["error"]
             path, value, reason = (*path, fault.field), _NO_VALUE, f"must be {fault.bound}"
         elif kind == "float_type":
             reason = number_hint(str(path[0]), value)
-        elif kind in ("greater_than_equal", "finite_number") and len(path) > 1:  # one of several numbers
+        elif (
+            kind in ("greater_than_equal", "finite_number") and len(path) > 1
+        ):  # one of several numbers
             reason = f"must be {BOUNDS['v0']}"
         else:
             extra: Any = model.model_fields[str(path[0])].json_schema_extra
@@ -114,7 +132,8 @@ def faults_of(
 
 
 class Kind(Enum):
-    """A type of problem: status, title, and headers.  The connection closes where the rest of a request is not read."""
+    """A type of problem: status, title, and headers.  The connection closes where the rest of a
+    request is not read."""
 
     MALFORMED_HTTP = 400, "The request is no HTTP that this service reads", CLOSE
     MALFORMED_BODY = 400, "The request cannot be read"
@@ -140,12 +159,17 @@ class Kind(Enum):
 
 
 class RequestError(MumacroError):
-    """A request that cannot be answered: the kind, why, the bad fields, headers and members of the document."""
+    """A request that cannot be answered: the kind, why, the bad fields, headers and members of the
+    document."""
 
     def __init__(
-        self, kind: Kind, detail: str, faults: Sequence[FieldFault] = (), headers: Mapping[str, str] | None = None,
+        self,
+        kind: Kind,
+        detail: str,
+        faults: Sequence[FieldFault] = (),
+        headers: Mapping[str, str] | None = None,
         **members: object,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.kind, self.detail, self.faults = kind, detail, tuple(faults)
         self.headers, self.members = headers or {}, members
         super().__init__(detail)
@@ -156,7 +180,12 @@ def _request_error(error: Exception) -> RequestError:
     if isinstance(error, RequestError):
         return error
     if isinstance(error, HTTPException):  # of Starlette: no such path, method or part of a file
-        named = {Kind.MALFORMED_BODY, Kind.NOT_FOUND, Kind.METHOD_NOT_ALLOWED, Kind.RANGE_NOT_SATISFIABLE}
+        named = {
+            Kind.MALFORMED_BODY,
+            Kind.NOT_FOUND,
+            Kind.METHOD_NOT_ALLOWED,
+            Kind.RANGE_NOT_SATISFIABLE,
+        }
         kind = next((kind for kind in named if kind.status == error.status_code), Kind.UNEXPECTED)
         return RequestError(kind, error.detail, headers=error.headers)
     if isinstance(error, InputError):
@@ -190,4 +219,6 @@ def problem_of(error: Exception, scope: Scope) -> Response:
     found = _request_error(error)
     headers = {"Cache-Control": "no-store", **found.kind.headers, **found.headers}
     content = orjson.dumps(document_of(found, scope))
-    return Response(content, found.kind.status, headers=headers, media_type="application/problem+json")
+    return Response(
+        content, found.kind.status, headers=headers, media_type="application/problem+json"
+    )

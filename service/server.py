@@ -1,7 +1,9 @@
-"""uvicorn's own protocol with limits: a time for every wait, the size of a head, one request at a time.
+"""uvicorn's own protocol with limits: a time for every wait, the size of a head, one request at a
+time.
 
-uvicorn takes the class by its documented ``http`` parameter.  It uses parts of ``HttpToolsProtocol`` that have no
-promise of stability: pyproject.toml bounds the version, and the tests try every limit on a socket.
+uvicorn takes the class by its documented ``http`` parameter.  It uses parts of
+``HttpToolsProtocol`` that have no promise of stability: pyproject.toml bounds the version, and the
+tests try every limit on a socket.
 """
 
 import math
@@ -17,11 +19,14 @@ MAX_FIELDS = 100  # fields of a head
 _PIECE = 2048  # bytes of a head that are read before its fields are counted
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
 _LOOK_EVERY_S = 0.25  # whether the time of a connection is over
-_TOO_LARGE = RequestError(Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
+_TOO_LARGE = RequestError(
+    Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
+)
 
 
 class _Transport:
-    """A transport that sends the head of an answer together with what follows at once: one packet, not two."""
+    """A transport that sends the head of an answer together with what follows at once: one packet,
+    not two."""
 
     def __init__(self, transport: Any, loop: Any) -> None:
         self._transport, self._loop, self._kept = transport, loop, b""
@@ -51,10 +56,12 @@ class _Transport:
 
 
 class Connection(HttpToolsProtocol):
-    """One connection.  It is closed when the client is silent, slow to send or to read, or sends too large a head.
+    """One connection.  It is closed when the client is silent, slow to send or to read, or sends
+    too large a head.
 
-    A second request that arrives before the first is answered is dropped, and the connection closes after the answer.
-    When all connections are open, the one that has waited longest for a request is closed in favour of a new one.
+    A second request that arrives before the first is answered is dropped, and the connection closes
+    after the answer. When all connections are open, the one that has waited longest for a request
+    is closed in favour of a new one.
     """
 
     #: connections without a request, the longest waiting first
@@ -77,10 +84,15 @@ class Connection(HttpToolsProtocol):
         self._due = min(self._due, self.loop.time() + self._settings.client_timeout_s)
 
     def _look(self) -> None:
-        """End the connection if its time is over: with 408 where a request has begun and its answer has not."""
+        """End the connection if its time is over: with 408 where a request has begun and its answer
+        has not."""
         now = self.loop.time()
         if now > self._due and (self._in_head or self._busy) and now <= self._end:
-            self._refuse(RequestError(Kind.SLOW_CLIENT, f"a client may take up to {self._settings.client_timeout_s} s"))
+            self._refuse(
+                RequestError(
+                    Kind.SLOW_CLIENT, f"a client may take up to {self._settings.client_timeout_s} s"
+                )
+            )
         elif now > min(self._due, self._end):
             self.transport.abort()
         if self in self.connections:
@@ -130,9 +142,11 @@ class Connection(HttpToolsProtocol):
             piece = data[start:stop]
             start, self._bytes = stop, self._bytes + len(piece)
             super().data_received(piece)
-            if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):  # also behind a body
+            # also behind a body
+            if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):
                 self._refuse(_TOO_LARGE)
-        in_batch = self._busy and self.scope["path"].endswith("/batch")  # where the application limits every wait
+        # where the application limits every wait
+        in_batch = self._busy and self.scope["path"].endswith("/batch")
         if self._in_head or not self._busy or (self.cycle.more_body and not in_batch):
             self._watch()
 
@@ -161,7 +175,9 @@ class Connection(HttpToolsProtocol):
 
     def on_headers_complete(self) -> None:
         """Begin a request."""
-        large = self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD
+        large = (
+            self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD
+        )
         if large or len(self.headers) > MAX_FIELDS:
             self._refusal = _TOO_LARGE
             raise _TOO_LARGE
@@ -178,9 +194,14 @@ class Connection(HttpToolsProtocol):
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
-        """Wait for the next request; in place of uvicorn, which starts a timer of its own for that."""
+        """Wait for the next request; in place of uvicorn, which starts a timer of its own for
+        that."""
         self.server_state.total_requests += 1
         if not self.transport.is_closing():
             self.flow.resume_reading()
-            self._due, self._end, self._bytes = self.loop.time() + self._settings.keep_alive_s, math.inf, 0
+            self._due, self._end, self._bytes = (
+                self.loop.time() + self._settings.keep_alive_s,
+                math.inf,
+                0,
+            )
             self.waiting[self] = None

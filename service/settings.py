@@ -1,7 +1,8 @@
 """Settings of the service: ``MUMACRO_*`` environment variables, checked before anything starts.
 
-Each setting has a heading of the same name in docs/operations.md.  A bad one is reported in one line that
-names the variable, the value and what it must be; the value of the API key is never shown.
+Each setting has a heading of the same name in docs/operations.md.  A bad one is reported in one
+line that names the variable, the value and what it must be; the value of the API key is never
+shown.
 """
 
 import os
@@ -22,20 +23,30 @@ class SettingsError(ValueError):
 
 def _split(value: Any, separator: str = ",") -> Any:
     """``a, b`` -> [``a``, ``b``]; what is no text is taken as it is."""
-    return [part.strip() for part in value.split(separator) if part.strip()] if isinstance(value, str) else value
+    return (
+        [part.strip() for part in value.split(separator) if part.strip()]
+        if isinstance(value, str)
+        else value
+    )
 
 
 def _pairs(value: Any) -> Any:
     """``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is."""
-    return dict(part.partition("=")[::2] for part in _split(value)) if isinstance(value, str) else value
+    return (
+        dict(part.partition("=")[::2] for part in _split(value))
+        if isinstance(value, str)
+        else value
+    )
 
 
-_BESIDE = Path(__file__).resolve().parent.parent / "tables"  # in site-packages PyTables may own it, without a table
+# in site-packages PyTables may own it, without a table
+_BESIDE = Path(__file__).resolve().parent.parent / "tables"
 _TABLES = _BESIDE if any(_BESIDE.glob("*.nc")) else Path("tables")
 
 
 def _default_guide() -> Path | None:
-    beside = Path(__file__).resolve().parent / "guide"  # in a wheel that was built after the documents
+    # in a wheel that was built after the documents
+    beside = Path(__file__).resolve().parent / "guide"
     return beside if (beside / "index.html").is_file() else None
 
 
@@ -49,7 +60,8 @@ def _whole(default: int, least: int, most: int, more: str = "") -> Any:
     return Field(default, ge=least, le=most, description=f"an integer from {least}{more} to {most}")
 
 
-# An empty variable must not count as "no key": a variable that is set shows that a key was intended.
+# An empty variable must not count as "no key": a variable that is set shows that a key was
+# intended.
 Key = Secret[Annotated[str, Field(pattern=r"^[!-~]{1,512}$")]]
 KeyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")]
 
@@ -59,10 +71,13 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
 
-    tables: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(partial(_split, separator=os.pathsep))] = Field(
+    tables: Annotated[
+        tuple[Path, ...], NoDecode, BeforeValidator(partial(_split, separator=os.pathsep))
+    ] = Field(
         default_factory=lambda: (_TABLES,),
         min_length=1,
-        description=f"a table file or a directory of *.nc files, or several joined by {os.pathsep!r}",
+        description="a table file or a directory of *.nc files, or several joined by "
+        f"{os.pathsep!r}",
     )
     host: str = Field("127.0.0.1", min_length=1, description="an address or host name to listen on")
     port: int = _whole(8000, 0, 65535, " (any free port)")
@@ -74,21 +89,30 @@ class Settings(BaseSettings):
     keep_alive_s: int = _whole(75, 1, 3600)
     client_timeout_s: int = _whole(30, 1, 3600)
     time_limit_s: int = _whole(300, 1, 86400)
-    api_key: Key | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
-    api_keys: Annotated[dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), AfterValidator(_one_name_each)] = Field(
-        default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -"
+    api_key: Key | None = Field(
+        None, description="1 to 512 printable ASCII characters without spaces"
+    )
+    api_keys: Annotated[
+        dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), AfterValidator(_one_name_each)
+    ] = Field(
+        default_factory=dict,
+        description="name=key pairs joined by commas; names of letters, digits and . _ -",
     )
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)] = Field(
         (), description="origins such as https://tool.example joined by commas, or *"
     )
-    root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")
-    trusted_proxies: str = Field("127.0.0.1", description="addresses or networks joined by commas, or *")
+    root_path: str = Field(
+        "", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing"
+    )
+    trusted_proxies: str = Field(
+        "127.0.0.1", description="addresses or networks joined by commas, or *"
+    )
     guide: DirectoryPath | None = Field(
         default_factory=_default_guide, description="a directory with the built documentation"
     )
-    log_level: Annotated[Literal["debug", "info", "warning", "error", "critical"], BeforeValidator(str.lower)] = Field(
-        "info", description="one of debug, info, warning, error, critical"
-    )
+    log_level: Annotated[
+        Literal["debug", "info", "warning", "error", "critical"], BeforeValidator(str.lower)
+    ] = Field("info", description="one of debug, info, warning, error, critical")
     shutdown_grace_s: int = _whole(10, 0, 3600)
 
     def keys(self) -> dict[str, str]:
@@ -100,14 +124,19 @@ class Settings(BaseSettings):
 
     @cached_property
     def cache_fields(self) -> dict[str, str]:
-        """How long, and by whom, an answer may be cached: with an API key, only by the client itself."""
+        """How long, and by whom, an answer may be cached: with an API key, only by the client
+        itself."""
         if not self.keys():
             return {"Cache-Control": f"public, max-age={_MAX_AGE_S}"}
-        return {"Cache-Control": f"private, max-age={_MAX_AGE_S}", "Vary": "X-API-Key, Authorization"}
+        return {
+            "Cache-Control": f"private, max-age={_MAX_AGE_S}",
+            "Vary": "X-API-Key, Authorization",
+        }
 
 
 def load_settings(**chosen: Any) -> Settings:
-    """The settings of the environment; ``chosen`` wins.  SettingsError names all that is bad, in one line."""
+    """The settings of the environment; ``chosen`` wins.  SettingsError names all that is bad, in
+    one line."""
     try:
         return Settings(**chosen)
     except ValidationError as error:
@@ -121,6 +150,9 @@ def load_settings(**chosen: Any) -> Settings:
 
 
 def unknown_variables() -> list[str]:
-    """Variables that begin with MUMACRO_ and are not settings: mostly spelling mistakes, so the log warns of them."""
+    """Variables that begin with MUMACRO_ and are not settings: mostly spelling mistakes, so the log
+    warns of them."""
     known = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
-    return sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)
+    return sorted(
+        name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known
+    )

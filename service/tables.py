@@ -1,4 +1,5 @@
-"""The loaded tables.  Each is opened and its checksum and a known answer are checked before the service is ready."""
+"""The loaded tables.  Each is opened and its checksum and a known answer are checked before the
+service is ready."""
 
 import logging
 from collections.abc import Sequence
@@ -14,7 +15,8 @@ _log = logging.getLogger("mumacro.tables")
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:
-    """Files among ``paths``, and the ``*.nc`` files of the directories among them, in order of name.
+    """Files among ``paths``, and the ``*.nc`` files of the directories among them, in order of
+    name.
 
     TableError where a path is missing, or a directory holds no table.
     """
@@ -22,7 +24,9 @@ def _files(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         found = [path] if path.is_file() else sorted(path.glob("[!.]*.nc"))
         if not found:
-            raise TableError(path, "the directory holds no *.nc file" if path.is_dir() else "missing")
+            raise TableError(
+                path, "the directory holds no *.nc file" if path.is_dir() else "missing"
+            )
         files += found
     return files
 
@@ -37,7 +41,8 @@ def _stamp(path: Path) -> tuple[int, int, int]:
 
 
 class LoadedTable:
-    """A table in memory, and the state of its file when it was read; TableError where it is damaged."""
+    """A table in memory, and the state of its file when it was read; TableError where it is
+    damaged."""
 
     def __init__(self, path: Path) -> None:
         self.stamp, self.surrogate = _stamp(path), Surrogate.open(path, threads=1)
@@ -52,7 +57,9 @@ class LoadedTable:
         """Check the known answer, and that the file is as it was; else TableError."""
         self.surrogate.self_check()
         if _stamp(self.surrogate.path) != self.stamp:
-            raise TableError(self.surrogate.path, "the file was changed after it was loaded; restart the service")
+            raise TableError(
+                self.surrogate.path, "the file was changed after it was loaded; restart the service"
+            )
 
 
 class Tables:
@@ -64,7 +71,8 @@ class Tables:
         self.fault: str | None = "the tables are not loaded yet"
 
     def load(self) -> None:
-        """Load all tables.  A refused table makes the service not ready; it never stops the process."""
+        """Load all tables.  A refused table makes the service not ready; it never stops the
+        process."""
         try:
             tables = [LoadedTable(path) for path in _files(self.paths)]
             names = [table.id for table in tables]
@@ -78,9 +86,14 @@ class Tables:
             self.fault = "the tables could not be loaded; the log has the reason"
             _log.exception("no tables")
         else:
-            self.loaded = tuple(sorted(tables, key=lambda table: (table.surrogate.tolerance, table.id)))
+            self.loaded = tuple(
+                sorted(tables, key=lambda table: (table.surrogate.tolerance, table.id))
+            )
             self.fault = None
-            _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in self.loaded]}})
+            _log.info(
+                "tables are loaded",
+                extra={"fields": {"tables": [table.label for table in self.loaded]}},
+            )
 
     def check(self) -> None:
         """Check every table again; TableError, or RequestError where none is loaded."""
@@ -89,7 +102,8 @@ class Tables:
             table.check()
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
-        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-])."""
+        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0
+        [-])."""
         if self.fault is not None:
             raise RequestError(Kind.NOT_READY, self.fault)
         tables = self.loaded
@@ -99,5 +113,8 @@ class Tables:
         if not fit:
             tightest = tables[0].surrogate.tolerance
             reason = f"must be >= {tightest:g}: no loaded table is tighter"
-            refuse([FieldFault(("tolerance",), reason, tolerance, parameter)], tightest_available=tightest)
+            refuse(
+                [FieldFault(("tolerance",), reason, tolerance, parameter)],
+                tightest_available=tightest,
+            )
         return min(fit, key=lambda table: (table.stamp[0], -table.surrogate.tolerance))

@@ -14,7 +14,14 @@ from tests.cases import Case
 
 PATIENCE_S = 120  # a browser on a busy machine can be slow
 #: the case that the page starts with
-START: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2 * math.pi * 20e3, "v0": 0.01}
+START: Case = {
+    "mu0": 0.3,
+    "Fz": 10.0,
+    "k": 1e6,
+    "y0": 2e-6,
+    "omega": 2 * math.pi * 20e3,
+    "v0": 0.01,
+}
 
 #: the service as it is; what it is asked is kept, for Page.asked
 RECORDED = """(path, options = {}) => {
@@ -31,19 +38,35 @@ def start(folder: Path) -> Any:
     LookupError
         Selenium, Chromium or its ChromeDriver is not installed.
     """
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    chromium = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     driver = shutil.which("chromedriver")
     if chromium is None or driver is None or find_spec("selenium") is None:
-        raise LookupError("the PyPI package selenium, or Chromium with its ChromeDriver on the PATH, is missing")
+        raise LookupError(
+            "the PyPI package selenium, or Chromium with its ChromeDriver on the PATH, is missing"
+        )
     from selenium import webdriver
 
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     for argument in (
-        "headless=new", "no-sandbox", "disable-gpu", "disable-dev-shm-usage", "disable-quic", "no-first-run",
-        "disable-background-networking", "disable-component-update", "disable-sync", "window-size=1400,1000",
-        "hide-scrollbars", "host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", f"user-data-dir={folder}",
-    ):  # fmt: skip
+        "headless=new",
+        "no-sandbox",
+        "disable-gpu",
+        "disable-dev-shm-usage",
+        "disable-quic",
+        "no-first-run",
+        "disable-background-networking",
+        "disable-component-update",
+        "disable-sync",
+        "window-size=1400,1000",
+        "hide-scrollbars",
+        "host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+        f"user-data-dir={folder}",
+    ):
         options.add_argument(f"--{argument}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
@@ -58,13 +81,26 @@ class Opened:
         self.browser, self.url = browser, url
         self.shown: Any = None
 
-    def __call__(self, address: str = "", width: int = 1400, height: int = 1000, url: Any = None, path: str = "",
-                 new: bool = False, wait: bool = True) -> Any:  # fmt: skip
+    def __call__(
+        self,
+        address: str = "",
+        width: int = 1400,
+        height: int = 1000,
+        url: Any = None,
+        path: str = "",
+        new: bool = False,
+        wait: bool = True,
+    ) -> Any:
         wanted = (width, height, url or self.url, path)
         page = Page(self.browser, url or self.url)
         if new or wanted != self.shown or path:
             self.browser.get("about:blank")
-            metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
+            metrics = {
+                "width": width,
+                "height": height,
+                "deviceScaleFactor": 1,
+                "mobile": width < 500,
+            }
             self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
             page.scheme("light")
             page.complaints()
@@ -73,8 +109,8 @@ class Opened:
         else:
             page.run(
                 "history.replaceState(null, '', location.pathname); scrollTo(0, 0);"
-                "const heard = new Promise((done) => addEventListener('hashchange', done, { once: true }));"
-                f"location.hash = {json.dumps(address or '#mu0=0.3')}; await heard;"
+                "const heard = new Promise((done) => addEventListener('hashchange', done, { once: "
+                f"true }}));location.hash = {json.dumps(address or '#mu0=0.3')}; await heard;"
             )
         if wait and not path and url is None:
             page.settle()
@@ -82,9 +118,12 @@ class Opened:
 
     @contextmanager
     def faked(self, function: Any, address: str = "", wait: bool = True) -> Any:
-        """The page with a function in the place of ``fetch`` from its first question on; ``real`` is the true one."""
+        """The page with a function in the place of ``fetch`` from its first question on; ``real``
+        is the true one."""
         source = f"const real = window.fetch; window.fetch = {function};"
-        added = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": source})
+        added = self.browser.execute_cdp_cmd(
+            "Page.addScriptToEvaluateOnNewDocument", {"source": source}
+        )
         try:
             yield self(address, new=True, wait=wait)
         finally:
@@ -103,11 +142,13 @@ class Page:
 
     def run(self, script: Any) -> Any:
         return self.browser.execute_async_script(
-            f"const done = arguments[arguments.length - 1]; (async () => {{ {script} }})().then(done);"
+            f"const done = arguments[arguments.length - 1]; (async () => {{ {script} "
+            f"}})().then(done);"
         )
 
     def settle(self) -> Any:
-        """Wait until every request that follows from the state is answered, and what follows is drawn.
+        """Wait until every request that follows from the state is answered, and what follows is
+        drawn.
 
         The browser may complain of refused and lost requests, which it logs, and of nothing else.
         """
@@ -116,7 +157,9 @@ class Page:
             " await new Promise((next) => setTimeout(next, 10));"
             "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"
         )
-        assert [told for told in self.complaints() if not re.search(r"status of (401|422|50\d)", told)] == []
+        assert [
+            told for told in self.complaints() if not re.search(r"status of (401|422|50\d)", told)
+        ] == []
         return self
 
     def until(self, found: Any, told: Any) -> Any:
@@ -134,7 +177,9 @@ class Page:
         return self.run(f"return document.querySelector({selector!r}).textContent;")
 
     def texts(self, selector: str) -> Any:
-        return self.run(f"return [...document.querySelectorAll({selector!r})].map((one) => one.textContent);")
+        return self.run(
+            f"return [...document.querySelectorAll({selector!r})].map((one) => one.textContent);"
+        )
 
     def number(self, selector: str = "#mu") -> Any:
         return float(self.text(selector))
@@ -204,7 +249,9 @@ class Page:
         self.run(f"document.querySelector({selector!r}).scrollIntoView({{ block: 'center' }});")
         size = element.size
         offset = round((x - 0.5) * size["width"]), round((y - 0.5) * size["height"])
-        actions = ActionChains(self.browser, duration=0).move_to_element_with_offset(element, *offset)
+        actions = ActionChains(self.browser, duration=0).move_to_element_with_offset(
+            element, *offset
+        )
         (actions.click() if click else actions).perform()
         self.settle()
 
@@ -217,13 +264,14 @@ class Page:
         return (folder / name).read_text("utf-8")
 
     def scheme(self, name: str) -> None:
-        """Switch to the light or dark scheme, and wait until the page has taken it and every colour has changed."""
+        """Switch to the light or dark scheme, and wait until the page has taken it and every colour
+        has changed."""
         media = {"features": [{"name": "prefers-color-scheme", "value": name}]}
         self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
         self.run(  # an empty document has no header, and no colours of its own
-            "const light = () => getComputedStyle(document.body).backgroundColor.match(/\\d+/g)[0] > 128;"
-            f"while (document.querySelector('header') && light() !== {json.dumps(name == 'light')})"
-            " await new Promise(requestAnimationFrame);"
-            "const changes = document.getAnimations().filter((one) => one instanceof CSSTransition);"
-            "await Promise.allSettled(changes.map((one) => one.finished));"
+            "const light = () => getComputedStyle(document.body).backgroundColor.match(/\\d+/g)[0] "
+            "> 128;while (document.querySelector('header') && light() !== "
+            f"{json.dumps(name == 'light')}) await new Promise(requestAnimationFrame);"
+            "const changes = document.getAnimations().filter((one) => one instanceof "
+            "CSSTransition);await Promise.allSettled(changes.map((one) => one.finished));"
         )

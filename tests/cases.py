@@ -1,4 +1,5 @@
-"""What tests of the library share: ordinary inputs, the committed tables, contacts with directions, random numbers."""
+"""What tests of the library share: ordinary inputs, the committed tables, contacts with directions,
+random numbers."""
 
 import functools
 from collections.abc import Mapping
@@ -15,16 +16,24 @@ Array = NDArray[np.float64]
 Case = dict[str, Any]  # inputs by name
 Capture = pytest.CaptureFixture[str]
 CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
-UNIT: Case = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "omega": 1.0}  # v~ = v0 and y~ = y0, to the last digit
+# v~ = v0 and y~ = y0, to the last digit
+UNIT: Case = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "omega": 1.0}
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
 #: every contact with every direction that it has
-PAIRS = [("spring", "across"), ("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
+PAIRS = [
+    ("spring", "across"),
+    ("ball", "across"),
+    ("spring", "along"),
+    ("ball", "along"),
+    ("spring", "normal"),
+]
 every_pair = pytest.mark.parametrize("pair", PAIRS, ids=" ".join)
 opened = functools.cache(Surrogate.open)
 
 
 def tables(*tolerances: float) -> Any:
-    """A fixture: the committed tables of these tolerances, all of them if none is named, one after the other."""
+    """A fixture: the committed tables of these tolerances, all of them if none is named, one after
+    the other."""
 
     @pytest.fixture(scope="module", params=tolerances or TOLERANCES, ids=str)
     def table(request: pytest.FixtureRequest) -> Surrogate:
@@ -38,10 +47,17 @@ def without(case: Mapping[str, Any], *names: str) -> Case:
     return {name: value for name, value in case.items() if name not in names}
 
 
-def as_kind(case: Mapping[str, Any], pair: tuple[str, str], share: float = 0.4) -> tuple[Case, Any, Case]:
-    """The keywords of a pair, its fields, and ``case`` with Fz_amplitude = ``share`` Fz where the pair has it."""
+def as_kind(
+    case: Mapping[str, Any], pair: tuple[str, str], share: float = 0.4
+) -> tuple[Case, Any, Case]:
+    """The keywords of a pair, its fields, and ``case`` with Fz_amplitude = ``share`` Fz where the
+    pair has it."""
     kind = kind_of(*pair)
-    return kind.names, kind.fields, kind.as_given({**case, "y0": share * case["Fz"]} if kind.normal else case)
+    return (
+        kind.names,
+        kind.fields,
+        kind.as_given({**case, "y0": share * case["Fz"]} if kind.normal else case),
+    )
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:

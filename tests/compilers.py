@@ -28,6 +28,8 @@ def compiler(name: str) -> tuple[str, ...]:
 def run(*command: object, cwd: Path | None = None, given: str = "") -> str:
     """The output of a command that must succeed."""
     words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=cwd, input=given, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        words, cwd=cwd, input=given, capture_output=True, text=True, timeout=300, check=False
+    )
     assert done.returncode == 0, f"{' '.join(words)}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
     return done.stdout

@@ -1,4 +1,5 @@
-"""Shared by the tests: the committed tables, a service with its client, reference values, solvers, the builder."""
+"""Shared by the tests: the committed tables, a service with its client, reference values, solvers,
+the builder."""
 
 import os
 import re
@@ -40,13 +41,16 @@ def tables_dir(repository: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def started(tables_dir: Path) -> "Callable[..., TestClient]":
-    """A client of an application on the committed tables with these settings; as a context it starts and ends it."""
+    """A client of an application on the committed tables with these settings; as a context it
+    starts and ends it."""
     from starlette.testclient import TestClient
 
     from service.app import create_app
     from service.settings import Settings
 
-    return lambda **settings: TestClient(create_app(Settings(**{"tables": (tables_dir,), **settings})))
+    return lambda **settings: TestClient(
+        create_app(Settings(**{"tables": (tables_dir,), **settings}))
+    )
 
 
 @pytest.fixture(scope="session")
@@ -88,7 +92,8 @@ def problem() -> Callable[..., dict[str, Any]]:
 
 @pytest.fixture(scope="session")
 def live_server(surrogate: Surrogate) -> Iterator[Server]:
-    """One service on the committed tables for all tests that use a real socket and do not stop it."""
+    """One service on the committed tables for all tests that use a real socket and do not stop
+    it."""
     with servers.serving(surrogate.path.parent) as server:
         yield server
 
@@ -112,7 +117,9 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @pytest.fixture(scope="session")
-def open_page(live_server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
+def open_page(
+    live_server: Server, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[..., Any]]:
     """Opens the page in a headless Chromium (tests/browser.py), if installed."""
     try:
         browser = browsing.start(tmp_path_factory.mktemp("browser"))
@@ -122,19 +129,23 @@ def open_page(live_server: Server, tmp_path_factory: pytest.TempPathFactory) -> 
     browser.quit()
 
 
-# --- shared by the numerical tests ---------------------------------------------------------------------
+# --- shared by the numerical tests ----------------------------------------------------------------
 
 
 @pytest.fixture(scope="session")
 def reference(repository: Path) -> Any:
-    """The 496 points of an independent quadruple-precision solver: columns of tests/data/points.csv, (496,) each."""
+    """The 496 points of an independent quadruple-precision solver: columns of
+    tests/data/points.csv, (496,) each."""
     points = repository / "tests" / "data" / "points.csv"
-    return np.genfromtxt(points, delimiter=",", names=True, dtype=None, encoding="utf-8").view(np.recarray)
+    return np.genfromtxt(points, delimiter=",", names=True, dtype=None, encoding="utf-8").view(
+        np.recarray
+    )
 
 
 @pytest.fixture(scope="session")
 def reference_border(repository: Path) -> Array:
-    """The border of the same solver, tests/data/border.csv: rows of y~, v~crit, mu~ there, shape (17, 3)."""
+    """The border of the same solver, tests/data/border.csv: rows of y~, v~crit, mu~ there, shape
+    (17, 3)."""
     return np.loadtxt(repository / "tests" / "data" / "border.csv", delimiter=",", skiprows=1)
 
 
@@ -151,14 +162,17 @@ def run_builder(repository: Path) -> Callable[..., subprocess.CompletedProcess[s
 
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         words = [sys.executable, "-m", "builder", *map(str, arguments)]
-        return subprocess.run(words, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
+        return subprocess.run(
+            words, cwd=repository, capture_output=True, text=True, timeout=300, check=False
+        )
 
     return run
 
 
-# --- nothing is skipped silently ------------------------------------------------------------------------
+# --- nothing is skipped silently ------------------------------------------------------------------
 
-#: reasons of skips that a run with CI=true may have: what no package index offers there, other users, other systems
+#: reasons of skips that a run with CI=true may have: what no package index offers there, other
+#: users, other systems
 EXPECTED_SKIPS = (
     r"soffice is not installed", r"curl [\d.]+ has no --json",
     r"mounting a small file system", r"only root may run", r"another user cannot run",
@@ -168,13 +182,19 @@ EXPECTED_SKIPS = (
 
 
 def unexpected_skips(config: pytest.Config) -> list[str]:
-    """Reasons of skips that are neither above nor about a program that .ci/run could not install."""
+    """Reasons of skips that are neither above nor about a program that .ci/run could not
+    install."""
     if os.environ.get("CI") != "true" or hasattr(config, "workerinput"):
         return []
     missing = os.environ.get("CI_MISSING", "").split()
     expected = re.compile("|".join([*EXPECTED_SKIPS, *map(re.escape, missing)]))
-    reports = getattr(config.pluginmanager.get_plugin("terminalreporter"), "stats", {}).get("skipped", [])
-    reasons = {str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr) for report in reports}
+    reports = getattr(config.pluginmanager.get_plugin("terminalreporter"), "stats", {}).get(
+        "skipped", []
+    )
+    reasons = {
+        str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr)
+        for report in reports
+    }
     return sorted(reason for reason in reasons if not expected.search(reason))
 
 
@@ -184,7 +204,9 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
     """Such skips at the end of the output."""
     for reason in unexpected_skips(config):
         terminalreporter.write_line(f"FAILED: an unexpected skip: {reason}", red=True)

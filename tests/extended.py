@@ -1,9 +1,10 @@
-"""Oscillation along and of the normal force in extended precision: the reference for bounds of the kernel.
+"""Oscillation along and of the normal force in extended precision: the reference for bounds of the
+kernel.
 
 The formulas are those of ``mumacro/kernel/directions.c``, checked against a play operator in
-``test_contact_directions.py``; here they are evaluated with the 64 bits of ``numpy.longdouble`` (x86), by bisection
-and Newton's method to the last digit, and a ball by rules of many nodes.  Arrays broadcast; rows come in the order of
-:data:`ROWS`.
+``test_contact_directions.py``; here they are evaluated with the 64 bits of ``numpy.longdouble``
+(x86), by bisection and Newton's method to the last digit, and a ball by rules of many nodes.
+Arrays broadcast; rows come in the order of :data:`ROWS`.
 """
 
 import math
@@ -44,7 +45,8 @@ def series(terms: list[Any], q: Any) -> Any:
 
 
 class Arc:
-    """sin m, cos m, 1 - cos m, m - sin m, sin m - m cos m, m - sin m cos m without loss of digits."""
+    """sin m, cos m, 1 - cos m, m - sin m, sin m - m cos m, m - sin m cos m without loss of
+    digits."""
 
     def __init__(self, m: Any) -> None:
         near = m <= 2.0
@@ -71,8 +73,10 @@ class Turning:
 
 
 def half_stick(at: Turning) -> tuple[Any, Any]:
-    """h and pi - h of a spring that does not slip backwards, by bisection in the logarithm of the nearer one."""
-    # the equation (h - sin h cos h) cos c = sin^2 h sin c has one root; its left side less its right one rises with h
+    """h and pi - h of a spring that does not slip backwards, by bisection in the logarithm of the
+    nearer one."""
+    # the equation (h - sin h cos h) cos c = sin^2 h sin c has one root; its left side less its
+    # right one rises with h
     small = at.x > 0.3
     low, high = np.full(at.x.shape, Long(1e-30)), np.full(at.x.shape, PI)
     low = np.where(small, np.minimum(at.c, 1.0), Long(1e-30) * at.x + Long(1e-25))
@@ -137,8 +141,11 @@ def way_in_stick(at: Turning, a: Any, s: Any, way: float) -> Any:
     """a times the integral of the way since the turn over the stick s after it."""
     arc, q = Arc(np.abs(s)), s * s
     lag = np.sign(s) * arc.lag
-    dip = np.where(np.abs(s) < 2.0, q * q * series(DIP, np.where(np.abs(s) < 2.0, q, 0.0).astype(Long)),
-                   0.5 * q - arc.versed)  # fmt: skip
+    dip = np.where(
+        np.abs(s) < 2.0,
+        q * q * series(DIP, np.where(np.abs(s) < 2.0, q, 0.0).astype(Long)),
+        0.5 * q - arc.versed,
+    )
     return a * (at.sine * lag - way * at.x * dip)
 
 
@@ -165,7 +172,9 @@ def reversing(at: Turning, v: Any, a: Any) -> Any:
     p, bent, *_ = of_reverse(at, m)
     both = m * m + p * p
     of_slow = a * (at.x * (both - 2.0 * bent) - 2.0 * p * at.sine)
-    layers = np.where(at.x < 0.5, of_slow, way_in_stick(at, a, m - p, -1.0) - way_in_stick(at, a, m + p, 1.0))
+    layers = np.where(
+        at.x < 0.5, of_slow, way_in_stick(at, a, m - p, -1.0) - way_in_stick(at, a, m + p, 1.0)
+    )
     layers = np.where(a > 1e100, 0.0, layers)
     mu = np.clip(2.0 / PI * (at.b + p) + layers / (2.0 * PI), 0.0, 1.0)
     along_v = v * both / (2.0 * PI)
@@ -174,15 +183,25 @@ def reversing(at: Turning, v: Any, a: Any) -> Any:
 
 
 def shares(nodes: int, panels: int) -> Any:
-    """The rule over the springs that slip backwards: in panels that halve towards the last one, (n, 2)."""
+    """The rule over the springs that slip backwards: in panels that halve towards the last one, (n,
+    2)."""
     rule = points(3, nodes).astype(Long)
-    parts = [(Long(0.0), Long(0.5))] + [(1.0 - Long(0.5) ** k, Long(0.5) ** (k + 1)) for k in range(1, panels)]
-    parts = [*parts, (1.0 - Long(0.5) ** panels, Long(0.5) ** panels)] if panels else [(Long(0.0), Long(1.0))]
-    return np.concatenate([np.stack([start + size * rule[:, 0], size * rule[:, 1]], axis=1) for start, size in parts])
+    parts = [(Long(0.0), Long(0.5))] + [
+        (1.0 - Long(0.5) ** k, Long(0.5) ** (k + 1)) for k in range(1, panels)
+    ]
+    parts = (
+        [*parts, (1.0 - Long(0.5) ** panels, Long(0.5) ** panels)]
+        if panels
+        else [(Long(0.0), Long(1.0))]
+    )
+    return np.concatenate(
+        [np.stack([start + size * rule[:, 0], size * rule[:, 1]], axis=1) for start, size in parts]
+    )
 
 
 def ball(v: Any, y: Any, nodes: int = 64, panels: int = 0) -> Any:
-    """The rows of balls, shape (5, n), for 0 <= v~ < y~; more panels where mu~ falls steeply, beside y~ = 1.5."""
+    """The rows of balls, shape (5, n), for 0 <= v~ < y~; more panels where mu~ falls steeply,
+    beside y~ = 1.5."""
     v, y = np.broadcast_arrays(np.asarray(v, Long), np.asarray(y, Long))
     with np.errstate(all="ignore"):
         at = Turning(v, y)

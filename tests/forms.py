@@ -25,7 +25,9 @@ def number(value: Any) -> Any:
 def as_csv(rows: Sequence[Row]) -> str:
     """A head with the names of the first row, and the rows; None is an empty cell."""
     text = io.StringIO()
-    csv.writer(text).writerows([list(rows[0]), *(["" if x is None else x for x in row.values()] for row in rows)])
+    csv.writer(text).writerows(
+        [list(rows[0]), *(["" if x is None else x for x in row.values()] for row in rows)]
+    )
     return text.getvalue()
 
 
@@ -34,7 +36,9 @@ def as_ndjson(rows: Sequence[Row]) -> str:
 
 
 def as_table(rows: Sequence[Row]) -> Any:
-    return pa.table({name: pa.array([number(row[name]) for row in rows], pa.float64()) for name in rows[0]})
+    return pa.table(
+        {name: pa.array([number(row[name]) for row in rows], pa.float64()) for name in rows[0]}
+    )
 
 
 def stream_of(table: Any, **options: Any) -> bytes:
@@ -58,7 +62,9 @@ def posted(client: Any, form: str, body: Any, **params: Any) -> Any:
 
 def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
     response = posted(client, form, WRITERS[form](rows), **params)
-    assert (response.status_code, response.headers["content-type"]) == (200, TYPES[form]), response.text
+    assert (response.status_code, response.headers["content-type"]) == (200, TYPES[form]), (
+        response.text
+    )
     return read(form, response)
 
 
@@ -69,7 +75,8 @@ def read(form: str, response: Any) -> list[Row]:
 
 
 def rows_of(form: str, text: str) -> list[Row]:
-    """The rows of a text; a cell of CSV is a number or a truth value where it can be one, None where empty."""
+    """The rows of a text; a cell of CSV is a number or a truth value where it can be one, None
+    where empty."""
     if form == "csv":
         rows = csv.DictReader(io.StringIO(text, newline=""))
         return [{name: _value(cell) for name, cell in row.items()} for row in rows]

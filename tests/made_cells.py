@@ -12,7 +12,8 @@ from mumacro.library import Data, Kernel, kernels
 from mumacro.table import Block, read_table
 from tests.cases import Array
 
-POWER = charts.QUANTITY_NAMES.index("power")  # its range has no upper end, and every block tabulates it
+# its range has no upper end, and every block tabulates it
+POWER = charts.QUANTITY_NAMES.index("power")
 
 
 class Cells:
@@ -21,7 +22,9 @@ class Cells:
     def __init__(self, cells: tuple[int, int], border: Border | None = None) -> None:
         self.cells, self.border = cells, border or Border(read_table(bundled_tables()[0]).border)
         none = np.empty(0)
-        self.data = Data(*self.border.arrays, block_rows([Block(none, none, cells)] * len(CHARTS)), outer_cells())
+        self.data = Data(
+            *self.border.arrays, block_rows([Block(none, none, cells)] * len(CHARTS)), outer_cells()
+        )
 
     def points(self, index: int, a: Any, b: Any) -> tuple[Array, Array]:
         """v~ and y~ at shares ``a``, ``b`` of the axes of a block, as evaluation counts them."""
@@ -29,7 +32,11 @@ class Cells:
         at = []
         for axis, share in zip(axes, (a, b), strict=True):
             low, high = axis.span
-            at.append(axis.to_file(low + (high - low) * np.atleast_1d(np.asarray(share, dtype=np.float64))))
+            at.append(
+                axis.to_file(
+                    low + (high - low) * np.atleast_1d(np.asarray(share, dtype=np.float64))
+                )
+            )
         v, y, _ = CHARTS[index].point(at[0], at[1], self.border)
         return np.ascontiguousarray(v), np.ascontiguousarray(y)
 
@@ -41,7 +48,9 @@ class Cells:
         kernel.values(self.data, POWER, v, y, value, None, None)
         return value
 
-    def tabulated(self, index: int, polynomials: Array, v: Array, y: Array, kernel: Kernel = kernels[-1]) -> Array:
+    def tabulated(
+        self, index: int, polynomials: Array, v: Array, y: Array, kernel: Kernel = kernels[-1]
+    ) -> Array:
         """What is tabulated at points (n,) of a block."""
         base, factor = kernel.forms(POWER, index, v, y, y - 1.0)
         return np.asarray((self.values(polynomials, v, y, kernel) - base) / factor)

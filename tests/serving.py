@@ -22,18 +22,28 @@ START_S = 180.0
 
 
 class Server:
-    """A process and its log.  Its port is the one that the log names; the service's own settings are left out."""
+    """A process and its log.  Its port is the one that the log names; the service's own settings
+    are left out."""
 
     def __init__(self, command: Sequence[str], log: Path, **environment: str) -> None:
-        variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
+        variables = {
+            name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")
+        }
         variables |= {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", **environment}
         self.log, self._lines, self.started = log, list[str](), time.monotonic()
         with log.open("wb") as sink:
             self.process = subprocess.Popen(
-                command, cwd=ROOT, env=variables, stdin=subprocess.DEVNULL, stdout=sink, stderr=subprocess.STDOUT,
+                command,
+                cwd=ROOT,
+                env=variables,
+                stdin=subprocess.DEVNULL,
+                stdout=sink,
+                stderr=subprocess.STDOUT,
                 start_new_session=True,
-            )  # fmt: skip
-        while (found := re.search(r"(?i)running on http://[^ ]+:(\d+)[ /]", log.read_text("utf-8"))) is None:
+            )
+        while (
+            found := re.search(r"(?i)running on http://[^ ]+:(\d+)[ /]", log.read_text("utf-8"))
+        ) is None:
             assert self.process.poll() is None, log.read_text("utf-8")
             self.in_time()
         self.port = int(found[1])
@@ -48,11 +58,17 @@ class Server:
     def lines(self) -> list[str]:
         """The lines of the log so far; all of them, where the process was ended here."""
         if self.log.exists():
-            self._lines = [line for line in self.log.read_text("utf-8").split("\n") if line]  # only at "\n"
+            # only at "\n"
+            self._lines = [line for line in self.log.read_text("utf-8").split("\n") if line]
         return self._lines
 
     def ask(
-        self, method: str, path: str, body: Any = None, headers: dict[str, str] | None = None, **options: Any
+        self,
+        method: str,
+        path: str,
+        body: Any = None,
+        headers: dict[str, str] | None = None,
+        **options: Any,
     ) -> tuple[int, dict[str, str], bytes]:
         """Status, headers and body of a response, on a connection of its own."""
         connection = HTTPConnection("127.0.0.1", self.port, timeout=60)
@@ -64,12 +80,16 @@ class Server:
             connection.close()
 
     def wait_until_ready(self, workers: int = 1) -> float:
-        """Wait until every worker can answer, or refuses for good because of its tables; seconds from the start."""
+        """Wait until every worker can answer, or refuses for good because of its tables; seconds
+        from the start."""
         while True:
             with suppress(OSError):  # with several workers the log names the port before it is open
                 status, _, body = self.ask("GET", "/readyz")
                 refused = status != 200 and b"not loaded yet" not in body
-                if refused or (status == 200 and sum("tables are loaded" in line for line in self.lines) >= workers):
+                if refused or (
+                    status == 200
+                    and sum("tables are loaded" in line for line in self.lines) >= workers
+                ):
                     return time.monotonic() - self.started
             self.in_time()
 
@@ -79,7 +99,8 @@ class Server:
         return next(int(line.split()[1]) for line in lines if line.startswith(what)) / 1024.0
 
     def busy(self) -> float:
-        """Processor time of all threads [s]; the clock's number is that of clock_getcpuclockid(3) on Linux."""
+        """Processor time of all threads [s]; the clock's number is that of clock_getcpuclockid(3)
+        on Linux."""
         return time.clock_gettime(~self.process.pid << 3 | 2)
 
     def errors(self) -> list[str]:
@@ -102,11 +123,29 @@ class Server:
 
 @contextmanager
 def serving(
-    tables: Path = ROOT / "tables", *arguments: str, ready: bool = True, before: Sequence[str] = (), **environment: str
+    tables: Path = ROOT / "tables",
+    *arguments: str,
+    ready: bool = True,
+    before: Sequence[str] = (),
+    **environment: str,
 ) -> Iterator[Server]:
-    """A service until the context ends; ``before`` stands before its command, as ``taskset`` does."""
-    command = [*before, sys.executable, "-m", "service", "--port", "0", "--tables", str(tables), *arguments]
-    with tempfile.TemporaryDirectory() as folder, running(command, Path(folder) / "log.jsonl", **environment) as server:
+    """A service until the context ends; ``before`` stands before its command, as ``taskset``
+    does."""
+    command = [
+        *before,
+        sys.executable,
+        "-m",
+        "service",
+        "--port",
+        "0",
+        "--tables",
+        str(tables),
+        *arguments,
+    ]
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running(command, Path(folder) / "log.jsonl", **environment) as server,
+    ):
         if ready:
             server.wait_until_ready()
         yield server
@@ -124,7 +163,8 @@ def running(command: Sequence[str], log: Path, **environment: str) -> Iterator[S
 
 @contextmanager
 def asking(server: Server, pause: float = 0.02) -> Iterator[list[float]]:
-    """Ask ``/livez`` on new connections until the context ends; it must always answer 200.  The waits [s]."""
+    """Ask ``/livez`` on new connections until the context ends; it must always answer 200.  The
+    waits [s]."""
     stop, waits = threading.Event(), list[float]()
 
     def ask() -> None:
@@ -154,7 +194,9 @@ def connect(server: Server, receive_buffer: int | None = None) -> socket.socket:
 def head(path: str, length: int | None, kind: str = "application/json", extra: str = "") -> bytes:
     """The head of a POST; without a length the body comes in chunks."""
     size = "Transfer-Encoding: chunked" if length is None else f"Content-Length: {length}"
-    return f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\n{size}\r\n{extra}\r\n".encode()
+    return (
+        f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\n{size}\r\n{extra}\r\n".encode()
+    )
 
 
 def chunk(piece: bytes) -> bytes:

@@ -1,4 +1,5 @@
-"""The scripts of benchmarks/: each runs, its tables are right, and results are stored where they belong."""
+"""The scripts of benchmarks/: each runs, its tables are right, and results are stored where they
+belong."""
 
 import importlib
 import re
@@ -19,22 +20,29 @@ Row = dict[str, str]
 def run(script: str, *arguments: str) -> list[list[Row]]:
     """The tables that a script of benchmarks/ prints, in a separate process, from the root."""
     command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), *arguments]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False
+    )
     assert done.returncode == 0, done.stderr
     return tables(done.stdout)
 
 
 def tables(text: str) -> list[list[Row]]:
-    """Every Markdown table in ``text``, rows as mappings from the header; unequal lengths are an error."""
+    """Every Markdown table in ``text``, rows as mappings from the header; unequal lengths are an
+    error."""
     found: list[list[Row]] = []
     for block in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE):
-        header, rule, *rows = ([cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines())
+        header, rule, *rows = (
+            [cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines()
+        )
         assert all(re.fullmatch(r"-+:?", cell) for cell in rule)
         found.append([dict(zip(header, row, strict=True)) for row in rows])
     return found
 
 
-def test_a_result_is_put_between_its_markers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+def test_a_result_is_put_between_its_markers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- begin times -->\n\nold\n\n<!-- end times -->\nafter\n", "utf-8")
     monkeypatch.setattr(measuring, "PAGES", (page,))
@@ -44,7 +52,10 @@ def test_a_result_is_put_between_its_markers(tmp_path: Path, monkeypatch: pytest
     measuring.main(None, sections, points=5)
     stored = (tmp_path / "results" / "trial-times.md").read_text("utf-8")
     assert stored.startswith("7 points\n\nTook 0.0 min. Machine: ")
-    assert page.read_text("utf-8") == f"before\n<!-- begin times -->\n\n{stored}\n<!-- end times -->\nafter\n"
+    assert (
+        page.read_text("utf-8")
+        == f"before\n<!-- begin times -->\n\n{stored}\n<!-- end times -->\nafter\n"
+    )
     assert (tmp_path / "results" / "trial-other.md").exists()
     assert "## other\n\nelsewhere" in capsys.readouterr().out
     for short in ("--quick", "--share=0.5"):  # short runs are never stored
@@ -71,7 +82,9 @@ SECTIONS = [
 def check(found: list[list[Row]]) -> None:
     assert found
     assert all(found)
-    assert not {"nan", "inf", "-inf"} & {cell for table in found for row in table for cell in row.values()}
+    assert not {"nan", "inf", "-inf"} & {
+        cell for table in found for row in table for cell in row.values()
+    }
 
 
 @pytest.mark.parametrize("section", SECTIONS)
@@ -97,7 +110,9 @@ def test_tables_keep_their_tolerance_where_plain_grids_do_not() -> None:
         if name.startswith("mumacro-"):
             assert 0.0 < error <= float(name.removeprefix("mumacro-"))
             seen.append(name)
-        assert " x " not in row["data"] or error > 1e-3, "24 and 48 nodes a side cannot follow the border"
+        assert " x " not in row["data"] or error > 1e-3, (
+            "24 and 48 nodes a side cannot follow the border"
+        )
     assert sorted(seen) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
 
 

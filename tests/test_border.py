@@ -43,29 +43,38 @@ def test_border_does_not_divide_by_a_settled_secant(y: float) -> None:
     assert solve(crit * (1.0 + 1e-9), y).mu_ratio == close(mu, abs=1e-11)
 
 
-def test_border_that_cannot_be_found_is_an_error_with_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_border_that_cannot_be_found_is_an_error_with_advice(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(steady, "border_raw", lambda *_: (math.nan, math.nan, NOT_CONVERGED))
-    with pytest.raises(ArithmeticError, match=r"border at y~ = 0.5: the section's root was not found"):
+    with pytest.raises(
+        ArithmeticError, match=r"border at y~ = 0.5: the section's root was not found"
+    ):
         border(0.5)
 
 
-# --- the stored curve ---------------------------------------------------------------------------------
+# --- the stored curve -----------------------------------------------------------------------------
 
 
-def test_stored_border_is_within_its_stated_error(table: Surrogate, reference_border: Array, sweep: Sweep) -> None:
+def test_stored_border_is_within_its_stated_error(
+    table: Surrogate, reference_border: Array, sweep: Sweep
+) -> None:
     y = np.concatenate([reference_border[:, 0], np.geomspace(1e-8, 1e8, 1000)])
     truth = sweep.solve("border", np.ones_like(y), y)["deficit"]
     error = np.abs(table.v_tilde_crit(y) / truth - 1.0)
     assert table.border.max_rel_error <= max(table.tolerance, 2e-14)
     assert error.max() <= table.border.max_rel_error + 2e-14
-    assert np.abs(table.v_tilde_crit(reference_border[:, 0]) / reference_border[:, 1] - 1.0).max() <= (
-        table.border.max_rel_error + 1e-15
-    )
+    assert np.abs(
+        table.v_tilde_crit(reference_border[:, 0]) / reference_border[:, 1] - 1.0
+    ).max() <= (table.border.max_rel_error + 1e-15)
 
 
 def test_stored_border_rises_also_where_its_pieces_meet(table: Surrogate) -> None:
     for seam in (Y_CONT, Y_TAIL):
-        below, above = table.v_tilde_crit(seam * (1.0 - 1e-15)), table.v_tilde_crit(seam * (1.0 + 1e-15))
+        below, above = (
+            table.v_tilde_crit(seam * (1.0 - 1e-15)),
+            table.v_tilde_crit(seam * (1.0 + 1e-15)),
+        )
         assert below == close(above, rel=2.0 * table.border.max_rel_error + 1e-14)
     assert np.all(np.diff(table.v_tilde_crit(np.geomspace(1e-6, 1e9, 30_000))) > 0.0)
 

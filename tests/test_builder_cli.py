@@ -21,8 +21,11 @@ Run = Callable[..., "CompletedProcess[str]"]
 
 
 @pytest.fixture
-def here(repository: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    """``python -m builder ARGUMENTS`` without a process of its own, which would compile the solver anew."""
+def here(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Run:
+    """``python -m builder ARGUMENTS`` without a process of its own, which would compile the solver
+    anew."""
     monkeypatch.chdir(repository)
 
     def run(*arguments: object) -> "CompletedProcess[str]":
@@ -60,7 +63,8 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     assert report["bytes"] == out.stat().st_size
     assert report["n_solves"] == opened.attributes["n_solves"]
     assert report["n_solves"] > 10_000
-    assert [path.name for path in tmp_path.iterdir()] == ["rough.nc"]  # no checkpoint, no partial file
+    # no checkpoint, no partial file
+    assert [path.name for path in tmp_path.iterdir()] == ["rough.nc"]
 
     verified = run_builder("verify", out, "--points", 300, "--seed", 5)
     assert verified.returncode == 0, verified.stderr
@@ -78,11 +82,14 @@ def test_solve_answers_at_the_ends_of_its_range(run_builder: Run, here: Run) -> 
         assert 0.0 < answer["mu_ratio"] <= 1.0
         assert 0.0 <= answer["error_estimate"] < 2e-15
     answer = json.loads(here("solve", "--v", "1e-9", "--y", "0.5").stdout)
-    assert (answer["regime"], answer["min_slip_speed"]) == ("stick_slip", None)  # far below the border: not computed
+    # far below the border: not computed
+    assert (answer["regime"], answer["min_slip_speed"]) == ("stick_slip", None)
     assert answer["stick_fraction"] > 0.99
 
 
-def test_verify_rejects_a_table_that_misses_its_tolerance(here: Run, tables_dir: Path, tmp_path: Path) -> None:
+def test_verify_rejects_a_table_that_misses_its_tolerance(
+    here: Run, tables_dir: Path, tmp_path: Path
+) -> None:
     table = read_table(tables_dir / "mumacro-1e-4.nc")
     table.attributes["tolerance"] = 1e-9  # it states a tolerance that it does not meet
     write_table(table, tmp_path / "boast.nc")
@@ -102,20 +109,32 @@ def test_verify_refuses_a_damaged_table(here: Run, tables_dir: Path, tmp_path: P
 ROUGH, V_RANGE = "build --tolerance 1e-3 --out x.nc", "from 1e-60 to 1e+10"
 REFUSED: dict[str, tuple[str, ...]] = {
     "build --tolerance 0.5 --out x.nc": ("--tolerance", "must be from 1e-12 to 0.01"),
-    **dict.fromkeys((f"build --tolerance {x} --out x.nc" for x in ("-1e-8", "nan")), ("--tolerance",)),
-    "build --tolerance 1e-15 --out x.nc": ("--tolerance", "1e-15"), "build --tolerance 1e-3": ("--out",),
+    **dict.fromkeys(
+        (f"build --tolerance {x} --out x.nc" for x in ("-1e-8", "nan")), ("--tolerance",)
+    ),
+    "build --tolerance 1e-15 --out x.nc": ("--tolerance", "1e-15"),
+    "build --tolerance 1e-3": ("--out",),
     **dict.fromkeys((f"{ROUGH} --workers {n}" for n in ("0", "2000")), ("--workers",)),
-    f"{ROUGH} --sideways": ("--sideways",), "build --tolerance 1e-2 --out tables": ("--out", "is a folder"),
+    f"{ROUGH} --sideways": ("--sideways",),
+    "build --tolerance 1e-2 --out tables": ("--out", "is a folder"),
     "build --tolerance 1e-3 --out no/such/folder/x.nc": ("no/such/folder",),
     **dict.fromkeys(("verify x.nc --points 1", "verify x.nc --points 99999999"), ("--points",)),
-    "verify x.nc --seed -1": ("--seed",), "verify x.nc --workers 0": ("--workers",), "verify": ("required: table",),
-    "verify no-such-table.nc": ("no-such-table.nc",), "verify README.md": ("README.md",), "bake": ("bake",),
-    "figures --out no/such/folder": ("--out",), "figures --out . --table no-such-table.nc": ("no-such-table.nc",),
+    "verify x.nc --seed -1": ("--seed",),
+    "verify x.nc --workers 0": ("--workers",),
+    "verify": ("required: table",),
+    "verify no-such-table.nc": ("no-such-table.nc",),
+    "verify README.md": ("README.md",),
+    "bake": ("bake",),
+    "figures --out no/such/folder": ("--out",),
+    "figures --out . --table no-such-table.nc": ("no-such-table.nc",),
     **dict.fromkeys((f"solve --v={v} --y 1" for v in ("-1", "nan", "fast", "")), ("--v",)),
-    "solve --v 1 --y 0": ("--y",), "solve --v 1": ("--y",), "solve 1 2": (),
+    "solve --v 1 --y 0": ("--y",),
+    "solve --v 1": ("--y",),
+    "solve 1 2": (),
     "solve --v 1 --y=-inf": ("--y", "from 1e-15 to 1e+14", "-inf", "a table answers"),
-    "solve --v 1e999 --y 1": ("--v", V_RANGE, "got inf"), "solve --v 1e-61 --y 1": ("--v", V_RANGE, "got 1e-61"),
-}  # fmt: skip
+    "solve --v 1e999 --y 1": ("--v", V_RANGE, "got inf"),
+    "solve --v 1e-61 --y 1": ("--v", V_RANGE, "got 1e-61"),
+}
 
 
 @pytest.mark.parametrize("words", REFUSED)

@@ -1,4 +1,5 @@
-"""``--format c``: the kernel's sources compile everywhere, give the library's bits, and refuse bad input."""
+"""``--format c``: the kernel's sources compile everywhere, give the library's bits, and refuse bad
+input."""
 
 import ctypes
 import functools
@@ -38,25 +39,36 @@ double mu_values(void) { return mu_min(MU_PI); }
 int main(void) {
     mumacro_answer a;
     int error = mumacro_evaluate(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01, &a);
-    printf("%d %.17g %s %s %.17g\\n", error, a.mu_macro, mumacro_source_name(a.source), mumacro_checksum(),
-           elsewhere(0.1, 0.5) - mumacro_mu_ratio(0.1, 0.5));
+    printf("%d %.17g %s %s %.17g\\n", error, a.mu_macro, mumacro_source_name(a.source),
+           mumacro_checksum(), elsewhere(0.1, 0.5) - mumacro_mu_ratio(0.1, 0.5));
     return mu_values() != 3.0;
 }
 """
 OTHER = '#include "mumacro.h"\ndouble elsewhere(double v, double y);\n'
 OTHER += "double elsewhere(double v, double y) { return mumacro_mu_ratio(v, y); }\n"
-#: instruction levels of the library by the number of doubles that go together, and one double at a time
+#: instruction levels of the library by the number of doubles that go together, and one double at a
+#: time
 AVX2 = ["-mavx2", "-mfma"]
-LANES = {1: ["-DMUMACRO_ONE_LANE"], 2: [], 4: AVX2, 8: [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl"]}
+LANES = {
+    1: ["-DMUMACRO_ONE_LANE"],
+    2: [],
+    4: AVX2,
+    8: [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl"],
+}
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
 LANGUAGES = {
-    "gcc": "-std=c99", "clang": "-std=c99", "zig cc": "-std=c99", "g++": "-std=c++17", "clang++": "-std=c++17"
-}  # fmt: skip
+    "gcc": "-std=c99",
+    "clang": "-std=c99",
+    "zig cc": "-std=c99",
+    "g++": "-std=c++17",
+    "clang++": "-std=c++17",
+}
 
 
 @pytest.fixture(scope="module")
 def folder(tables_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """``one``: all in one header, ``three``: three files; each with a program of two files that include mumacro.h."""
+    """``one``: all in one header, ``three``: three files; each with a program of two files that
+    include mumacro.h."""
     root = tmp_path_factory.mktemp("c")
     (root / "one").mkdir()
     for place, out in (("one", "one/mumacro.h"), ("three", "three")):
@@ -71,7 +83,8 @@ table = tables(1e-7)
 
 @pytest.fixture(scope="module")
 def build(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The driver with the 1e-7 table as a shared library: a function of the compiler and its options."""
+    """The driver with the 1e-7 table as a shared library: a function of the compiler and its
+    options."""
     root = tmp_path_factory.mktemp("drivers")
     write_c(table.table, root)
 
@@ -90,7 +103,9 @@ def flags(repository: Path) -> Any:
     """The options with which the library's kernels are compiled, by level."""
     module = runpy.run_path(str(repository / "hatch_build.py"))
     found = module["levels"](module["own_platform"]())
-    return {level: ["-O2", "-std=c99", "-ffp-contract=off", *words] for level, words in found.items()}
+    return {
+        level: ["-O2", "-std=c99", "-ffp-contract=off", *words] for level, words in found.items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -128,27 +143,54 @@ def drawn(table: Surrogate, n: int, seed: int) -> Any:
 
 
 def points(table: Surrogate, n: int, seed: int) -> Any:
-    """Drawn points; both sides of every seam of blocks, cells, the border and the closed forms; and the extremes."""
-    edges = [charts.Y_STICK_LO, 1.0, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL, 1e-150, 1e150]
+    """Drawn points; both sides of every seam of blocks, cells, the border and the closed forms; and
+    the extremes."""
+    edges = [
+        charts.Y_STICK_LO,
+        1.0,
+        charts.Y_CONT,
+        charts.Y_MID,
+        charts.Y_HIGH,
+        charts.Y_TAIL,
+        1e-150,
+        1e150,
+    ]
     y = np.concatenate([neighbours(edges), np.geomspace(1e-8, 1e8, 60)])
     crit = table.v_tilde_crit(y)
     half = crit * np.sin(0.5 * np.pi * charts.S_CUT) ** 2
-    speeds = [crit, half, 0.5 * crit, charts.RHO_MAX * crit, charts.FAST_KAPPA * np.sqrt(y), crit * 1e-9, crit * 1e9]
+    speeds = [
+        crit,
+        half,
+        0.5 * crit,
+        charts.RHO_MAX * crit,
+        charts.FAST_KAPPA * np.sqrt(y),
+        crit * 1e-9,
+        crit * 1e9,
+    ]
     v = np.concatenate([neighbours(speed) for speed in speeds])
-    extremes = np.array([0.0, 5e-324, 1e-310, 1e-290, 1e-150, 1.0, 1e150, 1e290, 1.7e308, np.inf, -1.0, np.nan])
-    grid = np.stack(np.meshgrid(extremes, np.concatenate([extremes, neighbours([1.0])]))).reshape(2, -1)
+    extremes = np.array(
+        [0.0, 5e-324, 1e-310, 1e-290, 1e-150, 1.0, 1e150, 1e290, 1.7e308, np.inf, -1.0, np.nan]
+    )
+    grid = np.stack(np.meshgrid(extremes, np.concatenate([extremes, neighbours([1.0])]))).reshape(
+        2, -1
+    )
     seams = np.stack([v, np.tile(y, v.size // y.size)])
     return np.concatenate([drawn(table, n, seed), seams, grid], axis=1)
 
 
-# --- the text ---------------------------------------------------------------------------------------------
+# --- the text -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("form", "name", "lanes"),
-    [*(("three", name, lanes) for name in LANGUAGES for lanes in LANES), *(("one", name, 2) for name in LANGUAGES)],
+    [
+        *(("three", name, lanes) for name in LANGUAGES for lanes in LANES),
+        *(("one", name, 2) for name in LANGUAGES),
+    ],
 )
-def test_no_compiler_warns(folder: Path, tables_dir: Path, form: Any, name: str, lanes: Any, tmp_path: Path) -> None:
+def test_no_compiler_warns(
+    folder: Path, tables_dir: Path, form: Any, name: str, lanes: Any, tmp_path: Path
+) -> None:
     language = ("-x", "c++") if name.endswith("++") else ()
     sources = ["main.c", "other.c", *(["mumacro.c", "mumacro_table.c"] if form == "three" else [])]
     words = [*compilers.compiler(name), *language, LANGUAGES[name], "-O1", *STRICT, *LANES[lanes]]
@@ -167,7 +209,9 @@ def test_no_compiler_warns(folder: Path, tables_dir: Path, form: Any, name: str,
 def test_arithmetic_without_infinities_is_refused(folder: Path, name: str, option: Any) -> None:
     command = [*compilers.compiler(name), "-std=c99", "-O1", option, "-fsyntax-only"]
     for source in ("one/main.c", "three/mumacro.c"):
-        done = subprocess.run([*command, folder / source], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [*command, folder / source], capture_output=True, text=True, check=False
+        )
         assert done.returncode != 0
         assert "compile without -ffast-math" in done.stderr
 
@@ -179,20 +223,28 @@ def test_names_of_the_declarations_are_the_kernels() -> None:
     expected = ", ".join(f"MUMACRO_{name.upper()}" for name in charts.QUANTITY_NAMES)
     assert f"enum {{ {expected}, MUMACRO_QUANTITIES }};" in text
     code = (KERNEL / "interface.c").read_text("ascii")
-    said = [f"{name} must be {BOUNDS[name]}" + (", or infinite" if name == "k" else "") for name in FIELDS]
+    said = [
+        f"{name} must be {BOUNDS[name]}" + (", or infinite" if name == "k" else "")
+        for name in FIELDS
+    ]
     assert re.findall(r'"(\w+ must be .*?)"', code) == said
 
 
 def test_a_header_has_no_names_of_the_kernel_of_its_own(table: Surrogate) -> None:
     text = re.sub(r'/\*.*?\*/|"[^"]*"', "", header_text(table.table), flags=re.DOTALL)
-    assert set(re.findall(r"\b(?:mu|MU)_\w+", text)) == {"mu_macro", "mu_ratio"}  # members of structs
+    # members of structs
+    assert set(re.findall(r"\b(?:mu|MU)_\w+", text)) == {"mu_macro", "mu_ratio"}
 
 
-@pytest.mark.parametrize(("out", "made"), [("mumacro.h", []), ("made", ["mumacro.c", "mumacro.h", "mumacro_table.c"])])
+@pytest.mark.parametrize(
+    ("out", "made"), [("mumacro.h", []), ("made", ["mumacro.c", "mumacro.h", "mumacro_table.c"])]
+)
 def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, made: Any) -> None:
     program = (
-        "import sys\nfor name in ('rich', 'scipy', 'netCDF4', 'xarray', 'numba'): sys.modules[name] = None\n"
-        "from mumacro.__main__ import main\nsys.exit(main(['export', '--format', 'c', '--out', sys.argv[1]]))"
+        "import sys\nfor name in ('rich', 'scipy', 'netCDF4', 'xarray', 'numba'): "
+        "sys.modules[name] = None\n"
+        "from mumacro.__main__ import main\nsys.exit(main(['export', '--format', 'c', '--out', "
+        "sys.argv[1]]))"
     )
     command = [sys.executable, "-c", program, str(tmp_path / out)]
     done = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False)
@@ -202,12 +254,16 @@ def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, 
     assert made or (tmp_path / out).read_text("ascii").startswith("/*")
 
 
-# --- the same bits ------------------------------------------------------------------------------------------
+# --- the same bits --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("words", [("gcc",), ("clang",), ("gcc", "-DMUMACRO_ONE_LANE")], ids=" ".join)
+@pytest.mark.parametrize(
+    "words", [("gcc",), ("clang",), ("gcc", "-DMUMACRO_ONE_LANE")], ids=" ".join
+)
 @pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
-def test_every_level_gives_the_librarys_bits(build: Any, flags: Any, table: Surrogate, words: Any, kernel: Any) -> None:
+def test_every_level_gives_the_librarys_bits(
+    build: Any, flags: Any, table: Surrogate, words: Any, kernel: Any
+) -> None:
     """Also with one double at a time, as MSVC compiles it."""
     driver = build(*words, *flags[kernel.level])
     v, y = points(table, 4000, 1)
@@ -231,9 +287,15 @@ def test_every_level_gives_the_librarys_bits(build: Any, flags: Any, table: Surr
 
 @pytest.mark.parametrize(
     ("options", "apart"),
-    [(("-O3", "-march=native"), 4), (("-O3", "-march=native", "-ffp-contract=fast"), 4), (("-O2",), 10)],
+    [
+        (("-O3", "-march=native"), 4),
+        (("-O3", "-march=native", "-ffp-contract=fast"), 4),
+        (("-O2",), 10),
+    ],
 )
-def test_other_options_move_the_last_digits_alone(build: Any, table: Surrogate, options: Any, apart: Any) -> None:
+def test_other_options_move_the_last_digits_alone(
+    build: Any, table: Surrogate, options: Any, apart: Any
+) -> None:
     """Off the border, where rounding does not decide the side; docs/c.md states the figures."""
     v, y = drawn(table, 15_000, 3)
     with np.errstate(all="ignore"):
@@ -259,7 +321,8 @@ def bad(name: str, value: Any) -> Any:
 
 
 def first_fault(case: Any, normal: bool) -> int:
-    """The number of the first bad input; 7 where the normal force would lift off; 0 if all are legal."""
+    """The number of the first bad input; 7 where the normal force would lift off; 0 if all are
+    legal."""
     for i, (name, value) in enumerate(zip(FIELDS, case, strict=True), 1):
         if normal and name == "y0":
             if not 0.0 <= value < case[1]:
@@ -270,7 +333,9 @@ def first_fault(case: Any, normal: bool) -> int:
 
 
 @every_pair
-def test_cases_of_every_contact_and_direction_are_the_librarys(best: Any, table: Surrogate, pair: Any) -> None:
+def test_cases_of_every_contact_and_direction_are_the_librarys(
+    best: Any, table: Surrogate, pair: Any
+) -> None:
     kind, plain = kind_of(*pair), pair == PAIRS[0]
     codes = CONTACTS.index(pair[0]), DIRECTIONS.index(pair[1])
     x = cases(20_000 if plain else 1000)
@@ -278,7 +343,14 @@ def test_cases_of_every_contact_and_direction_are_the_librarys(best: Any, table:
     found = ask(best.cases, x.shape[1], 21, *codes, x).T
     source, legal = answer.source_code, answer.source_code >= 0
     assert 0.15 < legal.mean() < 0.85
-    expected = [answer.mu_macro, answer.mu_ratio, answer.error_bound, answer.v_tilde, answer.y_tilde, source]
+    expected = [
+        answer.mu_macro,
+        answer.mu_ratio,
+        answer.error_bound,
+        answer.v_tilde,
+        answer.y_tilde,
+        source,
+    ]
     expected += [np.where(legal, charts.REGIME_OF_SOURCE[source], -1)]
     assert same(found[:7], expected)
     assert same(found[7], [first_fault(case, kind.normal) for case in x.T])
@@ -291,7 +363,11 @@ def test_cases_of_every_contact_and_direction_are_the_librarys(best: Any, table:
 
 def test_a_contact_or_direction_that_is_not_there_is_refused(best: Any) -> None:
     best.mumacro_error_text.restype = ctypes.c_char_p
-    for kind, error, about in (((1, 2), -4, b"radius"), ((2, 0), -3, b"no such"), ((0, -1), -3, b"no such")):
+    for kind, error, about in (
+        ((1, 2), -4, b"radius"),
+        ((2, 0), -3, b"no such"),
+        ((0, -1), -3, b"no such"),
+    ):
         found = ask(best.cases, 1, 21, *kind, np.ones((6, 1)))
         assert found[0, 7] == error
         assert np.isnan(found[0, :5]).all()
@@ -307,7 +383,14 @@ def test_cycles_are_the_librarys(best: Any, table: Surrogate) -> None:
         v, y, length = answer.v_tilde, answer.y_tilde, answer.length_scale
         mu0, load, stiffness, y0, omega, _ = x
         legal = answer.source_code >= 0
-        moving = legal & (y0 > 0.0) & (omega > 0.0) & np.isfinite(v) & np.isfinite(y) & np.isfinite(stiffness)
+        moving = (
+            legal
+            & (y0 > 0.0)
+            & (omega > 0.0)
+            & np.isfinite(v)
+            & np.isfinite(y)
+            & np.isfinite(stiffness)
+        )
         power, bound = table.power_with_bound(v, y)
         unit = mu0 * load * (length * omega)
         stick, stick_bound = table.stick_fraction_with_bound(v, y)
@@ -327,8 +410,26 @@ def test_cycles_are_the_librarys(best: Any, table: Surrogate) -> None:
     assert np.all(np.isnan(found[:5, ~legal]))
 
 
-def test_only_the_documented_functions_of_the_library_are_called(folder: Path, tmp_path: Path) -> None:
-    words = [*compilers.compiler("gcc"), "-std=c99", "-O0", "-c", "mumacro.c", "-o", tmp_path / "mumacro.o"]
+def test_only_the_documented_functions_of_the_library_are_called(
+    folder: Path, tmp_path: Path
+) -> None:
+    words = [
+        *compilers.compiler("gcc"),
+        "-std=c99",
+        "-O0",
+        "-c",
+        "mumacro.c",
+        "-o",
+        tmp_path / "mumacro.o",
+    ]
     compilers.run(*words, cwd=folder / "three")
-    symbols = compilers.run(*compilers.compiler("nm"), "--undefined-only", tmp_path / "mumacro.o").split()[1::2]
-    assert set(symbols) - {"_GLOBAL_OFFSET_TABLE_"} <= {"sqrt", "fabs", "memcpy", "mumacro_table", "memset"}
+    symbols = compilers.run(
+        *compilers.compiler("nm"), "--undefined-only", tmp_path / "mumacro.o"
+    ).split()[1::2]
+    assert set(symbols) - {"_GLOBAL_OFFSET_TABLE_"} <= {
+        "sqrt",
+        "fabs",
+        "memcpy",
+        "mumacro_table",
+        "memset",
+    }

@@ -1,4 +1,5 @@
-"""From Chebyshev nodes to cells: exact for polynomials, close for smooth functions; and how the kernel reads cells."""
+"""From Chebyshev nodes to cells: exact for polynomials, close for smooth functions; and how the
+kernel reads cells."""
 
 import math
 from typing import Any
@@ -27,7 +28,9 @@ def value(cell: Array, u: float, w: float) -> float:
 def at(coef: Array, cells: tuple[int, int], x: float, z: float) -> float:
     """Value at (x, z) in [0, 1]^2 of cells in the layout of :func:`cells_2d`."""
     i, j = min(int(x * cells[0]), cells[0] - 1), min(int(z * cells[1]), cells[1] - 1)
-    return value(coef[i * cells[1] + j], 2.0 * (x * cells[0] - i) - 1.0, 2.0 * (z * cells[1] - j) - 1.0)
+    return value(
+        coef[i * cells[1] + j], 2.0 * (x * cells[0] - i) - 1.0, 2.0 * (z * cells[1] - j) - 1.0
+    )
 
 
 @pytest.mark.parametrize("cells", [1, 3, 8])
@@ -43,7 +46,7 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
         assert found == close(chebyshev.chebval(2.0 * x - 1.0, c), abs=1e-11)
 
 
-# --- what the kernel reads ------------------------------------------------------------------------------
+# --- what the kernel reads ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
@@ -69,8 +72,11 @@ def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
 
 @pytest.mark.parametrize("index", range(len(CHARTS)), ids=NAMES)
 @pytest.mark.parametrize("cells", [(1, 1), (2, 7), (7, 2), (40, 1)])
-def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cells: tuple[int, int]) -> None:
-    """A table whose cells hold their own numbers: none is skipped, neighbours follow one another."""
+def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(
+    index: int, cells: tuple[int, int]
+) -> None:
+    """A table whose cells hold their own numbers: none is skipped, neighbours follow one
+    another."""
     made = Cells(cells)
     chart, n = CHARTS[index], cells[0] * cells[1]
     number = np.zeros((n * len(CHARTS), WIDTH, WIDTH))
@@ -92,7 +98,7 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cell
             assert (moving[0], moving[-1]) == (0, cells[axis] - 1)
 
 
-# --- the coordinates that evaluation uses --------------------------------------------------------------
+# --- the coordinates that evaluation uses ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("axis", AXES, ids=repr)
@@ -124,7 +130,8 @@ def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
 @pytest.mark.parametrize("chart", CHARTS, ids=NAMES)
 @pytest.mark.parametrize("cells", [(4, 12), (7, 20)])
 def test_cells_of_a_block_follow_a_smooth_function(chart: Chart, cells: tuple[int, int]) -> None:
-    """Along s they have an edge at the knot; those below the lowest s of a block are never visited."""
+    """Along s they have an edge at the knot; those below the lowest s of a block are never
+    visited."""
     spans = chart.a.span, chart.b.span
 
     def smooth(a: Any, b: Any) -> Any:
@@ -137,5 +144,8 @@ def test_cells_of_a_block_follow_a_smooth_function(chart: Chart, cells: tuple[in
     rng = np.random.default_rng(2)
     for x, z in zip(rng.random(200), rng.uniform(least, 1.0, 200), strict=True):
         shares = zip((chart.a, chart.b), spans, (x, z), strict=True)
-        place = [axis.to_file(np.array([low + (high - low) * share])) for axis, (low, high), share in shares]
+        place = [
+            axis.to_file(np.array([low + (high - low) * share]))
+            for axis, (low, high), share in shares
+        ]
         assert at(coef, cells, x, z) == close(smooth(*place)[0], abs=2e-9)

@@ -23,12 +23,17 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
     mine = block == index
     assert np.count_nonzero(mine) > 100
     chart = CHARTS[index]
-    again_v, again_y, eta = chart.point(chart.a.to_file(a[mine]), chart.b.to_file(b[mine]), table.border)
-    # d ln v~ / d b is unbounded where b ends: in continuous_low at v~ -> 0 and at v~ -> infinity, along s at v~ -> 0
+    again_v, again_y, eta = chart.point(
+        chart.a.to_file(a[mine]), chart.b.to_file(b[mine]), table.border
+    )
+    # d ln v~ / d b is unbounded where b ends: in continuous_low at v~ -> 0 and at v~ -> infinity,
+    # along s at v~ -> 0
     share = 1.0 + (v[mine] ** 2 + v[mine] ** -2 if index == C_LOW else 0.0)
     crit = table.v_tilde_crit(y[mine])
     low = 1.0 + (np.sqrt(crit / v[mine]) if chart.b.name == "s" else 0.0)
-    assert np.all(np.abs(again_v / v[mine] - 1.0) <= 4e-14 * share * low + (1e-9 if index == CORNER else 0.0))
+    assert np.all(
+        np.abs(again_v / v[mine] - 1.0) <= 4e-14 * share * low + (1e-9 if index == CORNER else 0.0)
+    )
     assert again_y == close(y[mine], rel=1e-13 if index != CORNER else 1e-12)
     assert eta == close(y[mine] - 1.0, abs=1e-13 * y[mine].max())
 
@@ -50,15 +55,21 @@ def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surro
 
 
 @pytest.mark.parametrize("quantity", charts.QUANTITIES, ids=charts.QUANTITY_NAMES)
-def test_the_form_of_a_value_is_the_value_at_the_nodes(table: Surrogate, quantity: charts.Quantity) -> None:
+def test_the_form_of_a_value_is_the_value_at_the_nodes(
+    table: Surrogate, quantity: charts.Quantity
+) -> None:
     """value = base + factor q with q from the file: exact at nodes, to the table's error."""
     for index, (chart, part) in enumerate(zip(CHARTS, table.table.blocks, strict=True)):
         assert (quantity.name in part.nodes) == chart.holds(quantity)
         a, b = np.meshgrid(part.a, part.b, indexing="ij")
         v, y, eta = chart.point(a, b, table.border)
         keep = (table.ratio_with_bound(v, y)[2] == index) & (v > 1e-200)
-        base, factor = kernels[-1].forms(charts.QUANTITY_NAMES.index(quantity.name), index, v[keep], y[keep], eta[keep])
+        base, factor = kernels[-1].forms(
+            charts.QUANTITY_NAMES.index(quantity.name), index, v[keep], y[keep], eta[keep]
+        )
         value, bound, _ = table.quantity(quantity.name, v[keep], y[keep])
         assert np.all((factor != 0.0) == chart.holds(quantity))
-        expected = base + factor * part.nodes[quantity.name][keep] if chart.holds(quantity) else 0.0 * base
+        expected = (
+            base + factor * part.nodes[quantity.name][keep] if chart.holds(quantity) else 0.0 * base
+        )
         assert np.all(np.abs(value - expected) <= 1.01 * bound + 4e-16), chart.name

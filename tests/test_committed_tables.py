@@ -1,4 +1,5 @@
-"""The committed tables: tolerance, bounds, seams and slopes against fresh solves and references; size and contents."""
+"""The committed tables: tolerance, bounds, seams and slopes against fresh solves and references;
+size and contents."""
 
 import csv
 import importlib
@@ -28,23 +29,32 @@ from tests.comparing import close
 
 ROOT = Path(__file__).resolve().parent.parent
 #: the most bytes of a file
-BYTES = {"mumacro-1e-4": 135_000, "mumacro-1e-7": 215_000, "mumacro-1e-10": 360_000, "mumacro-1e-12": 450_000}
+BYTES = {
+    "mumacro-1e-4": 135_000,
+    "mumacro-1e-7": 215_000,
+    "mumacro-1e-10": 360_000,
+    "mumacro-1e-12": 450_000,
+}
 PATHS = [ROOT / "tables" / f"{name}.nc" for name in BYTES]
 CHECK_VALUES = ROOT / "tests" / "data" / "check_values.csv"
 table = tables()
 fine = tables(1e-10)
 
 
-# --- against fresh solves -------------------------------------------------------------------------------
+# --- against fresh solves -------------------------------------------------------------------------
 
 
 def compare(table: Surrogate, sweep: Sweep, v: Array, y: Array) -> Array:
-    """Assert that fresh solves lie within tolerance and bounds; the bounds of the stick fraction."""
+    """Assert that fresh solves lie within tolerance and bounds; the bounds of the stick
+    fraction."""
     solved = sweep.solve("full", v, y)
     for name in QUANTITY_NAMES:
         value, bound, source = table.quantity(name, v, y)
         error = np.abs(value - solved[name])
-        assert np.all(error <= bound + solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS))
+        assert np.all(
+            error
+            <= bound + solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
+        )
         if name == "mu_ratio":
             assert error.max() <= table.tolerance
             assert (error / solved[name]).max() <= ABS_TO_REL * table.tolerance
@@ -53,24 +63,35 @@ def compare(table: Surrogate, sweep: Sweep, v: Array, y: Array) -> Array:
 
 @pytest.mark.slow
 def test_fresh_solves_lie_within_tolerance_and_bounds(table: Surrogate, sweep: Sweep) -> None:
-    """Values and slopes of every quantity, at points of every kind; tests/test_verify.py tries the verifier itself."""
+    """Values and slopes of every quantity, at points of every kind; tests/test_verify.py tries the
+    verifier itself."""
     assert holds(verify(table, sweep, 40_000, seed=77), table.tolerance)
 
 
-def test_bounds_hold_on_the_border_in_the_corner_and_at_creeping_speeds(table: Surrogate, sweep: Sweep) -> None:
+def test_bounds_hold_on_the_border_in_the_corner_and_at_creeping_speeds(
+    table: Surrogate, sweep: Sweep
+) -> None:
     y = np.geomspace(1e-4, 1e12, 40)
     crit = table.v_tilde_crit(y)
     for distance in (0.0, 1e-15, 1e-13, 1e-10, 1e-7, 1e-4, 1e-2):
         for side in (-1.0, 1.0):
             of_stick = compare(table, sweep, crit * (1.0 + side * distance), y)
-            assert of_stick.max() <= 0.7 * math.sqrt(table.border.max_rel_error + 2e-15) + 30.0 * table.tolerance
+            assert (
+                of_stick.max()
+                <= 0.7 * math.sqrt(table.border.max_rel_error + 2e-15) + 30.0 * table.tolerance
+            )
     assert table.stick_fraction_with_bound(2.0 * crit, y)[1].max() == 0.0
     v = np.geomspace(1e-12, 1e-2, 30)[:, None]
     gaps = np.concatenate([-np.geomspace(1e-12, 0.2, 12), [0.0], np.geomspace(1e-12, 0.4, 12)])
     compare(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, 1.0 + gaps)))
-    compare(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, np.geomspace(1e-2, 1e12, 30))))
+    compare(
+        table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, np.geomspace(1e-2, 1e12, 30)))
+    )
     # one digit of y~ changes mu~ by at most the root of two digits, also at the cusp
-    assert table.ratio_with_bound(np.geomspace(1e-300, 1e-9, 400), 1.0)[1].max() <= 1e-7 + table.tolerance
+    assert (
+        table.ratio_with_bound(np.geomspace(1e-300, 1e-9, 400), 1.0)[1].max()
+        <= 1e-7 + table.tolerance
+    )
 
 
 def test_the_reference_lies_within_tolerance_and_bounds(table: Surrogate, reference: Any) -> None:
@@ -90,7 +111,9 @@ def test_the_reference_lies_within_tolerance_and_bounds(table: Surrogate, refere
 
 def test_the_check_values_for_ports_are_made_by_their_script_of_references() -> None:
     pytest.importorskip("mpmath")
-    assert CHECK_VALUES.read_text("utf-8") == importlib.import_module("benchmarks.check_values").text()
+    assert (
+        CHECK_VALUES.read_text("utf-8") == importlib.import_module("benchmarks.check_values").text()
+    )
 
 
 def test_a_table_meets_the_check_values_of_six_inputs_within_its_bounds(table: Surrogate) -> None:
@@ -100,7 +123,9 @@ def test_a_table_meets_the_check_values_of_six_inputs_within_its_bounds(table: S
     for row in rows:  # the others are the reference itself
         case = {name: math.inf if row[name] == "rigid" else float(row[name]) for name in FIELDS}
         found = table.evaluate(case)
-        assert abs(found.mu_macro - float(row["value"])) <= found.error_bound + float(row["tolerance"]), row
+        assert abs(found.mu_macro - float(row["value"])) <= found.error_bound + float(
+            row["tolerance"]
+        ), row
 
 
 def test_known_answers_are_the_models_and_a_wrong_table_does_not_meet_them() -> None:
@@ -115,17 +140,23 @@ def test_known_answers_are_the_models_and_a_wrong_table_does_not_meet_them() -> 
         Surrogate(wrong, PATHS[1]).self_check()
 
 
-# --- seams, limits, slopes ------------------------------------------------------------------------------
+# --- seams, limits, slopes ------------------------------------------------------------------------
 
 
-def test_seams_are_invisible_and_mu_rises_with_speed_and_falls_with_amplitude(table: Surrogate) -> None:
+def test_seams_are_invisible_and_mu_rises_with_speed_and_falls_with_amplitude(
+    table: Surrogate,
+) -> None:
     assert seam_jumps(table) <= 2.0 * ABS_TO_REL * table.tolerance
     # along lines 1e-2.7 apart in the logarithm, across all seams; smaller steps are not resolved
     assert monotony(table) <= 1e-15 + (table.tolerance if table.tolerance > 1e-9 else 0.0)
     for y in SEAMS:  # one digit on either side
         v = np.array([1e-9, 1e-3, 0.1, 0.5, 3.0, 40.0, 1e4])
-        mu = np.stack([table.mu_ratio(v, b) for b in (math.nextafter(y, 0.0), y, math.nextafter(y, math.inf))])
-        assert np.all(np.ptp(mu, axis=0) <= 2.0 * ABS_TO_REL * table.tolerance * mu.max(axis=0) + 1e-14)
+        mu = np.stack(
+            [table.mu_ratio(v, b) for b in (math.nextafter(y, 0.0), y, math.nextafter(y, math.inf))]
+        )
+        assert np.all(
+            np.ptp(mu, axis=0) <= 2.0 * ABS_TO_REL * table.tolerance * mu.max(axis=0) + 1e-14
+        )
 
 
 def test_slopes_go_on_across_seams_and_stay_bounded_down_to_the_border(fine: Surrogate) -> None:
@@ -138,7 +169,7 @@ def test_slopes_go_on_across_seams_and_stay_bounded_down_to_the_border(fine: Sur
         assert np.abs(below - above).max() <= 3e-6 + 3.0 * distance
 
 
-# --- the files --------------------------------------------------------------------------------------------
+# --- the files ------------------------------------------------------------------------------------
 
 
 def test_every_committed_file_is_tested() -> None:
@@ -149,7 +180,9 @@ def test_every_committed_file_is_tested() -> None:
 def test_files_are_small(path: Path) -> None:
     variables: list[h5py.Dataset] = []
     with h5py.File(path) as root:
-        root.visititems(lambda _, item: variables.append(item) if isinstance(item, h5py.Dataset) else None)
+        root.visititems(
+            lambda _, item: variables.append(item) if isinstance(item, h5py.Dataset) else None
+        )
         numbers = sum(variable.id.get_storage_size() for variable in variables)
     assert path.stat().st_size <= BYTES[path.stem]
     # names, units, links, groups: contents other than numbers
@@ -166,9 +199,14 @@ def test_nodes_are_rounded_to_what_their_block_was_built_for(table: Surrogate) -
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: Sweep) -> None:
     with xr.open_dataset(path) as data:
-        mu, stick, error = data.mu_ratio.values, data.stick_fraction.values, data.error_estimate.values
+        mu, stick, error = (
+            data.mu_ratio.values,
+            data.stick_fraction.values,
+            data.error_estimate.values,
+        )
         assert np.all((mu > 0.0) & (mu <= 1.0))
-        assert np.all(np.diff(mu, axis=0) >= -1e-15)  # along v~; in the static limit neighbours are equal to rounding
+        # along v~; in the static limit neighbours are equal to rounding
+        assert np.all(np.diff(mu, axis=0) >= -1e-15)
         assert np.all(np.diff(mu, axis=1) <= 1e-15)
         sliding = data.v_tilde.values[:, None] >= data.v_tilde_crit.values
         assert np.all((stick >= 0.0) & (stick < 1.0))
@@ -181,7 +219,9 @@ def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: 
         solved = sweep.solve("full", data.v_tilde.values[::7, None], data.y_tilde.values[None, ::7])
         # to the digits stored in the file, with the error stated there
         assert np.all(np.abs(mu[::7, ::7] - solved["mu_ratio"]) <= error[::7, ::7])
-        np.testing.assert_allclose(stick[::7, ::7], solved["stick_fraction"], rtol=data.tolerance / STEPS, atol=1e-9)
+        np.testing.assert_allclose(
+            stick[::7, ::7], solved["stick_fraction"], rtol=data.tolerance / STEPS, atol=1e-9
+        )
 
 
 @pytest.mark.slow

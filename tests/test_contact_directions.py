@@ -1,4 +1,5 @@
-"""Oscillation along the sliding direction and of the normal force: against a play operator, closed forms, limits."""
+"""Oscillation along the sliding direction and of the normal force: against a play operator, closed
+forms, limits."""
 
 import math
 from typing import Any
@@ -25,9 +26,13 @@ def test_the_play_operator_marched_by_events(table: Surrogate) -> None:
     """At any amplitude, near the border and where reverse slip begins."""
     rng, n, seen = np.random.default_rng(1), 250, set()
     a = 10.0 ** rng.uniform(-2, 3, n)
-    x = np.where(rng.random(n) < 0.5, 10.0 ** rng.uniform(-5, 0, n), 1.0 - 10.0 ** rng.uniform(-6, 0, n))
+    x = np.where(
+        rng.random(n) < 0.5, 10.0 ** rng.uniform(-5, 0, n), 1.0 - 10.0 ** rng.uniform(-6, 0, n)
+    )
     corner = 1.0 + 10.0 ** rng.uniform(-6, -1, n) * rng.choice([-1.0, 1.0], n)
-    for v, y in zip(np.append(a * x, x * 1e-2).tolist(), np.append(a, corner).tolist(), strict=True):
+    for v, y in zip(
+        np.append(a * x, x * 1e-2).tolist(), np.append(a, corner).tolist(), strict=True
+    ):
         with mpmath.workdps(30):
             exact = [float(value) for value in play(mpmath.mpf(v), mpmath.mpf(y))]
         for name, expected in zip(("mu_ratio", "stick_fraction", "power"), exact, strict=True):
@@ -39,10 +44,13 @@ def test_the_play_operator_marched_by_events(table: Surrogate) -> None:
 
 
 def test_any_amplitude_up_to_the_largest_number(table: Surrogate) -> None:
-    """There mu~ is that of rigid contact, and the contact sticks until it has moved through both limits."""
+    """There mu~ is that of rigid contact, and the contact sticks until it has moved through both
+    limits."""
     y = 10.0 ** np.random.default_rng(4).uniform(40, 305, 20_000)
     x = 10.0 ** np.random.default_rng(5).uniform(-12, -0.01, y.size)
-    (mu, *_), (stick, bound, _) = (table.quantity(name, x * y, y, **ALONG) for name in ("mu_ratio", "stick_fraction"))
+    (mu, *_), (stick, bound, _) = (
+        table.quantity(name, x * y, y, **ALONG) for name in ("mu_ratio", "stick_fraction")
+    )
     assert mu == close(2.0 / math.pi * np.arcsin(x), abs=1e-15)
     assert stick == close(2.0 / math.pi / np.sqrt(y * np.sqrt((1.0 - x) * (1.0 + x))), rel=1e-12)
     assert np.all(bound < 1e-12)
@@ -54,7 +62,9 @@ def test_creeping_speeds_keep_their_digits(table: Surrogate) -> None:
     for a in (1.01, 1.5, 10.0, 1e4):
         slope = table.ratio_with_bound(1e-6, a, **ALONG)[0] / 1e-6
         for v in (1e-8, 1e-12, 1e-100):
-            assert table.ratio_with_bound(v, a, **ALONG)[0] / v == close(slope, rel=1e-6 * max(a / (a - 1.0), 1.0) ** 2)
+            assert table.ratio_with_bound(v, a, **ALONG)[0] / v == close(
+                slope, rel=1e-6 * max(a / (a - 1.0), 1.0) ** 2
+            )
 
 
 def test_static_and_continuous(table: Surrogate) -> None:
@@ -68,7 +78,9 @@ def test_static_and_continuous(table: Surrogate) -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 0.99, 1.0, 2.0])
-def test_rigid_contact_is_the_mean_direction_of_slip_and_the_limit_of_stiff_ones(table: Surrogate, ratio: Any) -> None:
+def test_rigid_contact_is_the_mean_direction_of_slip_and_the_limit_of_stiff_ones(
+    table: Surrogate, ratio: Any
+) -> None:
     case = {**CASE, "v0": ratio * CASE["y0"] * CASE["omega"]}
     rigid = table.evaluate(**{**case, "k": "rigid"}, **ALONG, gradient=True)
     assert rigid.mu_macro == close(0.3 * 2.0 / math.pi * math.asin(min(ratio, 1.0)), rel=1e-15)
@@ -102,8 +114,16 @@ def test_normal_is_the_master_curve_and_a_marched_spring(table: Surrogate) -> No
 
 def test_where_reverse_slip_begins_the_slopes_jump_and_the_bound_says_so(table: Surrogate) -> None:
     v = 0.5
-    a = brentq(lambda a: 2.0 * (math.sqrt(a * a - v * v) - v * math.acos(v / a)) - 2.0, 1.0, 5.0, xtol=1e-15)
-    below, at, above = (table.evaluate(**UNIT, y0=a * x, v0=v, **ALONG, gradient=True) for x in (1 - 1e-9, 1, 1 + 1e-9))
+    a = brentq(
+        lambda a: 2.0 * (math.sqrt(a * a - v * v) - v * math.acos(v / a)) - 2.0,
+        1.0,
+        5.0,
+        xtol=1e-15,
+    )
+    below, at, above = (
+        table.evaluate(**UNIT, y0=a * x, v0=v, **ALONG, gradient=True)
+        for x in (1 - 1e-9, 1, 1 + 1e-9)
+    )
     assert (below.regime, above.regime) == ("stick_slip", "reverse_slip")
     assert below.mu_macro == close(above.mu_macro, abs=1e-8)
     jump = abs(below.gradient["y0"] - above.gradient["y0"])

@@ -1,4 +1,5 @@
-"""Ball, oscillation along and of the normal force, intervals of k: what holds for every contact and direction."""
+"""Ball, oscillation along and of the normal force, intervals of k: what holds for every contact and
+direction."""
 
 import itertools
 import math
@@ -25,21 +26,30 @@ table = tables(1e-10)
 def test_the_gradient_is_that_of_the_answers(table: Surrogate, pair: Any) -> None:
     rng = np.random.default_rng(6)
     for _ in range(40):
-        said, fields, case = as_kind({name: x * 10.0 ** rng.uniform(-0.7, 0.7) for name, x in CASE.items()}, pair)
+        said, fields, case = as_kind(
+            {name: x * 10.0 ** rng.uniform(-0.7, 0.7) for name, x in CASE.items()}, pair
+        )
         if pair[1] == "normal":
             case["Fz_amplitude"] = rng.uniform(0.05, 0.95) * case["Fz"]
         found = table.evaluate(**case, **said, gradient=True)
         assert list(found.gradient) == list(fields)
         for name, x in case.items():
-            up, down = (table.evaluate(**{**case, name: x * (1.0 + h)}, **said) for h in (1e-6, -1e-6))
+            up, down = (
+                table.evaluate(**{**case, name: x * (1.0 + h)}, **said) for h in (1e-6, -1e-6)
+            )
             if {up.source_code, down.source_code} != {found.source_code}:
                 continue
             difference = (up.mu_macro - down.mu_macro) / (2e-6 * x)
             rounding = 1e-10 if pair[0] == "ball" else 1e-5
-            noise = min(up.error_bound + down.error_bound, 2e-12) / (2e-6 * x) + rounding * case["mu0"] / x
+            noise = (
+                min(up.error_bound + down.error_bound, 2e-12) / (2e-6 * x)
+                + rounding * case["mu0"] / x
+            )
             assert found.gradient[name] == close(difference, abs=noise + found.gradient_bound[name])
             if pair == ("ball", "across"):
-                assert found.gradient_bound[name] < 1e-2 * max(abs(found.gradient[name]), found.mu_macro / x)
+                assert found.gradient_bound[name] < 1e-2 * max(
+                    abs(found.gradient[name]), found.mu_macro / x
+                )
 
 
 @every_pair
@@ -48,7 +58,9 @@ def test_any_groups_have_an_answer_or_none(pair: Any) -> None:
     size = np.array([0.0, 5e-324, 1e-300, 1e-150, 1e-10, 0.5, 1.0, 1e10, 1e150, 1e281, 1.7e308])
     v, y = (a.ravel() for a in np.meshgrid(size, size))
     legal = y < 1.0 if kind.normal else y < np.inf
-    for s, name in itertools.product(map(opened, TOLERANCES), QUANTITY_NAMES[: 1 if kind.direction else 3]):
+    for s, name in itertools.product(
+        map(opened, TOLERANCES), QUANTITY_NAMES[: 1 if kind.direction else 3]
+    ):
         value, bound, source = s.quantity(name, v, y, **kind.names)
         assert np.all(((value >= 0.0) & (bound >= 0.0) & (source >= 0))[legal])
         assert name != "mu_ratio" or np.all(((value <= 1.0) & np.isfinite(bound))[legal])
@@ -57,7 +69,9 @@ def test_any_groups_have_an_answer_or_none(pair: Any) -> None:
             slopes = np.array(s.slopes(v[legal], y[legal], name, bounds=True))
             assert not np.isnan(slopes).any()
             assert np.all(slopes[3:] >= 0.0)
-    assert np.isnan(s.ratio_with_bound([-1.0, 1.0, np.nan, 1.0], [0.5, -1.0, 0.5, np.inf], **kind.names)[0]).all()
+    assert np.isnan(
+        s.ratio_with_bound([-1.0, 1.0, np.nan, 1.0], [0.5, -1.0, 0.5, np.inf], **kind.names)[0]
+    ).all()
 
 
 @every_other_pair
@@ -67,7 +81,14 @@ def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table: Surrogate, 
     many = table.evaluate(**{**case, "v0": v0}, **said, gradient=True)
     for i in range(0, 400, 37):
         one = table.evaluate(**{**case, "v0": v0[i]}, **said, gradient=True)
-        for name in ("mu_macro", "error_bound", "source_code", "v_tilde", "y_tilde", "regime_certain"):
+        for name in (
+            "mu_macro",
+            "error_bound",
+            "source_code",
+            "v_tilde",
+            "y_tilde",
+            "regime_certain",
+        ):
             assert getattr(one, name) == getattr(many, name)[i], name
         assert [*one.gradient.values()] == [slope[i] for slope in many.gradient.values()]
         ratio, bound, _ = table.ratio_with_bound(one.v_tilde, one.y_tilde, **said)
@@ -80,23 +101,36 @@ def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table: Surrogate, 
 
 
 REFUSED = [
-    ({"contact": "cube"}, "contact", "one of spring, ball"), ({"contact": None}, "contact", "one of"),
-    ({"direction": "up"}, "direction", "one of across"), ({**NORMAL, **BALL}, "direction", "contact radius"),
-    ({"Fz_amplitude": 1.0, **BALL}, "Fz_amplitude", "left out"), ({"v0": -1.0, **BALL}, "v0", ">= 0"),
+    ({"contact": "cube"}, "contact", "one of spring, ball"),
+    ({"contact": None}, "contact", "one of"),
+    ({"direction": "up"}, "direction", "one of across"),
+    ({**NORMAL, **BALL}, "direction", "contact radius"),
+    ({"Fz_amplitude": 1.0, **BALL}, "Fz_amplitude", "left out"),
+    ({"v0": -1.0, **BALL}, "v0", ">= 0"),
     ({"y0": None, "Fz_amplitude": 10.0, **NORMAL}, "Fz_amplitude", "lifts off"),
     ({"y0": None, "Fz_amplitude": -1.0, **NORMAL}, "Fz_amplitude", ">= 0"),
-    ({"y0": None, **NORMAL}, "Fz_amplitude", "given"), ({"Fz_amplitude": 1.0, **NORMAL}, "y0", "left out"),
+    ({"y0": None, **NORMAL}, "Fz_amplitude", "given"),
+    ({"Fz_amplitude": 1.0, **NORMAL}, "y0", "left out"),
     ({"v0": [-1.0, 0.01], "illegal": "raise", **BALL}, "v0", "index 0"),
-    ({"y0": None, "Fz_amplitude": [1.0, 10.0], "illegal": "raise", **NORMAL}, "Fz_amplitude", "at index 1"),
-    ({"k_range": (1e6, 2e6)}, "k", "left out beside"), ({"k": None, "k_range": (2e6, 1e6)}, "k_range", "low <= high"),
-    ({"k": None, "k_range": 1e6}, "k_range", "two"), ({"k": None, "k_range": (0.0, 1e6)}, "k_range", "0 < low"),
-    ({"k": None, "k_range": (1e6, math.inf)}, "k_range", "finite"), ({"k": None, "k_low": 1e6}, "k_high", "given"),
+    (
+        {"y0": None, "Fz_amplitude": [1.0, 10.0], "illegal": "raise", **NORMAL},
+        "Fz_amplitude",
+        "at index 1",
+    ),
+    ({"k_range": (1e6, 2e6)}, "k", "left out beside"),
+    ({"k": None, "k_range": (2e6, 1e6)}, "k_range", "low <= high"),
+    ({"k": None, "k_range": 1e6}, "k_range", "two"),
+    ({"k": None, "k_range": (0.0, 1e6)}, "k_range", "0 < low"),
+    ({"k": None, "k_range": (1e6, math.inf)}, "k_range", "finite"),
+    ({"k": None, "k_low": 1e6}, "k_high", "given"),
     ({"k": None, "k_range": ("a", 1e6)}, "k_low", "real number"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("changed", "field", "said"), REFUSED)
-def test_what_does_not_belong_is_refused_by_name(table: Surrogate, changed: Any, field: str, said: Any) -> None:
+def test_what_does_not_belong_is_refused_by_name(
+    table: Surrogate, changed: Any, field: str, said: Any
+) -> None:
     given = {**CASE, **changed}
     left_out = [name for name in ("k", "y0") if given[name] is None]
     with pytest.raises(InputError, match=said) as caught:
@@ -104,7 +138,9 @@ def test_what_does_not_belong_is_refused_by_name(table: Surrogate, changed: Any,
     assert caught.value.field == field
 
 
-def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(table: Surrogate) -> None:
+def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(
+    table: Surrogate,
+) -> None:
     bad = table.evaluate(**{**CASE, "v0": [-1.0, 0.01]}, **BALL)
     assert bad.source_code.tolist() == [-1, SOURCES.index("ball_partial_slip")]
     lifted = table.evaluate(**without(CASE, "y0"), Fz_amplitude=[1.0, 10.0, 11.0], **NORMAL)
@@ -119,12 +155,17 @@ def test_labels_are_kept(table: Surrogate) -> None:
     """Every contact and direction, and an interval, keep the labels and give the bits of arrays."""
     xr, v0 = pytest.importorskip("xarray"), np.array([0.01, 0.02, 0.05])
     plain = table.evaluate(**{**CASE, "v0": v0}, **BALL, gradient=True)
-    series = table.evaluate(**{**CASE, "v0": pd.Series(v0, index=list("abc"))}, **BALL, gradient=True)
+    series = table.evaluate(
+        **{**CASE, "v0": pd.Series(v0, index=list("abc"))}, **BALL, gradient=True
+    )
     assert series.mu_macro.index.tolist() == list("abc")
     assert series.mu_macro.tolist() == plain.mu_macro.tolist()
     assert series.regime_certain.tolist() == plain.regime_certain.tolist()
     frame = table.evaluate(pd.DataFrame({**CASE, "v0": v0}), **BALL)
-    assert (frame.mu_macro.tolist(), set(frame.regime)) == (plain.mu_macro.tolist(), {"partial_slip"})
+    assert (frame.mu_macro.tolist(), set(frame.regime)) == (
+        plain.mu_macro.tolist(),
+        {"partial_slip"},
+    )
     force = {"Fz_amplitude": xr.DataArray([1.0, 4.0], dims="force"), "k_range": (1e6, 2e6)}
     found = table.evaluate(**without(CASE, "k", "y0"), **force, **NORMAL, gradient=True)
     assert found.mu_macro_low.dims == ("force",)
@@ -132,7 +173,7 @@ def test_labels_are_kept(table: Surrogate) -> None:
     assert np.all(found.mu_macro_low <= found.mu_macro_high)
 
 
-# --- an interval of k: the extremes of mu_macro over it, which may lie inside -------------------------------
+# --- an interval of k: the extremes of mu_macro over it, which may lie inside ---------------------
 
 RAY: Case = {"mu0": 1.0, "Fz": 1.0, "y0": 20.0, "omega": 1.0, "v0": 1.0}
 
@@ -141,23 +182,32 @@ RAY: Case = {"mu0": 1.0, "Fz": 1.0, "y0": 20.0, "omega": 1.0, "v0": 1.0}
 def test_the_extremes_are_those_of_a_dense_sampling(table: Surrogate, pair: Any) -> None:
     rng = np.random.default_rng(1)
     for _ in range(40 if pair == PAIRS[0] else 12):
-        said, _, case = as_kind({**CASE, "v0": 10.0 ** rng.uniform(-3, 0), "y0": 10.0 ** rng.uniform(-7, -4)}, pair)
+        said, _, case = as_kind(
+            {**CASE, "v0": 10.0 ** rng.uniform(-3, 0), "y0": 10.0 ** rng.uniform(-7, -4)}, pair
+        )
         case, low = without(case, "k"), 10.0 ** rng.uniform(4, 8)
         high = low * 10.0 ** rng.uniform(0, 3)
         found = table.evaluate(k_range=(low, high), **case, **said)
         some = table.evaluate(k=np.geomspace(low, high, 3000), **case, **said)
         slack = found.error_bound + some.error_bound.max()
-        for end, sampled, sign in ((found.mu_macro_low, some.mu_macro.min(), 1.0),
-                                   (found.mu_macro_high, some.mu_macro.max(), -1.0)):  # fmt: skip
+        for end, sampled, sign in (
+            (found.mu_macro_low, some.mu_macro.min(), 1.0),
+            (found.mu_macro_high, some.mu_macro.max(), -1.0),
+        ):
             assert sign * (sampled - end) >= -slack
             assert end == close(sampled, abs=slack + 1e-7)
         middle = table.evaluate(k=math.sqrt(low) * math.sqrt(high), **case, **said)
-        assert (found.mu_macro, found.source, found.v_tilde) == (middle.mu_macro, middle.source, middle.v_tilde)
+        assert (found.mu_macro, found.source, found.v_tilde) == (
+            middle.mu_macro,
+            middle.source,
+            middle.v_tilde,
+        )
 
 
 @pytest.mark.parametrize("pair", PAIRS[:2], ids=" ".join)
 def test_extremes_inside(table: Surrogate, pair: Any) -> None:
-    """mu~ rises with k between a smallest and a largest value, so both ends of the interval lie between them."""
+    """mu~ rises with k between a smallest and a largest value, so both ends of the interval lie
+    between them."""
     kind, k = {"contact": pair[0]}, np.geomspace(1e-2, 1e4, 6001)
     slope = table.evaluate(k=k, **RAY, **kind, gradient=True).gradient["k"]
     turns = k[1:][slope[1:] * slope[:-1] < 0.0]
@@ -184,18 +234,31 @@ def test_turns_closer_than_samples(table: Surrogate, ratio: Any) -> None:
 
 
 def test_intervals_in_arrays_columns_and_of_one_point(table: Any) -> None:
-    case, low, high, v0 = without(CASE, "k"), [2e5, 8e5, 1e6, np.nan, -1.0], 1.2e6, np.array([[0.01], [0.1]])
+    case, low, high, v0 = (
+        without(CASE, "k"),
+        [2e5, 8e5, 1e6, np.nan, -1.0],
+        1.2e6,
+        np.array([[0.01], [0.1]]),
+    )
     found: Any = table.evaluate(k_range=(np.array(low), high), **{**case, "v0": v0}, gradient=True)
     assert found.mu_macro_low.shape == (2, 5)
     for i, j in np.ndindex(2, 3):
         one = table.evaluate(k_range=(low[j], high), **{**case, "v0": v0[i, 0]}, gradient=True)
-        assert (one.mu_macro, one.gradient["k"]) == (found.mu_macro[i, j], found.gradient["k"][i, j])
+        assert (one.mu_macro, one.gradient["k"]) == (
+            found.mu_macro[i, j],
+            found.gradient["k"][i, j],
+        )
         assert one.mu_macro_low == close(found.mu_macro_low[i, j], abs=1e-12)
         assert one.mu_macro_high == close(found.mu_macro_high[i, j], abs=1e-12)
     assert np.isnan(found.mu_macro_low[:, 3:]).all()
     assert (found.source_code[:, 3:] == -1).all()
     point = table.evaluate(k_range=(1e6, 1e6), **case)
-    assert point.mu_macro_low == point.mu_macro == point.mu_macro_high == table.evaluate(**CASE).mu_macro
+    assert (
+        point.mu_macro_low
+        == point.mu_macro
+        == point.mu_macro_high
+        == table.evaluate(**CASE).mu_macro
+    )
     frame = pd.DataFrame({**case, "k_low": [8e5, 1e6], "k_high": [1.2e6, 2e6]})
     answers: Any = table.evaluate(frame)
     widest = table.evaluate(k_range=(5e-324, 1.7e308), **case)  # a ratio beyond double range

@@ -1,4 +1,5 @@
-"""From SI inputs to dimensionless groups: legal values, messages for illegal values, and the ends of the range."""
+"""From SI inputs to dimensionless groups: legal values, messages for illegal values, and the ends
+of the range."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +20,9 @@ from mumacro.settling import settling
 from tests.cases import CASE, Case, log_uniform, tables, without
 from tests.comparing import close
 
-positive = st.floats(min_value=5e-324, max_value=1.7976931348623157e308, allow_nan=False, allow_infinity=False)
+positive = st.floats(
+    min_value=5e-324, max_value=1.7976931348623157e308, allow_nan=False, allow_infinity=False
+)
 any_inputs = st.fixed_dictionaries(dict.fromkeys(FIELDS, positive))
 table = tables(1e-10)
 
@@ -34,14 +37,15 @@ def exactly(numerator: list[float], denominator: list[float]) -> float:
 
 
 def same_digits(given: Any, expected: float) -> bool:
-    """Equal to a few rounding errors, or to the last digit of denormal numbers, or both infinite."""
+    """Equal to a few rounding errors, or to the last digit of denormal numbers, or both
+    infinite."""
     found = float(given)
     if math.isinf(expected) or math.isinf(found):
         return min(found, expected) > 1.797e308
     return abs(found - expected) <= 8e-16 * expected + 5e-324
 
 
-# --- the groups ---------------------------------------------------------------------------------------
+# --- the groups -----------------------------------------------------------------------------------
 
 
 @settings(max_examples=600, deadline=None)
@@ -52,7 +56,9 @@ def same_digits(given: Any, expected: float) -> bool:
 @example(case=dict(zip(FIELDS, (0.5, 1.0, 1e-320, 1.0, 1.0, 1.0), strict=True)))
 @example(case=dict(zip(FIELDS, (0.5, 5e-324, 5e-324, 0.25, 1.0, 0.5), strict=True)))
 @example(case=dict.fromkeys(FIELDS, 1e-200))
-def test_groups_are_right_whatever_overflows_and_the_answer_is_finite(table: Surrogate, case: Case) -> None:
+def test_groups_are_right_whatever_overflows_and_the_answer_is_finite(
+    table: Surrogate, case: Case
+) -> None:
     mu0, Fz, k, y0, omega, v0 = (case[name] for name in FIELDS)
     found = table.evaluate(case)
     assert same_digits(found.v_tilde, exactly([v0, k], [mu0, Fz, omega]))
@@ -67,10 +73,12 @@ def test_groups_are_right_whatever_overflows_and_the_answer_is_finite(table: Sur
             assert getattr(many, name)[0] == getattr(found, name)
 
 
-# --- edge cases of the answer -------------------------------------------------------------------------
+# --- edge cases of the answer ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("stillness", [{"y0": 0.0}, {"omega": 0.0}, {"y0": 0.0, "omega": 0.0}, {"y0": 0.0, "v0": 0.0}])
+@pytest.mark.parametrize(
+    "stillness", [{"y0": 0.0}, {"omega": 0.0}, {"y0": 0.0, "omega": 0.0}, {"y0": 0.0, "v0": 0.0}]
+)
 @pytest.mark.parametrize("k", [1e6, "rigid", 5e-324, 1e308])
 def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: Case, k: Any) -> None:
     found = table.evaluate(**{**CASE, **stillness, "k": k})
@@ -81,7 +89,12 @@ def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: Case, k
 @pytest.mark.parametrize("y", [1e-300, 0.3, 0.6, 0.999, 1.0, 1.2, 1e5, 1e300])
 def test_no_drive_is_the_static_limit(table: Surrogate, y: float) -> None:
     found = table.evaluate(mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=7.0, v0=0.0)
-    assert (found.v_tilde, found.y_tilde, found.regime, found.source) == (0.0, y, "static", "static_limit")
+    assert (found.v_tilde, found.y_tilde, found.regime, found.source) == (
+        0.0,
+        y,
+        "static",
+        "static_limit",
+    )
     assert found.mu_ratio == close(math.sqrt((1.0 - y) * (1.0 + y)) if y < 1.0 else 0.0, rel=5e-16)
     # the last digit of y~ = y0 k/(mu0 Fz) enters by its root only at the edge of the static limit
     assert 0.0 <= found.error_bound < (1e-7 if y == 1.0 else 1e-12)
@@ -90,18 +103,23 @@ def test_no_drive_is_the_static_limit(table: Surrogate, y: float) -> None:
 @pytest.mark.parametrize(
     ("inputs", "expected"),
     [
-        # y~ underflows: no effect of the oscillation; y~ and v~ both overflow: only their ratio matters
+        # y~ underflows: no effect of the oscillation; y~ and v~ both overflow: only their ratio
+        # matters
         ({"y0": 1e-300, "k": 1e-300, "Fz": 1e300}, 1.0),
-        ({"y0": 1e200, "k": 1e200, "v0": 1e200, "omega": 1.0}, 0.8346268416740731),  # r = 1: 1/AGM(1, sqrt 2)
+        # r = 1: 1/AGM(1, sqrt 2)
+        ({"y0": 1e200, "k": 1e200, "v0": 1e200, "omega": 1.0}, 0.8346268416740731),
         ({"y0": 1e300, "k": 1e300, "v0": 1e-300, "omega": 1e300}, 0.0),
-        ({"v0": 5e-324, "omega": 1e300, "y0": 1e-6}, 0.9428090415820634),  # v~ underflows: static limit at y~ = 1/3
+        # v~ underflows: static limit at y~ = 1/3
+        ({"v0": 5e-324, "omega": 1e300, "y0": 1e-6}, 0.9428090415820634),
         ({"v0": 1e300, "omega": 1e-300}, 1.0),
         # at rest: y~ overflows, or the contact is rigid
         ({"v0": 0.0, "Fz": 1e-300, "k": 1e300, "y0": 1.0}, 0.0),
         ({"v0": 0.0, "k": "rigid"}, 0.0),
     ],
 )
-def test_groups_that_leave_double_precision_have_their_limit(table: Surrogate, inputs: Case, expected: float) -> None:
+def test_groups_that_leave_double_precision_have_their_limit(
+    table: Surrogate, inputs: Case, expected: float
+) -> None:
     found = table.evaluate(**{**CASE, **inputs})
     assert abs(found.mu_ratio - expected) <= found.error_bound / CASE["mu0"] + 1e-15
     assert found.mu_ratio == close(expected, rel=1e-12, abs=1e-280)
@@ -113,12 +131,20 @@ exponent = st.integers(min_value=-60, max_value=60)
 
 @settings(max_examples=300, deadline=None)
 @given(a=exponent, b=exponent, c=exponent, v=st.floats(1e-6, 1e6), y=st.floats(1e-6, 1e6))
-def test_only_the_two_groups_matter(table: Surrogate, a: int, b: int, c: int, v: float, y: float) -> None:
-    """Scaling the inputs by powers of two at constant v~ and y~ does not change mu~, to the last digit."""
+def test_only_the_two_groups_matter(
+    table: Surrogate, a: int, b: int, c: int, v: float, y: float
+) -> None:
+    """Scaling the inputs by powers of two at constant v~ and y~ does not change mu~, to the last
+    digit."""
     plain = table.evaluate(mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=1.0, v0=v)
     length, force, time = 2.0**a, 2.0**b, 2.0**c
     scaled = table.evaluate(
-        mu0=0.5, Fz=2.0 * force, k=force / length, y0=y * length, omega=1.0 / time, v0=v * length / time
+        mu0=0.5,
+        Fz=2.0 * force,
+        k=force / length,
+        y0=y * length,
+        omega=1.0 / time,
+        v0=v * length / time,
     )
     assert (scaled.v_tilde, scaled.y_tilde) == (plain.v_tilde, plain.y_tilde) == (v, y)
     assert (scaled.mu_macro, scaled.source) == (plain.mu_macro, plain.source)
@@ -127,7 +153,7 @@ def test_only_the_two_groups_matter(table: Surrogate, a: int, b: int, c: int, v:
     assert swapped.mu_ratio == plain.mu_ratio
 
 
-# --- illegal values and their messages ---------------------------------------------------------------
+# --- illegal values and their messages ------------------------------------------------------------
 
 BAD = [
     (field, bad) for field in FIELDS for bad in (-1.0, -5e-324, math.nan, math.inf, -math.inf)
@@ -136,8 +162,13 @@ BAD = [
 
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
-def test_illegal_value_is_named_with_field_and_bound(table: Surrogate, field: str, bad: float) -> None:
-    for given_inputs, index in (({**CASE, field: bad}, None), ({**CASE, field: [CASE[field], bad, bad]}, 1)):
+def test_illegal_value_is_named_with_field_and_bound(
+    table: Surrogate, field: str, bad: float
+) -> None:
+    for given_inputs, index in (
+        ({**CASE, field: bad}, None),
+        ({**CASE, field: [CASE[field], bad, bad]}, 1),
+    ):
         with pytest.raises(InputError) as caught:
             table.evaluate(given_inputs, gradient=True, illegal="raise")
         error = caught.value
@@ -151,7 +182,9 @@ def test_illegal_value_is_named_with_field_and_bound(table: Surrogate, field: st
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
 @pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
-def test_an_illegal_value_of_an_array_spoils_its_case(table: Surrogate, field: str, bad: float, asked: Case) -> None:
+def test_an_illegal_value_of_an_array_spoils_its_case(
+    table: Surrogate, field: str, bad: float, asked: Case
+) -> None:
     column = [CASE[field], bad, CASE[field]]
     found = table.evaluate(**{**CASE, field: column}, **asked)
     sound = table.evaluate(**CASE, gradient=True)
@@ -183,7 +216,7 @@ def test_zero_is_legal_only_where_documented(table: Surrogate, field: str) -> No
         assert zero == minus
 
 
-# --- required inputs ----------------------------------------------------------------------------------
+# --- required inputs ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("field", FIELDS)
@@ -209,7 +242,11 @@ def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
     for bad, index in ((x, i) for x in (-2e4, math.nan, math.inf) for i in (None, 1)):
         with pytest.raises(InputError) as caught:
             table.evaluate(**rest, f=[2e4, bad] if index else bad, illegal="raise")
-        assert (caught.value.field, caught.value.index, repr(caught.value.value)) == ("f", index, repr(bad))
+        assert (caught.value.field, caught.value.index, repr(caught.value.value)) == (
+            "f",
+            index,
+            repr(bad),
+        )
 
 
 def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> None:
@@ -235,7 +272,11 @@ def test_rigid_is_given_as_the_word_or_infinity_in_numbers_and_in_arrays(table: 
     elastic = table.evaluate(**CASE)
     mixed = table.evaluate(**{**CASE, "k": [math.inf, CASE["k"], -1.0, math.inf]}, gradient=True)
     assert mixed.source.tolist() == ["rigid", elastic.source, "", "rigid"]
-    assert mixed.mu_macro[[0, 1, 3]].tolist() == [expected.mu_macro, elastic.mu_macro, expected.mu_macro]
+    assert mixed.mu_macro[[0, 1, 3]].tolist() == [
+        expected.mu_macro,
+        elastic.mu_macro,
+        expected.mu_macro,
+    ]
     assert mixed.length_scale[0] == 0.0
     assert mixed.gradient["k"][0] == 0.0
     assert table.evaluate(**{**CASE, "k": "rigid"}).mu_macro == expected.mu_macro
@@ -243,7 +284,9 @@ def test_rigid_is_given_as_the_word_or_infinity_in_numbers_and_in_arrays(table: 
     assert worded.source.tolist() == ["rigid", elastic.source, ""]
 
 
-@pytest.mark.parametrize("gap", [None, math.nan, "", "much", ["rigid", None], ["rigid", ""], [1e6, "much"]])
+@pytest.mark.parametrize(
+    "gap", [None, math.nan, "", "much", ["rigid", None], ["rigid", ""], [1e6, "much"]]
+)
 def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap: Any) -> None:
     told = '^k must be a number > 0 .*"rigid" or math.inf'
     rest = without(CASE, "k", "v0")
@@ -253,7 +296,9 @@ def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap:
         lambda: settling(table, **{**CASE, "k": gap}),
         lambda: friction_law(table, "v0", np.array([1e-3, 1e-2]), {**rest, "k": gap}),
         lambda: solve_for(table, "v0", 0.2, {**rest, "k": gap}),
-        lambda: fit({"v0": [0.01, 0.02], "mu_macro": [0.2, 0.2]}, "mu0", k=gap, **without(rest, "mu0")),
+        lambda: fit(
+            {"v0": [0.01, 0.02], "mu_macro": [0.2, 0.2]}, "mu0", k=gap, **without(rest, "mu0")
+        ),
     ]
     for ask in asked[: 2 if isinstance(gap, list) else None]:
         with pytest.raises(InputError, match=told):
@@ -281,11 +326,23 @@ def test_single_cases_equal_the_array(table: Surrogate, n: int) -> None:
     columns = [log_uniform(rng, *ends, n) for ends in ranges]
     for column in columns[3:]:
         column[:: max(2, n // 7)] = 0.0
-    columns[0][5::50], columns[1][6::50], columns[5][7::50], columns[2][8::50] = -0.3, 0.0, math.nan, math.inf
+    columns[0][5::50], columns[1][6::50], columns[5][7::50], columns[2][8::50] = (
+        -0.3,
+        0.0,
+        math.nan,
+        math.inf,
+    )
     for fixed in (None, 0, 2, 5):
         given: list[Any] = [c[:1].copy() if i == fixed else c for i, c in enumerate(columns)]
         found = table.evaluate(dict(zip(FIELDS, given, strict=True)))
-        macro, mu, bound, source = found.mu_macro, found.mu_ratio, found.error_bound, found.source_code
+        macro, mu, bound, source = (
+            found.mu_macro,
+            found.mu_ratio,
+            found.error_bound,
+            found.source_code,
+        )
         for i in range(0, n, 17):
             case = [float(c[i if c.size == n else 0]) for c in given]
-            np.testing.assert_array_equal(table.evaluate_case(*case), (macro[i], mu[i], bound[i], source[i]))
+            np.testing.assert_array_equal(
+                table.evaluate_case(*case), (macro[i], mu[i], bound[i], source[i])
+            )

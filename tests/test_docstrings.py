@@ -10,7 +10,10 @@ import mumacro
 
 # no module of Python; two that are gone
 LEFT_OUT = {"mumacro.__main__", "mumacro._kernel", "mumacro.jax", "mumacro.torch"}
-MODULES = sorted({"mumacro", *(one.name for one in pkgutil.walk_packages(mumacro.__path__, "mumacro."))} - LEFT_OUT)
+MODULES = sorted(
+    {"mumacro", *(one.name for one in pkgutil.walk_packages(mumacro.__path__, "mumacro."))}
+    - LEFT_OUT
+)
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -21,8 +24,18 @@ def test_examples_of_docstrings_run(name: str) -> None:
 
 
 def test_there_are_examples() -> None:
-    shown = {test.name for name in MODULES for test in doctest.DocTestFinder().find(importlib.import_module(name))
-             if test.examples}  # fmt: skip
-    used = {"answer.Answer", "bundled.bundled_tables", "settling.settling", "fitting.fit", "element.Element"}
+    shown = {
+        test.name
+        for name in MODULES
+        for test in doctest.DocTestFinder().find(importlib.import_module(name))
+        if test.examples
+    }
+    used = {
+        "answer.Answer",
+        "bundled.bundled_tables",
+        "settling.settling",
+        "fitting.fit",
+        "element.Element",
+    }
     used |= {f"surrogate.Surrogate.{name}" for name in ("evaluate", "mu_ratio", "open", "slopes")}
     assert {f"mumacro.{name}" for name in used} <= shown

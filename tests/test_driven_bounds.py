@@ -1,4 +1,5 @@
-"""Oscillation along and of the normal force: every bound covers its error, and none is much wider than that.
+"""Oscillation along and of the normal force: every bound covers its error, and none is much wider
+than that.
 
 The reference is evaluated with more digits, and for a ball with more springs (``extended.py``).
 """
@@ -14,31 +15,46 @@ from tests import extended
 from tests.cases import UNIT, Array, opened, tables
 
 table = tables(1e-7)
-needs_digits = pytest.mark.skipif(not extended.HAS_EXTENDED, reason="numpy.longdouble has the digits of a double here")
+needs_digits = pytest.mark.skipif(
+    not extended.HAS_EXTENDED, reason="numpy.longdouble has the digits of a double here"
+)
 
 #: largest median of bound over error, by row of extended.ROWS
 WIDEST = (400.0, 400.0, 1000.0, 3000.0, 3000.0)
 
 
 def answered(s: Surrogate, v: Array, y: Array, contact: str, direction: str) -> Any:
-    """Values and bounds of the rows of extended.ROWS, (5, 2, n); the power of direction normal is NaN."""
+    """Values and bounds of the rows of extended.ROWS, (5, 2, n); the power of direction normal is
+    NaN."""
     kind: Any = {"contact": contact, "direction": direction}
-    rows = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in extended.ROWS[:3] if direction != "normal"]
+    rows = [
+        np.array(s.quantity(name, v, y, **kind)[:2])
+        for name in extended.ROWS[:3]
+        if direction != "normal"
+    ]
     if direction == "normal":
-        ratio, stick = (np.array(s.quantity(name, v, y, **kind)[:2]) for name in ("mu_ratio", "stick_fraction"))
+        ratio, stick = (
+            np.array(s.quantity(name, v, y, **kind)[:2]) for name in ("mu_ratio", "stick_fraction")
+        )
         rows = [ratio, np.full_like(ratio, np.nan), stick]
-    amplitude, scale = ("Fz_amplitude", 2.0) if direction == "normal" else ("y0", 1.0)  # UNIT has Fz = 2
+    # UNIT has Fz = 2
+    amplitude, scale = ("Fz_amplitude", 2.0) if direction == "normal" else ("y0", 1.0)
     case: Any = {**UNIT, "v0": v, amplitude: scale * y, **kind}
     answer = s.evaluate(**case, gradient=True)
     for name, x in (("v0", v), (amplitude, scale * y)):
-        rows.append(np.array([answer.gradient[name] * x, answer.gradient_bound[name] * x]) / UNIT["mu0"])
+        rows.append(
+            np.array([answer.gradient[name] * x, answer.gradient_bound[name] * x]) / UNIT["mu0"]
+        )
     return np.array(rows)
 
 
 def ordinary(n: int, seed: int, normal: bool = False) -> tuple[Array, Array]:
     """Log-uniform points of those with v~ < y~, some of them close to v~ = y~."""
     rng = np.random.default_rng(seed)
-    v, y = 10.0 ** rng.uniform(-6.0, 4.0, 3 * n), 10.0 ** rng.uniform(-4.0, 0.0 if normal else 4.0, 3 * n)
+    v, y = (
+        10.0 ** rng.uniform(-6.0, 4.0, 3 * n),
+        10.0 ** rng.uniform(-4.0, 0.0 if normal else 4.0, 3 * n),
+    )
     v = np.where(rng.random(v.size) < 0.1, y * (1.0 - 10.0 ** rng.uniform(-12.0, 0.0, v.size)), v)
     below = v < y
     return v[below][:n], y[below][:n]
@@ -51,10 +67,15 @@ def hard(n: int, seed: int) -> tuple[Array, Array]:
     return v[plain], y[plain]
 
 
-def check(s: Surrogate, v: Array, y: Array, contact: str, direction: str, truth: Any, slack: float = 0.0) -> Array:
-    """No error is beyond its bound; returns the medians of bound over error, with the last digit as least error."""
+def check(
+    s: Surrogate, v: Array, y: Array, contact: str, direction: str, truth: Any, slack: float = 0.0
+) -> Array:
+    """No error is beyond its bound; returns the medians of bound over error, with the last digit as
+    least error."""
     medians = []
-    for name, (value, bound), true in zip(extended.ROWS, answered(s, v, y, contact, direction), truth, strict=True):
+    for name, (value, bound), true in zip(
+        extended.ROWS, answered(s, v, y, contact, direction), truth, strict=True
+    ):
         error = np.abs(value.astype(np.longdouble) - true).astype(float)
         legal = ~np.isnan(value)
         beyond = legal & (error > bound * (1.0 + slack) + 5e-324)
@@ -69,7 +90,9 @@ def check(s: Surrogate, v: Array, y: Array, contact: str, direction: str, truth:
 def test_the_bounds_of_a_spring_hold_and_are_not_wide(table: Surrogate, direction: str) -> None:
     normal = direction == "normal"
     v, y = ordinary(2500, 3, normal)
-    assert np.all(check(table, v, y, "spring", direction, extended.spring(v, y, not normal)) < WIDEST)
+    assert np.all(
+        check(table, v, y, "spring", direction, extended.spring(v, y, not normal)) < WIDEST
+    )
     if not normal:
         v, y = hard(400, 4)
         check(table, v, y, "spring", direction, extended.spring(v, y))
@@ -87,18 +110,36 @@ def test_the_bounds_of_a_ball_along_hold_and_are_not_wide(table: Surrogate) -> N
 @needs_digits
 @pytest.mark.slow
 def test_the_bounds_of_a_ball_along_hold_beside_its_corner(table: Surrogate) -> None:
-    """y~ = 1.5 at creeping speeds: mu~ falls within a part of the ball, and the reference needs many panels there."""
+    """y~ = 1.5 at creeping speeds: mu~ falls within a part of the ball, and the reference needs
+    many panels there."""
     rng = np.random.default_rng(7)
     y = 1.5 * (1.0 + rng.choice([-1.0, 1.0], 60) * 10.0 ** rng.uniform(-15.0, -1.0, 60))
     v = y * 10.0 ** rng.uniform(-20.0, -0.5, 60)
     check(table, v, y, "ball", "along", extended.ball(v, y, 10, panels=44), slack=1e-9)
 
 
-# each of these was beyond its bound once: contact, direction, tolerance, quantity, v~, y~, true value
+# each of these was beyond its bound once: contact, direction, tolerance, quantity, v~, y~, true
+# value
 ONCE_MISSED = [
-    ("ball", "across", 1e-10, "mu_ratio", 0.030345455605781824, 1.879170896054554, 0.0863453953187772),
+    (
+        "ball",
+        "across",
+        1e-10,
+        "mu_ratio",
+        0.030345455605781824,
+        1.879170896054554,
+        0.0863453953187772,
+    ),
     ("ball", "across", 1e-12, "power", 0.50276, 1.5, 0.3096576630510784),
-    ("ball", "along", 1e-12, "mu_ratio", 1.0106571086749353e-06, 1.5000030521278915, 7.344914597412166e-07),
+    (
+        "ball",
+        "along",
+        1e-12,
+        "mu_ratio",
+        1.0106571086749353e-06,
+        1.5000030521278915,
+        7.344914597412166e-07,
+    ),
     ("spring", "along", 1e-4, "stick_fraction", 3.133015082036328e-09, 0.5, 0.9999553397339749),
 ]
 
@@ -114,7 +155,9 @@ def test_bounds_that_were_once_exceeded_hold(place: Any) -> None:
 def test_next_to_the_border_the_bounds_reach_over_it(table: Surrogate, contact: str) -> None:
     """The last digits of v~ = y~ decide whether the contact sticks at all."""
     y = 10.0 ** np.random.default_rng(8).uniform(-6.0, 12.0, 300)
-    rows = [answered(table, y * (1.0 + digit * 2.0**-52), y, contact, "along") for digit in range(-3, 4)]
+    rows = [
+        answered(table, y * (1.0 + digit * 2.0**-52), y, contact, "along") for digit in range(-3, 4)
+    ]
     values, bounds = np.array(rows)[:, :, 0], np.array(rows)[:, :, 1]
     step = np.abs(np.diff(values, axis=0))
     assert np.all(step <= bounds[1:] + bounds[:-1])

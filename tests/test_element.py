@@ -16,12 +16,19 @@ CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6}
 
 
 def means(
-    v: Any, y: Any, steps: Any, periods: Any, contact: str = "spring", springs: Any = None, load: Any = None
+    v: Any,
+    y: Any,
+    steps: Any,
+    periods: Any,
+    contact: str = "spring",
+    springs: Any = None,
+    load: Any = None,
 ) -> Any:
     """Mean force along x over the last period, dimensionless, of many contacts at once."""
     contacts = Element(np.ones(v.shape), 1.0, 1.0, contact, springs)
     way = np.diff(np.sin(2.0 * math.pi * np.arange(steps + 1) / steps))
-    total = contacts.step(2.0, 0.0)[0]  # dragged, which is near the steady cycle of slow sliding at small amplitudes
+    # dragged, which is near the steady cycle of slow sliding at small amplitudes
+    total = contacts.step(2.0, 0.0)[0]
     for step in range(periods * steps):
         i = step % steps
         force = None if load is None else load(2.0 * math.pi * (i + 1) / steps)
@@ -29,10 +36,15 @@ def means(
     return total / steps
 
 
-def test_the_mean_is_the_tables_with_an_error_in_proportion_to_the_step(surrogate: Surrogate) -> None:
+def test_the_mean_is_the_tables_with_an_error_in_proportion_to_the_step(
+    surrogate: Surrogate,
+) -> None:
     """Border, corner, slow and fast, small and large amplitudes."""
     crit = surrogate.v_tilde_crit(np.array([0.1, 0.5, 1.0, 3.0]))
-    v, y = (x.ravel() for x in np.meshgrid([0.05, 0.2, 1.0, 5.0], [0.1, 0.5, 0.999, 1.0, 1.001, 1.1, 3.0, 30.0]))
+    v, y = (
+        x.ravel()
+        for x in np.meshgrid([0.05, 0.2, 1.0, 5.0], [0.1, 0.5, 0.999, 1.0, 1.001, 1.1, 3.0, 30.0])
+    )
     v, y = np.append(v, crit * [1.0, 0.99, 1.01, 1.0]), np.append(y, [0.1, 0.5, 1.0, 3.0])
     errors = [means(v, y, n, 25) - surrogate.mu_ratio(v, y) for n in (400, 800)]
     assert np.abs(errors[1]).max() < 1.3e-3
@@ -83,7 +95,8 @@ def test_an_open_contact_has_no_force_and_forgets() -> None:
 
 @pytest.mark.parametrize("contact", ["spring", "ball"])
 def test_the_play_operator_has_its_properties(contact: str) -> None:
-    """No force beyond the limit; friction dissipates; turned motion turns the force; two states only approach."""
+    """No force beyond the limit; friction dissipates; turned motion turns the force; two states
+    only approach."""
     rng = np.random.default_rng(3)
     first, second, turned = (Element(1.0, 1.0, 1.0, contact) for _ in range(3))
     second.step(0.7, -0.2)
@@ -105,7 +118,10 @@ def test_the_play_operator_has_its_properties(contact: str) -> None:
 def test_arrays_are_the_single_contacts() -> None:
     k = np.array([[1e6], [3e6]])
     many = Element(0.3, [10.0, 20.0, 30.0], k, contact="ball", springs=5)
-    single = [[Element(0.3, Fz, float(one), contact="ball", springs=5) for Fz in (10.0, 20.0, 30.0)] for one in k[:, 0]]
+    single = [
+        [Element(0.3, Fz, float(one), contact="ball", springs=5) for Fz in (10.0, 20.0, 30.0)]
+        for one in k[:, 0]
+    ]
     for dx, dy in ((1e-6, 2e-6), (5e-6, 0.0), (-3e-6, 1e-6)):
         found = many.step(dx, [[dy], [2.0 * dy]])
         for i in range(2):
@@ -139,28 +155,61 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
             x, y = contact.step(dx, dy)
             assert math.isfinite(x)
             assert math.hypot(x, y) <= 3.0 * (1.0 + 1e-15)
-    assert Element(0.3, 10.0, 1.0).step(1e-310, 1e-310) == (1e-310, 1e-310)  # whose squares are below it, too
+    # whose squares are below it, too
+    assert Element(0.3, 10.0, 1.0).step(1e-310, 1e-310) == (1e-310, 1e-310)
     assert Element(1e-300, 1e-300, 1.0).step(1.0, 1.0) == (0.0, 0.0)  # mu0 Fz is below double range
 
 
 @pytest.mark.parametrize(
     ("call", "said"),
-    [(lambda: Element(0.3, 10.0, 1e6, contact="cube"), "contact must be one of spring, ball"),
-     (lambda: Element(0.3, 10.0, 1e6, springs=2), "springs must be a whole number from 1 to 1 for contact='spring'"),
-     (lambda: Element(0.3, 10.0, 1e6, "ball", springs=0), "springs must be a whole number from 1 to 100000"),
-     (lambda: Element(0.0, 10.0, 1e6), "mu0 must be finite and > 0, got 0.0"),
-     (lambda: Element(0.3, [10.0, math.nan], 1e6), "Fz at index 1 must be finite and > 0, got nan"),
-     (lambda: Element(0.3, 10.0, math.inf), "k must be finite: a rigid contact"),
-     (lambda: Element(1e200, 1e200, 1.0), "Fz at index 0 must be finite and >= 0, with mu0 Fz below"),
-     (lambda: Element([0.3, 0.2], [1.0, 2.0, 3.0], 1.0), "inputs must be arrays whose shapes broadcast"),
-     (lambda: Element(0.3, 10.0, 1e6).step(math.nan, 0.0), "dx must be finite, got nan"),
-     (lambda: Element(0.3, 10.0, 1e6).step(0.0, "1um"), "dy must be a real number"),
-     (lambda: Element(0.3, 10.0, 1e6).step([1.0, 2.0], 0.0), "dx must be of a shape that broadcasts"),
-     (lambda: Element(0.3, 10.0, 1e6, "ball").step(0.0, 0.0, Fz=1.0), "Fz must be left out for a ball"),
-     (lambda: Element(0.3, 10.0, 1e6).step(0.0, 0.0, Fz=-1.0), "Fz at index 0 must be finite and >= 0"),
-     (lambda: setattr(Element(0.3, 10.0, 1e6), "state", [1.0, 2.0]), "state must be of the shape"),
-     (lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[math.inf, 0.0]]), "state must be finite")],
-)  # fmt: skip
+    [
+        (lambda: Element(0.3, 10.0, 1e6, contact="cube"), "contact must be one of spring, ball"),
+        (
+            lambda: Element(0.3, 10.0, 1e6, springs=2),
+            "springs must be a whole number from 1 to 1 for contact='spring'",
+        ),
+        (
+            lambda: Element(0.3, 10.0, 1e6, "ball", springs=0),
+            "springs must be a whole number from 1 to 100000",
+        ),
+        (lambda: Element(0.0, 10.0, 1e6), "mu0 must be finite and > 0, got 0.0"),
+        (
+            lambda: Element(0.3, [10.0, math.nan], 1e6),
+            "Fz at index 1 must be finite and > 0, got nan",
+        ),
+        (lambda: Element(0.3, 10.0, math.inf), "k must be finite: a rigid contact"),
+        (
+            lambda: Element(1e200, 1e200, 1.0),
+            "Fz at index 0 must be finite and >= 0, with mu0 Fz below",
+        ),
+        (
+            lambda: Element([0.3, 0.2], [1.0, 2.0, 3.0], 1.0),
+            "inputs must be arrays whose shapes broadcast",
+        ),
+        (lambda: Element(0.3, 10.0, 1e6).step(math.nan, 0.0), "dx must be finite, got nan"),
+        (lambda: Element(0.3, 10.0, 1e6).step(0.0, "1um"), "dy must be a real number"),
+        (
+            lambda: Element(0.3, 10.0, 1e6).step([1.0, 2.0], 0.0),
+            "dx must be of a shape that broadcasts",
+        ),
+        (
+            lambda: Element(0.3, 10.0, 1e6, "ball").step(0.0, 0.0, Fz=1.0),
+            "Fz must be left out for a ball",
+        ),
+        (
+            lambda: Element(0.3, 10.0, 1e6).step(0.0, 0.0, Fz=-1.0),
+            "Fz at index 0 must be finite and >= 0",
+        ),
+        (
+            lambda: setattr(Element(0.3, 10.0, 1e6), "state", [1.0, 2.0]),
+            "state must be of the shape",
+        ),
+        (
+            lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[math.inf, 0.0]]),
+            "state must be finite",
+        ),
+    ],
+)
 def test_bad_input_is_named_and_moves_nothing(call: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         call()

@@ -26,7 +26,12 @@ pytestmark = pytest.mark.slow
 def run(repository: Path, *command: Any) -> Any:
     environment = {**os.environ, "PYTHONPATH": str(repository), "OPENMDAO_REPORTS": "0"}
     done = subprocess.run(
-        [str(word) for word in command], cwd=repository, env=environment, capture_output=True, text=True, check=False
+        [str(word) for word in command],
+        cwd=repository,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -47,7 +52,11 @@ def number(pattern: Any, text: str) -> Any:
 
 
 def test_every_example_is_listed_and_tested(repository: Path) -> None:
-    there = {path.name for path in (repository / "examples").iterdir() if not path.name.startswith(("_", "."))}
+    there = {
+        path.name
+        for path in (repository / "examples").iterdir()
+        if not path.name.startswith(("_", "."))
+    }
     readme = (repository / "examples" / "README.md").read_text("utf-8")
     tests = "".join(path.read_text("utf-8") for path in (repository / "tests").glob("*.py"))
     untested = {"README.md", "demo.py"}  # to be read, or run by a person
@@ -74,13 +83,17 @@ def test_python(repository: Path, live_server: Any, surrogate: Surrogate) -> Non
         surrogate.evaluate(**CASE).mu_macro, abs=1e-6
     )
     for v0, mu in re.findall(r"v0 =\s+([\d.]+) m/s: mu_macro = ([\d.]+)", text):
-        assert float(mu) == close(surrogate.evaluate(**{**CASE, "v0": float(v0)}).mu_macro, abs=1e-6)
+        assert float(mu) == close(
+            surrogate.evaluate(**{**CASE, "v0": float(v0)}).mu_macro, abs=1e-6
+        )
     for target, y0 in re.findall(r"mu_macro = ([\d.]+) needs y0 = ([\d.]+) um", text):
         answer = surrogate.evaluate(**{**CASE, "y0": 1e-6 * float(y0)})
         assert answer.mu_macro == close(float(target), abs=2e-5)
 
 
-def test_the_spreadsheets_addresses(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
+def test_the_spreadsheets_addresses(
+    repository: Path, live_server: Any, surrogate: Surrogate
+) -> None:
     text = (repository / "examples" / "spreadsheet.md").read_text("utf-8")
     addresses = re.findall(r"^ {4}(http://127\.0\.0\.1:8000/\S+)$", text, re.MULTILINE)
     joined = re.search(r'address = "([^"]+)" & y0', text)
@@ -88,7 +101,9 @@ def test_the_spreadsheets_addresses(repository: Path, live_server: Any, surrogat
     addresses.append(joined[1] + "2E-06")
     assert len(addresses) == 3
     for address in addresses:
-        with urllib.request.urlopen(address.replace("http://127.0.0.1:8000", live_server.url), timeout=60) as response:
+        with urllib.request.urlopen(
+            address.replace("http://127.0.0.1:8000", live_server.url), timeout=60
+        ) as response:
             header, *rows = csv.reader(io.StringIO(response.read().decode()))
         assert len(rows) == 50
         along = header[0].split(" ")[0]
@@ -108,22 +123,35 @@ def test_the_spreadsheets_addresses(repository: Path, live_server: Any, surrogat
 def test_octave(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
     need("octave-cli")
     text = run(repository, "octave-cli", "--norc", "examples/octave.m", live_server.url)
-    assert number(r"mu_macro = ([\d.]+), stick_slip", text) == close(surrogate.evaluate(**CASE).mu_macro, abs=1e-6)
+    assert number(r"mu_macro = ([\d.]+), stick_slip", text) == close(
+        surrogate.evaluate(**CASE).mu_macro, abs=1e-6
+    )
     for pattern, v0 in ((r"from ([\d.]+) at 0.0001 m/s", 1e-4), (r"to ([\d.]+) at 10 m/s", 10.0)):
-        assert number(pattern, text) == close(surrogate.evaluate(**{**CASE, "v0": v0}).mu_macro, abs=1e-6)
+        assert number(pattern, text) == close(
+            surrogate.evaluate(**{**CASE, "v0": v0}).mu_macro, abs=1e-6
+        )
     assert 0.02 < number(r"steepest near ([\d.]+) m/s", text) < 0.04
 
 
-def test_the_umbridge_server_answers_as_the_library_and_outlives_an_error(bridge: Any, surrogate: Surrogate) -> None:
-    model, point = importlib.import_module("umbridge").HTTPModel(bridge, "mu_macro"), list(CASE.values())
+def test_the_umbridge_server_answers_as_the_library_and_outlives_an_error(
+    bridge: Any, surrogate: Surrogate
+) -> None:
+    model, point = (
+        importlib.import_module("umbridge").HTTPModel(bridge, "mu_macro"),
+        list(CASE.values()),
+    )
     expected = surrogate.evaluate(CASE, gradient=True)
     slopes = [expected.gradient[name] for name in CASE]
     with pytest.raises(Exception, match=r"."):
         model([[-0.3, *point[1:]]])
     assert (model.get_input_sizes(), model.get_output_sizes()) == ([6], [1])
     assert model([point])[0] == close([expected.mu_macro], rel=1e-13)
-    assert model.gradient(0, 0, [point], [2.0]) == close([2.0 * slope for slope in slopes], rel=1e-13)
-    assert model.apply_jacobian(0, 0, [point], [0.0, 0.0, 0.0, 0.0, 0.0, 3.0]) == close([3.0 * slopes[5]], rel=1e-13)
+    assert model.gradient(0, 0, [point], [2.0]) == close(
+        [2.0 * slope for slope in slopes], rel=1e-13
+    )
+    assert model.apply_jacobian(0, 0, [point], [0.0, 0.0, 0.0, 0.0, 0.0, 3.0]) == close(
+        [3.0 * slopes[5]], rel=1e-13
+    )
 
 
 def test_uncertainty(repository: Path, bridge: Any, surrogate: Surrogate) -> None:
@@ -133,7 +161,10 @@ def test_uncertainty(repository: Path, bridge: Any, surrogate: Surrogate) -> Non
     first_order = number(r"first order: standard deviation ([\d.]+)", text)
     gradient = surrogate.evaluate(**CASE, gradient=True).gradient
     spreads = {"mu0": 1.03, "Fz": 1.02, "y0": 1.05}
-    expected = sum((gradient[name] * CASE[name] * np.log(spread)) ** 2 for name, spread in spreads.items()) ** 0.5
+    expected = (
+        sum((gradient[name] * CASE[name] * np.log(spread)) ** 2 for name, spread in spreads.items())
+        ** 0.5
+    )
     assert first_order == close(expected, abs=1e-5)
     assert sampled == close(first_order, rel=0.02)
 

@@ -1,4 +1,5 @@
-"""``python -m builder export``: every format read back by its program: the same numbers, the same bytes."""
+"""``python -m builder export``: every format read back by its program: the same numbers, the same
+bytes."""
 
 import csv
 import json
@@ -42,7 +43,10 @@ def test_the_grid_as_csv_has_a_row_a_node_with_all_digits(table: Table, written:
         header, *rows = csv.reader(stream)
     assert header == ["v_tilde", "y_tilde", *PLANES, "v_tilde_crit"]
     columns = dict(zip(header, zip(*rows, strict=True), strict=True))
-    found = {name: np.asarray(column, dtype=float).reshape(table.mu_ratio.shape) for name, column in columns.items()}
+    found = {
+        name: np.asarray(column, dtype=float).reshape(table.mu_ratio.shape)
+        for name, column in columns.items()
+    }
     for name in PLANES:
         assert np.array_equal(found[name], getattr(table, name)), name
     assert np.array_equal(found["v_tilde"][:, 0], table.v_tilde)
@@ -53,19 +57,24 @@ def test_the_grid_as_csv_has_a_row_a_node_with_all_digits(table: Table, written:
 @pytest.mark.parametrize("kind", FORMATS)
 def test_the_same_table_gives_the_same_bytes(written: Any, tmp_path: Path, kind: Any) -> None:
     export_table(PATH, kind, tmp_path / "again.h")
-    assert (tmp_path / "again.h").read_bytes() == (written / FORMATS[kind][0].format("grid")).read_bytes()
+    assert (tmp_path / "again.h").read_bytes() == (
+        written / FORMATS[kind][0].format("grid")
+    ).read_bytes()
     assert [entry.name for entry in tmp_path.iterdir()] == ["again.h"]
 
 
 def test_c_in_three_files_is_written_twice_alike(tmp_path: Path) -> None:
     for folder in ("one", "two", "two"):
         export_table(PATH, "c", tmp_path / folder)
-    one, two = ({file.name: file.read_bytes() for file in (tmp_path / name).iterdir()} for name in ("one", "two"))
+    one, two = (
+        {file.name: file.read_bytes() for file in (tmp_path / name).iterdir()}
+        for name in ("one", "two")
+    )
     assert set(one) == {"mumacro.h", "mumacro.c", "mumacro_table.c"}
     assert one == two
 
 
-# --- the command, what is refused -----------------------------------------------------------------------
+# --- the command, what is refused -----------------------------------------------------------------
 
 
 def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
@@ -74,19 +83,34 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
     monkeypatch.chdir(tmp_path)
     assert main(["export", str(PATH), "--format", "csv"]) == 0
     assert json.loads(capsys.readouterr().out) == {
-        "table": str(PATH), "format": "csv", "out": "mumacro-1e-10.csv", "shape": list(table.mu_ratio.shape)
-    }  # fmt: skip
+        "table": str(PATH),
+        "format": "csv",
+        "out": "mumacro-1e-10.csv",
+        "shape": list(table.mu_ratio.shape),
+    }
     assert (tmp_path / "mumacro-1e-10.csv").stat().st_size > 1e5
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
-    [(["pyproject.toml", "--format", "csv"], 1, "pyproject.toml"), (["x.nc", "--format", "xls"], 2, "--format"),
-     *((["x.nc", "--format", kind], 2, f"--format {kind!r} is gone: use {GONE[kind]}") for kind in GONE),
-     (["x.nc"], 2, "--format"), ([str(PATH), "--format", "csv", "--out", "."], 2, "--out")],
-)  # fmt: skip
+    [
+        (["pyproject.toml", "--format", "csv"], 1, "pyproject.toml"),
+        (["x.nc", "--format", "xls"], 2, "--format"),
+        *(
+            (["x.nc", "--format", kind], 2, f"--format {kind!r} is gone: use {GONE[kind]}")
+            for kind in GONE
+        ),
+        (["x.nc"], 2, "--format"),
+        ([str(PATH), "--format", "csv", "--out", "."], 2, "--out"),
+    ],
+)
 def test_what_the_command_cannot_export_is_reported_in_one_line(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Capture, arguments: Any, code: Any, said: Any
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: Capture,
+    arguments: Any,
+    code: Any,
+    said: Any,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(PATH.parent.parent / "pyproject.toml", tmp_path)

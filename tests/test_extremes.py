@@ -14,12 +14,22 @@ from tests.comparing import close
 
 @pytest.mark.parametrize(
     ("v_range", "y_range"),
-    [(V_RANGE, Y_RANGE), ((1e-60, 1e-40), (1e-3, 1e6)), ((1e-60, 1e-12), (1e-15, 1e8)), ((1e-8, 1e10), (1e8, 1e14)),
-     ((1e-30, 1e-10), (1e-15, 1e-4)), ((1e6, 1e10), (1e-10, 1e14))],
-)  # fmt: skip
-def test_the_whole_range_is_solved(v_range: tuple[float, float], y_range: tuple[float, float]) -> None:
+    [
+        (V_RANGE, Y_RANGE),
+        ((1e-60, 1e-40), (1e-3, 1e6)),
+        ((1e-60, 1e-12), (1e-15, 1e8)),
+        ((1e-8, 1e10), (1e8, 1e14)),
+        ((1e-30, 1e-10), (1e-15, 1e-4)),
+        ((1e6, 1e10), (1e-10, 1e14)),
+    ],
+)
+def test_the_whole_range_is_solved(
+    v_range: tuple[float, float], y_range: tuple[float, float]
+) -> None:
     rng = np.random.default_rng(3)
-    for v, y in zip(log_uniform(rng, *v_range, 1000), log_uniform(rng, *y_range, 1000), strict=True):
+    for v, y in zip(
+        log_uniform(rng, *v_range, 1000), log_uniform(rng, *y_range, 1000), strict=True
+    ):
         found = solve(v, y)
         assert found.ok, (v, y)
         assert 0.0 < found.mu_ratio <= 1.0
@@ -31,7 +41,7 @@ def test_the_whole_range_is_solved(v_range: tuple[float, float], y_range: tuple[
         assert found.error_estimate < 2e-15
 
 
-# --- creep --------------------------------------------------------------------------------------------
+# --- creep ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("y", [1.001, 1.2, 2.0, 10.0, 1.4e5, 1e13])
@@ -72,13 +82,15 @@ def test_the_corner_at_any_speed_is_the_normal_form(eta: float) -> None:
     for v in (10.0**exponent for exponent in range(-30, -61, -3)):
         found = solve(v, 1.0, eta)
         mu = found.mu_ratio
-        assert mu * mu * mu + 2.0 * eta * mu == close(math.pi * v, rel=1e-9, abs=1e-14 * (mu**3 + abs(eta * mu)))
+        assert mu * mu * mu + 2.0 * eta * mu == close(
+            math.pi * v, rel=1e-9, abs=1e-14 * (mu**3 + abs(eta * mu))
+        )
         assert 0.0 <= found.stick_fraction <= 1.0
         assert found.power > 0.0
     assert solve(1e-60, 1.0).mu_ratio == close((math.pi * 1e-60) ** (1.0 / 3.0), rel=4e-15)
 
 
-# --- the power ----------------------------------------------------------------------------------------
+# --- the power ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("share", [1e-6, 0.1, 0.9, 1.1, 10.0, 1e3])
@@ -109,7 +121,7 @@ def test_the_table_continues_the_solver_down_to_any_amplitude(share: float, y: f
     assert abs(power / y**4 - solved.power / at**4) <= power_bound / y**4 + 1e-13 * power / y**4
 
 
-# --- large amplitudes and speeds ----------------------------------------------------------------------
+# --- large amplitudes and speeds ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("x", [1e-30, 1e-3, 0.1, 0.45, 0.5, 2.0, 50.0, 900.0])
@@ -140,7 +152,7 @@ def test_the_smallest_slip_speed_is_seen_in_stiff_steps() -> None:
         assert solve(v, y).min_slip_speed == close(v, rel=5e-3)
 
 
-# --- monotony -----------------------------------------------------------------------------------------
+# --- monotony -------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -149,20 +161,27 @@ def test_the_smallest_slip_speed_is_seen_in_stiff_steps() -> None:
     [*(("v", y) for y in (1e-15, 1e-12, 0.5, 1.0, 1.3, 1e5, 1e14)),
      *(("y", v) for v in (1e-60, 1e-40, 1e-18, 1e-3, 1.0, 1e5, 1e10))],
 )  # fmt: skip
-def test_mu_rises_with_speed_and_falls_with_amplitude_everywhere(along: str, fixed: float, sweep: Sweep) -> None:
-    moving, still = np.geomspace(*(V_RANGE if along == "v" else Y_RANGE), 3000), np.full(3000, fixed)
+def test_mu_rises_with_speed_and_falls_with_amplitude_everywhere(
+    along: str, fixed: float, sweep: Sweep
+) -> None:
+    moving, still = (
+        np.geomspace(*(V_RANGE if along == "v" else Y_RANGE), 3000),
+        np.full(3000, fixed),
+    )
     solved = sweep.solve("full", *((moving, still) if along == "v" else (still, moving)))
     for name, sign in (("mu_ratio", 1.0), ("deficit", -1.0)):
         rise = (sign if along == "v" else -sign) * np.diff(solved[name])
         assert np.all(rise >= -RELATIVE_ERROR * solved[name][1:]), name
 
 
-# --- the error estimate -------------------------------------------------------------------------------
+# --- the error estimate ---------------------------------------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("limits", [(-3.0, 3.0), (-12.0, 8.0), (-59.9, -12.0), (-59.9, 9.9)])
-def test_error_estimate_covers_neighbouring_doubles(limits: tuple[float, float], sweep: Sweep) -> None:
+def test_error_estimate_covers_neighbouring_doubles(
+    limits: tuple[float, float], sweep: Sweep
+) -> None:
     rng = np.random.default_rng(8)
     v = 10.0 ** rng.uniform(*limits, 800)
     y = 10.0 ** rng.uniform(*(limits if limits[0] > -50.0 else (-3.0, 14.0)), 800)

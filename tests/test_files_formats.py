@@ -1,4 +1,5 @@
-"""``mumacro eval``: what comes in, in which form, what comes out, and which rows are rejected with which reason."""
+"""``mumacro eval``: what comes in, in which form, what comes out, and which rows are rejected with
+which reason."""
 
 import csv
 import decimal
@@ -39,11 +40,15 @@ def cases(n: int, seed: int = 1) -> Any:
 
 
 def write(given: Any, path: Any) -> Any:
-    """Cases in the format of the name; an infinite k is the word rigid, where the format has no infinity."""
+    """Cases in the format of the name; an infinite k is the word rigid, where the format has no
+    infinity."""
     if path.suffix == ".parquet":
         pq.write_table(given, path, row_group_size=100)
         return path
-    rows = [{name: "rigid" if x == math.inf else x for name, x in row.items()} for row in given.to_pylist()]
+    rows = [
+        {name: "rigid" if x == math.inf else x for name, x in row.items()}
+        for row in given.to_pylist()
+    ]
     data = (as_csv if ".csv" in path.name else as_ndjson)(rows).encode()
     path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else data)
     return path
@@ -76,7 +81,9 @@ def ran(capsys: Capture, code: Any, *words: Any) -> Any:
 
 @pytest.mark.parametrize("start", KINDS)
 @pytest.mark.parametrize("end", KINDS)
-def test_every_format_goes_into_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: Any, end: Any) -> None:
+def test_every_format_goes_into_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: Any, end: Any
+) -> None:
     monkeypatch.setattr(reading, "ROWS", 70)  # several blocks
     given = cases(300)
     source, out = write(given, tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
@@ -88,19 +95,24 @@ def test_every_format_goes_into_all(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert list(found[0]) == [*NAMES, *ANSWERS]
     for name in (*NAMES, "mu_macro", "mu_ratio", "error_bound"):
         wanted = columns[name] if name in NAMES else getattr(expected, name)
-        assert [math.inf if row[name] == "rigid" else float(row[name]) for row in found] == wanted.tolist()
+        assert [
+            math.inf if row[name] == "rigid" else float(row[name]) for row in found
+        ] == wanted.tolist()
     for name in ("source", "regime"):
         assert [row[name] for row in found] == getattr(expected, name).tolist()
 
 
 def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path: Path) -> None:
     others = {
-        "i32": pa.array(range(300), pa.int32()), "f32": pa.array([0.1, math.nan, -math.inf] * 100, pa.float32()),
+        "i32": pa.array(range(300), pa.int32()),
+        "f32": pa.array([0.1, math.nan, -math.inf] * 100, pa.float32()),
         "ns": pa.array([10**18 + i for i in range(300)], pa.timestamp("ns", "UTC")),
-        "words": pa.array(["a", 'b"', None] * 100).dictionary_encode(), "text": pa.array(["µ,\n\\"] * 300),
-        "money": pa.array([decimal.Decimal("1.10")] * 300), "list": pa.array([[1, 2]] * 300),
+        "words": pa.array(["a", 'b"', None] * 100).dictionary_encode(),
+        "text": pa.array(["µ,\n\\"] * 300),
+        "money": pa.array([decimal.Decimal("1.10")] * 300),
+        "list": pa.array([[1, 2]] * 300),
         "flag": pa.array([True, None] * 150),
-    }  # fmt: skip
+    }
     given = cases(300)
     for name, values in others.items():
         given = given.append_column(name, values)
@@ -120,29 +132,46 @@ def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path: Pat
 
 
 def test_text_comes_out_as_it_came_in(tmp_path: Path) -> None:
-    lines = ['{"mu0":0.30,"Fz":10,"k":1000000,"y0":2e-6,"omega":130000,"v0":1E-2,"id":12345678901234567890, "b":[1] }',
-             '{"v0":0.01,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}']  # fmt: skip
+    lines = [
+        '{"mu0":0.30,"Fz":10,"k":1000000,"y0":2e-6,"omega":130000,'
+        '"v0":1E-2,"id":12345678901234567890, "b":[1] }',
+        '{"v0":0.01,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}',
+    ]
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
     evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", TABLE)
     for line, given in zip((tmp_path / "out.ndjson").read_text().splitlines(), lines, strict=True):
         assert line.startswith(given.rstrip("} "))
         json.loads(line)
     evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.csv", TABLE)
-    assert [(row["id"], row["b"]) for row in read(tmp_path / "out.csv")] == [("12345678901234567890", "[1]"), ("", "")]
-    text = f'name,{HEADER}\r\n"say ""so"",\nand more",{GOOD}\r\n007,{GOOD}\r\n5" pipe,{GOOD}\n,{GOOD}'
+    assert [(row["id"], row["b"]) for row in read(tmp_path / "out.csv")] == [
+        ("12345678901234567890", "[1]"),
+        ("", ""),
+    ]
+    text = (
+        f'name,{HEADER}\r\n"say ""so"",\nand more",{GOOD}\r\n007,{GOOD}\r\n5" pipe,{GOOD}\n,{GOOD}'
+    )
     (tmp_path / "cases.csv").write_bytes(text.encode())
     for kind in ("csv", "parquet", "ndjson"):
         evaluate_files([tmp_path / "cases.csv"], tmp_path / f"o.{kind}", TABLE)
         found = read(tmp_path / f"o.{kind}")
         assert [row["name"] for row in found] == ['say "so",\nand more', "007", '5" pipe', ""]
-    assert (tmp_path / "o.csv").read_bytes().startswith(text.replace("\r", "").encode()[: len(HEADER) + 5])
+    assert (
+        (tmp_path / "o.csv")
+        .read_bytes()
+        .startswith(text.replace("\r", "").encode()[: len(HEADER) + 5])
+    )
 
 
-GERMAN = 'name;mu0;Fz;k [N/mm];y0 [µm];f [kHz];v0\n"a;b";0,3;10;1,5e3;0,2;20;0,005\nc;0.3;10;rigid;0,2;20;0,005\n'
+GERMAN = (
+    "name;mu0;Fz;k [N/mm];y0 [µm];f "
+    '[kHz];v0\n"a;b";0,3;10;1,5e3;0,2;20;0,005\nc;0.3;10;rigid;0,2;20;0,005\n'
+)
 
 
 @pytest.mark.parametrize("text", [GERMAN, "\ufeff" + GERMAN.replace("\n", "\r\n")])
-def test_a_german_file_is_recognised_and_read_with_its_options(tmp_path: Path, capsys: Capture, text: str) -> None:
+def test_a_german_file_is_recognised_and_read_with_its_options(
+    tmp_path: Path, capsys: Capture, text: str
+) -> None:
     (tmp_path / "cases.csv").write_bytes(text.encode())
     out, words = tmp_path / "out.csv", [tmp_path / "cases.csv", "-o", tmp_path / "out.csv"]
     assert "give --sep ';' --decimal ','" in ran(capsys, 1, *words)
@@ -152,7 +181,8 @@ def test_a_german_file_is_recognised_and_read_with_its_options(tmp_path: Path, c
     assert out.read_bytes().splitlines()[1].startswith(text.splitlines()[1].encode())
     assert "," in row["mu_macro"]
     assert 0.0 < float(row["mu_macro"].replace(",", ".")) < 0.3
-    assert rejects_of(out) == [(2, "mu0", "must be a number such as 0,5")]  # 0.3 may be meant for 03
+    # 0.3 may be meant for 03
+    assert rejects_of(out) == [(2, "mu0", "must be a number such as 0,5")]
     (tmp_path / "cases.csv").write_text(f"{HEADER}\n{GOOD}\n".replace(",", "\t"))
     assert "--sep 'tab' --decimal '.'" in ran(capsys, 1, *words)
     assert "both ','" in ran(capsys, 1, *words, "--decimal", ",")
@@ -160,14 +190,21 @@ def test_a_german_file_is_recognised_and_read_with_its_options(tmp_path: Path, c
 
 
 @pytest.mark.parametrize("kind", ["csv", "ndjson", "csv.gz", "parquet"])
-def test_standard_input_output(tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, kind: Any) -> None:
+def test_standard_input_output(
+    tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
+) -> None:
     bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
-    source, wanted = write(bad, tmp_path / f"cases.{kind}"), tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv")
+    source, wanted = (
+        write(bad, tmp_path / f"cases.{kind}"),
+        tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv"),
+    )
     rejects = evaluate_files([source], wanted, TABLE).rejects
     assert rejects
     with source.open("rb") as stream:
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(stream))
-        monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written := io.BytesIO(), write_through=True))
+        monkeypatch.setattr(
+            sys, "stdout", io.TextIOWrapper(written := io.BytesIO(), write_through=True)
+        )
         assert main(["eval", "-", "-o", "-"]) == 3
         assert written.getvalue() == wanted.read_bytes()
     assert capfdbinary.readouterr().err.startswith(rejects.read_bytes() + b"49 of 50 rows")
@@ -178,44 +215,98 @@ def with_k(cell: Any) -> Any:
 
 
 @pytest.mark.parametrize("end", ["csv", "parquet", "ndjson"])
-def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(tmp_path: Path, capsys: Capture, end: Any) -> None:
-    rows = [GOOD, "-" + GOOD, "x" + GOOD, GOOD[:-4], GOOD[:-5], GOOD + ",7", with_k(""), with_k("Rigid"), "",
-            with_k("inf"), with_k("nan"), with_k("1e400"), GOOD.replace("1.3e5", "inf"), GOOD]  # fmt: skip
+def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
+    tmp_path: Path, capsys: Capture, end: Any
+) -> None:
+    rows = [
+        GOOD,
+        "-" + GOOD,
+        "x" + GOOD,
+        GOOD[:-4],
+        GOOD[:-5],
+        GOOD + ",7",
+        with_k(""),
+        with_k("Rigid"),
+        "",
+        with_k("inf"),
+        with_k("nan"),
+        with_k("1e400"),
+        GOOD.replace("1.3e5", "inf"),
+        GOOD,
+    ]
     (tmp_path / "cases.csv").write_text("\n".join([HEADER, *rows]))
     out = tmp_path / f"out.{end}"
     assert "4 of 13 rows evaluated" in ran(capsys, 3, tmp_path / "cases.csv", "-o", out)
-    assert [row["source"] for row in read(out)] == ["stick_slip_low", "rigid", "rigid", "stick_slip_low"]
+    assert [row["source"] for row in read(out)] == [
+        "stick_slip_low",
+        "rigid",
+        "rigid",
+        "stick_slip_low",
+    ]
     if end == "parquet":
         assert [row["k"] for row in read(out)] == [1e6, math.inf, math.inf, 1e6]
     assert rejects_of(out) == [
-        (2, "mu0", "must be finite and > 0"), (3, "mu0", "must be a number"), (4, "v0", "is missing"),
-        (5, "", "has 5 cells, the header has 6"), (6, "", "has 7 cells, the header has 6"), (7, "k", MISSING_K),
-        (10, "k", MISSING_K), (11, "k", "is beyond double range"), (12, "omega", "must be finite and >= 0"),
-    ]  # fmt: skip
+        (2, "mu0", "must be finite and > 0"),
+        (3, "mu0", "must be a number"),
+        (4, "v0", "is missing"),
+        (5, "", "has 5 cells, the header has 6"),
+        (6, "", "has 7 cells, the header has 6"),
+        (7, "k", MISSING_K),
+        (10, "k", MISSING_K),
+        (11, "k", "is beyond double range"),
+        (12, "omega", "must be finite and >= 0"),
+    ]
 
 
 @pytest.mark.parametrize("end", ["ndjson", "parquet"])
-def test_bad_lines_of_ndjson_land_in_the_side_file(tmp_path: Path, capsys: Capture, end: Any) -> None:
+def test_bad_lines_of_ndjson_land_in_the_side_file(
+    tmp_path: Path, capsys: Capture, end: Any
+) -> None:
     without_k = {name: value for name, value in CASE.items() if name != "k"}
-    lines = [json.dumps(line) if isinstance(line, dict) else line for line in (
-        {**CASE, "tag": "a"}, "", {**CASE, "k": None}, "[1]", "{", "null", {**CASE, "v0": True},
-        {**CASE, "Fz": 10**400}, json.dumps(CASE).replace("1000000.0", "1e400"), '{"mu0": 0.3}', {**CASE, "k": "rigid"},
-        without_k, {**CASE, "v0": None}, '{"mu0": 0.3, "mu0": 0.4}', {**CASE, "k": math.nan}, CASE,
-        json.dumps(CASE) * 2, '{"tag": "\\ud800"}', {**CASE, "tag": None, "v0": 1},
-    )]  # fmt: skip
+    lines = [
+        json.dumps(line) if isinstance(line, dict) else line
+        for line in (
+            {**CASE, "tag": "a"},
+            "",
+            {**CASE, "k": None},
+            "[1]",
+            "{",
+            "null",
+            {**CASE, "v0": True},
+            {**CASE, "Fz": 10**400},
+            json.dumps(CASE).replace("1000000.0", "1e400"),
+            '{"mu0": 0.3}',
+            {**CASE, "k": "rigid"},
+            without_k,
+            {**CASE, "v0": None},
+            '{"mu0": 0.3, "mu0": 0.4}',
+            {**CASE, "k": math.nan},
+            CASE,
+            json.dumps(CASE) * 2,
+            '{"tag": "\\ud800"}',
+            {**CASE, "tag": None, "v0": 1},
+        )
+    ]
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
     out = tmp_path / f"out.{end}"
     ran(capsys, 3, tmp_path / "cases.ndjson", "-o", out)
     found = read(out)
     assert [row.get("tag") for row in found] == ["a", None, None, None]
-    assert [row["source"] for row in found] == ["stick_slip_low", "rigid", "stick_slip_low", "continuous_low"]
+    assert [row["source"] for row in found] == [
+        "stick_slip_low",
+        "rigid",
+        "stick_slip_low",
+        "continuous_low",
+    ]
     assert found[0]["mu_macro"] == TABLE.evaluate(**CASE).mu_macro
     reasons = {row: (field, reason) for row, field, reason in rejects_of(out)}
     assert [row for row, (field, _) in reasons.items() if not field] == [3, 4, 5, 13, 14, 16, 17]
     assert reasons[2] == reasons[11] == ("k", MISSING_K)
     assert reasons[14] == ("", "is no JSON object: NaN is not in it; write null")
     assert reasons[6] == ("v0", "must be a number")
-    assert [reasons[i] for i in (7, 8)] == [(name, "is beyond double range") for name in ("Fz", "k")]
+    assert [reasons[i] for i in (7, 8)] == [
+        (name, "is beyond double range") for name in ("Fz", "k")
+    ]
     assert reasons[12] == ("v0", "is missing")
     assert reasons[13] == ("", "is no JSON object: repeats the key 'mu0'")
 
@@ -227,9 +318,17 @@ def test_no_first_line_of_ndjson_ends_the_process(tmp_path: Path, first: Any) ->
     assert (summary.answered, summary.rejected) == (1, 1)
 
 
-def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(reading, "ROWS", 2)  # records that go on in the next block
-    rows = [f'"a\nb",{GOOD}', f"c,{GOOD}", f'"d\n\n",{GOOD},1', f"e,-{GOOD}", f'"f\r\ng",{GOOD}'] * 3
+    rows = [
+        f'"a\nb",{GOOD}',
+        f"c,{GOOD}",
+        f'"d\n\n",{GOOD},1',
+        f"e,-{GOOD}",
+        f'"f\r\ng",{GOOD}',
+    ] * 3
     (tmp_path / "cases.csv").write_text(f"name,{HEADER}\n" + "\n".join(rows) + "\n", newline="")
     evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
     assert [row["name"] for row in read(tmp_path / "out.csv")] == ["a\nb", "c", "f\r\ng"] * 3
@@ -238,7 +337,9 @@ def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(tmp_path: Path, m
 
 @pytest.mark.parametrize("end", ["csv", "parquet"])
 @pytest.mark.parametrize(("rows", "bad"), [(1, '"b'), (1, '"b" c'), (150_000, '"b')])
-def test_an_open_quote_names_its_row(tmp_path: Path, capsys: Capture, end: Any, rows: Any, bad: Any) -> None:
+def test_an_open_quote_names_its_row(
+    tmp_path: Path, capsys: Capture, end: Any, rows: Any, bad: Any
+) -> None:
     text = f"name,{HEADER}\n" + f"a,{GOOD}\n" * rows + f"{bad},{GOOD}\n" + f"c,{GOOD}\n" * 50
     (tmp_path / "cases.csv").write_text(text)
     message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / f"out.{end}")
@@ -249,42 +350,60 @@ def test_an_open_quote_names_its_row(tmp_path: Path, capsys: Capture, end: Any, 
 @pytest.mark.parametrize(
     ("content", "parts"),
     [
-        ("", ["must name the columns, and is empty"]), ("a;b;c\n1;2;3\n", ["--sep ';' --decimal '.'"]),
+        ("", ["must name the columns, and is empty"]),
+        ("a;b;c\n1;2;3\n", ["--sep ';' --decimal '.'"]),
         ('"mu0,Fz\n', ["line 1: is no header"]),
-        ("mu0,Fz,y0,omega,v0\n", ["no column k", "'Fz'", "--rigid"]), (f"{HEADER}\r{GOOD}", ["line 1: is no header"]),
+        ("mu0,Fz,y0,omega,v0\n", ["no column k", "'Fz'", "--rigid"]),
+        (f"{HEADER}\r{GOOD}", ["line 1: is no header"]),
     ],
-)  # fmt: skip
-def test_a_file_without_cases_is_refused_by_name(tmp_path: Path, capsys: Capture, content: Any, parts: Any) -> None:
+)
+def test_a_file_without_cases_is_refused_by_name(
+    tmp_path: Path, capsys: Capture, content: Any, parts: Any
+) -> None:
     (tmp_path / "cases.csv").write_bytes(content.encode())
     message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "out.csv")
     assert all(part in message for part in [str(tmp_path / "cases.csv"), *parts])
     assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
 
 
-def test_damaged_and_missing_files_are_reported_in_one_line(tmp_path: Path, capsys: Capture) -> None:
+def test_damaged_and_missing_files_are_reported_in_one_line(
+    tmp_path: Path, capsys: Capture
+) -> None:
     good = write(cases(2000), tmp_path / "good.parquet")
     (tmp_path / "text.parquet").write_text("no parquet")
-    (tmp_path / "cut.csv.gz").write_bytes(write(cases(5000), tmp_path / "whole.csv.gz").read_bytes()[:50_000])
+    (tmp_path / "cut.csv.gz").write_bytes(
+        write(cases(5000), tmp_path / "whole.csv.gz").read_bytes()[:50_000]
+    )
     (tmp_path / "latin.csv").write_bytes(f"{HEADER},name\n{GOOD},µ\n".encode("latin-1"))
     flipped = bytearray(good.read_bytes())
     flipped[2000:60_000:97] = bytes(byte ^ 255 for byte in flipped[2000:60_000:97])
     (tmp_path / "flipped.parquet").write_bytes(flipped)
     for name, out, said in (
-        ("none.csv", "o.csv", "no such file"), ("*.none", "o.csv", "no such file"),
-        ("text.parquet", "o.csv", "Is this a 'parquet' file?"), ("cut.csv.gz", "o.csv", "is damaged"),
-        ("latin.csv", "o.parquet", "rows 1 to 1: no text in UTF-8"), ("flipped.parquet", "o.csv", ""),
-        ("good.parquet", "o.xlsx", "ends in"), ("good.parquet", "none/o.csv", "No such file or directory"),
+        ("none.csv", "o.csv", "no such file"),
+        ("*.none", "o.csv", "no such file"),
+        ("text.parquet", "o.csv", "Is this a 'parquet' file?"),
+        ("cut.csv.gz", "o.csv", "is damaged"),
+        ("latin.csv", "o.parquet", "rows 1 to 1: no text in UTF-8"),
+        ("flipped.parquet", "o.csv", ""),
+        ("good.parquet", "o.xlsx", "ends in"),
+        ("good.parquet", "none/o.csv", "No such file or directory"),
         ("good.parquet", ".", "must be the name of a file"),
-    ):  # fmt: skip
+    ):
         assert said in ran(capsys, 1, tmp_path / name, "-o", tmp_path / out, "--force")
-    assert "several formats" in ran(capsys, 1, good, tmp_path / "latin.csv", "-o", tmp_path / "o.csv")
+    assert "several formats" in ran(
+        capsys, 1, good, tmp_path / "latin.csv", "-o", tmp_path / "o.csv"
+    )
 
 
-def test_a_field_that_begins_late_is_not_lost(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_field_that_begins_late_is_not_lost(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(reading, "ROWS", 10)
     lines = [json.dumps(line) for line in [CASE] * 30 + [{**CASE, "x": 1}]]
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
-    assert "'x' is in no earlier row" in ran(capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.csv")
+    assert "'x' is in no earlier row" in ran(
+        capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.csv"
+    )
     ran(capsys, 0, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
     assert read(tmp_path / "out.ndjson")[-1]["x"] == 1
 
@@ -301,7 +420,9 @@ def test_folders_patterns_and_hive_names(tmp_path: Path) -> None:
     for year in (2023, 2024):
         (tmp_path / "runs" / f"year={year}").mkdir(parents=True)
         for name in "ba":
-            write(cases(10, year + ord(name)), tmp_path / "runs" / f"year={year}" / f"{name}.parquet")
+            write(
+                cases(10, year + ord(name)), tmp_path / "runs" / f"year={year}" / f"{name}.parquet"
+            )
     (tmp_path / "runs" / "notes.txt").write_text("no cases")
     evaluate_files([tmp_path / "runs"], tmp_path / "out.parquet", TABLE)
     found = pq.read_table(tmp_path / "out.parquet")
@@ -323,30 +444,42 @@ def test_folders_patterns_and_hive_names(tmp_path: Path) -> None:
 
 ALIKE = {name: value for name, value in CASE.items() if name not in ("k", "y0", "omega")}
 ANSWERED: dict[str, tuple[Case, Case]] = {
-    "ball": ({"contact": "ball"}, {"k": 1e6, "y0": 2e-6}), "along": ({"direction": "along"}, {"k": 1e6, "y0": 2e-6}),
+    "ball": ({"contact": "ball"}, {"k": 1e6, "y0": 2e-6}),
+    "along": ({"direction": "along"}, {"k": 1e6, "y0": 2e-6}),
     "normal": ({"direction": "normal"}, {"k": 1e6, "Fz_amplitude": 1.0}),
     "range": ({}, {"k_low": 0.8e6, "k_high": 1.2e6, "y0": 2e-6}),
     "range of a ball": ({"contact": "ball"}, {"k_low": 0.8e6, "k_high": 1.2e6, "y0": 2e-6}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("end", ["csv", "parquet"])
 @pytest.mark.parametrize("start", ["csv", "ndjson", "parquet"])
 @pytest.mark.parametrize("name", ANSWERED)
-def test_files_know_contact_and_ends_of_k(tmp_path: Path, capsys: Capture, start: Any, end: Any, name: str) -> None:
+def test_files_know_contact_and_ends_of_k(
+    tmp_path: Path, capsys: Capture, start: Any, end: Any, name: str
+) -> None:
     kind, more = ANSWERED[name]
     rng = np.random.default_rng(3)
-    given = {field: value * rng.uniform(0.9, 1.1, 40) for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()}
+    given = {
+        field: value * rng.uniform(0.9, 1.1, 40)
+        for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()
+    }
     source, out = write(pa.table(given), tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
     options = [f"--{key}={value}" for key, value in kind.items()]
     ran(capsys, 0, source, "-o", out, *options, "--include", "gradient")
     found = read(out)
     expected = TABLE.evaluate(given, gradient=True, **kind)
-    names = ["mu_macro", *(["mu_macro_low", "mu_macro_high"] if "k_low" in given else []), *ANSWERS[1:]]
+    names = [
+        "mu_macro",
+        *(["mu_macro_low", "mu_macro_high"] if "k_low" in given else []),
+        *ANSWERS[1:],
+    ]
     slopes = [f"d_mu_macro_d_{field}" for field in expected.gradient]
     assert list(found[0]) == [*given, *names, *slopes]
     for column in names:
-        read_back = [row[column] if column in ("regime", "source") else float(row[column]) for row in found]
+        read_back = [
+            row[column] if column in ("regime", "source") else float(row[column]) for row in found
+        ]
         assert read_back == getattr(expected, column).tolist()
     for field, slope in expected.gradient.items():
         assert [float(row[f"d_mu_macro_d_{field}"]) for row in found] == slope.tolist()

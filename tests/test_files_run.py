@@ -1,4 +1,5 @@
-"""``mumacro eval`` killed, stopped, cut, changed: the same command goes on with the same bytes, or says why not."""
+"""``mumacro eval`` killed, stopped, cut, changed: the same command goes on with the same bytes, or
+says why not."""
 
 import gzip
 import os
@@ -45,7 +46,9 @@ def cases(tmp_path_factory: pytest.TempPathFactory, small_blocks: Any) -> Any:  
     """3,000 cases in every format, and the output of a run that nothing disturbed."""
     folder = tmp_path_factory.mktemp("cases")
     for kind in KINDS:
-        evaluate_files([write(table_of(3000), folder / f"cases.{kind}")], folder / f"whole.{kind}", TABLE)
+        evaluate_files(
+            [write(table_of(3000), folder / f"cases.{kind}")], folder / f"whole.{kind}", TABLE
+        )
     return folder
 
 
@@ -72,29 +75,41 @@ def assert_whole(out: Any, cases: Any) -> None:
     """The bytes of the undisturbed run, and nothing left over."""
     kind = out.name.partition(".")[2]
     for ending in ("", ".rejects.csv"):
-        assert out.with_name(out.name + ending).read_bytes() == (cases / f"whole.{kind}{ending}").read_bytes()
+        assert (
+            out.with_name(out.name + ending).read_bytes()
+            == (cases / f"whole.{kind}{ending}").read_bytes()
+        )
     assert [name for name in left(out.parent) if name.startswith("out")] == [
-        f"out.{kind}", f"out.{kind}.rejects.csv", f"out.{kind}.run.json"
-    ]  # fmt: skip
+        f"out.{kind}",
+        f"out.{kind}.rejects.csv",
+        f"out.{kind}.run.json",
+    ]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("share", [-1.0, 0.4, 0.8])
-def test_a_stopped_run_goes_on_with_the_same_bytes(tmp_path: Path, cases: Any, kind: Any, share: Any) -> None:
+def test_a_stopped_run_goes_on_with_the_same_bytes(
+    tmp_path: Path, cases: Any, kind: Any, share: Any
+) -> None:
     source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
     stopped(source, out, share)
     assert not out.exists()
     summary = evaluate_files([source], out, TABLE, say=said.append)
     assert (summary.rows, summary.rejected) == (3000, 4)
-    assert said == [f"{out}.parts: {summary.resumed:,} rows are done already ({said[0].partition('(')[2]}"]
-    known = 0.0 if kind == "csv.gz" else share  # Python 3.12 and newer read far ahead of what they unpack
+    assert said == [
+        f"{out}.parts: {summary.resumed:,} rows are done already ({said[0].partition('(')[2]}"
+    ]
+    # Python 3.12 and newer read far ahead of what they unpack
+    known = 0.0 if kind == "csv.gz" else share
     assert 3000 * (known - 0.1) <= summary.resumed < 3000
     assert_whole(out, cases)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("harm", ["cut", "changed", "gone", "longer"])
-def test_finished_pieces_cut_or_changed_are_done_again(tmp_path: Path, cases: Any, kind: Any, harm: Any) -> None:
+def test_finished_pieces_cut_or_changed_are_done_again(
+    tmp_path: Path, cases: Any, kind: Any, harm: Any
+) -> None:
     source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
     stopped(source, out)
     part = tmp_path / f"out.{kind}.parts" / "log"
@@ -112,8 +127,11 @@ def test_finished_pieces_cut_or_changed_are_done_again(tmp_path: Path, cases: An
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_stop_at_any_step_ends_well(tmp_path: Path, cases: Any, monkeypatch: pytest.MonkeyPatch, kind: Any) -> None:
-    """Before each file that is put into place or deleted; then the same command completes the run."""
+def test_a_stop_at_any_step_ends_well(
+    tmp_path: Path, cases: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
+) -> None:
+    """Before each file that is put into place or deleted; then the same command completes the
+    run."""
     source, steps = copied(cases, kind, tmp_path), 0
     while True:
         out, count = tmp_path / str(steps) / f"out.{kind}", 0
@@ -145,7 +163,9 @@ def test_a_stop_at_any_step_ends_well(tmp_path: Path, cases: Any, monkeypatch: p
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_command_given_again_finds_all_done(tmp_path: Path, cases: Any, capsys: Capture, kind: Any) -> None:
+def test_the_command_given_again_finds_all_done(
+    tmp_path: Path, cases: Any, capsys: Capture, kind: Any
+) -> None:
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     words = ["eval", str(source), "-o", str(out)]
     assert [main(words), main(words)] == [3, 3]
@@ -163,8 +183,14 @@ def test_the_command_given_again_finds_all_done(tmp_path: Path, cases: Any, caps
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parquet", "csv"])
-def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path: Path, repository: Path, cases: Any, kind: Any) -> None:
-    source, out, log = tmp_path / "cases.csv", tmp_path / f"out.{kind}", tmp_path / f"out.{kind}.parts" / "log"
+def test_a_killed_run_goes_on_with_the_same_bytes(
+    tmp_path: Path, repository: Path, cases: Any, kind: Any
+) -> None:
+    source, out, log = (
+        tmp_path / "cases.csv",
+        tmp_path / f"out.{kind}",
+        tmp_path / f"out.{kind}.parts" / "log",
+    )
     header, *rows = (cases / "cases.csv").read_text().splitlines(keepends=True)
     source.write_text("".join([header, *(100 * rows)]))
     command, kills = [sys.executable, "-m", "mumacro", "eval", str(source), "-o"], 0
@@ -180,14 +206,21 @@ def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path: Path, repository: Pa
         process.wait(timeout=60)
     assert kills
     for path in (out, tmp_path / f"whole.{kind}"):
-        assert subprocess.run([*command, str(path)], cwd=repository, capture_output=True, check=False).returncode == 3
+        assert (
+            subprocess.run(
+                [*command, str(path)], cwd=repository, capture_output=True, check=False
+            ).returncode
+            == 3
+        )
     assert out.read_bytes() == (tmp_path / f"whole.{kind}").read_bytes()
     assert not list(tmp_path.glob("*.parts"))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("harm", ["cut", "changed"])
-def test_an_input_that_changes_is_not_reported_complete(tmp_path: Path, cases: Any, kind: Any, harm: Any) -> None:
+def test_an_input_that_changes_is_not_reported_complete(
+    tmp_path: Path, cases: Any, kind: Any, harm: Any
+) -> None:
     source, out = tmp_path / f"cases.{kind}", tmp_path / f"out.{kind}"
     copied(cases, kind, tmp_path)
     data, times = source.read_bytes(), (source.stat().st_atime_ns, source.stat().st_mtime_ns)
@@ -205,7 +238,9 @@ def test_an_input_that_changes_is_not_reported_complete(tmp_path: Path, cases: A
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_fault_that_a_change_brings_in_is_told_as_a_change(tmp_path: Path, cases: Any, kind: Any) -> None:
+def test_a_fault_that_a_change_brings_in_is_told_as_a_change(
+    tmp_path: Path, cases: Any, kind: Any
+) -> None:
     """The file ends in half a row, in half a member of gzip or before its footer."""
     source, out = tmp_path / f"cases.{kind}", tmp_path / f"out.{kind}"
     rows = b"".join((cases / "cases.csv").read_bytes().splitlines(keepends=True)[:20])
@@ -230,7 +265,9 @@ def test_a_fault_that_a_change_brings_in_is_told_as_a_change(tmp_path: Path, cas
 
 
 @pytest.mark.parametrize("kind", [{}, {"contact": "ball"}, {"direction": "along"}])
-def test_another_content_contact_or_direction_is_another_run(tmp_path: Path, cases: Any, kind: Any) -> None:
+def test_another_content_contact_or_direction_is_another_run(
+    tmp_path: Path, cases: Any, kind: Any
+) -> None:
     source, out = tmp_path / "cases.csv", tmp_path / "out.csv"
     copied(cases, "csv", tmp_path)
     stopped(source, out, **kind)
@@ -239,29 +276,42 @@ def test_another_content_contact_or_direction_is_another_run(tmp_path: Path, cas
         source.write_bytes(data.replace(b"e-05", b"e-06"))
         os.utime(source, ns=times)
     what = "options" if kind else "inputs"
-    with pytest.raises(FilesError, match=rf"parts of another run \({what} differ\); --force deletes them"):
+    with pytest.raises(
+        FilesError, match=rf"parts of another run \({what} differ\); --force deletes them"
+    ):
         evaluate_files([source], out, TABLE)
     source.write_bytes(data)  # and the same content of another time is the same input
     assert evaluate_files([source], out, TABLE, **kind).resumed
     if kind:
         evaluate_files([source], tmp_path / "whole.csv", TABLE, **kind)
-        assert out.read_bytes() == (tmp_path / "whole.csv").read_bytes() != (cases / "whole.csv").read_bytes()
+        assert (
+            out.read_bytes()
+            == (tmp_path / "whole.csv").read_bytes()
+            != (cases / "whole.csv").read_bytes()
+        )
     else:
         assert_whole(out, cases)
 
 
 @pytest.mark.parametrize("name", ["out.csv", "out.csv.rejects.csv"])
 @pytest.mark.parametrize("given", ["", "link.csv"])
-def test_an_output_never_replaces_an_input(tmp_path: Path, capsys: Capture, cases: Any, name: str, given: Any) -> None:
+def test_an_output_never_replaces_an_input(
+    tmp_path: Path, capsys: Capture, cases: Any, name: str, given: Any
+) -> None:
     shutil.copy(cases / "cases.csv", tmp_path / name)
     if given:
         (tmp_path / given).hardlink_to(tmp_path / name)
-    assert main(["eval", str(tmp_path / (given or name)), "-o", str(tmp_path / "out.csv"), "--force"]) == 1
+    assert (
+        main(["eval", str(tmp_path / (given or name)), "-o", str(tmp_path / "out.csv"), "--force"])
+        == 1
+    )
     assert "is an input, and would be overwritten" in capsys.readouterr().err
     assert (tmp_path / name).read_bytes() == (cases / "cases.csv").read_bytes()
 
 
-def test_other_files_are_kept_and_a_second_run_is_refused(tmp_path: Path, cases: Any, capsys: Capture) -> None:
+def test_other_files_are_kept_and_a_second_run_is_refused(
+    tmp_path: Path, cases: Any, capsys: Capture
+) -> None:
     source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", list[str]()
     (tmp_path / "out.csv.parts").mkdir()
     (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
@@ -279,15 +329,19 @@ def test_other_files_are_kept_and_a_second_run_is_refused(tmp_path: Path, cases:
 @pytest.mark.skipif(os.name == "nt", reason="no limit of file sizes")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_a_full_disk_is_told_and_the_run_goes_on_later(tmp_path: Path, cases: Any, repository: Path, kind: Any) -> None:
+def test_a_full_disk_is_told_and_the_run_goes_on_later(
+    tmp_path: Path, cases: Any, repository: Path, kind: Any
+) -> None:
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     program = (
         "import resource, sys; from mumacro.files import reading; reading.ROWS = 400; "
-        "from mumacro.__main__ import main; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); "
-        f"sys.exit(main(['eval', {str(source)!r}, '-o', {str(out)!r}]))"
+        "from mumacro.__main__ import main; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, "
+        f"200_000)); sys.exit(main(['eval', {str(source)!r}, '-o', {str(out)!r}]))"
     )
     words = [sys.executable, "-c", program]
-    done = subprocess.run(words, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        words, cwd=repository, capture_output=True, text=True, timeout=300, check=False
+    )
     assert done.returncode == 1, done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert "File too large" in done.stderr
@@ -302,11 +356,14 @@ def test_memory_does_not_grow_with_the_file(tmp_path: Path, repository: Path) ->
         pq.write_table(table_of(n), tmp_path / "cases.parquet", row_group_size=100_000)
         program = (
             "import resource; from mumacro.__main__ import main; "
-            f"main(['eval', {str(tmp_path / 'cases.parquet')!r}, '-o', {str(tmp_path / 'out.parquet')!r}, '--force']); "
+            f"main(['eval', {str(tmp_path / 'cases.parquet')!r}, '-o', "
+            f"{str(tmp_path / 'out.parquet')!r}, '--force']); "
             "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
         )
         words = [sys.executable, "-c", program]
-        done = subprocess.run(words, cwd=repository, capture_output=True, text=True, timeout=300, check=True)
+        done = subprocess.run(
+            words, cwd=repository, capture_output=True, text=True, timeout=300, check=True
+        )
         return int(done.stdout.split()[-1])
 
     # 1.2 million more rows are 130 MB of numbers

@@ -27,7 +27,9 @@ def quiet() -> Any:
 
 def friction(surrogate: Surrogate, contact: Any = "spring", **inputs: Any) -> Any:
     """mu_macro of a contact that is known."""
-    return np.asarray(surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, contact=contact).mu_macro)
+    return np.asarray(
+        surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, contact=contact).mu_macro
+    )
 
 
 def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> Any:
@@ -40,8 +42,11 @@ def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> An
 @pytest.mark.parametrize("given", [True, False], ids=["std", "scatter"])
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
 @pytest.mark.parametrize("contact", CONTACTS)
-def test_inputs_lie_within_their_covariance(surrogate: Surrogate, contact: Any, unknowns: Any, given: Any) -> None:
-    """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for itself."""
+def test_inputs_lie_within_their_covariance(
+    surrogate: Surrogate, contact: Any, unknowns: Any, given: Any
+) -> None:
+    """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for
+    itself."""
     from scipy.stats import binom, chi2
     from scipy.stats import f as fisher
 
@@ -59,7 +64,9 @@ def test_inputs_lie_within_their_covariance(surrogate: Surrogate, contact: Any, 
         off = np.array([found.values[name] - truth[name] for name in unknowns])
         limit = chi2.ppf(0.95, n) if given else n * fisher.ppf(0.95, n, 40 - n)
         inside += off @ np.linalg.solve(found.covariance, off) <= limit
-        intervals += [found.interval[name][0] <= truth[name] <= found.interval[name][1] for name in unknowns]
+        intervals += [
+            found.interval[name][0] <= truth[name] <= found.interval[name][1] for name in unknowns
+        ]
         assert len(found.solutions) == 1
         assert found.reduced_chi2 * (1.0 if given else spread**-2) == close(1.0, abs=1.0)
     low, high = (float(binom.ppf(level, 200, 0.95)) for level in (0.0005, 0.9995))
@@ -67,8 +74,11 @@ def test_inputs_lie_within_their_covariance(surrogate: Surrogate, contact: Any, 
     assert np.all((low <= intervals) & (intervals <= high))
 
 
-def test_the_variance_is_that_of_the_scatter_over_the_degrees_of_freedom(surrogate: Surrogate) -> None:
-    mu = [0.28, 0.31, 0.3, 0.29]  # without oscillation mu_macro is mu0: its mean, and the deviation of a mean
+def test_the_variance_is_that_of_the_scatter_over_the_degrees_of_freedom(
+    surrogate: Surrogate,
+) -> None:
+    # without oscillation mu_macro is mu0: its mean, and the deviation of a mean
+    mu = [0.28, 0.31, 0.3, 0.29]
     found = fit({"v0": np.ones(4), "mu_macro": mu}, "mu0", k=1e6, **{**RIG, "y0": 0.0})
     assert found.values["mu0"] == close(np.mean(mu), rel=1e-8)
     assert found.std["mu0"] == close(np.std(mu, ddof=1) / 2.0, rel=1e-8)
@@ -107,16 +117,22 @@ def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: Any
     found = fit({"v0": V0, "mu_macro": mu}, contact=contact, **RIG)
     assert found.values == {"k": close(k, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
     assert np.abs(found.residuals).max() < 1e-9
-    assert fit({"v0": V0, "mu_macro": mu}, "k", contact=contact, mu0=0.3, **RIG).values["k"] == close(k, rel=1e-8)
-    assert fit({"v0": V0, "mu_macro": mu}, "mu0", contact=contact, k=k, **RIG).values["mu0"] == close(0.3, rel=1e-9)
+    assert fit({"v0": V0, "mu_macro": mu}, "k", contact=contact, mu0=0.3, **RIG).values[
+        "k"
+    ] == close(k, rel=1e-8)
+    assert fit({"v0": V0, "mu_macro": mu}, "mu0", contact=contact, k=k, **RIG).values[
+        "mu0"
+    ] == close(0.3, rel=1e-9)
 
 
 def test_every_input_may_vary(surrogate: Surrogate) -> None:
     rng = np.random.default_rng(1)
     columns: Case = {
-        "v0": rng.uniform(1e-3, 1.0, 30), "Fz": rng.uniform(5.0, 20.0, 30), "y0": rng.uniform(0.0, 5e-6, 30),
+        "v0": rng.uniform(1e-3, 1.0, 30),
+        "Fz": rng.uniform(5.0, 20.0, 30),
+        "y0": rng.uniform(0.0, 5e-6, 30),
         "omega": rng.uniform(1e4, 2e5, 30),
-    }  # fmt: skip
+    }
     mu = np.asarray(surrogate.evaluate(mu0=0.3, k=1e6, **columns).mu_macro)
     found = fit({**columns, "mu_macro": mu})
     assert found.values == {"k": close(1e6, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
@@ -141,18 +157,24 @@ def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate: Surr
     found = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0), "std": 1e-3}, **RIG)
     mu, off = found.predict(v0=0.05)
     both = np.linalg.cholesky(found.covariance)
-    drawn = both @ np.random.default_rng(2).normal(size=(2, 4000)) + np.array([[x] for x in found.values.values()])
+    drawn = both @ np.random.default_rng(2).normal(size=(2, 4000)) + np.array(
+        [[x] for x in found.values.values()]
+    )
     each = surrogate.evaluate(k=drawn[0], mu0=drawn[1], v0=0.05, **RIG).mu_macro
     assert float(mu[0]) == close(each.mean(), abs=3.0 * off[0] / 60.0)
     assert float(off[0]) == close(each.std(), rel=0.05)
 
 
-# --- what points do not tell --------------------------------------------------------------------------------
+# --- what points do not tell ----------------------------------------------------------------------
 
 
-def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(surrogate: Surrogate) -> None:
+def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(
+    surrogate: Surrogate,
+) -> None:
     def measured(k: Any, spread: float = 3e-3) -> Any:
-        return fit({"v0": V0, "mu_macro": noisy(surrogate, spread, v0=V0, k=k), "std": spread}, **RIG)
+        return fit(
+            {"v0": V0, "mu_macro": noisy(surrogate, spread, v0=V0, k=k), "std": spread}, **RIG
+        )
 
     with pytest.warns(UserWarning, match="only a lower bound"):
         stiff = measured(1e9)
@@ -165,7 +187,11 @@ def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(surrogate
     soft, large = measured(1e3), measured(5e7, 1e-4)
     assert soft.interval["k"][0] == 0.0 < 1e3 < soft.interval["k"][1] < 2e6
     assert large.interval["k"][0] < 5e7 < large.interval["k"][1]
-    for found, said in ((stiff, "only a lower bound"), (soft, "only an upper bound"), (large, "above 20")):
+    for found, said in (
+        (stiff, "only a lower bound"),
+        (soft, "only an upper bound"),
+        (large, "above 20"),
+    ):
         assert any(said in text for text in found.warnings)
 
 
@@ -180,14 +206,23 @@ def test_all_solutions_are_found(surrogate: Surrogate) -> None:
     assert expected.size == 3
     for std in ({}, {"std": 1e-4}):
         found = fit({"v0": [v0], "mu_macro": [target], **std}, "k", mu0=0.3, **RIG)
-        assert sorted(one["k"] for one in found.solutions) == [close(one, rel=1e-3) for one in expected]
+        assert sorted(one["k"] for one in found.solutions) == [
+            close(one, rel=1e-3) for one in expected
+        ]
         assert any("3 solutions" in text for text in found.warnings)
-    for draw in np.random.default_rng(0).normal(scale=1e-5, size=10):  # any of which may be the truth
+    # any of which may be the truth
+    for draw in np.random.default_rng(0).normal(scale=1e-5, size=10):
         found = fit({"v0": [v0], "mu_macro": [target + draw], "std": 1e-5}, "k", mu0=0.3, **RIG)
         assert found.interval["k"][0] < expected[0] < expected[-1] < found.interval["k"][1]
-        assert any("3 solutions fit within 95 %, the interval covers them all" in text for text in found.warnings)
+        assert any(
+            "3 solutions fit within 95 %, the interval covers them all" in text
+            for text in found.warnings
+        )
     # with the scatter of a usual measurement the three are one
-    assert len(fit({"v0": [v0], "mu_macro": [target], "std": 0.02}, "k", mu0=0.3, **RIG).solutions) == 1
+    assert (
+        len(fit({"v0": [v0], "mu_macro": [target], "std": 0.02}, "k", mu0=0.3, **RIG).solutions)
+        == 1
+    )
 
 
 def test_as_many_points_as_unknowns_have_no_error_without_std(surrogate: Surrogate) -> None:
@@ -209,7 +244,10 @@ def test_units_and_sizes_do_not_matter(surrogate: Surrogate, k: Any, mu0: Any, s
     rig = {"Fz": 10.0 * scale, "y0": 2.0 * mu0 * 10.0 * scale / k, "f": 20e3}
     v0 = rig["y0"] * 1.3e5 * np.geomspace(0.01, 3.0, 20)
     mu = surrogate.evaluate(mu0=mu0, k=k, v0=v0, **rig).mu_macro
-    assert fit({"v0": v0, "mu_macro": mu}, **rig).values == {"k": close(k, rel=1e-7), "mu0": close(mu0, rel=1e-8)}
+    assert fit({"v0": v0, "mu_macro": mu}, **rig).values == {
+        "k": close(k, rel=1e-7),
+        "mu0": close(mu0, rel=1e-8),
+    }
 
 
 @pytest.mark.parametrize("along", ["v0", "y0"])
@@ -218,8 +256,10 @@ def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -
     matplotlib.use("Agg")
     x = {"v0": np.append(0.0, V0), "y0": np.geomspace(1e-7, 1e-5, 21)}[along]
     given = {**RIG, "v0": 0.05, along: x}
-    found = fit({along: x, "mu_macro": friction(surrogate, **given), "std": 1e-3}, **{
-        name: value for name, value in given.items() if name != along})  # fmt: skip
+    found = fit(
+        {along: x, "mu_macro": friction(surrogate, **given), "std": 1e-3},
+        **{name: value for name, value in given.items() if name != along},
+    )
     axes = found.plot()
     assert axes.get_xlabel() == {"v0": "v0 [m/s]", "y0": "y0 [m]"}[along]
     points, curve = axes.lines[0], axes.lines[-1]
@@ -230,7 +270,7 @@ def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -
     matplotlib.pyplot.close("all")
 
 
-# --- bad input ----------------------------------------------------------------------------------------------
+# --- bad input ------------------------------------------------------------------------------------
 
 POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
 
@@ -250,18 +290,42 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
         ({"v0": [0.1, 0.2]}, RIG, "mu_macro must be a column of the data"),
         ([0.1, 0.2], RIG, "data must be a mapping, DataFrame"),
         ({"v0": [0.1, 0.1, 0.1], "mu_macro": [0.2, 0.21, 0.2]}, RIG, "at least 2 different inputs"),
-        ({"v0": [0.1, 0.2, 0.3], "mu_macro": [0.2, 0.21]}, RIG, "data must be columns of one length"),
-        ({"v0": [0.1, 0.2], "mu_macro": [0.2, math.nan]}, RIG, "mu_macro at index 1 must be finite and >= 0"),
-        ({"v0": [0.1, 0.2], "mu_macro": [0.2, -0.1]}, RIG, "mu_macro at index 1 must be finite and >= 0"),
+        (
+            {"v0": [0.1, 0.2, 0.3], "mu_macro": [0.2, 0.21]},
+            RIG,
+            "data must be columns of one length",
+        ),
+        (
+            {"v0": [0.1, 0.2], "mu_macro": [0.2, math.nan]},
+            RIG,
+            "mu_macro at index 1 must be finite and >= 0",
+        ),
+        (
+            {"v0": [0.1, 0.2], "mu_macro": [0.2, -0.1]},
+            RIG,
+            "mu_macro at index 1 must be finite and >= 0",
+        ),
         ({"v0": [0.1, math.nan], "mu_macro": [0.2, 0.1]}, RIG, "v0 at index 1 must be finite"),
-        ({"v0": [0.1, 0.2], "mu_macro": [0.0, 0.0]}, RIG, "mu_macro must be > 0 in at least one point"),
+        (
+            {"v0": [0.1, 0.2], "mu_macro": [0.0, 0.0]},
+            RIG,
+            "mu_macro must be > 0 in at least one point",
+        ),
         ({**POINTS, "std": [1e-3, 0.0, 1e-3]}, RIG, "std at index 1 must be finite and > 0"),
         (POINTS, {**RIG, "y0": 0.0}, "points with y0 > 0 and omega > 0"),
-        (POINTS, {**RIG, "unknowns": "k", "mu0": 0.28}, "mu_macro at index 2 must be <= mu0, within 5 %; give std"),
-        ({**POINTS, "std": 1e-3}, {**RIG, "unknowns": "k", "mu0": 0.28}, "mu_macro at index 2 must be <= mu0"),
+        (
+            POINTS,
+            {**RIG, "unknowns": "k", "mu0": 0.28},
+            "mu_macro at index 2 must be <= mu0, within 5 %; give std",
+        ),
+        (
+            {**POINTS, "std": 1e-3},
+            {**RIG, "unknowns": "k", "mu0": 0.28},
+            "mu_macro at index 2 must be <= mu0",
+        ),
         ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "0.3"]}, RIG, "mu_macro must be a real number"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_named_with_the_remedy(data: Any, given: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         fit(data, **given)
@@ -274,7 +338,10 @@ def test_points_that_do_not_depend_on_k_are_refused() -> None:
     # noise may lie on the other side of what is possible, if it is said
     within = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.301], "std": 1e-3}
     assert fit(within, "k", mu0=0.3, **RIG).values["k"] > 0.0
-    assert fit({"v0": [1e-3, 0.1, 1.0], "mu_macro": [-1e-4, 0.1, 0.3], "std": 1e-3}, **RIG).values["k"] > 0.0
+    assert (
+        fit({"v0": [1e-3, 0.1, 1.0], "mu_macro": [-1e-4, 0.1, 0.3], "std": 1e-3}, **RIG).values["k"]
+        > 0.0
+    )
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -291,6 +358,11 @@ def test_extreme_points_are_refused_or_give_no_nan(seed: int) -> None:
             found = fit(data, Fz=10.0, f=20e3)
         except InputError:
             continue
-        told = [*found.values.values(), *found.std.values(), *sum(found.interval.values(), ()), *found.covariance.flat]
+        told = [
+            *found.values.values(),
+            *found.std.values(),
+            *sum(found.interval.values(), ()),
+            *found.covariance.flat,
+        ]
         assert not np.isnan([*told, found.chi2, *found.residuals]).any(), (name, size)
         assert min(low for low, _ in found.interval.values()) >= 0.0

@@ -1,4 +1,5 @@
-"""``--format fmu`` and ``fmu3``: FMPy validates and simulates them, with Python's values and derivatives."""
+"""``--format fmu`` and ``fmu3``: FMPy validates and simulates them, with Python's values and
+derivatives."""
 
 import math
 import shutil
@@ -23,7 +24,9 @@ table = tables(1e-4)
 
 
 @pytest.fixture(scope="module", params=["fmu", "fmu3"])
-def unit(request: pytest.FixtureRequest, table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def unit(
+    request: pytest.FixtureRequest, table: Surrogate, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     made = tmp_path_factory.mktemp("fmu") / f"{request.param}.fmu"
     export_table(table.path, request.param, made)
     return made
@@ -59,20 +62,29 @@ def test_fmpy_finds_no_fault(unit: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_a_simulation_follows_its_inputs(unit: Path, fmpy: Any, table: Surrogate, kind: Any) -> None:
+def test_a_simulation_follows_its_inputs(
+    unit: Path, fmpy: Any, table: Surrogate, kind: Any
+) -> None:
     time = np.linspace(0.0, 1.0, 41)
     v0 = 10.0 ** (-4.0 + 5.0 * time)
     given = np.array(list(zip(time, v0, strict=True)), dtype=[("time", float), ("v0", float)])
     outputs = ["mu_macro", "mu_ratio", "error_bound", "v_tilde", "y_tilde", "regime", "source"]
     found = fmpy.simulate_fmu(
-        str(unit), fmi_type=kind, stop_time=1.0, output_interval=0.025, input=given, output=["v0", *outputs],
+        str(unit),
+        fmi_type=kind,
+        stop_time=1.0,
+        output_interval=0.025,
+        input=given,
+        output=["v0", *outputs],
         start_values={"Fz": 20.0, "mu0": 0.2},
-    )  # fmt: skip
+    )
     assert len(found) >= 41
     answer = table.evaluate({**CASE, "Fz": 20.0, "mu0": 0.2, "v0": found["v0"]}, groups=True)
     for name in outputs[:5]:
         expected = getattr(answer, name)
-        assert np.allclose(found[name], expected, rtol=1e-6 if name == "error_bound" else 1e-13, atol=0.0), name
+        assert np.allclose(
+            found[name], expected, rtol=1e-6 if name == "error_bound" else 1e-13, atol=0.0
+        ), name
     assert np.array_equal(found["source"], answer.source_code)
     assert set(found["regime"]) == {0, 1}
 
@@ -85,15 +97,28 @@ class Loaded:
         self.unit = unit = fmpy.instantiate_fmu(
             fmpy.extract(str(path), str(folder)), description, fmi_type="CoSimulation"
         )
-        self.at = {variable.name: variable.valueReference for variable in description.modelVariables}
+        self.at = {
+            variable.name: variable.valueReference for variable in description.modelVariables
+        }
         self.outputs = [self.at[output.variable.name] for output in description.outputs]
         if description.fmiVersion == "2.0":
             unit.setupExperiment(startTime=0.0)
             self._set, self._get = (unit.setReal, unit.setInteger), (unit.getReal, unit.getInteger)
-            self.save, self.restore, self.drop = unit.getFMUstate, unit.setFMUstate, unit.freeFMUstate
+            self.save, self.restore, self.drop = (
+                unit.getFMUstate,
+                unit.setFMUstate,
+                unit.freeFMUstate,
+            )
         else:
-            self._set, self._get = (unit.setFloat64, unit.setInt64), (unit.getFloat64, unit.getInt64)
-            self.save, self.restore, self.drop = unit.getFMUState, unit.setFMUState, unit.freeFMUState
+            self._set, self._get = (
+                (unit.setFloat64, unit.setInt64),
+                (unit.getFloat64, unit.getInt64),
+            )
+            self.save, self.restore, self.drop = (
+                unit.getFMUState,
+                unit.setFMUState,
+                unit.freeFMUState,
+            )
         for name, value in parameters.items():
             self.put(**{name: value})
         unit.enterInitializationMode()
@@ -114,7 +139,9 @@ class Loaded:
         return self.unit.getDirectionalDerivative([self.at[output]], known, list(seeds.values()))[0]
 
 
-def test_directional_derivatives_are_the_gradient(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path) -> None:
+def test_directional_derivatives_are_the_gradient(
+    unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path
+) -> None:
     made = Loaded(fmpy, unit, tmp_path)
     assert made.outputs == [made.at[name] for name in ("mu_macro", "mu_ratio", "force")]
     for case in (CASE, {**CASE, "v0": 1.0}, {**CASE, "y0": 2e-5}, {**CASE, "v0": -0.01}):
@@ -127,14 +154,18 @@ def test_directional_derivatives_are_the_gradient(unit: Path, fmpy: Any, table: 
         for name in FIELDS:
             of_ratio = (gradient[name] - answer.mu_ratio * (name == "mu0")) / case["mu0"]
             of_force = sign * (gradient[name] * case["Fz"] + answer.mu_macro * (name == "Fz"))
-            found = [made.slope(output, **{name: 1.0}) for output in ("mu_macro", "mu_ratio", "force")]
+            found = [
+                made.slope(output, **{name: 1.0}) for output in ("mu_macro", "mu_ratio", "force")
+            ]
             assert found == close([gradient[name], of_ratio, of_force], rel=1e-9)
         seeds = {name: 1e-3 * value for name, value in case.items()}
         expected = sum(gradient[name] * seed for name, seed in seeds.items())
         assert made.slope("mu_macro", **seeds) == close(expected, rel=1e-9)
         if hasattr(made.unit, "getAdjointDerivative"):
             known = [made.at[name] for name in FIELDS]
-            adjoint = made.unit.getAdjointDerivative([made.at["mu_macro"]], known, [2.0], len(FIELDS))
+            adjoint = made.unit.getAdjointDerivative(
+                [made.at["mu_macro"]], known, [2.0], len(FIELDS)
+            )
             assert adjoint == close([2.0 * slope for slope in gradient.values()], rel=1e-9)
 
 
@@ -155,7 +186,13 @@ def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path,
     exact = table.evaluate(case, **said, gradient=True).gradient
     for name in (*FIELDS, "Fz_amplitude"):
         assert made.slope("mu_macro", **{name: 1.0}) == close(exact.get(name, 0.0), rel=1e-9)
-    for name, wrong in (("contact", -1), ("contact", 2), ("direction", -1), ("direction", 3), ("source", 0)):
+    for name, wrong in (
+        ("contact", -1),
+        ("contact", 2),
+        ("direction", -1),
+        ("direction", 3),
+        ("source", 0),
+    ):
         with pytest.raises(Exception, match="status 3"):
             made.put(**{name: wrong})
     made.put(contact=1, direction=2)
@@ -164,7 +201,9 @@ def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path,
 
 
 @pytest.mark.parametrize("kind", [{}, {"contact": 1}, {"direction": 1}, {"direction": 2}])
-def test_the_force_passes_through_zero_with_its_derivatives(unit: Path, fmpy: Any, tmp_path: Path, kind: Any) -> None:
+def test_the_force_passes_through_zero_with_its_derivatives(
+    unit: Path, fmpy: Any, tmp_path: Path, kind: Any
+) -> None:
     made = Loaded(fmpy, unit, tmp_path, **kind, v_rest=1e-3)
     made.put(Fz_amplitude=4.0)
 
@@ -173,22 +212,34 @@ def test_the_force_passes_through_zero_with_its_derivatives(unit: Path, fmpy: An
         return made.get("force")[0]
 
     assert (force(v0=0.0), force(v0=-4e-4)) == (0.0, -force(v0=4e-4))
-    assert 0.0 < force(v0=4e-4) < force(v0=9e-4) < force(v0=1e-3) == CASE["Fz"] * made.get("mu_macro")[0]
+    assert (
+        0.0
+        < force(v0=4e-4)
+        < force(v0=9e-4)
+        < force(v0=1e-3)
+        == CASE["Fz"] * made.get("mu_macro")[0]
+    )
     for case in ({**CASE, "v0": 4e-4}, {**CASE, "v0": -9e-4}, {**CASE, "v0": 0.0}):
         made.put(**case)
         slopes = {name: made.slope("force", **{name: 1.0}) for name in FIELDS}
         for name, value in case.items():
             step = 1e-5 * (value or 1e-3)
-            difference = (force(**{name: value + step}) - force(**{name: value - step})) / (2.0 * step)
+            difference = (force(**{name: value + step}) - force(**{name: value - step})) / (
+                2.0 * step
+            )
             made.put(**{name: value})
-            assert slopes[name] == close(difference, rel=2e-4, abs=1e-5 * abs(force()) / (abs(value) + 1e-3)), name
+            assert slopes[name] == close(
+                difference, rel=2e-4, abs=1e-5 * abs(force()) / (abs(value) + 1e-3)
+            ), name
     for wrong in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(Exception, match="status 3"):
             made.put(v_rest=wrong)
     assert made.get("v_rest") == [1e-3]
 
 
-def test_states_are_kept_and_illegal_inputs_discarded(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path) -> None:
+def test_states_are_kept_and_illegal_inputs_discarded(
+    unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path
+) -> None:
     made = Loaded(fmpy, unit, tmp_path)
     expected = table.evaluate(CASE).mu_macro
     assert made.get("mu_macro") == [close(expected, rel=1e-13)]

@@ -1,4 +1,5 @@
-"""One table of cases through every way of asking the service: values, names, order, gaps, rigid contact, reasons."""
+"""One table of cases through every way of asking the service: values, names, order, gaps, rigid
+contact, reasons."""
 
 import json
 import math
@@ -24,16 +25,28 @@ GOOD: tuple[Row, ...] = (
 )
 GAP = "is missing; write rigid or a number"
 BAD: dict[str, tuple[str, str]] = {  # JSON of the value, and the reason
-    "y0": ("-1.0", "must be finite and >= 0"), "mu0": ("0.0", "must be finite and > 0"), "k": ("null", GAP),
-}  # fmt: skip
-ROWS = (*GOOD[:4], *({**CASE, name: json.loads(value)} for name, (value, _) in BAD.items()), *GOOD[4:])
-REASONS = [None] * 4 + [f"{name}: {reason}" for name, (_, reason) in BAD.items()] + [None] * (len(GOOD) - 4)
+    "y0": ("-1.0", "must be finite and >= 0"),
+    "mu0": ("0.0", "must be finite and > 0"),
+    "k": ("null", GAP),
+}
+ROWS = (
+    *GOOD[:4],
+    *({**CASE, name: json.loads(value)} for name, (value, _) in BAD.items()),
+    *GOOD[4:],
+)
+REASONS = (
+    [None] * 4
+    + [f"{name}: {reason}" for name, (_, reason) in BAD.items()]
+    + [None] * (len(GOOD) - 4)
+)
 
 
 @pytest.fixture(scope="module")
 def good(surrogate: Surrogate) -> list[Row]:
     """The library, case by case."""
-    answers = [surrogate.evaluate({name: number(value) for name, value in row.items()}) for row in GOOD]
+    answers = [
+        surrogate.evaluate({name: number(value) for name, value in row.items()}) for row in GOOD
+    ]
     return [{name: getattr(answer, name) for name in COLUMNS} for answer in answers]
 
 
@@ -57,9 +70,14 @@ def of_one(document: Row) -> Row:
 def with_errors(columns: Row, document: Row) -> list[Row]:
     assert tuple(document)[-4:] == ("errors", "n_errors", "table", "api_version")
     assert document["n_errors"] == len(BAD)
-    reasons = {error["index"]: f"{error['field']}: {error['reason']}" for error in document["errors"]}
+    reasons = {
+        error["index"]: f"{error['field']}: {error['reason']}" for error in document["errors"]
+    }
     rows = zip(*(columns[name] for name in COLUMNS), strict=True)
-    return [{**dict(zip(COLUMNS, row, strict=True)), "error": reasons.get(i)} for i, row in enumerate(rows)]
+    return [
+        {**dict(zip(COLUMNS, row, strict=True)), "error": reasons.get(i)}
+        for i, row in enumerate(rows)
+    ]
 
 
 def by_get(client: Any, row: Row) -> Row:
@@ -70,7 +88,9 @@ def by_get(client: Any, row: Row) -> Row:
 def by_rows(client: Any) -> list[Row]:
     document = client.post(BATCH, json=list(ROWS)).json()
     assert all(row is None or tuple(row) == COLUMNS for row in document["results"])
-    return with_errors({name: [row and row[name] for row in document["results"]] for name in COLUMNS}, document)
+    return with_errors(
+        {name: [row and row[name] for row in document["results"]] for name in COLUMNS}, document
+    )
 
 
 def by_columns(client: Any) -> list[Row]:
@@ -91,7 +111,9 @@ WAYS: dict[str, Callable[[Any], list[Row]]] = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_the_service_answers_in_every_format_what_the_library_does(client: Any, expected: list[Row], way: str) -> None:
+def test_the_service_answers_in_every_format_what_the_library_does(
+    client: Any, expected: list[Row], way: str
+) -> None:
     found = WAYS[way](client)
     i = REASONS.index(f"k: {GAP}")
     if way == "GET":  # an empty value is no number there
@@ -106,13 +128,16 @@ INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling
 
 
 def flat(document: Row, path: str = "") -> Row:
-    """Leaves of nested objects by their paths; JSON has no number that is not finite, and says null."""
+    """Leaves of nested objects by their paths; JSON has no number that is not finite, and says
+    null."""
     found: Row = {}
     for name, value in document.items():
         if isinstance(value, dict):
             found |= flat(value, f"{path}{name}.")
         else:
-            found[path + name] = None if isinstance(value, float) and not math.isfinite(value) else value
+            found[path + name] = (
+                None if isinstance(value, float) and not math.isfinite(value) else value
+            )
     return found
 
 
@@ -124,9 +149,13 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     assert names[: len(COLUMNS)] == list(COLUMNS)
     assert len(names) > 30
     single = [{name: row[name] for name in names} for row in single]
-    columns = client.post(BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **asked_for}).json()
+    columns = client.post(
+        BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **asked_for}
+    ).json()
     listed = {name: values for name, values in flat(columns).items() if name in names}
-    assert [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)] == single
+    assert [
+        dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)
+    ] == single
     query = {"include": ",".join(INCLUDED), **{f"std_{name}": value for name, value in std.items()}}
     of_query = flat(client.get("/v1/mu-macro", params={**CASE, **query}).json())
     assert {name: of_query[name] for name in names} == single[0]

@@ -16,10 +16,20 @@ SPEEDS = np.geomspace(1e-3, 1.0, 30)
 
 @pytest.mark.parametrize(
     "more",
-    [{}, {"gradient": True}, {"groups": True}, {"contact": "ball"}, {"k_range": (0.8e6, 1.2e6)}, {"v0": 0.01},
-     {"v0": SPEEDS.reshape(5, 6)}, {"v0": np.array([0.01, -1.0])}],
-)  # fmt: skip
-def test_a_frame_has_one_row_a_case_with_what_was_requested(surrogate: Surrogate, more: Any) -> None:
+    [
+        {},
+        {"gradient": True},
+        {"groups": True},
+        {"contact": "ball"},
+        {"k_range": (0.8e6, 1.2e6)},
+        {"v0": 0.01},
+        {"v0": SPEEDS.reshape(5, 6)},
+        {"v0": np.array([0.01, -1.0])},
+    ],
+)
+def test_a_frame_has_one_row_a_case_with_what_was_requested(
+    surrogate: Surrogate, more: Any
+) -> None:
     pandas = pytest.importorskip("pandas")
     case = {name: value for name, value in CASE.items() if name != "k" or "k_range" not in more}
     answer = surrogate.evaluate(**{**case, "v0": SPEEDS, **more})
@@ -45,7 +55,9 @@ def test_the_map_of_a_normal_force_ends_where_it_lifts_off(surrogate: Surrogate)
     assert v.tolist() == close(y.tolist(), rel=1e-15)  # normal: the border is the amplitude itself
 
 
-def test_without_pandas_a_frame_names_it(surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pandas_a_frame_names_it(
+    surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MumacroError, match="pip install pandas"):
         surrogate.evaluate(**CASE, v0=0.01).to_frame()

@@ -1,7 +1,8 @@
-"""The examples of README, tutorial and how-to pages run unchanged in an environment with the wheel, not with this tree.
+"""The examples of README, tutorial and how-to pages run unchanged in an environment with the wheel,
+not with this tree.
 
-README and tutorial have nothing but the wheel and what it requires; the other pages also have the packages of the
-running environment, for extras.  The blocks of a page share one session.
+README and tutorial have nothing but the wheel and what it requires; the other pages also have the
+packages of the running environment, for extras.  The blocks of a page share one session.
 """
 
 import os
@@ -59,7 +60,15 @@ def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The programs of an environment with the wheel and the packages of this one."""
     folder = tmp_path_factory.mktemp("full") / "venv"
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-    pip = (folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "-q", "--no-deps")
+    pip = (
+        folder / "bin" / "python",
+        "-m",
+        "pip",
+        "--disable-pip-version-check",
+        "install",
+        "-q",
+        "--no-deps",
+    )
     subprocess.run([*pip, wheel], check=True)
     (packages,) = folder.glob("lib/python*/site-packages")
     # behind the wheel, and without the links to this tree that an installation in place has
@@ -76,8 +85,16 @@ def service(full: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[st
 
 
 def run(programs: Path, folder: Path, *words: str | Path) -> str:
-    env = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
-    env |= {"PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin", "COLUMNS": "120", "MPLBACKEND": "agg"}
+    env = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHON", "MUMACRO_"))
+    }
+    env |= {
+        "PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin",
+        "COLUMNS": "120",
+        "MPLBACKEND": "agg",
+    }
     done = subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -101,7 +118,12 @@ def last_place(number: str) -> float:
 
 
 def test_a_number_of_the_guide_has_a_last_place() -> None:
-    assert [last_place(text) for text in ("8.444e-16", "0.2400", "-12", "1e-12")] == [1e-19, 1e-4, 1.0, 1e-12]
+    assert [last_place(text) for text in ("8.444e-16", "0.2400", "-12", "1e-12")] == [
+        1e-19,
+        1e-4,
+        1.0,
+        1e-12,
+    ]
 
 
 @pytest.mark.parametrize("page", having("console"), ids=lambda page: page.stem)

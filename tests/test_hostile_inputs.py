@@ -1,4 +1,5 @@
-"""One policy for bad input: a bad scalar is refused by name, a bad array value gives NaN, and nothing crashes."""
+"""One policy for bad input: a bad scalar is refused by name, a bad array value gives NaN, and
+nothing crashes."""
 
 import itertools
 import math
@@ -15,19 +16,39 @@ from tests.cases import CASE, tables, without
 #: methods of (v~, y~)
 PLANE: dict[str, Callable[..., Any]] = {
     **{name: getattr(Surrogate, name) for name in (*QUANTITY_NAMES, "ratio_with_bound")},
-    **{name: getattr(Surrogate, name) for name in ("power_with_bound", "stick_fraction_with_bound")},
-    **{f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITY_NAMES},
+    **{
+        name: getattr(Surrogate, name) for name in ("power_with_bound", "stick_fraction_with_bound")
+    },
+    **{
+        f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True)
+        for of in QUANTITY_NAMES
+    },
 }
 NO_NUMBERS: dict[str, Any] = {
-    "text": "0.1", "bytes": b"0.1", "complex": 1j, "None": None, "object": object(), "a set": {1.0},
-    "a mapping": {"a": 1.0}, "a type": float, "ragged": [[1.0], [1.0, 2.0]], "texts": ["0.1", "0.2"],
-    "bytes in a list": [b"1"], "complex array": np.array([1j, 2.0]), "too large": 10**400,
+    "text": "0.1",
+    "bytes": b"0.1",
+    "complex": 1j,
+    "None": None,
+    "object": object(),
+    "a set": {1.0},
+    "a mapping": {"a": 1.0},
+    "a type": float,
+    "ragged": [[1.0], [1.0, 2.0]],
+    "texts": ["0.1", "0.2"],
+    "bytes in a list": [b"1"],
+    "complex array": np.array([1j, 2.0]),
+    "too large": 10**400,
     "too large in a list": [10**400],
-    "times": np.array(["2020-01-01"], dtype="datetime64[s]"), "durations": np.array([1], dtype="timedelta64[s]"),
-    "a time": np.datetime64("2020-01-01"), "text array": np.array(["0.1"]), "None in an array": [0.1, None],
-    "records": np.zeros(3, dtype=[("a", "f8")]), "objects": np.array([object()]), "void": np.void(b"12345678"),
+    "times": np.array(["2020-01-01"], dtype="datetime64[s]"),
+    "durations": np.array([1], dtype="timedelta64[s]"),
+    "a time": np.datetime64("2020-01-01"),
+    "text array": np.array(["0.1"]),
+    "None in an array": [0.1, None],
+    "records": np.zeros(3, dtype=[("a", "f8")]),
+    "objects": np.array([object()]),
+    "void": np.void(b"12345678"),
     "long": ["x" * 100_000] * 100,
-}  # fmt: skip
+}
 OUT_OF_BOUNDS = [-1.0, -1e6, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
 table = tables(1e-4)
 
@@ -39,7 +60,9 @@ def parts(found: Any) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", NO_NUMBERS)
-def test_a_value_that_is_not_a_number_is_refused_by_name(table: Surrogate, method: str, bad: str) -> None:
+def test_a_value_that_is_not_a_number_is_refused_by_name(
+    table: Surrogate, method: str, bad: str
+) -> None:
     for v, y, field in ((NO_NUMBERS[bad], 0.5, "v_tilde"), (0.1, NO_NUMBERS[bad], "y_tilde")):
         with pytest.raises(InputError) as caught:
             PLANE[method](table, v, y)
@@ -51,7 +74,9 @@ def test_a_value_that_is_not_a_number_is_refused_by_name(table: Surrogate, metho
 
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", OUT_OF_BOUNDS, ids=repr)
-def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate, method: str, bad: Any) -> None:
+def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(
+    table: Surrogate, method: str, bad: Any
+) -> None:
     ask = PLANE[method]
     for v, y, field in ((bad, 0.5, "v_tilde"), (0.1, bad, "y_tilde")):
         with pytest.raises(InputError) as caught:
@@ -67,7 +92,8 @@ def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate,
 def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -> None:
     ask = PLANE[method]
     rng = np.random.default_rng(3)
-    v = np.round(10.0 ** rng.uniform(-2.0, 2.0, (6, 10)) * 64.0) / 64.0 + 1.0 / 64.0  # exact in half precision
+    # exact in half precision
+    v = np.round(10.0 ** rng.uniform(-2.0, 2.0, (6, 10)) * 64.0) / 64.0 + 1.0 / 64.0
     v = v.astype(np.float16).astype(np.float64)
     y = 10.0 ** rng.uniform(-2.0, 2.0, (6, 10))
     expected = ask(table, v, y)
@@ -75,14 +101,25 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
     read_only.flags.writeable = False
     spread = np.zeros((12, 30))
     spread[::2, ::3] = v
-    unaligned = np.frombuffer(b"x" + v.tobytes(), dtype=np.uint8)[1:].view(np.float64).reshape(v.shape)
+    unaligned = (
+        np.frombuffer(b"x" + v.tobytes(), dtype=np.uint8)[1:].view(np.float64).reshape(v.shape)
+    )
     layouts: dict[str, Any] = {
-        "order": np.asfortranarray(v), "read only": read_only, "strided": spread[::2, ::3], "list": v.tolist(),
-        "big endian": v.astype(">f8"), "half": v.astype(np.float16), "single": v.astype(np.float32),
-        "long": v.astype(np.longdouble), "objects": v.astype(object), "reversed": v[::-1][::-1],
-        "unaligned": unaligned, "tuple": tuple(map(tuple, v)), "masked": np.ma.masked_array(v, mask=False),
+        "order": np.asfortranarray(v),
+        "read only": read_only,
+        "strided": spread[::2, ::3],
+        "list": v.tolist(),
+        "big endian": v.astype(">f8"),
+        "half": v.astype(np.float16),
+        "single": v.astype(np.float32),
+        "long": v.astype(np.longdouble),
+        "objects": v.astype(object),
+        "reversed": v[::-1][::-1],
+        "unaligned": unaligned,
+        "tuple": tuple(map(tuple, v)),
+        "masked": np.ma.masked_array(v, mask=False),
         "memory": memoryview(v.data),
-    }  # fmt: skip
+    }
     for name, layout in layouts.items():
         for one, two in zip(parts(ask(table, layout, y)), parts(expected), strict=True):
             np.testing.assert_array_equal(one, two, err_msg=name)
@@ -112,7 +149,13 @@ def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
 def test_the_callers_floating_point_settings_are_unchanged(table: Surrogate) -> None:
     with np.errstate(all="raise"):
         table.mu_ratio(np.array([1e-304, math.nan, 0.1]), np.array([1.4e5, 0.5, 0.5]))
-        columns = {"mu0": [1e-300, 0.3], "Fz": 1e-300, "k": [math.inf, 1.0], "y0": 1e-300, "omega": 1e-300}
+        columns = {
+            "mu0": [1e-300, 0.3],
+            "Fz": 1e-300,
+            "k": [math.inf, 1.0],
+            "y0": 1e-300,
+            "omega": 1e-300,
+        }
         table.evaluate({**columns, "v0": [1e-310, -1.0]}, gradient=True).regime_certain  # noqa: B018
         assert np.geterr()["under"] == "raise"
 
@@ -132,7 +175,9 @@ def test_of_must_be_a_quantity(table: Surrogate) -> None:
 
 @pytest.mark.parametrize("bad", [bad for bad in NO_NUMBERS if bad != "None"])
 @pytest.mark.parametrize("field", ["mu0", "k", "omega", "f", "v0"])
-def test_evaluate_refuses_a_value_that_is_not_a_number_by_name(table: Surrogate, field: str, bad: str) -> None:
+def test_evaluate_refuses_a_value_that_is_not_a_number_by_name(
+    table: Surrogate, field: str, bad: str
+) -> None:
     case = {**without(CASE, "omega" if field == "f" else field), field: NO_NUMBERS[bad]}
     for asked in ({}, {"gradient": True}, {"illegal": "raise"}):
         with pytest.raises(InputError) as caught:
@@ -142,12 +187,38 @@ def test_evaluate_refuses_a_value_that_is_not_a_number_by_name(table: Surrogate,
         table.evaluate(case)
 
 
-EXTREMES = [0.0, -0.0, 5e-324, 1e-310, 1e-200, 1e-150, 1e-100, 1e-15, 0.75, 1.0, 1.5, 3.0, 32.0, 2.0**17, 1e100, 1e150,
-            1e200, 1.7976931348623157e308, math.inf, -math.inf, math.nan, -1.0, -1e300, -5e-324]  # fmt: skip
+EXTREMES = [
+    0.0,
+    -0.0,
+    5e-324,
+    1e-310,
+    1e-200,
+    1e-150,
+    1e-100,
+    1e-15,
+    0.75,
+    1.0,
+    1.5,
+    3.0,
+    32.0,
+    2.0**17,
+    1e100,
+    1e150,
+    1e200,
+    1.7976931348623157e308,
+    math.inf,
+    -math.inf,
+    math.nan,
+    -1.0,
+    -1e300,
+    -5e-324,
+]
 
 
 @pytest.mark.parametrize("method", PLANE)
-def test_any_bits_have_an_answer_if_they_are_legal_alone_as_in_an_array(table: Surrogate, method: str) -> None:
+def test_any_bits_have_an_answer_if_they_are_legal_alone_as_in_an_array(
+    table: Surrogate, method: str
+) -> None:
     rng, pairs = np.random.default_rng(0), np.array(list(itertools.product(EXTREMES, EXTREMES)))
     bits = rng.integers(0, 2**64, 200_000, dtype=np.uint64).view(np.float64).reshape(-1, 2)
     v, y = np.concatenate([pairs, bits]).T
@@ -185,4 +256,6 @@ def test_six_inputs_of_any_bits_are_answered_alone_as_in_an_array(table: Surroga
             assert not legal[i]
             continue
         assert (one.mu_macro, one.error_bound) == (found.mu_macro[i], found.error_bound[i])
-        np.testing.assert_array_equal([*one.gradient.values()], [column[i] for column in found.gradient.values()])
+        np.testing.assert_array_equal(
+            [*one.gradient.values()], [column[i] for column in found.gradient.values()]
+        )

@@ -1,4 +1,5 @@
-"""The inverse problem: roots against the forward answer, folds, reach, the border; bracketed Newton steps."""
+"""The inverse problem: roots against the forward answer, folds, reach, the border; bracketed Newton
+steps."""
 
 import math
 from types import SimpleNamespace
@@ -26,22 +27,33 @@ def decade(low: float, high: float) -> Any:
 
 
 cases = st.fixed_dictionaries(
-    {"mu0": decade(-2, 0), "Fz": decade(-3, 4), "k": decade(3, 9), "y0": decade(-9, -3), "omega": decade(0, 7),
-     "v0": decade(-6, 2)}
-)  # fmt: skip
+    {
+        "mu0": decade(-2, 0),
+        "Fz": decade(-3, 4),
+        "k": decade(3, 9),
+        "y0": decade(-9, -3),
+        "omega": decade(0, 7),
+        "v0": decade(-6, 2),
+    }
+)
 
 
 @every_pair
 @settings(max_examples=60, deadline=None)
 @given(case=cases, share=st.floats(0.001, 0.999), place=st.integers(0, 5))
-def test_the_forward_answer_is_inverted(surrogate: Surrogate, pair: Any, case: Case, share: Any, place: Any) -> None:
+def test_the_forward_answer_is_inverted(
+    surrogate: Surrogate, pair: Any, case: Case, share: Any, place: Any
+) -> None:
     said, fields, case = as_kind(case, pair, share)
     unknown = fields[place]
     forward: Any = surrogate.evaluate(**case, **said)
     solution = solve_for(surrogate, unknown, forward.mu_macro, without(case, unknown), **said)
     if solution.constant or not solution.roots[0]:
         # within the surrogate's error the input has no influence here, or its end equals the limit
-        edge = min(abs(forward.mu_macro - solution.reach.mu_min), abs(forward.mu_macro - solution.reach.mu_max))
+        edge = min(
+            abs(forward.mu_macro - solution.reach.mu_min),
+            abs(forward.mu_macro - solution.reach.mu_max),
+        )
         assert edge <= 4.0 * forward.error_bound + 1e-9 * case["mu0"]
         return
     for root in solution.roots[0]:
@@ -54,9 +66,12 @@ def test_the_forward_answer_is_inverted(surrogate: Surrogate, pair: Any, case: C
 
 
 def test_an_enclosure_on_a_plateau_spans_it(surrogate: Surrogate) -> None:
-    # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, for any stiffness from a hundredth of this one on
+    # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, for any stiffness from a hundredth of
+    # this one on
     case: Case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
-    root = only_root(solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, without(case, "k")))
+    root = only_root(
+        solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, without(case, "k"))
+    )
     assert root.low < 10.0 < 1e9 < root.high
 
 
@@ -66,14 +81,22 @@ def test_targets_are_solved_together_as_alone(surrogate: Surrogate) -> None:
     values = [roots[0].value for roots in together.roots]
     assert values == sorted(values)
     for target, value in zip(targets, values, strict=True):
-        assert only_root(solve_for(surrogate, "v0", target, without(CASE, "v0"))).value == close(value, rel=1e-9)
+        assert only_root(solve_for(surrogate, "v0", target, without(CASE, "v0"))).value == close(
+            value, rel=1e-9
+        )
 
 
 @pytest.mark.parametrize(
     ("unknown", "low", "high"),
-    [("v0", 0.3 * math.sqrt(5.0) / 3.0, 0.3), ("y0", 0.0, 0.3), ("omega", 0.3 * math.sqrt(5.0) / 3.0, 0.3)],
+    [
+        ("v0", 0.3 * math.sqrt(5.0) / 3.0, 0.3),
+        ("y0", 0.0, 0.3),
+        ("omega", 0.3 * math.sqrt(5.0) / 3.0, 0.3),
+    ],
 )
-def test_a_monotone_unknown_reports_its_reach(surrogate: Surrogate, unknown: Any, low: Any, high: Any) -> None:
+def test_a_monotone_unknown_reports_its_reach(
+    surrogate: Surrogate, unknown: Any, low: Any, high: Any
+) -> None:
     targets = [0.999 * low, low + 0.5 * (high - low), 1.001 * high]
     solution = solve_for(surrogate, unknown, targets, without(CASE, unknown))
     assert [len(roots) for roots in solution.roots] == [0, 1, 0]
@@ -81,7 +104,9 @@ def test_a_monotone_unknown_reports_its_reach(surrogate: Surrogate, unknown: Any
     assert solution.reach.mu_max == high
 
 
-def test_an_end_that_is_attained_is_a_root_and_one_that_is_only_approached_none(surrogate: Surrogate) -> None:
+def test_an_end_that_is_attained_is_a_root_and_one_that_is_only_approached_none(
+    surrogate: Surrogate,
+) -> None:
     static = surrogate.evaluate(**{**CASE, "v0": 0.0}).mu_macro
     for unknown, end in (("v0", static), ("y0", 0.3), ("omega", 0.3)):
         assert only_root(solve_for(surrogate, unknown, end, without(CASE, unknown))).value == 0.0
@@ -122,7 +147,9 @@ def test_a_range_keeps_its_roots_only(surrogate: Surrogate) -> None:
     every = solve_for(surrogate, "k", target, case)
     assert len(every.roots[0]) == 3
     first, second, third = (root.value for root in every.roots[0])
-    middle = solve_for(surrogate, "k", target, case, within=(math.sqrt(first * second), math.sqrt(second * third)))
+    middle = solve_for(
+        surrogate, "k", target, case, within=(math.sqrt(first * second), math.sqrt(second * third))
+    )
     assert only_root(middle).value == close(second, rel=1e-9)
     half = solve_for(surrogate, "v0", 0.25, without(CASE, "v0"), within=(0.0, 1e-3))
     assert half.roots == ((),)
@@ -132,10 +159,19 @@ def test_a_range_keeps_its_roots_only(surrogate: Surrogate) -> None:
 
 @pytest.mark.parametrize(
     ("unknown", "changed"),
-    [("v0", {"y0": 0.0}), ("v0", {"omega": 0.0}), ("k", {"y0": 0.0}), ("Fz", {"omega": 0.0}), ("y0", {"omega": 0.0}),
-     ("omega", {"y0": 0.0}), ("Fz", {"k": "rigid"})],
-)  # fmt: skip
-def test_an_input_without_influence_is_reported(surrogate: Surrogate, unknown: Any, changed: Any) -> None:
+    [
+        ("v0", {"y0": 0.0}),
+        ("v0", {"omega": 0.0}),
+        ("k", {"y0": 0.0}),
+        ("Fz", {"omega": 0.0}),
+        ("y0", {"omega": 0.0}),
+        ("omega", {"y0": 0.0}),
+        ("Fz", {"k": "rigid"}),
+    ],
+)
+def test_an_input_without_influence_is_reported(
+    surrogate: Surrogate, unknown: Any, changed: Any
+) -> None:
     case = {**CASE, **changed}
     value = surrogate.evaluate(**case).mu_macro
     solution = solve_for(surrogate, unknown, [value, 0.9 * value], without(case, unknown))
@@ -153,7 +189,9 @@ def test_at_rest_the_frequency_only_matters_by_being_there(surrogate: Surrogate)
     assert (root.low, root.high) == (5e-324, 1.7976931348623157e308)
 
 
-def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(surrogate: Surrogate) -> None:
+def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(
+    surrogate: Surrogate,
+) -> None:
     for unknown in ("v0", "y0", "omega", "mu0"):
         case = {**CASE, "k": "rigid"}
         target = surrogate.evaluate(**case).mu_macro
@@ -168,13 +206,18 @@ def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(s
 @pytest.mark.parametrize("unknown", ["k", "Fz"])
 @settings(max_examples=15, deadline=None)
 @given(v0=decade(-5, 0), share=st.floats(0.001, 0.999))
-def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: Any, unknown: Any, v0: Any, share: Any) -> None:
+def test_no_root_is_missed_on_a_ray(
+    surrogate: Surrogate, contact: Any, unknown: Any, v0: Any, share: Any
+) -> None:
     case, ray = {**CASE, "v0": v0}, CASE[unknown] * np.geomspace(1e-9, 1e9, 20_001)
     mu = surrogate.evaluate(**{**case, unknown: ray}, contact=contact).mu_macro
     target = float(mu[int(share * 20_000)])
-    assume(mu.min() * (1.0 + 1e-9) < target < mu.max() * (1.0 - 1e-9))  # not on a plateau, where all are roots
+    # not on a plateau, where all are roots
+    assume(mu.min() * (1.0 + 1e-9) < target < mu.max() * (1.0 - 1e-9))
     above = mu > target * (1.0 + 1e-12)
-    found = solve_for(surrogate, unknown, target, without(case, unknown), (ray[0], ray[-1]), contact=contact).roots[0]
+    found = solve_for(
+        surrogate, unknown, target, without(case, unknown), (ray[0], ray[-1]), contact=contact
+    ).roots[0]
     assert len(found) >= np.count_nonzero(above[1:] != above[:-1])
     assert all(root.mu_macro == close(target, rel=1e-11) for root in found)
     values = [root.value for root in found]
@@ -183,13 +226,21 @@ def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: Any, unknown:
 
 @pytest.mark.parametrize("pair", [pair for pair in PAIRS if pair[1] != "across"], ids=" ".join)
 @pytest.mark.parametrize("k", [1e6, "rigid"])
-def test_along_and_normal_the_whole_friction_is_reached(surrogate: Surrogate, pair: Any, k: Any) -> None:
+def test_along_and_normal_the_whole_friction_is_reached(
+    surrogate: Surrogate, pair: Any, k: Any
+) -> None:
     said, _, case = as_kind({**CASE, "k": k}, pair)
     solution = solve_for(surrogate, "v0", 0.3, without(case, "v0"), **said)
     root = only_root(solution)
     # where the springs begin to slide all the time; the last digits before it are mu0, too
     z = case.get("Fz_amplitude", 0.0) / case["Fz"]
-    begin = z * 3e-6 * CASE["omega"] if z and k != "rigid" else 5e-324 if z else CASE["y0"] * CASE["omega"]
+    begin = (
+        z * 3e-6 * CASE["omega"]
+        if z and k != "rigid"
+        else 5e-324
+        if z
+        else CASE["y0"] * CASE["omega"]
+    )
     assert root.value == close(begin, rel=1e-5, abs=5e-324)
     assert root.low <= root.value <= begin * (1.0 + 1e-12)
     assert root.high == solution.reach.high
@@ -206,24 +257,36 @@ def test_the_amplitude_of_the_force_stays_below_the_force(surrogate: Surrogate) 
 
 
 ANY = 0.2  # a target
-REFUSED: list[tuple[str, Any, Case, str]] = [  # direction, the first arguments, what is changed in the case, why
-    ("across", ("w0", ANY), {}, "unknown must be"), ("across", ("v0", ANY), {"v0": 1.0}, "v0 must be"),
-    ("across", ("v0", ANY), {"Fz": None}, "Fz must be"), ("across", ("v0", -0.1), {}, "target must be"),
+# direction, the first arguments, what is changed in the case, why
+REFUSED: list[tuple[str, Any, Case, str]] = [
+    ("across", ("w0", ANY), {}, "unknown must be"),
+    ("across", ("v0", ANY), {"v0": 1.0}, "v0 must be"),
+    ("across", ("v0", ANY), {"Fz": None}, "Fz must be"),
+    ("across", ("v0", -0.1), {}, "target must be"),
     ("across", ("v0", [0.1, math.nan]), {}, "target at index 1 must be"),
     ("across", ("v0", ANY), {"mu0": 0.0}, "mu0 must"),
-    ("across", ("v0", ANY, (1.0, 1.0)), {}, "range must"), ("across", ("k", ANY, (0.0, 1.0)), {}, "range must"),
-    ("across", ("v0", ANY, (0.0, math.inf)), {}, "range must"), ("across", ("omega", ANY), {"f": 1e3}, "f must"),
+    ("across", ("v0", ANY, (1.0, 1.0)), {}, "range must"),
+    ("across", ("k", ANY, (0.0, 1.0)), {}, "range must"),
+    ("across", ("v0", ANY, (0.0, math.inf)), {}, "range must"),
+    ("across", ("omega", ANY), {"f": 1e3}, "f must"),
     ("across", ("v0", ANY), {"omega": None, "f": 1e308}, "f must"),
     ("across", ("v0", ANY), {"k": [1e6, 2e6]}, "k must"),
     ("normal", ("v0", ANY), {"Fz_amplitude": 10.0}, "Fz_amplitude must be >= 0 and below Fz"),
     ("normal", ("v0", ANY), {"y0": 1e-6}, "y0 must be left out for direction normal"),
-    ("across", ("v0", ANY), {"Fz_amplitude": 1.0}, "Fz_amplitude must be left out for direction across"),
+    (
+        "across",
+        ("v0", ANY),
+        {"Fz_amplitude": 1.0},
+        "Fz_amplitude must be left out for direction across",
+    ),
     ("normal", ("y0", ANY), {}, "unknown must be one of mu0, Fz, k, Fz_amplitude"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("direction", "asked", "changed", "said"), REFUSED)
-def test_a_bad_question_is_refused(surrogate: Surrogate, direction: str, asked: Any, changed: Case, said: str) -> None:
+def test_a_bad_question_is_refused(
+    surrogate: Surrogate, direction: str, asked: Any, changed: Case, said: str
+) -> None:
     keywords, _, case = as_kind(CASE, ("spring", direction))
     given = {**without(case, asked[0]), **changed}
     gone = [name for name, value in changed.items() if value is None and name != "k"]
@@ -231,13 +294,15 @@ def test_a_bad_question_is_refused(surrogate: Surrogate, direction: str, asked: 
         solve_for(surrogate, asked[0], asked[1], without(given, *gone), *asked[2:], **keywords)
 
 
-# --- border -------------------------------------------------------------------------------------------
+# --- border ---------------------------------------------------------------------------------------
 
 
 @every_pair
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("speed", [0.01, 0.15])
-def test_the_crossings_are_all_changes_of_the_regime(surrogate: Surrogate, pair: Any, place: Any, speed: Any) -> None:
+def test_the_crossings_are_all_changes_of_the_regime(
+    surrogate: Surrogate, pair: Any, place: Any, speed: Any
+) -> None:
     said, fields, case = as_kind({**CASE, "v0": speed}, pair)
     along = fields[place]
     values = case[along] * np.geomspace(1e-3, 1e3, 3001)
@@ -249,13 +314,17 @@ def test_the_crossings_are_all_changes_of_the_regime(surrogate: Surrogate, pair:
     assert [mark.regimes for mark in marks] == [(regime[i], regime[i + 1]) for i in changes]
     for mark, i in zip(marks, changes, strict=True):
         assert values[i] < mark.value <= values[i + 1]
-        there = surrogate.evaluate(**{**case, along: np.array([np.nextafter(mark.value, 0.0), mark.value])}, **said)
+        there = surrogate.evaluate(
+            **{**case, along: np.array([np.nextafter(mark.value, 0.0), mark.value])}, **said
+        )
         assert tuple(there.regime) == mark.regimes
         assert mark.mu_macro == there.mu_macro[1]
 
 
 @pytest.mark.parametrize(("share", "expected"), [(1.0 + 1e-9, 2), (1.0 - 1e-9, 0)])
-def test_a_ray_at_the_border_crosses_it_twice_or_never(surrogate: Surrogate, share: Any, expected: Any) -> None:
+def test_a_ray_at_the_border_crosses_it_twice_or_never(
+    surrogate: Surrogate, share: Any, expected: Any
+) -> None:
     closest = 1.290791
     ratio = share * closest / surrogate.v_tilde_crit(closest)  # y~ / v~
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": ratio, "v0": 1.0}
@@ -266,7 +335,8 @@ def test_a_ray_at_the_border_crosses_it_twice_or_never(surrogate: Surrogate, sha
 
 def test_a_fold_just_above_its_first_ratio_is_found(surrogate: Surrogate) -> None:
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
-    target = float(surrogate.mu_ratio(0.6626, 6.626))  # between minimum and maximum, which differ by a thousandth
+    # between minimum and maximum, which differ by a thousandth
+    target = float(surrogate.mu_ratio(0.6626, 6.626))
     roots = solve_for(surrogate, "k", target, case).roots[0]
     assert len(roots) == 3
     assert roots[1].low <= 6.626 <= roots[1].high
@@ -280,7 +350,7 @@ def test_outside_its_range_there_is_no_border(surrogate: Surrogate) -> None:
     assert border_crossings(surrogate, "k", {**without(CASE, "k"), "v0": 0.0}, 1e-3, 1e3) == ()
 
 
-# --- bracketed Newton steps ---------------------------------------------------------------------------
+# --- bracketed Newton steps -----------------------------------------------------------------------
 
 
 class Known:
@@ -320,7 +390,8 @@ def test_levels_are_met_to_rounding_in_a_few_steps(sign: Any) -> None:
     piece = curve(known, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
     level = sign * np.array([1e-290, 1e-12, 0.3, 0.78, 1.5, 1.57])
     found = piece.meet(level)
-    assert found == close(np.tan(np.abs(level)), rel=1e-12)  # 1,250 times flatter at 1.57 than at 0.3
+    # 1,250 times flatter at 1.57 than at 0.3
+    assert found == close(np.tan(np.abs(level)), rel=1e-12)
     assert np.all(np.abs(known.function(found) - level) <= 2.0 * 2.0**-52 * np.abs(level))
     known.calls = 0
     piece.meet(sign * np.array([0.3]))
@@ -360,14 +431,25 @@ def test_a_level_that_is_never_reached_gives_an_end() -> None:
     piece = curve(known, 0.5, 2.0)
     assert piece.meet(np.array([0.1, 1.5])).tolist() == [0.5, 2.0]
     assert known.calls == 0
-    assert piece.holds(np.array([0.1, math.atan(0.5), 1.0, 1.5])).tolist() == [False, True, True, False]
+    assert piece.holds(np.array([0.1, math.atan(0.5), 1.0, 1.5])).tolist() == [
+        False,
+        True,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize("name", ["v0", "y0", "omega"])
-def test_newton_meets_the_levels_of_a_table_to_the_last_digits(surrogate: Surrogate, name: str) -> None:
+def test_newton_meets_the_levels_of_a_table_to_the_last_digits(
+    surrogate: Surrogate, name: str
+) -> None:
     rng = np.random.default_rng(4)
     for _ in range(20):
-        changed = {field: value * 10.0 ** rng.uniform(-2.0, 2.0) for field, value in CASE.items() if field != "mu0"}
+        changed = {
+            field: value * 10.0 ** rng.uniform(-2.0, 2.0)
+            for field, value in CASE.items()
+            if field != "mu0"
+        }
         sweep = sweep_over(surrogate, name, **changed)
         x = np.geomspace(1e-12, 1e12, 49) * CASE[name]
         piece = Curve(sweep, x, sweep.mu(x))
@@ -394,7 +476,9 @@ def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> No
     rest = without(CASE, "k", "y0")
     for ends in ({"k_range": (8e5, 1.25e6)}, {"k_low": 8e5, "k_high": 1.25e6}):
         found = solve_for(surrogate, "y0", [0.15, 0.4], {**rest, **ends})
-        assert found.ends == tuple(solve_for(surrogate, "y0", [0.15, 0.4], {**rest, "k": k}) for k in (8e5, 1.25e6))
+        assert found.ends == tuple(
+            solve_for(surrogate, "y0", [0.15, 0.4], {**rest, "k": k}) for k in (8e5, 1.25e6)
+        )
         assert found.roots[0][0].value == close(
             solve_for(surrogate, "y0", 0.15, {**rest, "k": 1e6}).roots[0][0].value, rel=1e-9
         )

@@ -1,4 +1,5 @@
-"""The kernel under sanitizers: no input and no table makes it read or write out of bounds, or do what C leaves open."""
+"""The kernel under sanitizers: no input and no table makes it read or write out of bounds, or do
+what C leaves open."""
 
 import platform
 from pathlib import Path
@@ -16,16 +17,29 @@ pytestmark = pytest.mark.slow
 KERNEL = Path(library.__file__).parent / "kernel"
 DRIVER = Path(__file__).parent / "c" / "sanitized.c"
 CHECKS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
-#: instructions that the compiler may use, and by how many doubles at a time the kernel then computes
+#: instructions that the compiler may use, and by how many doubles at a time the kernel then
+#: computes
 NATIVE = {"base": 2, "avx2": 4, "avx512": 8}[library.kernels[-1].level]
 RANDOM, NASTY, TABLES = 100_000, 172_800, 300
 
 
-@pytest.mark.parametrize(("option", "lanes"), [("-march=native", NATIVE), ("-DMUMACRO_ONE_LANE", 1), ("-O1", 2)])
+@pytest.mark.parametrize(
+    ("option", "lanes"), [("-march=native", NATIVE), ("-DMUMACRO_ONE_LANE", 1), ("-O1", 2)]
+)
 def test_sanitizers_are_silent(tables_dir: Path, tmp_path: Path, option: Any, lanes: Any) -> None:
     """Random and nasty cases, and tables of nonsense, through every entry."""
-    (tmp_path / "table.c").write_text(files(read_table(tables_dir / "mumacro-1e-4.nc"))["mumacro_table.c"], "ascii")
-    words = (*compilers.compiler("gcc"), "-std=c99", "-O1", "-g", "-ffp-contract=off", *compilers.STRICT, *CHECKS)
+    (tmp_path / "table.c").write_text(
+        files(read_table(tables_dir / "mumacro-1e-4.nc"))["mumacro_table.c"], "ascii"
+    )
+    words = (
+        *compilers.compiler("gcc"),
+        "-std=c99",
+        "-O1",
+        "-g",
+        "-ffp-contract=off",
+        *compilers.STRICT,
+        *CHECKS,
+    )
     out = tmp_path / "sanitized"
     compilers.run(*words, option, f"-I{KERNEL}", DRIVER, tmp_path / "table.c", "-o", out, "-lm")
     told = [int(word) for word in compilers.run(out, RANDOM, NASTY, TABLES).split()[1::2]]

@@ -1,4 +1,5 @@
-"""Labels are kept: pandas, xarray and Dask objects in, the same types out; Dask stays lazy until compute()."""
+"""Labels are kept: pandas, xarray and Dask objects in, the same types out; Dask stays lazy until
+compute()."""
 
 import math
 import os
@@ -15,7 +16,15 @@ from mumacro.inputs import FIELDS
 from tests.cases import CASE, Case, tables
 
 N = 60
-VALUES = ("mu_macro", "mu_ratio", "error_bound", "source_code", "v_tilde", "y_tilde", "length_scale")
+VALUES = (
+    "mu_macro",
+    "mu_ratio",
+    "error_bound",
+    "source_code",
+    "v_tilde",
+    "y_tilde",
+    "length_scale",
+)
 ALL = (*VALUES, "regime", "source", "regime_code", "regime_certain")
 table = tables(1e-7)
 
@@ -36,13 +45,17 @@ def columns(n: int = N) -> Case:
 def same(found: Any, expected: Any) -> None:
     """Two answers have the same values, for any array type; the expected ones are plain arrays."""
     for name in (*VALUES, "regime_code", "regime_certain"):
-        np.testing.assert_array_equal(np.asarray(getattr(found, name)), getattr(expected, name), err_msg=name)
+        np.testing.assert_array_equal(
+            np.asarray(getattr(found, name)), getattr(expected, name), err_msg=name
+        )
     for name in ("gradient", "gradient_bound"):
         for field in FIELDS:
-            np.testing.assert_array_equal(np.asarray(getattr(found, name)[field]), getattr(expected, name)[field])
+            np.testing.assert_array_equal(
+                np.asarray(getattr(found, name)[field]), getattr(expected, name)[field]
+            )
 
 
-# --- pandas -------------------------------------------------------------------------------------------
+# --- pandas ---------------------------------------------------------------------------------------
 
 
 def test_series_give_series_with_their_index(table: Surrogate) -> None:
@@ -60,7 +73,9 @@ def test_series_give_series_with_their_index(table: Surrogate) -> None:
     assert found.regime_certain.dtype == bool
 
 
-def test_regime_and_source_of_pandas_are_categories_without_one_for_illegal_cases(table: Surrogate) -> None:
+def test_regime_and_source_of_pandas_are_categories_without_one_for_illegal_cases(
+    table: Surrogate,
+) -> None:
     found = table.evaluate(pd.DataFrame(columns()))
     expected = table.evaluate(columns())
     assert list(found.columns) == ["mu_macro", "mu_ratio", "regime", "error_bound", "source"]
@@ -78,10 +93,15 @@ def test_a_frame_gives_a_frame_with_its_index(table: Surrogate, index: str) -> N
     n = 0 if index == "empty" else N
     at = {
         "dates": pd.date_range("2020-01-01", periods=N, freq="h"),
-        "two levels": pd.MultiIndex.from_product([range(N // 2), ["left", "right"]], names=["trial", "side"]),
-        "repeated": pd.Index([1] * N), "empty": pd.RangeIndex(0),
-    }[index]  # fmt: skip
-    frame = pd.DataFrame({**{name: values[:n] for name, values in columns().items()}, "note": ["x"] * n}, index=at)
+        "two levels": pd.MultiIndex.from_product(
+            [range(N // 2), ["left", "right"]], names=["trial", "side"]
+        ),
+        "repeated": pd.Index([1] * N),
+        "empty": pd.RangeIndex(0),
+    }[index]
+    frame = pd.DataFrame(
+        {**{name: values[:n] for name, values in columns().items()}, "note": ["x"] * n}, index=at
+    )
     found = table.evaluate(frame)
     assert found.index.equals(at)
     np.testing.assert_array_equal(found["mu_ratio"], table.evaluate(columns()).mu_ratio[:n])
@@ -98,7 +118,9 @@ def test_numbers_and_arrays_go_beside_series(table: Surrogate) -> None:
     np.testing.assert_array_equal(found.mu_macro.to_numpy(), expected.mu_macro)
     assert found.mu_macro.index.equals(index)
     rigid = table.evaluate(**{**CASE, "v0": v0, "k": "rigid"})
-    np.testing.assert_array_equal(rigid.mu_macro, table.evaluate({**CASE, "v0": given["v0"], "k": "rigid"}).mu_macro)
+    np.testing.assert_array_equal(
+        rigid.mu_macro, table.evaluate({**CASE, "v0": given["v0"], "k": "rigid"}).mu_macro
+    )
     frequency = table.evaluate(pd.DataFrame({"v0": v0, "f": 2e4}), mu0=0.3, Fz=10.0, k=1e6, y0=2e-6)
     expected = table.evaluate(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=2e4, v0=given["v0"])
     np.testing.assert_array_equal(frequency["mu_macro"], expected.mu_macro)
@@ -107,7 +129,11 @@ def test_numbers_and_arrays_go_beside_series(table: Surrogate) -> None:
 def test_integers_and_missing_values_of_pandas(table: Surrogate) -> None:
     for v0 in (pd.Series([1, None, 3], dtype="Int64"), pd.Series([1.0, None, 3.0])):
         found = table.evaluate(**{**CASE, "v0": v0})
-        assert found.mu_macro.isna().tolist() == (found.source_code == -1).tolist() == [False, True, False]
+        assert (
+            found.mu_macro.isna().tolist()
+            == (found.source_code == -1).tolist()
+            == [False, True, False]
+        )
         assert found.mu_macro[0] == table.evaluate(**{**CASE, "v0": 1.0}).mu_macro
 
 
@@ -136,12 +162,16 @@ def test_policies_hold_for_labels_too(table: Surrogate) -> None:
         table.evaluate(**{**CASE, "v0": pd.Series([0.1]), "Fz": xr.DataArray([1.0])})
 
 
-# --- xarray -------------------------------------------------------------------------------------------
+# --- xarray ---------------------------------------------------------------------------------------
 
 
 def plane() -> dict[str, xr.DataArray]:
     given = columns()
-    v0 = xr.DataArray(given["v0"], dims="speed", coords={"speed": np.arange(N), "hour": ("speed", np.arange(N) / 4)})
+    v0 = xr.DataArray(
+        given["v0"],
+        dims="speed",
+        coords={"speed": np.arange(N), "hour": ("speed", np.arange(N) / 4)},
+    )
     k = xr.DataArray([1e5, 1e6, math.inf, -1.0], dims="spring", coords={"spring": list("abcd")})
     return {"v0": v0, "k": k}
 
@@ -169,7 +199,9 @@ def test_data_arrays_broadcast_by_name_and_keep_their_coordinates(table: Surroga
 
 
 def test_a_dataset_gives_a_dataset(table: Surrogate) -> None:
-    data = xr.Dataset({**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane(), "note": 1.0})
+    data = xr.Dataset(
+        {**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane(), "note": 1.0}
+    )
     found = table.evaluate(data)
     assert isinstance(found, xr.Dataset)
     assert set(found) == {"mu_macro", "mu_ratio", "regime", "error_bound", "source"}
@@ -190,7 +222,7 @@ def test_coordinates_and_chunks_that_do_not_fit_are_refused(table: Surrogate) ->
         table.evaluate(**{**CASE, "v0": one, "Fz": two})
 
 
-# --- Dask ---------------------------------------------------------------------------------------------
+# --- Dask -----------------------------------------------------------------------------------------
 
 
 def no_compute(*_: Any, **__: Any) -> Any:
@@ -222,7 +254,9 @@ def test_dask_arrays_stay_lazy_and_keep_their_chunks(table: Surrogate) -> None:
 
 def test_a_dask_dataset_stays_lazy(table: Surrogate) -> None:
     dask = pytest.importorskip("dask")
-    data = xr.Dataset({**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane()}).chunk(speed=13)
+    data = xr.Dataset(
+        {**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane()}
+    ).chunk(speed=13)
     with dask.config.set(scheduler=no_compute):
         found = table.evaluate(data)
         assert found.mu_macro.chunks is not None
@@ -238,7 +272,11 @@ def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surr
     found = table.evaluate(**{**CASE, "v0": v0}, illegal="raise")
     with pytest.raises(InputError, match="v0 at index 1"):
         found.mu_macro.compute(scheduler="threads")
-    assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [False, True, False]
+    assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [
+        False,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.slow
@@ -248,8 +286,14 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bits(table: Surrogate) -> 
     v0 = xr.DataArray(np.geomspace(1e-4, 1.0, 40_000), dims="case")
     whole = table.evaluate(**{**CASE, "v0": v0})
     lazy = table.evaluate(**{**CASE, "v0": v0.chunk(case=1000)}).mu_macro
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
-    start = "fork" if hasattr(os, "fork") else "spawn"  # forked workers need not load everything again
+    options = {
+        "n_workers": 2,
+        "threads_per_worker": 1,
+        "dashboard_address": None,
+        "host": "127.0.0.1",
+    }
+    # forked workers need not load everything again
+    start = "fork" if hasattr(os, "fork") else "spawn"
     with (
         dask.config.set({"distributed.worker.multiprocessing-method": start}),
         distributed.LocalCluster(processes=True, **options) as cluster,
@@ -265,11 +309,13 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bits(table: Surrogate) -> 
         assert keeper not in client.run(os.getpid)
 
 
-# --- names and units; other tables --------------------------------------------------------------------
+# --- names and units; other tables ----------------------------------------------------------------
 
 
 def test_results_of_xarray_have_names_and_units_of_their_own(table: Surrogate) -> None:
-    v0 = xr.DataArray([0.01, 0.02], dims="t", name="v0", attrs={"units": "m/s", "long_name": "sliding speed"})
+    v0 = xr.DataArray(
+        [0.01, 0.02], dims="t", name="v0", attrs={"units": "m/s", "long_name": "sliding speed"}
+    )
     found = table.evaluate(**{**CASE, "v0": v0}, gradient=True)
     names = ALL
     arrays = {name: getattr(found, name) for name in names}
@@ -279,9 +325,13 @@ def test_results_of_xarray_have_names_and_units_of_their_own(table: Surrogate) -
         assert array.name == name
         assert set(array.attrs) == {"units", "long_name"}
         assert array.attrs["long_name"] != "sliding speed"
-    units = {name: array.attrs["units"] for name, array in arrays.items() if array.attrs["units"] != "1"}
+    units = {
+        name: array.attrs["units"] for name, array in arrays.items() if array.attrs["units"] != "1"
+    }
     per = {"Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}
-    expected = {f"d_mu_macro_d_{name}{end}": unit for name, unit in per.items() for end in ("", "_bound")}
+    expected = {
+        f"d_mu_macro_d_{name}{end}": unit for name, unit in per.items() for end in ("", "_bound")
+    }
     assert units == {**expected, "length_scale": "m"}
     data = table.evaluate(xr.Dataset({**CASE, "v0": v0}))
     assert data.mu_macro.attrs == found.mu_macro.attrs
@@ -295,7 +345,9 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
     found = table.evaluate(lazy, Fz=10.0)
     assert isinstance(found, frames.DataFrame)
     assert found.npartitions == 3
-    pd.testing.assert_frame_equal(found.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0))
+    pd.testing.assert_frame_equal(
+        found.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0)
+    )
     with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(lazy, Fz=10.0, v0=0.01)
     with pytest.raises(InputError, match=r"^Fz must be given"):
@@ -319,15 +371,23 @@ def test_columns_of_arrow_tables_give_arrays(table: Surrogate, kind: str) -> Non
     same(table.evaluate(**{name: make(given)[name] for name in given}, gradient=True), want)
     assert isinstance(found.mu_macro, np.ndarray)
     words = make({**given, "k": ["rigid"] * N})
-    np.testing.assert_array_equal(table.evaluate(words).mu_macro, table.evaluate({**expected, "k": math.inf}).mu_macro)
+    np.testing.assert_array_equal(
+        table.evaluate(words).mu_macro, table.evaluate({**expected, "k": math.inf}).mu_macro
+    )
     rigid = table.evaluate(**{**given, "k": words["k"], "v0": 0.01}).mu_macro
-    np.testing.assert_array_equal(rigid, table.evaluate({**expected, "k": math.inf, "v0": 0.01}).mu_macro)
+    np.testing.assert_array_equal(
+        rigid, table.evaluate({**expected, "k": math.inf, "v0": 0.01}).mu_macro
+    )
     gap = make({"k": [None, 1e6]})["k"]
     assert np.isnan(table.evaluate(**{**CASE, "k": gap}).mu_macro).tolist() == [True, False]
 
 
 def test_a_stream_of_arrow_is_read_once(table: Surrogate) -> None:
     pa = pytest.importorskip("pyarrow")
-    rows = pa.table({**{name: [value] * 3 for name, value in CASE.items()}, "v0": [0.01, 0.02, None]})
+    rows = pa.table(
+        {**{name: [value] * 3 for name, value in CASE.items()}, "v0": [0.01, 0.02, None]}
+    )
     found = table.evaluate(rows.to_reader(max_chunksize=2)).mu_macro
-    np.testing.assert_array_equal(found, table.evaluate({**CASE, "v0": np.array([0.01, 0.02, math.nan])}).mu_macro)
+    np.testing.assert_array_equal(
+        found, table.evaluate({**CASE, "v0": np.array([0.01, 0.02, math.nan])}).mu_macro
+    )

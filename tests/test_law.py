@@ -1,4 +1,5 @@
-"""The friction law over a range of one input; its approximations by equation number, their ranges and values."""
+"""The friction law over a range of one input; its approximations by equation number, their ranges
+and values."""
 
 import math
 from typing import Any
@@ -9,7 +10,14 @@ import pytest
 from mumacro import InputError, Surrogate, closed_forms
 from mumacro.contact import kind_of
 from mumacro.inputs import FIELDS
-from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
+from mumacro.law import (
+    APPROXIMATIONS,
+    BORDERS,
+    approximations,
+    border_speeds,
+    friction_law,
+    sweep_values,
+)
 from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.comparing import close
 
@@ -18,14 +26,16 @@ LINE = without({**CASE, "y0": 4e-6}, "v0")
 SPEEDS = sweep_values("v0", 1e-4, 2.0, 25, "log")
 
 
-def law_of(surrogate: Surrogate, pair: Any, change: Any = (), values: Any = SPEEDS, **options: Any) -> Any:
+def law_of(
+    surrogate: Surrogate, pair: Any, change: Any = (), values: Any = SPEEDS, **options: Any
+) -> Any:
     """A law over v0, the keywords of its kind, and its other inputs."""
     said, _, case = as_kind(LINE, pair, 0.7)
     case = {**without(case, *("k" for name in change if name.startswith("k_"))), **dict(change)}
     return friction_law(surrogate, "v0", values, case, **said, **options), said, case
 
 
-# --- the range ----------------------------------------------------------------------------------------
+# --- the range ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scale", ["log", "linear"])
@@ -52,7 +62,7 @@ def test_a_bad_range_names_its_field(field: str, arguments: Any) -> None:
     assert caught.value.field == field
 
 
-# --- any contact and direction ------------------------------------------------------------------------
+# --- any contact and direction --------------------------------------------------------------------
 
 
 @every_pair
@@ -63,8 +73,10 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, pl
     values = sweep_values(along, 0.01 * case[along], 100.0 * case[along], 41, "log")
     law = friction_law(surrogate, along, values, without(case, along), **said)
     assert law.kind.names == said
-    moving, still = (surrogate.evaluate(**{**case, along: values, **v0}, **said)
-                     for v0 in ({}, {"v0": np.zeros(41)}))  # fmt: skip
+    moving, still = (
+        surrogate.evaluate(**{**case, along: values, **v0}, **said)
+        for v0 in ({}, {"v0": np.zeros(41)})
+    )
     assert law.answer.mu_macro == close(moving.mu_macro, rel=1e-15)
     assert law.mu_static == close(still.mu_macro, rel=1e-9, abs=1e-15)
     assert np.count_nonzero(law.answer.regime[1:] != law.answer.regime[:-1]) == len(law.border)
@@ -73,21 +85,38 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, pl
 
 
 @every_pair
-@pytest.mark.parametrize("interval", [INTERVAL, {"k_low": 0.8e6, "k_high": 1.2e6}], ids=["range", "ends"])
-def test_the_band_holds_every_stiffness_of_its_interval(surrogate: Surrogate, pair: Any, interval: Any) -> None:
+@pytest.mark.parametrize(
+    "interval", [INTERVAL, {"k_low": 0.8e6, "k_high": 1.2e6}], ids=["range", "ends"]
+)
+def test_the_band_holds_every_stiffness_of_its_interval(
+    surrogate: Surrogate, pair: Any, interval: Any
+) -> None:
     law, said, case = law_of(surrogate, pair, interval)
     low, high = law.band
     assert law.case["k"] == close(math.sqrt(0.8e6 * 1.2e6), rel=1e-15)
     assert ((low <= law.answer.mu_macro) & (law.answer.mu_macro <= high)).all()
     single = without(case, *interval)
-    inside = [surrogate.evaluate(**single, **said, k=k, v0=SPEEDS).mu_macro for k in np.geomspace(0.8e6, 1.2e6, 33)]
+    inside = [
+        surrogate.evaluate(**single, **said, k=k, v0=SPEEDS).mu_macro
+        for k in np.geomspace(0.8e6, 1.2e6, 33)
+    ]
     slack = 2.0 * law.answer.error_bound
-    for end, reached, sign in ((low, np.min(inside, axis=0), 1.0), (high, np.max(inside, axis=0), -1.0)):
+    for end, reached, sign in (
+        (low, np.min(inside, axis=0), 1.0),
+        (high, np.max(inside, axis=0), -1.0),
+    ):
         assert (sign * (reached - end) >= -slack).all()
         assert end == close(reached, rel=1e-4, abs=1e-12)  # the true band: both ends are reached
     assert [*law.columns] == [
-        "v0", "mu_macro", "mu_macro_low", "mu_macro_high", "regime", "error_bound", "source", "mu_static"
-    ]  # fmt: skip
+        "v0",
+        "mu_macro",
+        "mu_macro_low",
+        "mu_macro_high",
+        "regime",
+        "error_bound",
+        "source",
+        "mu_static",
+    ]
     middle, _, _ = law_of(surrogate, pair, {"k": law.case["k"]})
     assert middle.band is None
     assert "mu_macro_low" not in middle.columns
@@ -97,20 +126,26 @@ def test_the_band_holds_every_stiffness_of_its_interval(surrogate: Surrogate, pa
 
 @every_pair
 @pytest.mark.parametrize("scale", ["log", "linear"])
-def test_a_refined_law_is_straight_between_its_values(surrogate: Surrogate, pair: Any, scale: Any) -> None:
+def test_a_refined_law_is_straight_between_its_values(
+    surrogate: Surrogate, pair: Any, scale: Any
+) -> None:
     values = sweep_values("v0", 1e-4, 2.0, 25, scale)
     law, said, case = law_of(surrogate, pair, values=values, refine=True)
     assert {*values, *(mark.value for mark in law.border)} <= set(law.values)
     assert (np.diff(law.values) > 0.0).all()
     mu = law.answer.mu_macro
-    middle = surrogate.evaluate(**case, **said, v0=np.sqrt(law.values[1:] * law.values[:-1])).mu_macro
+    middle = surrogate.evaluate(
+        **case, **said, v0=np.sqrt(law.values[1:] * law.values[:-1])
+    ).mu_macro
     assert np.abs(middle - 0.5 * (mu[1:] + mu[:-1])).max() <= 1.1e-3 * np.ptp(mu)
     assert law.values.size < 150
     assert (law_of(surrogate, pair, values=values)[0].values == values).all()
 
 
 @pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
-def test_the_articles_formulas_are_refused_for_another_contact(surrogate: Surrogate, pair: Any) -> None:
+def test_the_articles_formulas_are_refused_for_another_contact(
+    surrogate: Surrogate, pair: Any
+) -> None:
     for formulas in (approximations, border_speeds):
         with pytest.raises(InputError, match="they are those of one spring, across"):
             formulas(surrogate, law_of(surrogate, pair)[0])
@@ -118,14 +153,28 @@ def test_the_articles_formulas_are_refused_for_another_contact(surrogate: Surrog
 
 @pytest.mark.parametrize(
     ("along", "case", "direction", "said"),
-    [("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
-     ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
-     ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high must be given"),
-     ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude must be left out"),
-     ("k", {**without(LINE, "k"), "v0": 0.01, **INTERVAL}, "across", "k_range .* left out where k is the swept"),
-     ("Fz_amplitude", without(CASE, "y0"), "normal", "Fz_amplitude at index 1 must be >= 0 and below Fz")],
-)  # fmt: skip
-def test_a_bad_interval_is_named(surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any) -> None:
+    [
+        ("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
+        ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
+        ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high must be given"),
+        ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude must be left out"),
+        (
+            "k",
+            {**without(LINE, "k"), "v0": 0.01, **INTERVAL},
+            "across",
+            "k_range .* left out where k is the swept",
+        ),
+        (
+            "Fz_amplitude",
+            without(CASE, "y0"),
+            "normal",
+            "Fz_amplitude at index 1 must be >= 0 and below Fz",
+        ),
+    ],
+)
+def test_a_bad_interval_is_named(
+    surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any
+) -> None:
     with pytest.raises(InputError, match=said):
         friction_law(surrogate, along, np.array([1.0, 10.0]), case, direction=direction)
 
@@ -144,11 +193,13 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
     told = axes.get_legend_handles_labels()[1]
     assert len(told) == len(set(told)) == 3 + len(law.border)
     amplitudes = np.array([1.0, 9.0])
-    other = friction_law(surrogate, "Fz_amplitude", amplitudes, without(CASE, "y0"), direction="normal")
+    other = friction_law(
+        surrogate, "Fz_amplitude", amplitudes, without(CASE, "y0"), direction="normal"
+    )
     assert other.plot().get_xlabel().endswith("[N]")
 
 
-# --- the approximations of one spring -----------------------------------------------------------------
+# --- the approximations of one spring -------------------------------------------------------------
 
 CONTACT: Case = {"mu0": 0.25, "Fz": 1.0, "k": 4.0, "omega": 3.0}  # l0 = 1/16 m
 LENGTH = 0.0625
@@ -165,43 +216,70 @@ def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("name", "y", "ends", "off"),
-    # what they leave out is of the order y~^4, v~^(3/2) beside creep, 1/v~^2 at large speed, mu~^3 in the corner
-    [("static", 0.5, (1e-12, 1e-9), 1e-8), ("small_amplitude", 0.01, (1e-3, 1e3), 1e-8),
-     ("creep", 0.5, (1e-12, 1e-6), 1e-8), ("creep", 2.0, (1e-12, 1e-6), 1e-8),
-     ("continuous", 0.01, (1e-3, 1e3), 1e-8), ("continuous", 1.0, (1e3, 1e6), 1e-6), ("rigid", 1.0, (1e3, 1e6), 1e-6),
-     ("corner", 1.0, (1e-12, 1e-9), 1e-8)],
-)  # fmt: skip
-def test_approximations_hold_where_they_should(surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any) -> None:
+    # what they leave out is of the order y~^4, v~^(3/2) beside creep, 1/v~^2 at large speed, mu~^3
+    # in the corner
+    [
+        ("static", 0.5, (1e-12, 1e-9), 1e-8),
+        ("small_amplitude", 0.01, (1e-3, 1e3), 1e-8),
+        ("creep", 0.5, (1e-12, 1e-6), 1e-8),
+        ("creep", 2.0, (1e-12, 1e-6), 1e-8),
+        ("continuous", 0.01, (1e-3, 1e3), 1e-8),
+        ("continuous", 1.0, (1e3, 1e6), 1e-6),
+        ("rigid", 1.0, (1e3, 1e6), 1e-6),
+        ("corner", 1.0, (1e-12, 1e-9), 1e-8),
+    ],
+)
+def test_approximations_hold_where_they_should(
+    surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any
+) -> None:
     law, found, _ = columns(surrogate, y, np.geomspace(ends[0], ends[1], 31))
     assert np.max(np.abs(found[name] - law.answer.mu_ratio)) < off
 
 
 @pytest.mark.parametrize("y", [1e-3, 0.3, 0.45, 0.55, 0.999, 1.0, 1.45, 1.55, 3.0])
-def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(surrogate: Surrogate, y: Any) -> None:
+def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(
+    surrogate: Surrogate, y: Any
+) -> None:
     crit = float(surrogate.v_tilde_crit(y))
-    v = np.unique(np.concatenate([crit * np.geomspace(1e-6, 1e6, 241), np.geomspace(1e-4, 0.99, 200)]))
+    v = np.unique(
+        np.concatenate([crit * np.geomspace(1e-6, 1e6, 241), np.geomspace(1e-4, 0.99, 200)])
+    )
     law, found, borders = columns(surrogate, y, v)
     sliding, low = law.answer.regime == "continuous", y <= 1.0
     with np.errstate(over="ignore"):
         corner = (abs(y - 1.0) <= 0.5) & (v < 1.0) & (closed_forms.corner_root(v, y - 1.0) <= 0.7)
     given = {
-        "static": True, "rigid": True, "continuous": sliding, "small_amplitude": sliding & low, "critical": low,
-        "master_curve": low & (v <= closed_forms.border_27(y)), "master_curve_limit": low & (v <= crit),
-        "corner": corner, "creep": np.isfinite(found["creep"]) & (found["creep"] <= 1.0) if y != 1.0 else False,
-    }  # fmt: skip
+        "static": True,
+        "rigid": True,
+        "continuous": sliding,
+        "small_amplitude": sliding & low,
+        "critical": low,
+        "master_curve": low & (v <= closed_forms.border_27(y)),
+        "master_curve_limit": low & (v <= crit),
+        "corner": corner,
+        "creep": np.isfinite(found["creep"]) & (found["creep"] <= 1.0) if y != 1.0 else False,
+    }
     for name, where in given.items():
         near = np.abs(v / crit - 1.0) < 1e-9
         assert ((np.isfinite(found[name]) == where) | near).all(), name
     assert not corner.all()
     for name, where in {
-        "eq_23": low, "eq_24": low, "small_amplitude": low, "eq_26": y >= 1.0, "large_amplitude": y >= 1.0,
-        "exact": True, "eq_27": True, "blend": True,
-    }.items():  # fmt: skip
+        "eq_23": low,
+        "eq_24": low,
+        "small_amplitude": low,
+        "eq_26": y >= 1.0,
+        "large_amplitude": y >= 1.0,
+        "exact": True,
+        "eq_27": True,
+        "blend": True,
+    }.items():
         assert np.isfinite(borders[name]).all() == where, name
     # within their ranges they have the stated accuracy
     assert np.nanmax(np.abs(found["continuous"] - law.answer.mu_ratio)) < 0.0401
     if low:
-        assert np.nanmax(np.abs(found["small_amplitude"] - law.answer.mu_ratio)) <= 0.08 * y**4 + 4e-13
+        assert (
+            np.nanmax(np.abs(found["small_amplitude"] - law.answer.mu_ratio)) <= 0.08 * y**4 + 4e-13
+        )
 
 
 def test_the_papers_law_of_small_amplitudes(surrogate: Surrogate) -> None:
@@ -221,7 +299,9 @@ def test_the_papers_law_of_small_amplitudes(surrogate: Surrogate) -> None:
 
 
 @pytest.mark.parametrize("along", FIELDS)
-def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate: Surrogate, along: Any) -> None:
+def test_the_border_of_every_case_is_where_the_law_crosses_it(
+    surrogate: Surrogate, along: Any
+) -> None:
     values = sweep_values(along, 0.1 * CASE[along], 10.0 * CASE[along], 31, "log")
     law = friction_law(surrogate, along, values, without(CASE, along))
     speeds = border_speeds(surrogate, law)
@@ -234,24 +314,38 @@ def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate: Surroga
 
 
 @pytest.mark.parametrize("along", FIELDS)
-def test_extreme_inputs_give_numbers_or_nan_and_no_warning(surrogate: Surrogate, along: Any) -> None:
+def test_extreme_inputs_give_numbers_or_nan_and_no_warning(
+    surrogate: Surrogate, along: Any
+) -> None:
     case = {"mu0": 0.3, "Fz": 1e-200, "k": 1e200, "y0": 1e-300, "omega": 1e150, "v0": 1e-150}
-    values = sweep_values(along, 1e-300 if along != "v0" else 0.0, 1e300, 41, "log" if along != "v0" else "linear")
+    values = sweep_values(
+        along, 1e-300 if along != "v0" else 0.0, 1e300, 41, "log" if along != "v0" else "linear"
+    )
     law = friction_law(surrogate, along, values, without(case, along))
-    for column in (*approximations(surrogate, law).values(), *border_speeds(surrogate, law).values()):
+    for column in (
+        *approximations(surrogate, law).values(),
+        *border_speeds(surrogate, law).values(),
+    ):
         assert column.shape == values.shape
     assert (law.answer.mu_macro <= (law.values if along == "mu0" else 0.3)).all()
 
 
-def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(surrogate: Surrogate) -> None:
+def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(
+    surrogate: Surrogate,
+) -> None:
     values = sweep_values("v0", 1e-3, 10.0, 5, "log")
     for changed in ({"k": "rigid"}, {"k": math.inf}, {"y0": 0.0}, {"omega": 0.0}):
         law = friction_law(surrogate, "v0", values, {**without(CASE, "v0"), **changed})
         assert all((column == 0.0).all() for column in border_speeds(surrogate, law).values())
         found = approximations(surrogate, law)
         if "k" in changed:
-            assert found["rigid"] == close(0.3 * closed_forms.outer(2e-6 * 1.3e5 / values), rel=1e-14)
-            assert all(np.isnan(found[name]).all() for name in ("creep", "continuous", "corner", "small_amplitude"))
+            assert found["rigid"] == close(
+                0.3 * closed_forms.outer(2e-6 * 1.3e5 / values), rel=1e-14
+            )
+            assert all(
+                np.isnan(found[name]).all()
+                for name in ("creep", "continuous", "corner", "small_amplitude")
+            )
         assert (law.mu_static == (0.0 if "k" in changed else 0.3)).all()
 
 

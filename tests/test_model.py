@@ -1,4 +1,5 @@
-"""The equations of motion: series, slip, stick and events, against general-purpose integrators and exact structure."""
+"""The equations of motion: series, slip, stick and events, against general-purpose integrators and
+exact structure."""
 
 import math
 from typing import Any
@@ -17,7 +18,9 @@ from tests.comparing import close
 HALF = 0.5 * math.pi
 
 
-def follow(v: float, y: float, start: float, angle: float, end: float, chart: int = 0) -> tuple[float, Array]:
+def follow(
+    v: float, y: float, start: float, angle: float, end: float, chart: int = 0
+) -> tuple[float, Array]:
     """Angle after slip from ``start`` to ``end`` in sigma, and all other outputs of slip."""
     w, out, _, _ = workspace()
     assert slip(v, y, start, 0, angle - chart * HALF, chart, end, False, w, out) == OK
@@ -25,12 +28,19 @@ def follow(v: float, y: float, start: float, angle: float, end: float, chart: in
 
 
 def witness(v: float, y: float, start: float, angle: float, end: float, **how: Any) -> Array:
-    """Angle, integrals of u_x, 1 - u_x, lam and y~ cos tau u_y in the time sigma = tau - pi/2; eqs. (11), (12)."""
+    """Angle, integrals of u_x, 1 - u_x, lam and y~ cos tau u_y in the time sigma = tau - pi/2; eqs.
+    (11), (12)."""
 
     def rate(sigma: float, state: Array) -> list[float]:
         c, th = -math.sin(sigma), state[0]
         lam = v * math.cos(th) + y * c * math.sin(th)
-        return [y * c * math.cos(th) - v * math.sin(th), math.cos(th), 1.0 - math.cos(th), lam, y * c * math.sin(th)]
+        return [
+            y * c * math.cos(th) - v * math.sin(th),
+            math.cos(th),
+            1.0 - math.cos(th),
+            lam,
+            y * c * math.sin(th),
+        ]
 
     def jacobian(sigma: float, state: Array) -> Array:
         c, out = -math.sin(sigma), np.zeros((5, 5))
@@ -39,12 +49,18 @@ def witness(v: float, y: float, start: float, angle: float, end: float, **how: A
         return out
 
     implicit: Any = {"jac": jacobian} if how["method"] == "Radau" else {}
-    return np.asarray(solve_ivp(rate, (start, end), [angle, 0, 0, 0, 0], **implicit, **how).y[:, -1])
+    return np.asarray(
+        solve_ivp(rate, (start, end), [angle, 0, 0, 0, 0], **implicit, **how).y[:, -1]
+    )
 
 
-@pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (2.0, 1.0), (0.01, 0.7), (3.0, 30.0), (40.0, 5.0)])
+@pytest.mark.parametrize(
+    ("v", "y"), [(0.5, 0.3), (2.0, 1.0), (0.01, 0.7), (3.0, 30.0), (40.0, 5.0)]
+)
 @pytest.mark.parametrize("angle", [-1.2, 0.0, 0.4, 1.5])
-def test_slip_and_its_integrals_agree_with_a_general_integrator(v: float, y: float, angle: float) -> None:
+def test_slip_and_its_integrals_agree_with_a_general_integrator(
+    v: float, y: float, angle: float
+) -> None:
     start, end = -1.3, 1.1
     expected = witness(v, y, start, angle, end, method="DOP853", rtol=1e-13, atol=1e-14)
     th, out = follow(v, y, start, angle, end)
@@ -58,14 +74,17 @@ def test_slip_and_its_integrals_agree_with_a_general_integrator(v: float, y: flo
 def test_stiff_steps_agree_with_a_general_integrator(v: float, y: float) -> None:
     expected = witness(v, y, -HALF, 0.3, HALF, method="Radau", rtol=1e-10, atol=1e-12)
     th, out = follow(v, y, -HALF, 0.3, HALF)
-    assert out[STEPS] < 0.5 * (out[PATH] / 7.9)  # a Taylor step is at most 0.33 ORDER = 7.9 lengths long
+    # a Taylor step is at most 0.33 ORDER = 7.9 lengths long
+    assert out[STEPS] < 0.5 * (out[PATH] / 7.9)
     assert th == close(expected[0], abs=1e-7)
     assert out[SUM_UX : WORK + 1] == close(expected[1:], rel=1e-7, abs=1e-7)
 
 
 @pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (0.05, 3.0), (1.2, 8.0), (0.0, 1.7), (3.0, 0.0)])
 @pytest.mark.parametrize("span", [(-1.5, -0.2), (-0.4, 0.9), (0.1, 1.5)])
-def test_slip_is_a_moebius_map_of_the_half_angle_tangent(v: float, y: float, span: tuple[float, float]) -> None:
+def test_slip_is_a_moebius_map_of_the_half_angle_tangent(
+    v: float, y: float, span: tuple[float, float]
+) -> None:
     """z = tan(th/2) solves a Riccati equation, so the cross ratio of four orbits never changes."""
 
     def cross_ratio(th: list[float]) -> float:
@@ -97,24 +116,27 @@ def test_time_may_count_from_either_turn(turn: int, sigma: float) -> None:
     assert counted[: WORK + 1] == close(out[: WORK + 1], abs=2e-14)
 
 
-# --- stick --------------------------------------------------------------------------------------------
+# --- stick ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("chart", [0, 1])
 @pytest.mark.parametrize("d", [0.0, 0.05, 0.5, 1.7, 3.0])
 def test_stick_excess_is_the_deflated_stretch(chart: int, d: float) -> None:
-    """At its double root d = 0 it is the fall of the slip speed: -y~ sin tau u_y + |w|^2 of u.w with u' = w."""
+    """At its double root d = 0 it is the fall of the slip speed: -y~ sin tau u_y + |w|^2 of u.w
+    with u' = w."""
     v, y, sigma = 0.05, 0.8, 0.3
     th = math.atan2(v, y * math.sin(sigma))  # lam = 0 ties the angle to the instant
     ux = math.cos(th) + v * d
     uy = math.sin(th) + y * (math.cos(sigma + d) - math.cos(sigma))
     fall = -y * math.cos(sigma) * math.sin(th) + v * v + (y * math.sin(sigma)) ** 2
     expected = (ux * ux + uy * uy - 1.0) / (d * d) if d else fall
-    excess = stick_excess(v, y, y - 1.0, HALF - th if chart else th, chart, sigma, sigma + d - math.pi, d)
+    excess = stick_excess(
+        v, y, y - 1.0, HALF - th if chart else th, chart, sigma, sigma + d - math.pi, d
+    )
     assert excess == close(expected, rel=1e-12, abs=1e-13 / (d * d) if d else 0.0)
 
 
-# --- the end of slip ----------------------------------------------------------------------------------
+# --- the end of slip ------------------------------------------------------------------------------
 
 
 def slip_speed(v: float, y: float, sigma: float, th: float) -> float:
@@ -138,7 +160,7 @@ def test_slip_without_an_end_has_its_own_status() -> None:
     assert slip(3.0, 0.5, -HALF, 0, 0.1, 0, HALF, True, w, out) == NO_STICK
 
 
-# --- collocation --------------------------------------------------------------------------------------
+# --- collocation ----------------------------------------------------------------------------------
 
 
 def test_the_radau_rule_is_exact_for_polynomials() -> None:

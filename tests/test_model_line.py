@@ -30,7 +30,10 @@ def test_rows_are_those_of_the_document(repository: Path) -> None:
 
 def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) -> None:
     mu = surrogate.evaluate(**CASE).mu_macro
-    off = [abs(surrogate.evaluate(**{**CASE, "k": 1e6 * x}).mu_macro / mu - 1.0) for x in (1.1, 1.0 / 1.1)]
+    off = [
+        abs(surrogate.evaluate(**{**CASE, "k": 1e6 * x}).mu_macro / mu - 1.0)
+        for x in (1.1, 1.0 / 1.1)
+    ]
     text, effect = rows(surrogate)["k is known"]
     assert effect == close(max(off), rel=1e-9)
     assert f"{100.0 * effect:.2g} %" in text
@@ -43,8 +46,10 @@ def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) ->
     top = float(k[surrogate.evaluate(**{**CASE, "v0": v0, "k": k}).mu_macro[5000:].argmax() + 5000])
     assert k_effect(surrogate, {**CASE, "v0": v0, "k": top}) > 1e-5
     assert k_effect(surrogate, {**CASE, "k": "rigid"}) == 0.0
-    assert k_effect(surrogate, {**CASE, "y0": 20e-6, "v0": 0.0}) == 0.0  # mu_macro = 0 for every such k
-    assert k_effect(surrogate, {**CASE, "y0": 3.1e-6, "v0": 0.0}) == math.inf  # 0, and not 0 for a softer contact
+    # mu_macro = 0 for every such k
+    assert k_effect(surrogate, {**CASE, "y0": 20e-6, "v0": 0.0}) == 0.0
+    # 0, and not 0 for a softer contact
+    assert k_effect(surrogate, {**CASE, "y0": 3.1e-6, "v0": 0.0}) == math.inf
 
 
 def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate: Surrogate) -> None:
@@ -67,16 +72,21 @@ def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
 def test_slip_path_tilt_and_heat_have_their_sizes(surrogate: Surrogate) -> None:
     found = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
     way = float(re.findall(r"slip path ([\d.e-]+) m a period", found["Coulomb friction"][0])[0])
-    assert way == close(4.0 * 5e-6, rel=0.1)  # the foot follows the motion but for l0 = 0.23 um at each turn
+    # the foot follows the motion but for l0 = 0.23 um at each turn
+    assert way == close(4.0 * 5e-6, rel=0.1)
     assert found["Coulomb friction"][1] == close(0.01 * math.log(100.0) / 0.3, rel=1e-12)
-    assert found["constant normal force"][1] == close(1.21 * 0.3 * 0.01 * 5e-6 / (3.0 / 1.3e7), rel=1e-12)
+    assert found["constant normal force"][1] == close(
+        1.21 * 0.3 * 0.01 * 5e-6 / (3.0 / 1.3e7), rel=1e-12
+    )
     watts = float(re.findall(r"turns ([\d.]+) W", found["no wear, no heating"][0])[0])
     assert watts == close(3.0 * way * 20e3, rel=0.1)
     assert "constant normal force" not in rows(surrogate)
 
 
 @pytest.mark.parametrize("case", [{"y0": 0.0}, {"f": 0.0}, {"k": "rigid"}, {"k": math.inf}])
-def test_nothing_is_said_where_nothing_oscillates_or_gives_way(surrogate: Surrogate, case: Case) -> None:
+def test_nothing_is_said_where_nothing_oscillates_or_gives_way(
+    surrogate: Surrogate, case: Case
+) -> None:
     assert model_rows(surrogate, {**CASE, **case}) == []
 
 
@@ -85,11 +95,22 @@ def test_the_other_contact_is_told_with_the_difference(surrogate: Surrogate) -> 
     text, effect = rows(surrogate, **case)["one spring"]
     assert effect == close(0.2551 / 0.2477 - 1.0, abs=5e-4)
     assert "ball" in text
-    assert rows(surrogate, "ball", **case)["one spring"][1] == close(0.2477 / 0.2551 - 1.0, abs=5e-4)
+    assert rows(surrogate, "ball", **case)["one spring"][1] == close(
+        0.2477 / 0.2551 - 1.0, abs=5e-4
+    )
 
 
 def test_digits_are_those_that_the_uncertainty_leaves() -> None:
-    assert [digits(x) for x in (math.inf, 0.5, 0.06, 1e-3, 3e-4, 3e-5, 1e-9, 0.0)] == [4, 4, 4, 4, 5, 6, 6, 6]
+    assert [digits(x) for x in (math.inf, 0.5, 0.06, 1e-3, 3e-4, 3e-5, 1e-9, 0.0)] == [
+        4,
+        4,
+        4,
+        4,
+        5,
+        6,
+        6,
+        6,
+    ]
     assert digits(1e-9, most=12) == 10
     assert all(digits(x) >= digits(2.0 * x) for x in np.geomspace(1e-9, 1.0, 50))
     with pytest.raises(InputError, match="uncertainty must be >= 0"):
@@ -98,7 +119,11 @@ def test_digits_are_those_that_the_uncertainty_leaves() -> None:
 
 @pytest.mark.parametrize(
     ("changed", "said"),
-    [({"v0": -1.0}, "v0 must be"), ({"k": [1e6, 2e6]}, "case must be one case"), ({"contact": 1}, "contact")],
+    [
+        ({"v0": -1.0}, "v0 must be"),
+        ({"k": [1e6, 2e6]}, "case must be one case"),
+        ({"contact": 1}, "contact"),
+    ],
 )
 def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> None:
     with pytest.raises((InputError, TypeError), match=said):

@@ -1,4 +1,5 @@
-"""The example of an OpenMDAO component: partial derivatives checked by OpenMDAO, limits and illegal cases."""
+"""The example of an OpenMDAO component: partial derivatives checked by OpenMDAO, limits and illegal
+cases."""
 
 import importlib
 import math
@@ -25,7 +26,9 @@ def component(repository: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def made(**options: Any) -> Any:
         problem = om.Problem(reports=None)
-        problem.model.add_subsystem("friction", friction(surrogate=table, vec_size=4, **options), promotes=["*"])
+        problem.model.add_subsystem(
+            "friction", friction(surrogate=table, vec_size=4, **options), promotes=["*"]
+        )
         problem.setup(force_alloc_complex=False)
         length = CASE["mu0"] * CASE["Fz"] / CASE["k"]
         v, y = POINTS.T
@@ -39,16 +42,24 @@ def component(repository: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def test_openmdao_checks_the_partials(component: Any) -> None:
     problem = component(power=True)
-    checked = problem.check_partials(out_stream=None, method="fd", form="central", step=1e-6, step_calc="rel_element")
+    checked = problem.check_partials(
+        out_stream=None, method="fd", form="central", step=1e-6, step_calc="rel_element"
+    )
     (pairs,) = checked.values()
     assert len(pairs) == 2 * 6
     for (of, wrt), pair in pairs.items():
         scale = float(np.abs(pair["J_fd"]).max())
-        np.testing.assert_allclose(pair["J_fwd"], pair["J_fd"], rtol=1e-5, atol=1e-7 * scale, err_msg=f"{of} {wrt}")
+        np.testing.assert_allclose(
+            pair["J_fwd"], pair["J_fd"], rtol=1e-5, atol=1e-7 * scale, err_msg=f"{of} {wrt}"
+        )
     (v, y), table = POINTS.T, Surrogate.open(1e-10, threads=1)
-    np.testing.assert_allclose(problem.get_val("mu_macro"), CASE["mu0"] * table.mu_ratio(v, y), rtol=1e-12)
+    np.testing.assert_allclose(
+        problem.get_val("mu_macro"), CASE["mu0"] * table.mu_ratio(v, y), rtol=1e-12
+    )
     unit = (CASE["mu0"] * CASE["Fz"]) ** 2 / CASE["k"] * CASE["omega"]
-    np.testing.assert_allclose(problem.get_val("oscillation_power"), unit * table.power(v, y), rtol=1e-12)
+    np.testing.assert_allclose(
+        problem.get_val("oscillation_power"), unit * table.power(v, y), rtol=1e-12
+    )
 
 
 def test_openmdao_may_step_back_from_illegal_values(component: Any) -> None:
@@ -57,7 +68,9 @@ def test_openmdao_may_step_back_from_illegal_values(component: Any) -> None:
     problem.run_model()
     assert np.all(problem.get_val("mu_macro") > 0.0)
     problem.set_val("y0", -1e-6)
-    with pytest.raises(om.AnalysisError, match="y0 at index 0 must be finite and >= 0, got -1e-06") as caught:
+    with pytest.raises(
+        om.AnalysisError, match="y0 at index 0 must be finite and >= 0, got -1e-06"
+    ) as caught:
         problem.run_model()
     assert isinstance(caught.value.__cause__, InputError)
     problem = component(power=True)

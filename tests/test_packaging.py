@@ -1,4 +1,5 @@
-"""The distribution: one version, tables with the library, a one-line message if something is missing."""
+"""The distribution: one version, tables with the library, a one-line message if something is
+missing."""
 
 import importlib
 import os
@@ -76,13 +77,19 @@ REQUIREMENTS = "import hatchling.build as b; print(*b.get_requires_for_build_whe
 def python(folder: Path, program: Any, *arguments: Any, **variables: Any) -> Any:
     env = {name: value for name, value in os.environ.items() if name != "CC"} | variables
     command = [sys.executable, "-c", program, *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=300)
+    return subprocess.run(
+        command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=300
+    )
 
 
 @pytest.mark.parametrize("where", ["nothing", "without headers", "another platform", "here"])
-def test_zig_is_a_build_requirement_only_where_no_compiler_works(repository: Path, tmp_path: Path, where: Any) -> None:
+def test_zig_is_a_build_requirement_only_where_no_compiler_works(
+    repository: Path, tmp_path: Path, where: Any
+) -> None:
     if where == "without headers":
-        (tmp_path / "cc").write_text("#!/bin/sh\necho 'fatal error: math.h: No such file' >&2; exit 1\n")
+        (tmp_path / "cc").write_text(
+            "#!/bin/sh\necho 'fatal error: math.h: No such file' >&2; exit 1\n"
+        )
         (tmp_path / "cc").chmod(0o755)
     other = {"MUMACRO_BUILD_PLATFORM": "win_amd64"}
     variables = {"another platform": other, "here": {}}.get(where, {"PATH": str(tmp_path)})
@@ -108,14 +115,18 @@ def test_a_build_that_cannot_be_made_says_so_in_one_line(repository: Path, tmp_p
 def test_a_platform_without_a_wheel_is_refused_by_name(repository: Path) -> None:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel"]
     env = {**os.environ, "MUMACRO_BUILD_PLATFORM": "amiga"}
-    done = subprocess.run(command, cwd=repository, env=env, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=repository, env=env, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1
     assert re.search("MUMACRO_BUILD_PLATFORM=amiga is not one of .*win_amd64", done.stderr)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
-def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository: Path, tmp_path: Path) -> None:
+def test_a_failed_compilation_keeps_the_shared_object_that_was_there(
+    repository: Path, tmp_path: Path
+) -> None:
     shutil.copytree(repository / "mumacro" / "kernel", tmp_path / "mumacro" / "kernel")
     for name in ("hatch_build.py", "pyproject.toml"):
         shutil.copy(repository / name, tmp_path)
@@ -130,7 +141,9 @@ def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux" or not shutil.which("gcc"), reason="needs Linux and gcc")
+@pytest.mark.skipif(
+    sys.platform != "linux" or not shutil.which("gcc"), reason="needs Linux and gcc"
+)
 def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: Path) -> None:
     done = python(repository, BUILD, tmp_path, CC="gcc", MUMACRO_BUILD_DEBUG="1")
     assert done.returncode == 0, done.stderr
@@ -139,7 +152,9 @@ def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: P
         assert (b"libasan" in made, b"libubsan" in made) == (debug, debug)
 
 
-def test_dev_py_sees_a_changed_c_source(repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dev_py_sees_a_changed_c_source(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.syspath_prepend(repository)
     dev = importlib.import_module("dev")
     monkeypatch.setattr(dev, "ROOT", tmp_path)
@@ -163,7 +178,9 @@ def test_dev_py_sees_a_changed_c_source(repository: Path, tmp_path: Path, monkey
 
 
 @pytest.mark.slow
-def test_the_source_distribution_builds_and_its_tests_collect(repository: Path, tmp_path: Path) -> None:
+def test_the_source_distribution_builds_and_its_tests_collect(
+    repository: Path, tmp_path: Path
+) -> None:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)]
     subprocess.run(command, cwd=repository, check=True, capture_output=True)
     (archive,) = tmp_path.glob("*.tar.gz")
@@ -181,7 +198,9 @@ def test_the_source_distribution_builds_and_its_tests_collect(repository: Path, 
     assert collected == {f"tests/{path.name}" for path in (repository / "tests").glob("test_*.py")}
 
 
-def test_a_package_finds_its_own_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tables_dir: Path) -> None:
+def test_a_package_finds_its_own_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tables_dir: Path
+) -> None:
     assert bundled.bundled_tables() == sorted(tables_dir.glob("*.nc"))  # a checkout
     package = tmp_path / "mumacro"
     for folder in (package, tmp_path / "tables"):
@@ -196,21 +215,32 @@ def test_a_package_finds_its_own_tables(tmp_path: Path, monkeypatch: pytest.Monk
 
 PARTS = ("service", "builder", "mumacro")
 LACKS = [(name, "packages", r".*(\w+) is not installed: pip install 'mumacro.*") for name in PARTS]
-LACKS += [(name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*") for name in PARTS[1:]]
+LACKS += [
+    (name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*")
+    for name in PARTS[1:]
+]
 
 
 @pytest.mark.parametrize(("module", "lacks", "said"), LACKS)
-def test_one_line_says_what_is_missing(repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any) -> None:
+def test_one_line_says_what_is_missing(
+    repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any
+) -> None:
     ignored = shutil.ignore_patterns("__pycache__", *(["_kernel.*"] if lacks == "kernel" else []))
     for name in {"mumacro", module}:
         shutil.copytree(repository / name, tmp_path / name, ignore=ignored)
-    options = ["-S"] if lacks == "packages" else []  # without site-packages: the standard library alone
+    # without site-packages: the standard library alone
+    options = ["-S"] if lacks == "packages" else []
     command = [sys.executable, *options, "-m", module]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
     assert (done.returncode, done.stdout) == (1, "")
     assert re.fullmatch(said, done.stderr.strip())
 
 
 def test_a_missing_module_of_the_project_itself_is_not_explained_away() -> None:
     with pytest.raises(ModuleNotFoundError):
-        missing("builder", ModuleNotFoundError("No module named 'builder.nothing'", name="builder.nothing"))
+        missing(
+            "builder",
+            ModuleNotFoundError("No module named 'builder.nothing'", name="builder.nothing"),
+        )

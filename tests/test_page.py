@@ -29,9 +29,14 @@ AXE = "tests/data/axe-core/axe.min.js"
 def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate) -> None:
     response = client.get("/static/page/map.json")
     data = response.json()
-    v, y = (np.geomspace(axis["start"], axis["stop"], axis["n"]) for axis in (data["v_tilde"], data["y_tilde"]))
+    v, y = (
+        np.geomspace(axis["start"], axis["stop"], axis["n"])
+        for axis in (data["v_tilde"], data["y_tilde"])
+    )
     grid = data["unit"] * np.array(data["mu_ratio"]).reshape(y.size, v.size)
-    assert np.max(np.abs(grid - surrogate.mu_ratio(v[None, :], y[:, None]))) <= 0.5001 * data["unit"]
+    assert (
+        np.max(np.abs(grid - surrogate.mu_ratio(v[None, :], y[:, None]))) <= 0.5001 * data["unit"]
+    )
     border = np.array(data["border"])
     assert border[:, 0] == close(surrogate.v_tilde_crit(border[:, 1]), rel=1e-5)
     etag = response.headers["etag"]
@@ -43,21 +48,34 @@ def test_units_and_geometries_are_the_librarys(client: Any) -> None:
         return {unit: list(scale) for unit, scale in units.items()}
 
     told = client.get("/static/page/names.json").json()
-    expected = {name: scales(units) for name, units in {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}.items()}
-    cycles = {unit: [2 * math.pi * times, over] for unit, (times, over) in expected.pop("f").items()}
-    expected["omega"] |= cycles | dict.fromkeys(expected["omega"].keys() & cycles)  # a unit of both says neither
+    expected = {
+        name: scales(units) for name, units in {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}.items()
+    }
+    cycles = {
+        unit: [2 * math.pi * times, over] for unit, (times, over) in expected.pop("f").items()
+    }
+    # a unit of both says neither
+    expected["omega"] |= cycles | dict.fromkeys(expected["omega"].keys() & cycles)
     assert {name: one["units"] for name, one in told["inputs"].items()} == expected
     assert all(set(one["offered"]) <= set(one["units"]) for one in told["inputs"].values())
     assert [list(words) for words in told["choices"].values()] == [list(CONTACTS), list(DIRECTIONS)]
-    assert {name: (one["meaning"], one["arguments"]) for name, one in told["geometries"].items()} == {
-        name: (one.meaning, [*one.arguments, *BODIES]) for name, one in GEOMETRIES.items()
-    }
+    assert {
+        name: (one["meaning"], one["arguments"]) for name, one in told["geometries"].items()
+    } == {name: (one.meaning, [*one.arguments, *BODIES]) for name, one in GEOMETRIES.items()}
     for name, one in ARGUMENTS.items():
-        assert told["arguments"][name] == {**one._asdict(), "units": scales(one.units), "choices": list(one.choices)}
+        assert told["arguments"][name] == {
+            **one._asdict(),
+            "units": scales(one.units),
+            "choices": list(one.choices),
+        }
     # what is offered is what a request may hold
     described = client.get("/openapi.json").json()
     panels = {name for name in ("stiffness", "fit") if f"/v1/{name}" in described["paths"]}
-    assert set(told["knows"]) == {"service", *described["components"]["schemas"]["CaseRequest"]["properties"], *panels}
+    assert set(told["knows"]) == {
+        "service",
+        *described["components"]["schemas"]["CaseRequest"]["properties"],
+        *panels,
+    }
 
 
 def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, problem: Any) -> None:
@@ -66,13 +84,17 @@ def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, pr
         problem(client.get("/static/page/map.json"), 503)
 
 
-def test_built_documentation_is_served_if_named(tmp_path: Path, tables_dir: Path, client: Any, problem: Any) -> None:
+def test_built_documentation_is_served_if_named(
+    tmp_path: Path, tables_dir: Path, client: Any, problem: Any
+) -> None:
     (tmp_path / "how-to").mkdir()
     (tmp_path / "index.html").write_text("<h1>Guide</h1>")
     (tmp_path / "how-to" / "index.html").write_text("<h1>How to</h1>")
     settings = Settings(tables=(tables_dir,), guide=tmp_path, api_key="open-sesame")
     with TestClient(create_app(settings)) as guided:  # it needs no key
-        assert guided.get("/guide/").text == guided.get("/guide/index.html").text == "<h1>Guide</h1>"
+        assert (
+            guided.get("/guide/").text == guided.get("/guide/index.html").text == "<h1>Guide</h1>"
+        )
         assert guided.get("/guide/how-to/").text == "<h1>How to</h1>"
         assert guided.get("/guide").url.path == "/guide/"
         assert "guide" in guided.get("/static/page/names.json").json()["knows"]
@@ -82,19 +104,31 @@ def test_built_documentation_is_served_if_named(tmp_path: Path, tables_dir: Path
     problem(client.get("/guide/"), 404)
 
 
-def test_a_wheel_holds_the_built_documents_where_there_are_any(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wheel_holds_the_built_documents_where_there_are_any(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import hatch_build
     from service import settings
 
     monkeypatch.setattr(hatch_build, "ROOT", tmp_path)
     assert hatch_build.guide() == {}
     site = tmp_path / "build" / "docs"
-    for name in ("index.html", "how-to/index.html", "_static/a.css", "_static/a.css.map", ".doctrees/index.doctree",
-                 "_sources/index.md.txt", "objects.inv", ".buildinfo"):  # fmt: skip
+    for name in (
+        "index.html",
+        "how-to/index.html",
+        "_static/a.css",
+        "_static/a.css.map",
+        ".doctrees/index.doctree",
+        "_sources/index.md.txt",
+        "objects.inv",
+        ".buildinfo",
+    ):
         (site / name).parent.mkdir(parents=True, exist_ok=True)
         (site / name).write_text(name)
     places = {"index.html", "how-to/index.html", "_static/a.css"}
-    assert hatch_build.guide() == {str(site / name): f"mumacro/service/guide/{name}" for name in places}
+    assert hatch_build.guide() == {
+        str(site / name): f"mumacro/service/guide/{name}" for name in places
+    }
     # which is where the installed service looks for it
     monkeypatch.setattr(settings, "__file__", str(tmp_path / "settings.py"))
     assert settings.Settings().guide is None
@@ -102,15 +136,25 @@ def test_a_wheel_holds_the_built_documents_where_there_are_any(tmp_path: Path, m
     assert settings.Settings().guide == tmp_path / "guide"
 
 
-def test_what_is_typed_and_asked_without_a_browser(client: Any, repository: Path, tmp_path: Path) -> None:
+def test_what_is_typed_and_asked_without_a_browser(
+    client: Any, repository: Path, tmp_path: Path
+) -> None:
     """The tests of the modules in node: texts, numbers, addresses, questions."""
     node = shutil.which("node")
-    if node is None or tuple(map(int, re.findall(r"\d+", subprocess.check_output([node, "-v"], text=True)))) < (20, 19):
+    if node is None or tuple(
+        map(int, re.findall(r"\d+", subprocess.check_output([node, "-v"], text=True)))
+    ) < (20, 19):
         pytest.skip("node 20.19 or newer is not installed")
     told = tmp_path / "names.json"
     told.write_text(json.dumps(client.get("/static/page/names.json").json()))
-    done = subprocess.run([node, "--test", "tests/page"], cwd=repository, env={**os.environ, "PAGE_NAMES": str(told)},
-                          capture_output=True, text=True, check=False)  # fmt: skip
+    done = subprocess.run(
+        [node, "--test", "tests/page"],
+        cwd=repository,
+        env={**os.environ, "PAGE_NAMES": str(told)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout
     assert int(re.findall(r"^(?:#|ℹ) pass (\d+)$", done.stdout, re.MULTILINE)[0]) > 50
 
@@ -131,15 +175,15 @@ def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
     overlaps = page.run(
         "const all = [...document.querySelectorAll('section, header, .notice')]"
         ".map((one) => one.getBoundingClientRect()).filter(({ width }) => width > 0);"
-        "return all.flatMap((a, i) => all.slice(i + 1).filter((b) => a.left < b.right && b.left < a.right"
-        " && a.top < b.bottom && b.top < a.bottom)).length"
+        "return all.flatMap((a, i) => all.slice(i + 1).filter((b) => a.left < b.right && b.left < "
+        "a.right && a.top < b.bottom && b.top < a.bottom)).length"
         " + [...document.querySelectorAll('*')].filter((one) => ['sticky', 'fixed'].includes("
         "getComputedStyle(one).position)).length;"
     )
     assert overlaps == 0
     small = page.run(
-        "return [...document.querySelectorAll('input, select, button, summary, nav a')].map((element) => "
-        "[element.id || element.outerHTML,"
+        "return [...document.querySelectorAll('input, select, button, summary, nav "
+        "a')].map((element) => [element.id || element.outerHTML,"
         " (element.closest('.switch, .choice label') ?? element).getBoundingClientRect().height])"
         ".filter(([, height]) => height > 0 && height < 40);"
     )
@@ -148,10 +192,14 @@ def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
     page = open_page("#k=0.8..1.2N/um&along=k", width=width, height=height)
     cut = page.run(
         "return ['field-k', 'range'].map((id) => document.getElementById(id)).filter((field) => {"
-        " const pen = new OffscreenCanvas(1, 1).getContext('2d'); pen.font = getComputedStyle(field).font;"
-        " return pen.measureText(field.value || field.placeholder).width > field.clientWidth - 16; }).length;"
+        " const pen = new OffscreenCanvas(1, 1).getContext('2d'); pen.font = "
+        "getComputedStyle(field).font; return pen.measureText(field.value || "
+        "field.placeholder).width > field.clientWidth - 16; }).length;"
     )
-    rows = "return ['contact', 'direction'].map((id) => new Set([...document.getElementById(id).children].map((one) =>"
+    rows = (
+        "return ['contact', 'direction'].map((id) => new "
+        "Set([...document.getElementById(id).children].map((one) =>"
+    )
     assert (cut, page.run(f"{rows} one.getBoundingClientRect().y)).size);")) == (0, [1, 1])
 
 
@@ -163,7 +211,8 @@ def inaccessible(page: Any, repository: Path) -> Any:
         page.scheme(scheme)
         broken = page.run(
             f"const found = await axe.run(document, {{ resultTypes: ['violations'], ...{rules} }});"
-            "return found.violations.map((one) => [one.id, one.nodes.map((node) => node.target.join(' '))]);"
+            "return found.violations.map((one) => [one.id, one.nodes.map((node) => "
+            "node.target.join(' '))]);"
         )
         found.update({(scheme, rule): places[:5] for rule, places in broken})
     page.scheme("light")
@@ -186,13 +235,17 @@ def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) ->
     assert page.run("return document.documentElement.scrollWidth;") <= width
 
 
-def test_the_description_is_accessible_and_leads_back(open_page: Any, repository: Path, surrogate: Surrogate) -> None:
+def test_the_description_is_accessible_and_leads_back(
+    open_page: Any, repository: Path, surrogate: Surrogate
+) -> None:
     page = open_page(path="docs")
     page.wait_for("#swagger-ui", "The value of one input that gives a wanted mu_macro")
     assert not page.find("#key-form").is_displayed()
     # with one GET and one POST operation open
-    page.run("for (const call of ['get', 'post'])"
-             " document.querySelector(`.opblock-${call} .opblock-summary-control`).click();")  # fmt: skip
+    page.run(
+        "for (const call of ['get', 'post'])"
+        " document.querySelector(`.opblock-${call} .opblock-summary-control`).click();"
+    )
     page.wait_for("#swagger-ui", "Coulomb friction coefficient of the contact")
     assert inaccessible(page, repository) == {}
     page.find("#back").click()
@@ -200,7 +253,9 @@ def test_the_description_is_accessible_and_leads_back(open_page: Any, repository
     assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
 
 
-def test_the_pages_ask_for_the_key_and_use_it(open_page: Any, serving: Any, tables_dir: Path, tmp_path: Path) -> None:
+def test_the_pages_ask_for_the_key_and_use_it(
+    open_page: Any, serving: Any, tables_dir: Path, tmp_path: Path
+) -> None:
     def enter(key: Any) -> None:
         page.type("#key", key, commit=False)
         page.find("#key-form button").click()

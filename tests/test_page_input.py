@@ -34,13 +34,17 @@ def test_a_typed_value_applies_on_commit(open_page: Any, surrogate: Surrogate) -
         expect(**changed)
 
 
-def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page: Any, surrogate: Surrogate) -> None:
+def test_a_bad_value_greys_the_result_and_gives_the_reason(
+    open_page: Any, surrogate: Surrogate
+) -> None:
     page = open_page()
     page.type("#field-Fz", "5 mm")
     assert page.is_old()
     assert page.find("#field-Fz").get_attribute("aria-invalid") == "true"
     assert page.text("#fault-Fz") == "Fz: “mm” is not a unit of Fz: give N, mN, kN."
-    assert page.text("#status") == f"{page.text('#fault-Fz')} Grey results belong to earlier values."
+    assert (
+        page.text("#status") == f"{page.text('#fault-Fz')} Grey results belong to earlier values."
+    )
     assert page.is_red("#status")
     before = page.number()
     # another field does not repair it, and no request is sent meanwhile
@@ -48,7 +52,11 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page: Any, surro
     assert (page.is_old(), page.number()) == (True, before)
     page.press("#field-Fz", "ESCAPE")
     assert not page.is_old()
-    assert (page.text("#status"), page.text("#fault-Fz"), page.value("#field-Fz")) == ("", "", "10 N")
+    assert (page.text("#status"), page.text("#fault-Fz"), page.value("#field-Fz")) == (
+        "",
+        "",
+        "10 N",
+    )
     assert page.number() == page.rounded(surrogate.evaluate(**{**START, "mu0": 0.4}).mu_macro)
     # an empty field is no error, but there is no result for it
     page.type("#field-Fz", "")
@@ -61,7 +69,9 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page: Any, surro
     assert page.is_old()
     page.choose("#slider-v0", "-1000", "input")
     assert not page.is_old()
-    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "mu0": 0.4, "v0": 0.1}).mu_macro)
+    assert page.number() == page.rounded(
+        surrogate.evaluate(**{**START, "mu0": 0.4, "v0": 0.1}).mu_macro
+    )
     assert page.text("#regime") == "continuous"
     assert page.find("#slider-v0").get_attribute("aria-valuetext") == "v₀ = 100 mm/s"
 
@@ -69,7 +79,8 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page: Any, surro
 def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page("#k=5e5")
     page.click("#rigid")
-    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro, 6)  # no k to be known
+    # no k to be known
+    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro, 6)
     assert not page.find("#field-k").is_enabled()
     assert "k=rigid" in page.address()
     assert (page.shown()["ṽ = v₀/(l₀ω)"], page.shown()["shaker power"]) == ("∞", "– (rigid)")
@@ -83,38 +94,72 @@ def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) ->
     assert page.find("#rigid").is_selected()
 
 
-def test_every_trouble_of_the_service_has_its_own_message(open_page: Any, surrogate: Surrogate) -> None:
-    said = "new Response(JSON.stringify({ detail: 'too many cases' }), { status: %s, headers: { 'Retry-After': '1' } })"
+def test_every_trouble_of_the_service_has_its_own_message(
+    open_page: Any, surrogate: Surrogate
+) -> None:
+    said = (
+        "new Response(JSON.stringify({ detail: 'too many cases' }), { status: %s, headers: { "
+        "'Retry-After': '1' } })"
+    )
     with open_page.faked("(...all) => (window.reply ?? real)(...all)") as page:
         before = page.number()
         for reply, message, red in (
-            (f"async () => {said % 503}", "^The service cannot answer now: too many cases. Asking again by its", False),
-            (f"async () => {said % 422}", "^The service refuses this: too many cases. Grey results belong to e", True),
-            ("async () => new Response('<html>', { status: 200 })",
-             "^The response of the service cannot be read .status 200.. Asking again by itself", False),
-            ("(...all) => new Promise((done) => (window.late ??= []).push(() => done(real(...all))))",
-             "^Waiting for the service. Grey results belong to earlier values.$", False),
-        ):  # fmt: skip
+            (
+                f"async () => {said % 503}",
+                "^The service cannot answer now: too many cases. Asking again by its",
+                False,
+            ),
+            (
+                f"async () => {said % 422}",
+                "^The service refuses this: too many cases. Grey results belong to e",
+                True,
+            ),
+            (
+                "async () => new Response('<html>', { status: 200 })",
+                "^The response of the service cannot be read .status 200.. Asking again by itself",
+                False,
+            ),
+            (
+                "(...all) => new Promise((done) => (window.late ??= []).push(() => "
+                "done(real(...all))))",
+                "^Waiting for the service. Grey results belong to earlier values.$",
+                False,
+            ),
+        ):
             page.run(f"window.reply = {reply}; document.querySelector('#rigid').click();")
             page.wait_for("#status", message)
             assert (page.is_old(), page.is_red("#status"), page.number()) == (True, red, before)
         page.run("delete window.reply; window.late.forEach((answer) => answer());")
         page.settle()
-        page.run("window.reply = () => Promise.reject(new TypeError()); document.querySelector('#rigid').click();")
-        page.wait_for("#status", "^The service does not answer. Asking again by itself. Grey results belong to earlier")
+        page.run(
+            "window.reply = () => Promise.reject(new TypeError()); "
+            "document.querySelector('#rigid').click();"
+        )
+        page.wait_for(
+            "#status",
+            "^The service does not answer. Asking again by itself. Grey results belong to earlier",
+        )
         page.run("delete window.reply; dispatchEvent(new Event('online'));")
         page.settle()
-        assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro, 6)
+        assert page.number() == page.rounded(
+            surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro, 6
+        )
         assert (page.is_old(), page.text("#status")) == (False, "")
 
 
-def test_the_start_is_calm_while_the_service_is_not_ready(open_page: Any, surrogate: Surrogate) -> None:
+def test_the_start_is_calm_while_the_service_is_not_ready(
+    open_page: Any, surrogate: Surrogate
+) -> None:
     unready = (
-        "async (path, options) => (window.ready || path.includes('names.json') ? real(path, options) : new Response("
-        "'{\"detail\": \"the tables are not loaded yet\"}', { status: 503, headers: { 'Retry-After': '1' } }))"
+        "async (path, options) => (window.ready || path.includes('names.json') ? real(path, "
+        'options) : new Response(\'{"detail": "the tables are not loaded yet"}\', { status: 503, '
+        "headers: { 'Retry-After': '1' } }))"
     )
     with open_page.faked(unready, wait=False) as page:
-        said = "^The service cannot answer now: the tables are not loaded yet. Asking again by itself.$"
+        said = (
+            "^The service cannot answer now: the tables are not loaded yet. Asking again by "
+            "itself.$"
+        )
         page.wait_for("#status", said)  # no word of earlier values: there are none
         assert not page.is_red("#status")
         assert page.text("#law-status") == page.text("#solve-status") == ""

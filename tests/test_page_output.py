@@ -17,31 +17,46 @@ from tests.browser import RECORDED, START
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
-ODD, SEEN = r"NaN|undefined|null|Infinity|\[object", "return document.querySelector('main').innerText;"
-HEADING = "return document.querySelector('#law > .upright').previousSibling.textContent;"  # of the law's axis
+ODD, SEEN = (
+    r"NaN|undefined|null|Infinity|\[object",
+    "return document.querySelector('main').innerText;",
+)
+# of the law's axis
+HEADING = "return document.querySelector('#law > .upright').previousSibling.textContent;"
 
 
-def test_it_loads_and_shows_the_known_value(open_page: Any, surrogate: Surrogate, live_server: Any) -> None:
+def test_it_loads_and_shows_the_known_value(
+    open_page: Any, surrogate: Surrogate, live_server: Any
+) -> None:
     page = open_page(new=True)
     answer = surrogate.evaluate(**START, gradient=True)
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
     assert page.text("#regime") == "stick slip"
     assert page.text("#model") == (
-        "Model: one spring of stiffness k, oscillation across the sliding direction; not compared with measured points."
+        "Model: one spring of stiffness k, oscillation across the sliding direction; not compared "
+        "with measured points."
     )
     assert "k is known: k known to 10 % leaves mu_macro uncertain by" in page.text("#rows")
     stick = surrogate.stick_fraction(answer.v_tilde, answer.y_tilde)
     power = surrogate.power(answer.v_tilde, answer.y_tilde) * 0.3 * 10 * 3e-6 * START["omega"]
     expected = {
-        "µ/µ₀": f"{answer.mu_ratio:.4g}", "ṽ = v₀/(l₀ω)": f"{answer.v_tilde:.4g}", "ỹ = y₀/l₀": f"{answer.y_tilde:.4g}",
-        "peak vibration y₀ω": "251.3 mm/s", "stick fraction": f"{100 * stick:.4g} %",
-        "shaker power": f"{1e3 * power:.4g} mW", "power saved": f"{1e3 * (0.3 - answer.mu_macro) * 0.1:.4g} mW",
-        "answered by block": answer.source, "of table": f"{surrogate.id}, tolerance {surrogate.tolerance:g}",
+        "µ/µ₀": f"{answer.mu_ratio:.4g}",
+        "ṽ = v₀/(l₀ω)": f"{answer.v_tilde:.4g}",
+        "ỹ = y₀/l₀": f"{answer.y_tilde:.4g}",
+        "peak vibration y₀ω": "251.3 mm/s",
+        "stick fraction": f"{100 * stick:.4g} %",
+        "shaker power": f"{1e3 * power:.4g} mW",
+        "power saved": f"{1e3 * (0.3 - answer.mu_macro) * 0.1:.4g} mW",
+        "answered by block": answer.source,
+        "of table": f"{surrogate.id}, tolerance {surrogate.tolerance:g}",
         "numerical error of µ": f"≤ {answer.error_bound:.2g}".replace("e-0", "e-"),
-    }  # fmt: skip
+    }
     assert expected.items() <= page.shown().items()
     assert not page.find("#origin").is_displayed()  # closed by default
-    shares = [float(text.replace("−", "-").removesuffix(" %")) for text in page.texts("#bars td:last-child")]
+    shares = [
+        float(text.replace("−", "-").removesuffix(" %"))
+        for text in page.texts("#bars td:last-child")
+    ]
     for share, (name, value) in zip(shares, START.items(), strict=True):
         assert share == close(answer.gradient[name] * value / answer.mu_macro, abs=6e-4)
     # all digits are those that the table's bound supports
@@ -66,7 +81,9 @@ def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.click("#solve-form button")  # which amplitude halves the friction?
     found = page.wait_for("#solve-result", r"y₀ = (\S+) µm: µ = 0.15, stick slip, shaker (\S+) mW")
-    assert surrogate.evaluate(**{**START, "y0": float(found[1]) * 1e-6}).mu_ratio == close(0.5, abs=1e-5)
+    assert surrogate.evaluate(**{**START, "y0": float(found[1]) * 1e-6}).mu_ratio == close(
+        0.5, abs=1e-5
+    )
     page.click("#solve-result button")
     assert (page.shown()["µ/µ₀"], page.shown()["shaker power"]) == ("0.5", f"{found[2]} mW")
     assert not page.is_old("#solve")
@@ -78,7 +95,11 @@ def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
     page.wait_for("#solve-result", r"k = \S+ N/µm: µ = 0.29")
     page.type("#target", "2")
     page.wait_for("#solve-result", r"^No value gives that: here it can be \S+ to \S+\.$")
-    for text, said in (("half", "not a number"), ("0.5 N", "is not a unit"), ("-1", "refuses this: target.*>= 0")):
+    for text, said in (
+        ("half", "not a number"),
+        ("0.5 N", "is not a unit"),
+        ("-1", "refuses this: target.*>= 0"),
+    ):
         page.type("#target", text)
         page.wait_for("#solve-status", said)
     page.choose("#target", "2", "input")
@@ -98,18 +119,28 @@ def test_the_map_is_read_and_moved_on(open_page: Any, surrogate: Surrogate) -> N
     page.press("#map", "ARROW_RIGHT", "ARROW_UP")
     expected = surrogate.evaluate(**{**START, "v0": 0.0105, "y0": 2.1e-6})
     assert page.number() == page.rounded(expected.mu_macro)
-    assert f"speed {page.rounded(expected.v_tilde, 3)}" in page.find("#map").get_attribute("aria-label")
+    assert f"speed {page.rounded(expected.v_tilde, 3)}" in page.find("#map").get_attribute(
+        "aria-label"
+    )
     page.press("#law", "ARROW_LEFT")
     assert page.number() == page.rounded(surrogate.evaluate(**{**START, "y0": 2.1e-6}).mu_macro)
 
 
-OUTSIDE = (("#v0=100", (0, 0), "^$"), ("#v0=1e6", (1, 0), "ṽ = 2.65e6"), ("#v0=0", (-1, 0), "ṽ = 0"),
-           ("#y0=1", (0, 1), "ỹ = 3.33e5"), ("#y0=0", (0, -1), "ỹ = 0"), ("#omega=0", (1, 0), "ṽ = ∞"),
-           ("#v0=1e6&y0=1e-12", (1, -1), "ỹ = 3.33e-7"))  # fmt: skip
+OUTSIDE = (
+    ("#v0=100", (0, 0), "^$"),
+    ("#v0=1e6", (1, 0), "ṽ = 2.65e6"),
+    ("#v0=0", (-1, 0), "ṽ = 0"),
+    ("#y0=1", (0, 1), "ỹ = 3.33e5"),
+    ("#y0=0", (0, -1), "ỹ = 0"),
+    ("#omega=0", (1, 0), "ṽ = ∞"),
+    ("#v0=1e6&y0=1e-12", (1, -1), "ỹ = 3.33e-7"),
+)
 
 
 @pytest.mark.parametrize(("address", "side", "said"), OUTSIDE)
-def test_a_point_outside_of_the_map_is_marked_on_its_frame(open_page: Any, address: Any, side: Any, said: Any) -> None:
+def test_a_point_outside_of_the_map_is_marked_on_its_frame(
+    open_page: Any, address: Any, side: Any, said: Any
+) -> None:
     page = open_page(address)
     assert re.search(said, page.text("#map-out"))
     x, y = page.run(
@@ -123,11 +154,15 @@ def test_a_point_outside_of_the_map_is_marked_on_its_frame(open_page: Any, addre
     assert page.text("#status") == ""
 
 
-def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surrogate, repository: Path) -> None:
+def test_the_map_has_a_colour_between_two_levels(
+    open_page: Any, surrogate: Surrogate, repository: Path
+) -> None:
     page = open_page()
     script = (repository / "service/static/page/figures.js").read_text("utf-8")
     levels = sorted(float(one) for one in re.findall(r'\[(0\.\d+), "#', script))
-    v, y = (low.ravel() for low in np.meshgrid(np.geomspace(2e-4, 5e2, 30), np.geomspace(2e-2, 5e2, 30)))
+    v, y = (
+        low.ravel() for low in np.meshgrid(np.geomspace(2e-4, 5e2, 30), np.geomspace(2e-2, 5e2, 30))
+    )
     # places that lie clear of a level: the picture is interpolated
     around = [surrogate.mu_ratio(v * 1.02**i, y * 1.02**j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     bands = np.searchsorted(levels, around, side="right")
@@ -135,17 +170,23 @@ def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surr
     x_share, y_share = (np.log10(v) + 4) / 7, 1 - (np.log10(y) + 2) / 5
     colours = page.run(
         "const plot = document.querySelector('#map'); plot.scrollIntoView();"
-        "const { x: left, y: top, width, height } = plot.querySelector('.shade').getBoundingClientRect();"
-        f"return {np.column_stack((x_share, y_share)).tolist()}.map(([x, y]) => document.elementsFromPoint("
-        "left + x * width, top + y * height).find((one) => one.matches('.shade')).style.fill);"
+        "const { x: left, y: top, width, height } = "
+        "plot.querySelector('.shade').getBoundingClientRect();return "
+        f"{np.column_stack((x_share, y_share)).tolist()}.map(([x, y]) => "
+        "document.elementsFromPoint(left + x * width, top + y * height).find((one) => "
+        "one.matches('.shade')).style.fill);"
     )
-    told = {(band, colour) for band, colour, good in zip(bands[0], colours, clear, strict=True) if good}
+    told = {
+        (band, colour) for band, colour, good in zip(bands[0], colours, clear, strict=True) if good
+    }
     assert len(told) == len({band for band, _ in told}) == len({colour for _, colour in told}) > 10
     shades = [colour for _, colour in sorted(told)]
     assert (shades[0], shades[-1]) == ("rgb(68, 1, 84)", "rgb(253, 231, 37)")  # viridis
 
 
-def test_the_law_is_read_in_the_units_of_its_field_over_a_range(open_page: Any, surrogate: Surrogate) -> None:
+def test_the_law_is_read_in_the_units_of_its_field_over_a_range(
+    open_page: Any, surrogate: Surrogate
+) -> None:
     page = open_page()
     page.touched("#law", 0.5, 0.5)
     read = page.wait_for("#law-read", r"v₀ = (\S+) mm/s: µ = (\S+),")
@@ -155,9 +196,12 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(open_page: Any, 
     assert page.texts("#law .tick")[:6] == ["10⁻¹", "10⁰", "10¹", "10²", "10³", "10⁴"]
     assert {"0", "0.1", "0.2", "0.3"} <= set(page.texts("#law .tick"))
     page.type("#range", "5mm/s..2m/s")
-    assert re.search("at v₀ = 5 mm/s to.*at v₀ = 2000 mm/s", page.find("#law").get_attribute("aria-label"))
+    assert re.search(
+        "at v₀ = 5 mm/s to.*at v₀ = 2000 mm/s", page.find("#law").get_attribute("aria-label")
+    )
     page.type("#range", "0..100")
-    page.wait_for("#law-status", "refuses this: .*start.* > 0.* Grey results")  # on a logarithmic scale
+    # on a logarithmic scale
+    page.wait_for("#law-status", "refuses this: .*start.* > 0.* Grey results")
     assert (page.is_old("#law-section"), page.is_old()) == (True, False)
     page.choose("#scale", "linear")
     assert page.text("#law-status") == ""
@@ -176,12 +220,21 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(open_page: Any, 
 
 
 ENDS = {
-    "#along=mu0": "µ₀", "#along=Fz": "Fz [N]", "#along=k&scale=linear": "k [N/µm]", "#along=omega": "f [kHz]",
-    "#along=y0&scale=linear": "y₀ [µm]", "#v0=1e307": "v₀ [m/s]", "#v0=1e-310&along=v0": "v₀ [m/s]",
-    "#k=1e300&along=k": "k [N/m]", "#y0=0&omega=0&v0=0": "v₀ [m/s]", "#k=rigid&y0=0&v0=0": "v₀ [m/s]",
-    "#k=rigid&along=k": "k [N/µm]", "#y0=1e300&omega=1e200&along=omega": "ω [rad/s]",
-    "#mu0=1e-300&Fz=1e-10&along=mu0&scale=linear": "µ₀", "#v0=0&y0=3e-6": "v₀ [m/s]",
-}  # fmt: skip
+    "#along=mu0": "µ₀",
+    "#along=Fz": "Fz [N]",
+    "#along=k&scale=linear": "k [N/µm]",
+    "#along=omega": "f [kHz]",
+    "#along=y0&scale=linear": "y₀ [µm]",
+    "#v0=1e307": "v₀ [m/s]",
+    "#v0=1e-310&along=v0": "v₀ [m/s]",
+    "#k=1e300&along=k": "k [N/m]",
+    "#y0=0&omega=0&v0=0": "v₀ [m/s]",
+    "#k=rigid&y0=0&v0=0": "v₀ [m/s]",
+    "#k=rigid&along=k": "k [N/µm]",
+    "#y0=1e300&omega=1e200&along=omega": "ω [rad/s]",
+    "#mu0=1e-300&Fz=1e-10&along=mu0&scale=linear": "µ₀",
+    "#v0=0&y0=3e-6": "v₀ [m/s]",
+}
 
 
 @pytest.mark.parametrize("address", ENDS)
@@ -207,17 +260,26 @@ def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None
         assert words[-1].startswith("µ₀ = 0.3, Fz = 10 N, k = 1 N/µm, y₀ = 2 µm, f = 20 kHz")
         assert min(float(picture.attrib[side]) for side in ("width", "height")) >= 300
         # it looks the same without the page's style sheet
-        assert all("fill:" in one.attrib["style"] for one in picture.iter("{http://www.w3.org/2000/svg}path"))
+        assert all(
+            "fill:" in one.attrib["style"]
+            for one in picture.iter("{http://www.w3.org/2000/svg}path")
+        )
 
 
 @pytest.mark.parametrize("direction", ["across", "along", "normal"])
 @pytest.mark.parametrize("contact", ["spring", "ball"])
-def test_all_contacts_and_directions_answer(open_page: Any, surrogate: Surrogate, contact: Any, direction: Any) -> None:
+def test_all_contacts_and_directions_answer(
+    open_page: Any, surrogate: Surrogate, contact: Any, direction: Any
+) -> None:
     with open_page.faked(RECORDED) as page:
         page.click(f"[name=contact][value={contact}]")
         page.click(f"[name=direction][value={direction}]")
         normal = direction == "normal"
-        there = {"#field-Fz_amplitude": normal, "#field-y0": not normal, f"#sketch .{direction}": True}
+        there = {
+            "#field-Fz_amplitude": normal,
+            "#field-y0": not normal,
+            f"#sketch .{direction}": True,
+        }
         for selector, shown in there.items():
             assert page.find(selector).is_displayed() is shown
         page.type("#field-k", "0.8..1.2 N/um")
@@ -227,13 +289,19 @@ def test_all_contacts_and_directions_answer(open_page: Any, surrogate: Surrogate
             return
         swing = {"y0": None, "Fz_amplitude": 5.0} if normal else {}
         case = {name: x for name, x in {**START, **swing, "k": None}.items() if x is not None}
-        expected = surrogate.evaluate(**case, contact=contact, direction=direction, k_range=(8e5, 1.2e6))
+        expected = surrogate.evaluate(
+            **case, contact=contact, direction=direction, k_range=(8e5, 1.2e6)
+        )
         told = page.wait_for("#interval", r"^(\S+) to (\S+) for k = 0.8..1.2 N/µm$")
         ends = [expected.mu_macro_low, expected.mu_macro_high]
-        assert [float(told[1]), float(told[2])] == close(ends, abs=0.02 * (ends[1] - ends[0]) + 1e-9)
+        assert [float(told[1]), float(told[2])] == close(
+            ends, abs=0.02 * (ends[1] - ends[0]) + 1e-9
+        )
         assert len(page.texts("#law .band")) == 1
         assert (page.text("#rows") != "") is not normal
-        assert ("does not hold" in page.text("#map-out")) is ((contact, direction) != ("spring", "across"))
+        assert ("does not hold" in page.text("#map-out")) is (
+            (contact, direction) != ("spring", "across")
+        )
         assert page.asked("v1/law")["k_range"] == close([8e5, 1.2e6], rel=1e-15)
         page.choose("#along", "k")
         assert "k_range" not in page.asked("v1/law")
@@ -243,7 +311,9 @@ def test_all_contacts_and_directions_answer(open_page: Any, surrogate: Surrogate
         assert (page.text("#map-out"), page.value("#field-k")) == ("", "1 N/µm")
 
 
-def test_the_panels_ask_and_fill_the_form(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None:
+def test_the_panels_ask_and_fill_the_form(
+    open_page: Any, surrogate: Surrogate, tmp_path: Path
+) -> None:
     with open_page.faked(RECORDED, "#contact=ball") as page:
         page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
         for name, text in (("radius", "5 mm"), ("E", "210 GPa"), ("nu", "0.3"), ("E2", "rigid")):
@@ -252,27 +322,40 @@ def test_the_panels_ask_and_fill_the_form(open_page: Any, surrogate: Surrogate, 
         asked = {"radius": close(5e-3, rel=1e-15), "Fz": 10, "E": 210e9, "nu": 0.3, "E2": "rigid"}
         assert page.asked("v1/stiffness") == {"geometry": "ball", **asked}
         found = contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3, E2=np.inf)
-        assert page.text("#stiffness-result") == f"k = {found.k / 1e6:.4g} N/µm at Fz = 10 N; contact: ball (Hertz)Use"
+        assert (
+            page.text("#stiffness-result")
+            == f"k = {found.k / 1e6:.4g} N/µm at Fz = 10 N; contact: ball (Hertz)Use"
+        )
         page.click("[name=contact][value=spring]")
         page.click("#stiffness-result button")
         assert page.value("#field-k") == f"{found.k / 1e6:.6g} N/µm"
         assert page.find("[name=contact][value=ball]").is_selected()
         page.choose("#geometry", "cylinder", "input")
         assert page.value("#argument-radius") == "5 mm"  # what two geometries share stays
-        for text, said in (("10 parsec", "^length: “parsec” is not a unit of length: give m, .*Grey results belong"),
-                           ("-1 mm", "refuses this: length")):  # fmt: skip
+        for text, said in (
+            (
+                "10 parsec",
+                "^length: “parsec” is not a unit of length: give m, .*Grey results belong",
+            ),
+            ("-1 mm", "refuses this: length"),
+        ):
             page.type("#argument-length", text)
             page.wait_for("#stiffness-status", said)
         v0 = np.geomspace(1e-3, 1.0, 9)
         mu = surrogate.evaluate(**{**START, "k": 1.3e6, "v0": v0}, contact="ball").mu_macro
-        rows = [f"{1e3 * speed!r};{friction!r};0.001" for speed, friction in zip(v0.tolist(), mu.tolist(), strict=True)]
+        rows = [
+            f"{1e3 * speed!r};{friction!r};0.001"
+            for speed, friction in zip(v0.tolist(), mu.tolist(), strict=True)
+        ]
         page.choose("#points", "\n".join(["v0 [mm/s];mu;std", *rows]), "input")
         page.click("#fit-form button")
         asked = page.asked("v1/fit")
         assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
         assert (asked["contact"], asked["unknowns"], "k" in asked) == ("ball", ["k", "mu0"], False)
         lines = page.texts("#fit-found li")
-        for line, pattern in zip(lines, ("k = 1.3 N/µm ± .*; µ₀ = 0.3 ± .*Use", "reduced χ² = .*"), strict=True):
+        for line, pattern in zip(
+            lines, ("k = 1.3 N/µm ± .*; µ₀ = 0.3 ± .*Use", "reduced χ² = .*"), strict=True
+        ):
             assert re.fullmatch(pattern, line)
         assert len(page.texts("#fit-plot :is(circle.measured, .band, .curve)")) == 11
         assert "k = 1.3 N/µm" in page.download("#fit-image", tmp_path, "friction-fit.svg")

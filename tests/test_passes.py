@@ -1,4 +1,5 @@
-"""Many points at once against one by one: the same bits, for all positions and numbers of points."""
+"""Many points at once against one by one: the same bits, for all positions and numbers of
+points."""
 
 from typing import Any
 
@@ -23,7 +24,12 @@ def one_by_one(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> 
     found = []
     for i in range(v.size):
         one = slice(i, i + 1)
-        found.append((*batch.values(code, data, v[one], y[one], 1), *batch.slopes(code, data, v[one], y[one], 1)))
+        found.append(
+            (
+                *batch.values(code, data, v[one], y[one], 1),
+                *batch.slopes(code, data, v[one], y[one], 1),
+            )
+        )
     return [np.concatenate(part) for part in zip(*found, strict=True)]
 
 
@@ -44,7 +50,9 @@ def same(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> None:
     assert np.all((value >= 0.0) & (bound >= 0.0))
     if name == "mu_ratio":
         np.testing.assert_array_equal(table.mu_ratio(v, y), value)
-        np.testing.assert_array_equal([table.mu_ratio(float(a), float(b)) for a, b in zip(v, y, strict=True)], value)
+        np.testing.assert_array_equal(
+            [table.mu_ratio(float(a), float(b)) for a, b in zip(v, y, strict=True)], value
+        )
         assert np.all(value <= 1.0)
 
 
@@ -52,7 +60,11 @@ def same(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> None:
 def test_over_the_whole_quadrant_and_next_to_the_corner(table: Surrogate, name: str) -> None:
     rng, n = np.random.default_rng(5), 3000
     v = [log_uniform(rng, *ends, n) for ends in ((1e-14, 1e10), (1e-3, 1e3), (1e-8, 0.1))]
-    y = [log_uniform(rng, 1e-10, 1e14, n), log_uniform(rng, 1e-3, 1e3, n), 1.0 + rng.uniform(-0.25, 0.5, n)]
+    y = [
+        log_uniform(rng, 1e-10, 1e14, n),
+        log_uniform(rng, 1e-3, 1e3, n),
+        1.0 + rng.uniform(-0.25, 0.5, n),
+    ]
     same(table, np.concatenate(v), np.concatenate(y), name)
     source = table.quantity(name, np.concatenate(v), np.concatenate(y))[2]
     assert np.unique(source).size >= len(CHARTS) - 1
@@ -72,8 +84,13 @@ def test_on_both_sides_of_every_seam(table: Surrogate) -> None:
 def test_on_every_edge_of_every_cell(table: Surrogate) -> None:
     """Where rounding decides which of two cells is used."""
     rng = np.random.default_rng(7)
-    axes = [(chart.a, block.cells[0]) for chart, block in zip(CHARTS, table.table.blocks, strict=True)]
-    axes += [(axis, p.cells) for (_, axis, _), p in zip(charts.BORDER_PIECES, table.table.border, strict=True)]
+    axes = [
+        (chart.a, block.cells[0]) for chart, block in zip(CHARTS, table.table.blocks, strict=True)
+    ]
+    axes += [
+        (axis, p.cells)
+        for (_, axis, _), p in zip(charts.BORDER_PIECES, table.table.border, strict=True)
+    ]
     ends = []
     for axis, cells in axes:
         edges = np.linspace(axis.low, axis.high, cells + 1)
@@ -96,11 +113,13 @@ def test_any_number_of_points_at_any_position(table: Surrogate, n: int) -> None:
     np.testing.assert_array_equal(table.mu_ratio(v[3:], y[3:]), expected[3:])
 
 
-# --- the arithmetic behind it -------------------------------------------------------------------------
+# --- the arithmetic behind it ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
-def test_the_logarithm_is_close_to_the_libraries_and_never_falls(table: Surrogate, kernel: Kernel) -> None:
+def test_the_logarithm_is_close_to_the_libraries_and_never_falls(
+    table: Surrogate, kernel: Kernel
+) -> None:
     """Where ln y~ is the coordinate: the logarithm of any y~, and of neighbouring doubles."""
     for start in (3.5, 4.0, 8.0, 16.0, 31.0, 1e3, 1e5):
         y = np.unique(start * (1.0 + np.arange(-2000, 2000) * 1e-15))
@@ -118,17 +137,22 @@ def test_cells_of_the_limit_of_large_speed_are_the_closed_form() -> None:
     f, g, slope, _, _ = kernels[-1].outer_expansion(np.sqrt(np.expm1(x))).T
     cell = np.minimum((x * cells / top).astype(int), cells - 1)
     u = 2.0 * (x * cells / top - cell) - 1.0
-    first, rest = (np.sum(outer_cells()[cell, term] * u[:, None] ** np.arange(7, -1, -1), axis=1) for term in (0, 1))
+    first, rest = (
+        np.sum(outer_cells()[cell, term] * u[:, None] ** np.arange(7, -1, -1), axis=1)
+        for term in (0, 1)
+    )
     assert first == close(f, abs=1e-15)
     # taken times 1 / (1 + v~^2) < 1e-3, and not known better in closed form
     assert rest == close(g + 0.5 * slope, abs=1e-14)
 
 
-# --- the levels of the processor ------------------------------------------------------------------------
+# --- the levels of the processor ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", charts.QUANTITY_NAMES)
-def test_every_level_with_fused_multiply_add_gives_the_same_bits(table: Surrogate, name: str) -> None:
+def test_every_level_with_fused_multiply_add_gives_the_same_bits(
+    table: Surrogate, name: str
+) -> None:
     rng, n = np.random.default_rng(12), 20_000
     v, y = log_uniform(rng, 1e-9, 1e6, n), log_uniform(rng, 1e-6, 1e8, n)
     code, data = charts.QUANTITY_NAMES.index(name), table._with(name)
@@ -150,15 +174,25 @@ def test_every_level_with_fused_multiply_add_gives_the_same_bits(table: Surrogat
         same = (found[2] == best[2]) & (np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-6)
         assert np.mean(found[2] == best[2]) > 0.9999
         off = np.abs(found[0] - best[0])
-        assert np.all((off <= 1e-13 * (1.0 + np.abs(best[0])))[same] & (off <= 2.0 * found[1])[same])
+        assert np.all(
+            (off <= 1e-13 * (1.0 + np.abs(best[0])))[same] & (off <= 2.0 * found[1])[same]
+        )
         assert np.all((np.abs(found[3][1:3] - best[3][1:3]) <= 2.0 * found[3][3:])[:, same])
 
 
-@pytest.mark.parametrize("kind", [(1, 0), (0, 1), (1, 1), (0, 2)], ids=["ball", "along", "ball-along", "normal"])
-def test_contacts_and_directions_have_the_same_bits(table: Surrogate, kind: tuple[int, int]) -> None:
-    """On every level with fused multiply-add, in an array and alone: all 17 rows, of cases and their neighbours."""
+@pytest.mark.parametrize(
+    "kind", [(1, 0), (0, 1), (1, 1), (0, 2)], ids=["ball", "along", "ball-along", "normal"]
+)
+def test_contacts_and_directions_have_the_same_bits(
+    table: Surrogate, kind: tuple[int, int]
+) -> None:
+    """On every level with fused multiply-add, in an array and alone: all 17 rows, of cases and
+    their neighbours."""
     rng, n = np.random.default_rng(13), 1500
-    six = [10.0 ** rng.uniform(low, high, n) for low, high in ((-1, 0), (0, 2), (4, 9), (-9, -2), (1, 6), (-7, 2))]
+    six = [
+        10.0 ** rng.uniform(low, high, n)
+        for low, high in ((-1, 0), (0, 2), (4, 9), (-9, -2), (1, 6), (-7, 2))
+    ]
     if kind[1] == 2:
         six[3] = six[1] * rng.uniform(0.0, 1.0, n)
     six[5][:20], six[3][20:40], six[2][40:60] = 0.0, 0.0, np.inf

@@ -13,7 +13,14 @@ from tests.comparing import close
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 PAGE = (Path(__file__).parent.parent / "docs" / "how-to" / "scale.md").read_text("utf-8")
-CASES: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": np.array([1e-6, 2e-6]), "omega": 1.3e5, "v0": 0.01}
+CASES: dict[str, Any] = {
+    "mu0": 0.3,
+    "Fz": 10.0,
+    "k": 1e6,
+    "y0": np.array([1e-6, 2e-6]),
+    "omega": 1.3e5,
+    "v0": 0.01,
+}
 
 
 def run(heading: str, *needs: str) -> dict[str, Any]:
@@ -48,7 +55,9 @@ def test_designs_and_reductions() -> None:
     assert bool(enough.isel(found["place"]))
 
 
-def test_files_over_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, expected: Any) -> None:
+def test_files_over_a_cluster(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, expected: Any
+) -> None:
     pq, pa = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("pyarrow")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs").mkdir()
@@ -56,4 +65,6 @@ def test_files_over_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, e
     for i in range(3):
         pq.write_table(table.slice(0, 1 + i % 2), tmp_path / "runs" / f"{i}.parquet")
     assert run("Files over a cluster", "distributed")["rows"] == [1, 2, 1]
-    assert pq.read_table(tmp_path / "runs" / "1.out.parquet")["mu_macro"].to_pylist() == list(expected)
+    assert pq.read_table(tmp_path / "runs" / "1.out.parquet")["mu_macro"].to_pylist() == list(
+        expected
+    )

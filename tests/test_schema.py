@@ -1,9 +1,11 @@
-"""The interface against its own description: schemathesis makes valid and invalid requests and checks the responses.
+"""The interface against its own description: schemathesis makes valid and invalid requests and
+checks the responses.
 
-All checks are on for every operation; the requests are always the same.  One check has an exception: a request that the
-description allows may be refused for a rule that JSON Schema cannot express, a relation between two fields or a field
-and the loaded tables.  ``RELATIONS`` lists these reasons; a refusal for any other reason fails.  A bad
-line of a stream, or a bad case of a batch, is refused at its position in the response, not by the status.
+All checks are on for every operation; the requests are always the same.  One check has an
+exception: a request that the description allows may be refused for a rule that JSON Schema cannot
+express, a relation between two fields or a field and the loaded tables.  ``RELATIONS`` lists these
+reasons; a refusal for any other reason fails.  A bad line of a stream, or a bad case of a batch, is
+refused at its position in the response, not by the status.
 """
 
 import json
@@ -13,7 +15,9 @@ from typing import Any
 
 import pytest
 
-schemathesis = pytest.importorskip("schemathesis", reason="the PyPI package schemathesis is not installed")
+schemathesis = pytest.importorskip(
+    "schemathesis", reason="the PyPI package schemathesis is not installed"
+)
 
 from hypothesis import HealthCheck, settings  # noqa: E402
 from schemathesis.config import GenerationConfig, ProjectConfig, ProjectsConfig, SchemathesisConfig  # noqa: E402
@@ -25,55 +29,85 @@ EXAMPLES = 25
 ARROW, NDJSON = "application/vnd.apache.arrow.stream", "application/x-ndjson"
 RELATIONS = (
     r"must be (left out: no effect unless|given if) include has std",
-    r"must be left out: it is the unknown or swept input", r"must be >= 1e-12: no loaded table is tighter",
+    r"must be left out: it is the unknown or swept input",
+    r"must be >= 1e-12: no loaded table is tighter",
     r"is given in the query and in the body",
     r"is given more than once",  # k=low..high beside k_range
-    r"must be two (ascending, finite )?numbers", r"must be (finite and )?> start", r"lists must have one length",
-    r"is required: (omega|the tangential stiffness)", r"omega is given, too",
-    r"must be left out beside omega", r"must be finite and > 0 on a logarithmic scale",
-    r"must be mu_macro where mu0 is the unknown", r".* is the swept input", r"(mu0|Fz|k) must be finite and > 0",
-    r"is not in the answer", r"must be left out (for direction|beside)", r"must be two stiffnesses",
-    r"must be across or along for a ball", r"must be without (y0|Fz_amplitude|approx)",
+    r"must be two (ascending, finite )?numbers",
+    r"must be (finite and )?> start",
+    r"lists must have one length",
+    r"is required: (omega|the tangential stiffness)",
+    r"omega is given, too",
+    r"must be left out beside omega",
+    r"must be finite and > 0 on a logarithmic scale",
+    r"must be mu_macro where mu0 is the unknown",
+    r".* is the swept input",
+    r"(mu0|Fz|k) must be finite and > 0",
+    r"is not in the answer",
+    r"must be left out (for direction|beside)",
+    r"must be two stiffnesses",
+    r"must be across or along for a ball",
+    r"must be without (y0|Fz_amplitude|approx)",
     r".* is (not computed|for one case)",
-    r"must be >= 0 and below Fz", r"must be left out: (over an interval|unknown field)",
-    r"must be left out where k is the swept input", r"must be given(:| \[)",
-)  # fmt: skip
-#: further ones of a path: what a geometry needs depends on its name; random points hold no information
+    r"must be >= 0 and below Fz",
+    r"must be left out: (over an interval|unknown field)",
+    r"must be left out where k is the swept input",
+    r"must be given(:| \[)",
+)
+#: further ones of a path: what a geometry needs depends on its name; random points hold no
+#: information
 OF_PATH = {
-    "/v1/stiffness": (r"must be finite in at least one of the two bodies", r"must be >= \S+, the width of the contact"),
-    "/v1/fit": (
-        r"must be left out: it is among the unknowns", r"must be one or both of", r"must be columns of one length",
-        r"must be given or f \[Hz\] in its place", r"must be points ", r"must be > 0 in at least one point",
-        r"must be finite and (>|>=) 0$",  # an entry of a list
-        r"must be finite and >= 0, within", r"must be <= mu0, within",
+    "/v1/stiffness": (
+        r"must be finite in at least one of the two bodies",
+        r"must be >= \S+, the width of the contact",
     ),
-}  # fmt: skip
+    "/v1/fit": (
+        r"must be left out: it is among the unknowns",
+        r"must be one or both of",
+        r"must be columns of one length",
+        r"must be given or f \[Hz\] in its place",
+        r"must be points ",
+        r"must be > 0 in at least one point",
+        r"must be finite and (>|>=) 0$",  # an entry of a list
+        r"must be finite and >= 0, within",
+        r"must be <= mu0, within",
+    ),
+}
 FIVE = ("mu0", "Fz", "y0", "omega", "v0")  # one of these is the unknown, the others are required
 
 
 def as_it_is(_context: Any, value: Any) -> bytes:
-    """An Arrow stream is bytes, and most generated bytes are not a stream; NDJSON is described by one line of it."""
+    """An Arrow stream is bytes, and most generated bytes are not a stream; NDJSON is described by
+    one line of it."""
     return value if isinstance(value, bytes) else json.dumps(value, default=str).encode() + b"\n"
 
 
 for form in (ARROW, NDJSON):
     schemathesis.serializer(form)(as_it_is)
-schemathesis.deserializer(NDJSON)(lambda _context, response: json.loads(response.content.split(b"\n", 1)[0]))
+schemathesis.deserializer(NDJSON)(
+    lambda _context, response: json.loads(response.content.split(b"\n", 1)[0])
+)
 
 
 def described() -> Any:
-    """The description, from an application that is never started: pytest needs the operations during collection."""
+    """The description, from an application that is never started: pytest needs the operations
+    during collection."""
     generation = GenerationConfig(deterministic=True, max_examples=EXAMPLES)
-    config = SchemathesisConfig(projects=ProjectsConfig(default=ProjectConfig(generation=generation)))
+    config = SchemathesisConfig(
+        projects=ProjectsConfig(default=ProjectConfig(generation=generation))
+    )
     tables = Path(__file__).resolve().parent.parent / "tables"
-    return schemathesis.openapi.from_dict(create_app(Settings(tables=(tables,))).openapi(), config=config)
+    return schemathesis.openapi.from_dict(
+        create_app(Settings(tables=(tables,))).openapi(), config=config
+    )
 
 
 SCHEMA = described()
 
 
 def is_beyond_a_schema(case: Any, response: Any) -> Any:
-    """Whether a refusal is only for relations that a schema cannot express, or for bytes that are not a stream."""
+    """Whether a refusal is only for relations that a schema cannot express, or for bytes that are
+    not a stream."""
     if case.media_type in (ARROW, "text/csv") and response.status_code in (400, 422):
         return True
     if response.status_code != 422:
@@ -92,20 +126,27 @@ def is_beyond_a_schema(case: Any, response: Any) -> Any:
 
 
 def is_refused_in_its_place(response: Any) -> Any:
-    """Whether a bad line or a bad case of a batch is refused at its position, and not by the status of the response.
+    """Whether a bad line or a bad case of a batch is refused at its position, and not by the status
+    of the response.
 
     A stream starts with 200 before the line is read.  A bad case of a batch affects only itself.
     """
-    batch = response.status_code == 200 and response.request.path_url.startswith("/v1/mu-macro/batch")
+    batch = response.status_code == 200 and response.request.path_url.startswith(
+        "/v1/mu-macro/batch"
+    )
     return batch and re.search(rb'"urn:problem-type:|"errors":\[\{', response.content) is not None
 
 
 @pytest.mark.slow
 @SCHEMA.parametrize()  # type: ignore[untyped-decorator]
-@settings(max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(
+    max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
 def test_every_answer_is_as_described(case: Any, live_server: Any) -> None:
     response = case.call(base_url=live_server.url)
-    known = [schemathesis.checks.positive_data_acceptance] if is_beyond_a_schema(case, response) else []
+    known = (
+        [schemathesis.checks.positive_data_acceptance] if is_beyond_a_schema(case, response) else []
+    )
     if is_refused_in_its_place(response):
         known.append(schemathesis.checks.negative_data_rejection)
     case.validate_response(response, excluded_checks=known)
@@ -114,5 +155,7 @@ def test_every_answer_is_as_described(case: Any, live_server: Any) -> None:
 def test_every_operation_is_tried(live_server: Any) -> None:
     labels = {operation.ok().label for operation in SCHEMA.get_all_operations()}
     served = json.loads(live_server.ask("GET", "/openapi.json")[2])["paths"]
-    assert labels == {f"{method.upper()} {path}" for path, methods in served.items() for method in methods}
+    assert labels == {
+        f"{method.upper()} {path}" for path, methods in served.items() for method in methods
+    }
     assert "POST /v1/mu-macro/batch" in labels

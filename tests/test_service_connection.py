@@ -1,4 +1,5 @@
-"""HTTP/1.1 as bytes on a socket: the limits of a connection, and that one client cannot keep others out."""
+"""HTTP/1.1 as bytes on a socket: the limits of a connection, and that one client cannot keep others
+out."""
 
 import http.client
 import json
@@ -34,9 +35,13 @@ def columns(n: int, **more: Any) -> Any:
 def strict(serving: Any, surrogate: Surrogate) -> Any:
     """A service with short times, few connections, and two batches at a time."""
     with serving(
-        surrogate.path, MUMACRO_CLIENT_TIMEOUT_S=str(WAIT_S), MUMACRO_TIME_LIMIT_S="4", MUMACRO_KEEP_ALIVE_S="60",
-        MUMACRO_MAX_CONNECTIONS=str(FULL), MUMACRO_MAX_BATCHES="2",
-    ) as server:  # fmt: skip
+        surrogate.path,
+        MUMACRO_CLIENT_TIMEOUT_S=str(WAIT_S),
+        MUMACRO_TIME_LIMIT_S="4",
+        MUMACRO_KEEP_ALIVE_S="60",
+        MUMACRO_MAX_CONNECTIONS=str(FULL),
+        MUMACRO_MAX_BATCHES="2",
+    ) as server:
         yield server
 
 
@@ -57,8 +62,13 @@ def posted(path: Any, body: Any) -> Any:
 
 
 def test_a_connection_is_kept_over_errors_and_ends_when_asked(raw: Any) -> None:
-    for text, status in ((GET, 200), (b"GET /x HTTP/1.1\r\nHost: x\r\n\r\n", 404), (posted(SINGLE, b"{"), 400),
-                         (posted(BATCH, b"[]"), 200), (LAST, 200)):  # fmt: skip
+    for text, status in (
+        (GET, 200),
+        (b"GET /x HTTP/1.1\r\nHost: x\r\n\r\n", 404),
+        (posted(SINGLE, b"{"), 400),
+        (posted(BATCH, b"[]"), 200),
+        (LAST, 200),
+    ):
         raw.sendall(text)
         assert answer(raw)[0] == status
     assert to_end(raw) == b""
@@ -80,16 +90,25 @@ def test_a_half_closed_client_gets_the_whole_answer(raw: Any) -> None:
     assert received.endswith(END)
 
 
-TWO_LENGTHS = b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n" + END
+TWO_LENGTHS = (
+    b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n" + END
+)
 HEADS = [
-    (b"GET /livez HTTP/1.1\r\n\r\n", 400), (GET[:-2] + b"Host: y\r\n\r\n", 400), (b"nonsense\r\n\r\n", 400),
-    (TWO_LENGTHS, 400), (GET[:-2] + b"a: b\r\n" * 99 + b"\r\n", 200), (GET[:-2] + b"a: b\r\n" * 100 + b"\r\n", 431),
-    (GET[:-2] + b"A: " + b"b" * 65_000 + b"\r\n\r\n", 200), (GET[:-2] + b"A: " + b"b" * 66_000 + b"\r\n\r\n", 431),
-    (b"GET /" + b"b" * 66_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", 431), (head(SINGLE, 300_000_000), 413),
-    (head(BATCH, 300_000_000), 413), (b"GET /livez\r\n\r\n", 400),
+    (b"GET /livez HTTP/1.1\r\n\r\n", 400),
+    (GET[:-2] + b"Host: y\r\n\r\n", 400),
+    (b"nonsense\r\n\r\n", 400),
+    (TWO_LENGTHS, 400),
+    (GET[:-2] + b"a: b\r\n" * 99 + b"\r\n", 200),
+    (GET[:-2] + b"a: b\r\n" * 100 + b"\r\n", 431),
+    (GET[:-2] + b"A: " + b"b" * 65_000 + b"\r\n\r\n", 200),
+    (GET[:-2] + b"A: " + b"b" * 66_000 + b"\r\n\r\n", 431),
+    (b"GET /" + b"b" * 66_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", 431),
+    (head(SINGLE, 300_000_000), 413),
+    (head(BATCH, 300_000_000), 413),
+    (b"GET /livez\r\n\r\n", 400),
     (GET[:-2] + b"Transfer-Encoding: gzip, chunked\r\n\r\n" + END, 400),
     (posted(SINGLE, b"{}").replace(b": 2\r\n", b": 2\t\r\n"), 422),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("text", "status"), HEADS, ids=range(len(HEADS)))
@@ -100,7 +119,8 @@ def test_a_head_is_refused_with_its_status(raw: Any, text: bytes, status: Any) -
     assert status == 200 or json.loads(content)["status"] == status
 
 
-#: what a client sends, what it sends again and again, and what is in the answer before the connection ends
+#: what a client sends, what it sends again and again, and what is in the answer before the
+#: connection ends
 SLOW = {
     "silent": (b"", b"", b""),
     "empty lines": (b"\r\n", b"\r\n", b""),
@@ -168,7 +188,9 @@ def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(s
     assert json.loads(content)["max_bytes"] == 65536
 
 
-def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(strict: Any) -> None:
+def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
+    strict: Any,
+) -> None:
     large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
     compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
     assert len(compact) < 64 * 1024
@@ -190,7 +212,8 @@ def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
         assert strict.ask("POST", BATCH, iter([large]), encode_chunked=True)[0] == 503
         assert strict.ask("POST", BATCH, compact)[0] == 503  # it asks for much
         assert strict.ask("POST", BATCH, large, {"Content-Type": NDJSON})[0] == 503
-        assert strict.ask("POST", "/v1/law", orjson.dumps(law))[0] == 200  # questions have their own
+        # questions have their own
+        assert strict.ask("POST", "/v1/law", orjson.dumps(law))[0] == 200
         assert strict.ask("POST", BATCH, json.dumps([CASE]))[0] == 200
 
 
@@ -204,13 +227,19 @@ def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
         for _ in range(FULL):  # busy ones
             held.enter_context(connect(strict)).sendall(head(SINGLE, 90) + b"x")
         time.sleep(0.2)
-        assert [strict.ask("GET", path)[0] for path in ("/livez", "/readyz", "/v1/table")] == [200, 200, 503]
+        assert [strict.ask("GET", path)[0] for path in ("/livez", "/readyz", "/v1/table")] == [
+            200,
+            200,
+            503,
+        ]
     time.sleep(2 * WAIT_S)
     assert strict.ask("GET", "/v1/table")[0] == 200
 
 
 @pytest.mark.parametrize(("kind", "step"), [("application/json", 1000), (NDJSON, 300_000)])
-def test_a_body_is_read_in_any_pieces_after_100_continue(live_server: Any, raw: Any, kind: Any, step: Any) -> None:
+def test_a_body_is_read_in_any_pieces_after_100_continue(
+    live_server: Any, raw: Any, kind: Any, step: Any
+) -> None:
     body = columns(20_000)
     raw.sendall(head(BATCH, len(body), kind, "Expect: 100-continue\r\n"))
     said = b""
@@ -249,11 +278,17 @@ def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server: Any) 
 
 
 @pytest.mark.slow
-def test_short_requests_are_answered_while_a_large_batch_is(serving: Any, surrogate: Surrogate) -> None:
+def test_short_requests_are_answered_while_a_large_batch_is(
+    serving: Any, surrogate: Surrogate
+) -> None:
     n = 1_000_000
-    body = json.dumps({**{name: [value] * n for name, value in CASE.items()}, "v0": [1e-7 * i for i in range(n)]})
+    body = json.dumps(
+        {**{name: [value] * n for name, value in CASE.items()}, "v0": [1e-7 * i for i in range(n)]}
+    )
     with (
-        serving(surrogate.path, MUMACRO_MAX_BATCH=str(n), MUMACRO_MAX_BODY_BYTES="200000000") as server,
+        serving(
+            surrogate.path, MUMACRO_MAX_BATCH=str(n), MUMACRO_MAX_BODY_BYTES="200000000"
+        ) as server,
         ThreadPoolExecutor(1) as pool,
     ):
         large = pool.submit(server.ask, "POST", BATCH, body)
@@ -280,7 +315,10 @@ def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(
     places, n = 6, 100_000
     rows = json.dumps([{**CASE, "v0": 1e-7 * i} for i in range(1, n + 1)]).encode()
     assert len(rows) > 8_000_000
-    with serving(surrogate.path, MUMACRO_MAX_BATCHES=str(places)) as server, ThreadPoolExecutor(places) as pool:
+    with (
+        serving(surrogate.path, MUMACRO_MAX_BATCHES=str(places)) as server,
+        ThreadPoolExecutor(places) as pool,
+    ):
         base = server.memory("VmHWM")
         answers = list(pool.map(lambda _: server.ask("POST", BATCH, rows), range(places)))
         assert [status for status, _, _ in answers] == [200] * places

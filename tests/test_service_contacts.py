@@ -1,4 +1,5 @@
-"""Balls, other directions and intervals of k over HTTP: every form gives the library's answer, bit for bit."""
+"""Balls, other directions and intervals of k over HTTP: every form gives the library's answer, bit
+for bit."""
 
 from typing import Any
 
@@ -19,12 +20,16 @@ ACROSS = {"k": 1e6, "y0": 2e-6}
 ENDS = {"k_low": 0.8e6, "k_high": 1.3e6}
 BALL = {"contact": "ball"}
 ASKED: dict[str, tuple[Case, Case]] = {
-    "spring": ({}, ACROSS), "ball": (BALL, ACROSS), "rigid ball": (BALL, {"k": "rigid", "y0": 2e-6}),
-    "along": ({"direction": "along"}, ACROSS), "ball along": ({**BALL, "direction": "along"}, ACROSS),
-    "normal": ({"direction": "normal"}, NORMAL), "interval": ({}, {**ENDS, "y0": 2e-6}),
+    "spring": ({}, ACROSS),
+    "ball": (BALL, ACROSS),
+    "rigid ball": (BALL, {"k": "rigid", "y0": 2e-6}),
+    "along": ({"direction": "along"}, ACROSS),
+    "ball along": ({**BALL, "direction": "along"}, ACROSS),
+    "normal": ({"direction": "normal"}, NORMAL),
+    "interval": ({}, {**ENDS, "y0": 2e-6}),
     "interval of a ball": (BALL, {**ENDS, "y0": 2e-6}),
     "interval, normal": ({"direction": "normal"}, {**ENDS, "Fz_amplitude": 4.0}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", ASKED)
@@ -44,7 +49,9 @@ def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate,
     answer = client.post(BATCH, json=rows, params=options).json()
     assert answer["results"] == expected
     for form in ("csv", "ndjson", "arrow"):
-        more = {"table": answer["table"], "api_version": "1"} if form == "ndjson" else {"error": None}
+        more = (
+            {"table": answer["table"], "api_version": "1"} if form == "ndjson" else {"error": None}
+        )
         answers = asked(client, form, rows, **options)
         assert answers == [{**one, **more} for one in expected]
         assert list(answers[0]) == [*names, *more]
@@ -52,9 +59,14 @@ def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate,
     one, of_query = {**rows[2], **options}, {**rows[2], **options}
     if ends:
         one["k_range"] = low, high = one.pop("k_low"), one.pop("k_high")
-        of_query = {name: x for name, x in of_query.items() if name not in ENDS} | {"k": f"{low}..{high}"}
+        of_query = {name: x for name, x in of_query.items() if name not in ENDS} | {
+            "k": f"{low}..{high}"
+        }
     of_one = surrogate.evaluate(**{**known, "v0": V0[2]}, **options)
-    alone = {name: getattr(of_one, name) for name in names} | {"table": answer["table"], "api_version": "1"}
+    alone = {name: getattr(of_one, name) for name in names} | {
+        "table": answer["table"],
+        "api_version": "1",
+    }
     assert client.post(PATH, json=one).json() == client.get(PATH, params=of_query).json() == alone
     assert float(client.get(f"{PATH}.txt", params=of_query).text) == of_one.mu_macro
 
@@ -68,7 +80,13 @@ def test_columns_may_have_units_in_csv(client: Any) -> None:
 
 
 def test_bad_rows_spoil_only_themselves(client: Any) -> None:
-    given = {**RIG, "y0": 2e-6, "v0": 0.01, "k_low": [8e5, None, 2e6, 1e6], "k_high": [1e6, 1e6, 1e6, "rigid"]}
+    given = {
+        **RIG,
+        "y0": 2e-6,
+        "v0": 0.01,
+        "k_low": [8e5, None, 2e6, 1e6],
+        "k_high": [1e6, 1e6, 1e6, "rigid"],
+    }
     answer = client.post(BATCH, json=given).json()
     assert [mu is None for mu in answer["mu_macro_low"]] == [False, True, True, True]
     assert [fault["field"] for fault in answer["errors"]] == ["k_low", "k_low", "k_high"]
@@ -83,7 +101,9 @@ def test_bad_rows_spoil_only_themselves(client: Any) -> None:
 
 @pytest.mark.parametrize("v0", [1e-4, 0.02, 5.0])
 @pytest.mark.parametrize("name", ["spring", "ball", "along", "ball along", "normal"])
-def test_included_quantities_are_the_librarys(client: Any, surrogate: Surrogate, name: str, v0: Any) -> None:
+def test_included_quantities_are_the_librarys(
+    client: Any, surrogate: Surrogate, name: str, v0: Any
+) -> None:
     options, inputs = ASKED[name]
     case = {**RIG, **inputs, "v0": v0}
     include = ["groups", "limits", "gradient", "stick_fraction", "std"]
@@ -111,7 +131,9 @@ def test_included_quantities_are_the_librarys(client: Any, surrogate: Surrogate,
         saved = (case["mu0"] - found.mu_macro) * case["Fz"] * v0
         assert answer["power"] == close({"oscillation": power * unit, "saved": saved}, rel=1e-13)
         assert answer["power_bound"]["oscillation"] == close(bound * unit, rel=1e-13)
-        assert answer["power_bound"]["saved"] == close(found.error_bound * case["Fz"] * v0, rel=1e-2, abs=1e-14)
+        assert answer["power_bound"]["saved"] == close(
+            found.error_bound * case["Fz"] * v0, rel=1e-2, abs=1e-14
+        )
     batch = client.post(BATCH, json={**case, "v0": [v0], **more}).json()
     for quantity in ("limits", "gradient"):
         assert batch[quantity] == {name: [value] for name, value in answer[quantity].items()}
@@ -134,9 +156,19 @@ def test_a_law_has_a_band_and_an_inverse_its_contact(client: Any, surrogate: Sur
     found = surrogate.evaluate(**rig, k_range=(8e5, 1.2e6), v0=np.array(law["values"]))
     assert law["mu_macro_low"] == found.mu_macro_low.tolist()
     assert law["mu_macro_high"] == found.mu_macro_high.tolist()
-    answer = client.post("/v1/solve-for", json={**rig, "k": 1e6, "unknown": "v0", "target": 0.26}).json()
+    answer = client.post(
+        "/v1/solve-for", json={**rig, "k": 1e6, "unknown": "v0", "target": 0.26}
+    ).json()
     (root,) = answer["results"][0]["roots"]
     assert surrogate.evaluate(**rig, k=1e6, v0=root["value"]).mu_macro == root["mu_macro"]
-    normal = {**RIG, "k": 1e6, "v0": 0.01, "direction": "normal", "along": "Fz_amplitude", "start": 0.1, "stop": 9.0}
+    normal = {
+        **RIG,
+        "k": 1e6,
+        "v0": 0.01,
+        "direction": "normal",
+        "along": "Fz_amplitude",
+        "start": 0.1,
+        "stop": 9.0,
+    }
     law = client.post("/v1/law", json={**normal, "points": 3}).json()
     assert (law["unit"], len(law["mu_macro"])) == ("N", 3)

@@ -27,5 +27,8 @@ def test_a_strange_request_is_answered_or_refused_and_never_an_error(live_server
 
 
 def test_a_connection_is_divided_into_the_same_requests_as_by_h11(live_server: Server) -> None:
-    assert {framing.compared(live_server, seed) for seed in range(2000)} == {"the same", "fewer here"}
+    assert {framing.compared(live_server, seed) for seed in range(2000)} == {
+        "the same",
+        "fewer here",
+    }
     assert live_server.errors() == []

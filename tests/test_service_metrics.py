@@ -45,9 +45,13 @@ def test_requests_are_counted_by_route_method_and_status(fresh: Any, case: Case)
     fresh.request("BREW", "/livez")
     found = scrape(fresh)
     for route, method, status, number in (
-        (PATH, "POST", "200", 3), (PATH, "GET", "200", 1), (PATH, "POST", "422", 1),
-        (f"{PATH}/batch", "POST", "200", 1), ("other", "GET", "404", 1), ("/livez", "other", "405", 1),
-    ):  # fmt: skip
+        (PATH, "POST", "200", 3),
+        (PATH, "GET", "200", 1),
+        (PATH, "POST", "422", 1),
+        (f"{PATH}/batch", "POST", "200", 1),
+        ("other", "GET", "404", 1),
+        ("/livez", "other", "405", 1),
+    ):
         assert found["mumacro_requests_total", *sorted((route, method, status))] == number
     assert found["mumacro_request_duration_seconds_count", PATH] == 5
     assert found["mumacro_request_duration_seconds_bucket", *sorted((PATH, "+Inf"))] == 5
@@ -76,26 +80,37 @@ def test_clients_cannot_add_labels(fresh: Any, case: Case) -> None:
     assert scrape(fresh).keys() == before
 
 
-def test_cases_are_counted_by_source_and_regime(fresh: Any, case: Case, surrogate: Surrogate) -> None:
+def test_cases_are_counted_by_source_and_regime(
+    fresh: Any, case: Case, surrogate: Surrogate
+) -> None:
     rows = [{**case, "v0": v0} for v0 in (0, 1e-4, 0.01, 0.1, 10.0)] + [{**case, "v0": -1}] * 4
     answers = [fresh.post(PATH, json=row).json() for row in rows[:5]]
     fresh.post(f"{PATH}/batch", json=rows)
     fresh.get(PATH, params=rows[1])
     fresh.post(PATH, json={**rows[2], "include": ["limits"]})
-    fresh.post(f"{PATH}/batch", content="\n".join(map(json.dumps, rows)), headers={"Content-Type": "application/jsonl"})
+    fresh.post(
+        f"{PATH}/batch",
+        content="\n".join(map(json.dumps, rows)),
+        headers={"Content-Type": "application/jsonl"},
+    )
     fresh.post(f"{PATH}/batch", json={**case, "v0": [rows[4]["v0"]] * 1000})
     found = scrape(fresh)
     expected: dict[tuple[str, ...], int] = {}
     for answer in [*answers * 3, answers[1], answers[2], *[answers[4]] * 1000]:
         key = ("mumacro_cases_total", *sorted((surrogate.id, answer["source"], answer["regime"])))
         expected[key] = expected.get(key, 0) + 1
-    assert {key: value for key, value in found.items() if key[0] == "mumacro_cases_total"} == expected
-    assert found["mumacro_bad_cases_total", surrogate.id] == 4  # of the batch; bad lines are not counted here
+    assert {
+        key: value for key, value in found.items() if key[0] == "mumacro_cases_total"
+    } == expected
+    # of the batch; bad lines are not counted here
+    assert found["mumacro_bad_cases_total", surrogate.id] == 4
     assert found["mumacro_table_info", *sorted((surrogate.id, f"{surrogate.tolerance:g}"))] == 1
 
 
 @pytest.mark.slow
-def test_several_workers_behind_a_key_count_together_and_stop(serving: Any, surrogate: Surrogate, case: Case) -> None:
+def test_several_workers_behind_a_key_count_together_and_stop(
+    serving: Any, surrogate: Surrogate, case: Case
+) -> None:
     body, asked, key = json.dumps(case), 40, {"X-API-Key": "k3y"}
     with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
         server.wait_until_ready(2)

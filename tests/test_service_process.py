@@ -1,4 +1,5 @@
-"""The service as a process: its start and end, its health check, and its log, which no client and no reader harms."""
+"""The service as a process: its start and end, its health check, and its log, which no client and
+no reader harms."""
 
 import http.client
 import json
@@ -22,7 +23,15 @@ from tests.cases import Case
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 #: texts that a client behind a proxy can send in place of its address
-NO_ADDRESS = ['a"b', "a\\", '1.2.3.4" "level": "error', "\t1.2.3.4", "{}", "\u00e9\u00ff", "a" * 64 + "b" * 5000]
+NO_ADDRESS = [
+    'a"b',
+    "a\\",
+    '1.2.3.4" "level": "error',
+    "\t1.2.3.4",
+    "{}",
+    "\u00e9\u00ff",
+    "a" * 64 + "b" * 5000,
+]
 NO_PATH = ("/%0a%7B%22level%22%3A%22error%22%7D", "/%22", "/%00", "/%ff", "/%E2%80%A8", "/a%0d%0ab")
 
 
@@ -45,9 +54,13 @@ def accesses(lines: Any) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_requested_stop_is_a_success(serving: Any, surrogate: Surrogate, case: Case, number: Any) -> None:
+def test_a_requested_stop_is_a_success(
+    serving: Any, surrogate: Surrogate, case: Case, number: Any
+) -> None:
     with serving(surrogate.path, MUMACRO_ROOT_PATH="/friction") as server:
-        status, headers, _ = server.ask("POST", SINGLE, json.dumps(case), {"X-Request-ID": "the-last"})
+        status, headers, _ = server.ask(
+            "POST", SINGLE, json.dumps(case), {"X-Request-ID": "the-last"}
+        )
         assert (status, headers["x-request-id"]) == (200, "the-last")
         assert "server" not in headers
         assert server.stop(number) == 0
@@ -55,12 +68,19 @@ def test_a_requested_stop_is_a_success(serving: Any, surrogate: Surrogate, case:
     assert line.pop("duration_ms") > 0.0
     del line["time"]
     assert line == {
-        "level": "info", "logger": "mumacro.access", "message": "request", "request_id": "the-last", "method": "POST",
-        "path": SINGLE, "status": 200, "client": "127.0.0.1",
-    }  # fmt: skip
+        "level": "info",
+        "logger": "mumacro.access",
+        "message": "request",
+        "request_id": "the-last",
+        "method": "POST",
+        "path": SINGLE,
+        "status": 200,
+        "client": "127.0.0.1",
+    }
 
 
-#: run before the service: sends SIGTERM to the own process when the module of this name is about to be imported
+#: run before the service: sends SIGTERM to the own process when the module of this name is about to
+#: be imported
 STOPPED_AT = """
 import os, signal, sys
 
@@ -79,16 +99,26 @@ def begun(repository: Path, surrogate: Surrogate, **variables: str) -> Any:
     """A service that has only been started."""
     words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
     return subprocess.Popen(
-        words, cwd=repository, env={**os.environ, **variables}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        words,
+        cwd=repository,
+        env={**os.environ, **variables},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
     )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "workers"),
-    [("argparse", "1"), ("pydantic", "1"), ("uvicorn", "1"), ("uvicorn", "2"), ("service.observe", "2"),
-     ("service.app", "1")],
-)  # fmt: skip
+    [
+        ("argparse", "1"),
+        ("pydantic", "1"),
+        ("uvicorn", "1"),
+        ("uvicorn", "2"),
+        ("service.observe", "2"),
+        ("service.app", "1"),
+    ],
+)
 def test_a_stop_at_an_import_of_the_start_is_a_success(
     repository: Path, surrogate: Surrogate, tmp_path: Path, module: str, workers: str
 ) -> None:
@@ -109,7 +139,8 @@ def test_a_stop_soon_after_the_start_is_a_success(
 ) -> None:
     with begun(repository, surrogate, MUMACRO_WORKERS=workers) as process:
         status, caught = Path(f"/proc/{process.pid}/status"), 0
-        while not caught >> (signal.SIGTERM - 1) & 1:  # before, it is not yet the service, but Python, that starts
+        # before, it is not yet the service, but Python, that starts
+        while not caught >> (signal.SIGTERM - 1) & 1:
             caught = int(re.findall(r"^SigCgt:\s*(\w+)$", status.read_text(), re.MULTILINE)[0], 16)
         time.sleep(after)
         process.terminate()
@@ -119,7 +150,9 @@ def test_a_stop_soon_after_the_start_is_a_success(
 
 
 @pytest.mark.slow
-def test_without_a_table_or_pyarrow_it_starts_and_says_so(serving: Any, tmp_path: Path, case: Case) -> None:
+def test_without_a_table_or_pyarrow_it_starts_and_says_so(
+    serving: Any, tmp_path: Path, case: Case
+) -> None:
     (tmp_path / "damaged.nc").write_bytes(b"damaged")
     (tmp_path / "sitecustomize.py").write_text('import sys\n\nsys.modules["pyarrow"] = None\n')
     path = os.pathsep.join([str(tmp_path), os.getcwd()])
@@ -135,18 +168,28 @@ def test_without_a_table_or_pyarrow_it_starts_and_says_so(serving: Any, tmp_path
 
 def command(repository: Path, *arguments: Any) -> Any:
     return subprocess.run(
-        [sys.executable, "-m", "service", *arguments], cwd=repository, capture_output=True, text=True, check=False,
-        timeout=180, env={**os.environ, "http_proxy": "http://[::1]:9"},
-    )  # fmt: skip
+        [sys.executable, "-m", "service", *arguments],
+        cwd=repository,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=180,
+        env={**os.environ, "http_proxy": "http://[::1]:9"},
+    )
 
 
 @pytest.mark.slow
-def test_the_health_check_and_a_port_that_is_taken(live_server: Any, repository: Path, surrogate: Surrogate) -> None:
+def test_the_health_check_and_a_port_that_is_taken(
+    live_server: Any, repository: Path, surrogate: Surrogate
+) -> None:
     found = command(repository, "healthcheck", "--port", str(live_server.port))
     assert found.returncode == 0, found.stderr
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
-        assert command(repository, "healthcheck", "--port", str(unused.getsockname()[1])).returncode == 1
+        assert (
+            command(repository, "healthcheck", "--port", str(unused.getsockname()[1])).returncode
+            == 1
+        )
     failed = command(repository, "--tables", str(surrogate.path), "--port", str(live_server.port))
     assert failed.returncode == 1
     assert "Traceback" not in failed.stdout + failed.stderr
@@ -158,7 +201,9 @@ def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
     alice, bob, wrong = "k3y-of-alice", "k3y-of-bob", "wr0ng-key"
     body, told = json.dumps(case), []
     known = "&".join(f"{name}={value}" for name, value in case.items())
-    with serving(surrogate.path, "--log-level", "debug", MUMACRO_API_KEYS=f"alice={alice},bob={bob}") as server:
+    with serving(
+        surrogate.path, "--log-level", "debug", MUMACRO_API_KEYS=f"alice={alice},bob={bob}"
+    ) as server:
         for text in NO_ADDRESS:
             said = {"X-API-Key": alice, "X-Forwarded-For": text.encode("latin-1")}
             assert server.ask("POST", SINGLE, body, said)[0] == 200
@@ -167,10 +212,21 @@ def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
             assert server.ask("GET", "/nowhere", headers=said)[0] == 404
         for path in NO_PATH:
             assert server.ask("GET", path, headers={"X-API-Key": alice})[0] == 404
-        asked = [("POST", SINGLE, body), ("POST", BATCH, f"[{body}]"), ("POST", SINGLE, "{"), ("GET", "/metrics", None)]
-        for headers in ({"X-API-Key": alice}, {"X-API-Key": wrong}, *({"Authorization": text} for text in (
-                        f"Bearer {bob}", f"Basic {wrong}", bob))):  # fmt: skip
-            told += [str(server.ask(*request, headers)) for request in (*asked, ("GET", "/openapi.json", None))]
+        asked = [
+            ("POST", SINGLE, body),
+            ("POST", BATCH, f"[{body}]"),
+            ("POST", SINGLE, "{"),
+            ("GET", "/metrics", None),
+        ]
+        for headers in (
+            {"X-API-Key": alice},
+            {"X-API-Key": wrong},
+            *({"Authorization": text} for text in (f"Bearer {bob}", f"Basic {wrong}", bob)),
+        ):
+            told += [
+                str(server.ask(*request, headers))
+                for request in (*asked, ("GET", "/openapi.json", None))
+            ]
         assert server.stop() == 0
     for text in (alice, bob, wrong):
         assert text not in "".join(server.lines)
@@ -185,14 +241,21 @@ def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
 
 @contextmanager
 def unread(repository: Path, surrogate: Surrogate) -> Any:
-    """A service whose standard output is read up to the line with its port only: process, port, lines."""
+    """A service whose standard output is read up to the line with its port only: process, port,
+    lines."""
     words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
-    variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
-    process = subprocess.Popen(words, cwd=repository, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    variables = {
+        name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")
+    }
+    process = subprocess.Popen(
+        words, cwd=repository, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
     assert process.stdout is not None
     try:
         lines: list[bytes] = []
-        while not (found := re.search(rb"running on http://[^ ]+:(\d+) ", lines[-1] if lines else b"")):
+        while not (
+            found := re.search(rb"running on http://[^ ]+:(\d+) ", lines[-1] if lines else b"")
+        ):
             lines.append(process.stdout.readline())
             assert lines[-1], b"".join(lines)
         yield process, int(found[1]), lines
@@ -228,7 +291,9 @@ def test_a_log_reader_that_stalls_delays_no_request(
             process.stdout.close()
         # Some 250 bytes a line: a pipe holds 64 kB, and the service a megabyte.
         with ThreadPoolExecutor(4) as pool:
-            answered = [pool.submit(statuses, port, *asked) for asked in 4 * [(query, many), ("/x", 500)]]
+            answered = [
+                pool.submit(statuses, port, *asked) for asked in 4 * [(query, many), ("/x", 500)]
+            ]
         assert [one.result() for one in answered] == 4 * [many * [200], 500 * [404]]
         if then != "reads":
             return

@@ -14,16 +14,24 @@ from service.__main__ import main
 from service.settings import Settings, SettingsError, load_settings
 
 BAD = {
-    "MUMACRO_TABLES": ("", os.pathsep), "MUMACRO_HOST": ("",), "MUMACRO_WORKERS": ("0", "257", "two"),
-    "MUMACRO_PORT": ("", "http", "-1", "65536", "80.5", "tcp://10.0.0.1:80"), "MUMACRO_LOG_LEVEL": ("", "loud"),
-    "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)), "MUMACRO_MAX_BATCH": ("0", "10000001"),
-    "MUMACRO_MAX_BATCHES": ("0", "1025"), "MUMACRO_MAX_CONNECTIONS": ("0", "many", "1000001"),
-    "MUMACRO_KEEP_ALIVE_S": ("0", "3601"), "MUMACRO_CLIENT_TIMEOUT_S": ("0", "3601"),
+    "MUMACRO_TABLES": ("", os.pathsep),
+    "MUMACRO_HOST": ("",),
+    "MUMACRO_WORKERS": ("0", "257", "two"),
+    "MUMACRO_PORT": ("", "http", "-1", "65536", "80.5", "tcp://10.0.0.1:80"),
+    "MUMACRO_LOG_LEVEL": ("", "loud"),
+    "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)),
+    "MUMACRO_MAX_BATCH": ("0", "10000001"),
+    "MUMACRO_MAX_BATCHES": ("0", "1025"),
+    "MUMACRO_MAX_CONNECTIONS": ("0", "many", "1000001"),
+    "MUMACRO_KEEP_ALIVE_S": ("0", "3601"),
+    "MUMACRO_CLIENT_TIMEOUT_S": ("0", "3601"),
     "MUMACRO_API_KEYS": ("alice", "alice=", "two words=x", "a=same,b=same"),
     "MUMACRO_API_KEY": ("", "two words", "schlüssel", "x" * 513, "line\nbreak"),
-    "MUMACRO_ROOT_PATH": ("friction", "/a/", "/a b"), "MUMACRO_GUIDE": ("no/such/directory", __file__),
-    "MUMACRO_TIME_LIMIT_S": ("0", "86401"), "MUMACRO_SHUTDOWN_GRACE_S": ("-1", "3601", "soon"),
-}  # fmt: skip
+    "MUMACRO_ROOT_PATH": ("friction", "/a/", "/a b"),
+    "MUMACRO_GUIDE": ("no/such/directory", __file__),
+    "MUMACRO_TIME_LIMIT_S": ("0", "86401"),
+    "MUMACRO_SHUTDOWN_GRACE_S": ("-1", "3601", "soon"),
+}
 
 
 @pytest.fixture(autouse=True)
@@ -33,16 +41,26 @@ def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
             monkeypatch.delenv(name)
 
 
-@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in BAD.items() for value in values])
-def test_a_bad_setting_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch, name: str, value: Any) -> None:
+@pytest.mark.parametrize(
+    ("name", "value"), [(name, value) for name, values in BAD.items() for value in values]
+)
+def test_a_bad_setting_is_named_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: Any
+) -> None:
     monkeypatch.setenv(name, value)
     with pytest.raises(SettingsError, match=rf"^{name} must be [^\n]*$") as error:
         load_settings()
     assert name != "MUMACRO_API_KEY" or not value or value not in str(error.value)
 
 
-def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    for name, value in (("TABLES", f"{tmp_path}{os.pathsep}other.nc"), ("PORT", "81"), ("LOG_LEVEL", "WARNING")):
+def test_settings_come_from_the_environment(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name, value in (
+        ("TABLES", f"{tmp_path}{os.pathsep}other.nc"),
+        ("PORT", "81"),
+        ("LOG_LEVEL", "WARNING"),
+    ):
         monkeypatch.setenv(f"MUMACRO_{name}", value)
     settings = load_settings(host="::1")
     assert settings.tables == (tmp_path, Path("other.nc"))
@@ -53,7 +71,9 @@ def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp
         load_settings()
 
 
-def test_a_misspelt_variable_is_noticed(started: Any, monkeypatch: pytest.MonkeyPatch, caplog: Any) -> None:
+def test_a_misspelt_variable_is_noticed(
+    started: Any, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
     monkeypatch.setenv("MUMACRO_TABLE", "x")
     monkeypatch.setenv("MUMACRO_PORT", "81")
     with started():
@@ -69,7 +89,9 @@ def test_the_key_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_health_check_asks_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.environ", os.environ.copy())  # main writes its options there
-    monkeypatch.setattr("urllib.request.OpenerDirector.open", opened := Mock(side_effect=LookupError))
+    monkeypatch.setattr(
+        "urllib.request.OpenerDirector.open", opened := Mock(side_effect=LookupError)
+    )
     for host, asked in (("0.0.0.0", "127.0.0.1"), ("::", "[::1]"), ("10.1.2.3", "10.1.2.3")):  # noqa: S104
         with pytest.raises(LookupError):
             main(["healthcheck", "--host", host])
@@ -78,7 +100,8 @@ def test_the_health_check_asks_this_machine(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_the_manual_and_the_settings_agree(repository: Path) -> None:
     names = {f"MUMACRO_{name.upper()}" for name in Settings.model_fields}
-    assert set(BAD) | {"MUMACRO_CORS_ORIGINS", "MUMACRO_TRUSTED_PROXIES"} == names  # any text is allowed
+    # any text is allowed
+    assert set(BAD) | {"MUMACRO_CORS_ORIGINS", "MUMACRO_TRUSTED_PROXIES"} == names
     text = (repository / "docs" / "operations.md").read_text()
     assert set(re.findall(r"^### (MUMACRO_\w+)$", text, re.MULTILINE)) == names
     for name, field in Settings.model_fields.items():
@@ -90,10 +113,17 @@ def test_the_manual_and_the_settings_agree(repository: Path) -> None:
 
 @pytest.mark.parametrize(
     ("option", "told"),
-    [(["--port", "70000"], "MUMACRO_PORT must be"), (["--workers=0"], "MUMACRO_WORKERS must be"),
-     (["--log-level", "x"], "MUMACRO_LOG_LEVEL must be"), (["--nonsense"], "usage"), (["fly"], "usage")],
-)  # fmt: skip
-def test_a_bad_argument_ends_the_process_without_a_traceback(repository: Path, option: Any, told: Any) -> None:
+    [
+        (["--port", "70000"], "MUMACRO_PORT must be"),
+        (["--workers=0"], "MUMACRO_WORKERS must be"),
+        (["--log-level", "x"], "MUMACRO_LOG_LEVEL must be"),
+        (["--nonsense"], "usage"),
+        (["fly"], "usage"),
+    ],
+)
+def test_a_bad_argument_ends_the_process_without_a_traceback(
+    repository: Path, option: Any, told: Any
+) -> None:
     words = [sys.executable, "-m", "service", *option]
     process = subprocess.run(words, cwd=repository, capture_output=True, text=True, check=False)
     assert (process.returncode, process.stdout) == (2, "")

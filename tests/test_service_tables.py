@@ -1,4 +1,5 @@
-"""Tables behind the service: metadata, the file, choice by tolerance, health with and without them."""
+"""Tables behind the service: metadata, the file, choice by tolerance, health with and without
+them."""
 
 import shutil
 from collections.abc import Callable
@@ -22,8 +23,15 @@ def table_copy(surrogate: Surrogate, tmp_path: Path) -> Any:
 def test_the_table_describes_itself(client: Any, surrogate: Surrogate) -> None:
     answer = client.get("/v1/table").json()
     label = {name: getattr(surrogate, name) for name in ("id", "tolerance")}
-    expected = {name: getattr(surrogate, name) for name in ("checksum", "max_abs_error", "max_rel_error")}
-    expected |= {**label, "table": label, "file": surrogate.path.name, "size_bytes": surrogate.path.stat().st_size}
+    expected = {
+        name: getattr(surrogate, name) for name in ("checksum", "max_abs_error", "max_rel_error")
+    }
+    expected |= {
+        **label,
+        "table": label,
+        "file": surrogate.path.name,
+        "size_bytes": surrogate.path.stat().st_size,
+    }
     assert {name: answer[name] for name in expected} == expected
     assert all(answer[name] for name in ("attributes", "blocks"))
     assert label in answer["loaded"]
@@ -31,14 +39,28 @@ def test_the_table_describes_itself(client: Any, surrogate: Surrogate) -> None:
 
 @pytest.mark.parametrize(
     ("tolerance", "name"),
-    [(None, "1e-12"), (1e-12, "1e-12"), (9e-11, "1e-12"), (1e-10, "1e-10"), (2e-8, "1e-10"), (1e-7, "1e-7"),
-     (1, "1e-4")],
-)  # fmt: skip
-def test_the_smallest_table_that_is_tight_enough_is_picked(client: Any, case: Case, tolerance: Any, name: str) -> None:
-    picked = client.get("/v1/table", params={} if tolerance is None else {"tolerance": tolerance}).json()
+    [
+        (None, "1e-12"),
+        (1e-12, "1e-12"),
+        (9e-11, "1e-12"),
+        (1e-10, "1e-10"),
+        (2e-8, "1e-10"),
+        (1e-7, "1e-7"),
+        (1, "1e-4"),
+    ],
+)
+def test_the_smallest_table_that_is_tight_enough_is_picked(
+    client: Any, case: Case, tolerance: Any, name: str
+) -> None:
+    picked = client.get(
+        "/v1/table", params={} if tolerance is None else {"tolerance": tolerance}
+    ).json()
     assert picked["id"] == f"mumacro-{name}"
-    for path, more in (("mu-macro", {}), ("law", {"v0": None, "start": 0.1, "stop": 1.0}),
-                       ("solve-for", {"v0": None, "unknown": "v0", "target": 0.1})):  # fmt: skip
+    for path, more in (
+        ("mu-macro", {}),
+        ("law", {"v0": None, "start": 0.1, "stop": 1.0}),
+        ("solve-for", {"v0": None, "unknown": "v0", "target": 0.1}),
+    ):
         answer = client.post(f"/v1/{path}", json={**case, **more, "tolerance": tolerance}).json()
         assert answer["table"] == picked["table"]
     assert [label["tolerance"] for label in picked["loaded"]] == [1e-12, 1e-10, 1e-7, 1e-4]
@@ -58,20 +80,30 @@ def test_the_file_is_the_table(client: Any, surrogate: Surrogate) -> None:
 @pytest.mark.parametrize("path", HEALTH)
 def test_ready_means_loaded(client: Any, surrogate: Surrogate, path: str) -> None:
     response = client.get(path)
-    assert (response.status_code, response.json()["status"], client.head(path).status_code) == (200, "ready", 200)
+    assert (response.status_code, response.json()["status"], client.head(path).status_code) == (
+        200,
+        "ready",
+        200,
+    )
     assert {"id": surrogate.id, "tolerance": surrogate.tolerance} in response.json()["tables"]
     assert response.headers["cache-control"] == "no-store"
 
 
 SPOILT: dict[str, Callable[[bytes], bytes]] = {
-    "missing": lambda _: b"", "empty": lambda _: b"", "truncated": lambda whole: whole[: len(whole) // 2],
+    "missing": lambda _: b"",
+    "empty": lambda _: b"",
+    "truncated": lambda whole: whole[: len(whole) // 2],
     "foreign": lambda _: b"not a table " * 1000,
-    "with one wrong bit": lambda whole: whole[:50_000] + bytes([whole[50_000] ^ 1]) + whole[50_001:],
-}  # fmt: skip
+    "with one wrong bit": lambda whole: (
+        whole[:50_000] + bytes([whole[50_000] ^ 1]) + whole[50_001:]
+    ),
+}
 
 
 @pytest.mark.parametrize("kind", SPOILT)
-def test_an_unusable_table_is_not_ready(started: Any, table_copy: Any, case: Case, problem: Any, kind: Any) -> None:
+def test_an_unusable_table_is_not_ready(
+    started: Any, table_copy: Any, case: Case, problem: Any, kind: Any
+) -> None:
     table_copy.write_bytes(SPOILT[kind](table_copy.read_bytes()))
     if kind == "missing":
         table_copy.unlink()
@@ -114,7 +146,9 @@ def test_a_wrong_known_answer_is_not_ready(
         assert "secret" not in detail
 
 
-def test_tables_are_found(started: Any, tmp_path: Path, table_copy: Any, surrogate: Surrogate, problem: Any) -> None:
+def test_tables_are_found(
+    started: Any, tmp_path: Path, table_copy: Any, surrogate: Surrogate, problem: Any
+) -> None:
     for name in (".hidden.nc", "notes.txt"):
         (tmp_path / name).write_bytes(b"")
     other = tmp_path / "other"

@@ -1,4 +1,5 @@
-"""How fast a disturbance decays: the multiplier and the bound against marching, limits, bad input."""
+"""How fast a disturbance decays: the multiplier and the bound against marching, limits, bad
+input."""
 
 import math
 from typing import Any
@@ -51,7 +52,14 @@ def test_a_small_disturbance_decays_as_derived(surrogate: Surrogate, v: Any, y: 
     beside = here + size * np.array([-here[1], here[0]])
     beside *= min(1.0, 1.0 / np.hypot(*beside))
     apart = [
-        float(np.hypot(*(naive.march(v, y, STEPS, n, *beside)[-1] - naive.march(v, y, STEPS, n, *start)[-1])))
+        float(
+            np.hypot(
+                *(
+                    naive.march(v, y, STEPS, n, *beside)[-1]
+                    - naive.march(v, y, STEPS, n, *start)[-1]
+                )
+            )
+        )
         for n in (1, 2)
     ]
     cosine, share = at_rest_angles(v, y) if (v, y) in STICKING else (1.0, 0.0)
@@ -66,12 +74,17 @@ def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -
     steady = naive.march(v, y, 4000, naive.periods_until_steady(v, y))[-1]
     rng = np.random.default_rng(1)
     angle, radius = rng.uniform(0.0, 2.0 * math.pi, 12), np.sqrt(rng.uniform(0.0, 1.0, 12))
-    starts = [(0.0, 0.0), (-1.0, 0.0), *zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)]
+    starts = [
+        (0.0, 0.0),
+        (-1.0, 0.0),
+        *zip(radius * np.cos(angle), radius * np.sin(angle), strict=True),
+    ]
     for start in starts:
         first = float(np.hypot(*(np.array(start) - steady)))
         for n in (1, 3, math.ceil(found.periods_any)):
             left = float(np.hypot(*(naive.march(v, y, 4000, n, *start)[-1] - steady)))
-            assert left <= first * math.exp(-0.5 * n * found.slip_path) + 2e-3  # error of the time steps
+            # error of the time steps
+            assert left <= first * math.exp(-0.5 * n * found.slip_path) + 2e-3
             if n >= found.periods_any:
                 assert left <= 0.01 * first + 2e-3
 
@@ -79,13 +92,23 @@ def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -
 @pytest.mark.parametrize(
     ("changed", "periods"),
     [
-        ({"v0": 0.0}, math.inf), ({"v0": 0.0, "y0": 0.0}, math.inf), ({"v0": 0.0, "omega": 0.0}, math.inf),
-        ({"k": "rigid", "v0": 0.0, "y0": 0.0}, math.inf), ({"k": "rigid"}, 0.0), ({"k": math.inf}, 0.0),
+        ({"v0": 0.0}, math.inf),
+        ({"v0": 0.0, "y0": 0.0}, math.inf),
+        ({"v0": 0.0, "omega": 0.0}, math.inf),
+        ({"k": "rigid", "v0": 0.0, "y0": 0.0}, math.inf),
+        ({"k": "rigid"}, 0.0),
+        ({"k": math.inf}, 0.0),
     ],
-)  # fmt: skip
-def test_without_slip_nothing_settles_and_rigid_at_once(surrogate: Surrogate, changed: Any, periods: Any) -> None:
+)
+def test_without_slip_nothing_settles_and_rigid_at_once(
+    surrogate: Surrogate, changed: Any, periods: Any
+) -> None:
     found = settling(surrogate, **{**CASE, **changed})
-    assert (found.periods, found.time, found.slip_path) == (periods, periods, 0.0 if periods else math.inf)
+    assert (found.periods, found.time, found.slip_path) == (
+        periods,
+        periods,
+        0.0 if periods else math.inf,
+    )
 
 
 def test_the_frequency_may_be_f(surrogate: Surrogate) -> None:
@@ -118,7 +141,12 @@ def test_at_zero_speed_only_large_amplitudes_settle(surrogate: Surrogate) -> Non
 
 def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> None:
     found = settling(
-        surrogate, **{**CASE, "v0": np.array([[0.0], [1e-300], [0.01], [1e300]]), "y0": np.array([0.0, 2e-6, 1e300])}
+        surrogate,
+        **{
+            **CASE,
+            "v0": np.array([[0.0], [1e-300], [0.01], [1e300]]),
+            "y0": np.array([0.0, 2e-6, 1e300]),
+        },
     )
     assert found.periods.shape == found.time.shape == found.error_bound.shape == (4, 3)
     assert not np.isnan(found.periods).any()
@@ -128,18 +156,32 @@ def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> 
 
 @pytest.mark.parametrize(
     ("changed", "said"),
-    [*(({"remaining": x}, "remaining must be") for x in (0.0, 1.0, -1.0, math.nan, 2.0)), ({"Fz": -1.0}, "Fz must be"),
-     *(({"direction": x}, "across: how a disturbance decays is derived for no other") for x in ("along", "normal"))],
-)  # fmt: skip
+    [
+        *(({"remaining": x}, "remaining must be") for x in (0.0, 1.0, -1.0, math.nan, 2.0)),
+        ({"Fz": -1.0}, "Fz must be"),
+        *(
+            ({"direction": x}, "across: how a disturbance decays is derived for no other")
+            for x in ("along", "normal")
+        ),
+    ],
+)
 def test_bad_input_is_named_with_the_reason(surrogate: Surrogate, changed: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         settling(surrogate, **{**CASE, **changed})
 
 
 def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:
-    found = settling(surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.full(3, 0.3)})
+    found = settling(
+        surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.full(3, 0.3)}
+    )
     assert found.periods[0] == settling(surrogate, **CASE).periods
-    for column in (found.periods, found.periods_any, found.time, found.slip_path, found.error_bound):
+    for column in (
+        found.periods,
+        found.periods_any,
+        found.time,
+        found.slip_path,
+        found.error_bound,
+    ):
         assert np.isnan(column[1:]).all()
 
 

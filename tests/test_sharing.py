@@ -1,4 +1,5 @@
-"""Threads, processes and pickles: the same bits everywhere, no blocking, no state that a fork loses."""
+"""Threads, processes and pickles: the same bits everywhere, no blocking, no state that a fork
+loses."""
 
 import multiprocessing
 import operator
@@ -42,13 +43,22 @@ def everything(table: Surrogate, n: int = N, seed: int = 1) -> bytes:
     """The bits of all quantities of a table at some points."""
     v, y = points(n, seed)
     answer = table.evaluate(**UNIT, y0=y, v0=v, gradient=True)
-    parts = [table.mu_ratio(v, y), *table.power_with_bound(v, y), *table.stick_fraction_with_bound(v, y)]
-    parts += [*table.slopes(v, y, "power", bounds=True), answer.mu_macro, answer.error_bound, answer.source_code]
+    parts = [
+        table.mu_ratio(v, y),
+        *table.power_with_bound(v, y),
+        *table.stick_fraction_with_bound(v, y),
+    ]
+    parts += [
+        *table.slopes(v, y, "power", bounds=True),
+        answer.mu_macro,
+        answer.error_bound,
+        answer.source_code,
+    ]
     parts += [*(answer.gradient or {}).values(), *(answer.gradient_bound or {}).values()]
     return b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
 
 
-# --- threads ------------------------------------------------------------------------------------------
+# --- threads --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3, 7])
@@ -58,7 +68,9 @@ def test_the_number_of_threads_changes_nothing_but_the_time(table: Surrogate, th
     assert everything(other) == everything(table)
 
 
-def test_one_thread_means_that_none_is_started(table: Surrogate, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_thread_means_that_none_is_started(
+    table: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
     alone = Surrogate.open(table.path, threads=1)
 
     def refuse(*_: Any, **__: Any) -> None:
@@ -80,7 +92,8 @@ def test_no_thread_outlives_its_call(table: Surrogate) -> None:
 
 
 def workers() -> Iterator[Any]:
-    """Ways to hand a call to a worker, by name: each calls a function with an argument and returns its result."""
+    """Ways to hand a call to a worker, by name: each calls a function with an argument and returns
+    its result."""
 
     def executor(pool: Any) -> Callable[..., Any]:
         def call(function: Any, argument: Any) -> Any:
@@ -96,7 +109,9 @@ def workers() -> Iterator[Any]:
     yield pytest.param(executor(lambda: ThreadPoolExecutor(1)), id="threads")
     for method in ("fork", "spawn") if hasattr(os, "fork") else ("spawn",):
         context = multiprocessing.get_context(method)
-        yield pytest.param(executor(lambda c=context: ProcessPoolExecutor(1, mp_context=c)), id=method)
+        yield pytest.param(
+            executor(lambda c=context: ProcessPoolExecutor(1, mp_context=c)), id=method
+        )
     yield pytest.param(joblib, id="joblib")
 
 
@@ -122,7 +137,10 @@ def test_tables_are_read_by_many_threads_at_once() -> None:
 
     def work(i: int) -> dict[Path, str]:
         start.wait()
-        return {path: str(read_table(path).attributes["content_sha256"]) for path in TABLES[i % 4 :] + TABLES[: i % 4]}
+        return {
+            path: str(read_table(path).attributes["content_sha256"])
+            for path in TABLES[i % 4 :] + TABLES[: i % 4]
+        }
 
     with ThreadPoolExecutor(8) as pool:
         assert all(found == expected for found in pool.map(work, range(8)))
@@ -152,7 +170,7 @@ def test_a_small_call_does_not_wait_for_a_large_one(table: Surrogate) -> None:
     assert answered >= 10
 
 
-# --- processes ----------------------------------------------------------------------------------------
+# --- processes ------------------------------------------------------------------------------------
 
 
 _here: Surrogate | None = None  # for a forked child
@@ -165,7 +183,9 @@ def _ask(seed: int) -> bytes:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_forked_workers_give_the_same_bits_and_so_does_the_parent_afterwards(table: Surrogate) -> None:
+def test_forked_workers_give_the_same_bits_and_so_does_the_parent_afterwards(
+    table: Surrogate,
+) -> None:
     global _here
     _here, context = table, multiprocessing.get_context("fork")
     expected = [everything(table, N, seed) for seed in range(4)]  # large calls before the fork
@@ -182,7 +202,7 @@ def test_errors_come_out_of_a_pickle_as_they_went_in(protocol: int) -> None:
         assert (str(again), vars(again)) == (str(error), vars(error))
 
 
-# --- pickles ------------------------------------------------------------------------------------------
+# --- pickles --------------------------------------------------------------------------------------
 
 
 def in_another_process(data: bytes, folder: Path, repository: Path) -> str:
@@ -192,7 +212,12 @@ def in_another_process(data: bytes, folder: Path, repository: Path) -> str:
     )
     environment = {**os.environ, "PYTHONPATH": str(repository)}
     done = subprocess.run(
-        [sys.executable, "-c", program], input=data, cwd=folder, env=environment, capture_output=True, check=False
+        [sys.executable, "-c", program],
+        input=data,
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr.decode()
     return done.stdout.decode().strip()
@@ -211,7 +236,9 @@ def test_a_bundled_table_is_pickled_by_name_and_checksum(tmp_path: Path, reposit
     assert in_another_process(data, tmp_path, repository) == told(opened)
 
 
-def test_another_table_carries_its_bytes(tmp_path: Path, repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_table_carries_its_bytes(
+    tmp_path: Path, repository: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "mine").mkdir()
     shutil.copy(TABLES[-2], tmp_path / "mine" / "own.nc")
     monkeypatch.chdir(tmp_path / "mine")

@@ -1,4 +1,5 @@
-"""The exact solver: an independent quadruple-precision solver, a naive one, the orbit, limits and events.
+"""The exact solver: an independent quadruple-precision solver, a naive one, the orbit, limits and
+events.
 
 Energy balance, monotony and error estimate over the whole range are in test_extremes.py.
 """
@@ -22,23 +23,36 @@ from tests.cases import log_uniform
 from tests.comparing import close
 
 ORDINARY = [(0.1, 0.5), (2.0, 1.0), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (0.02, 1.05), (1.5, 20.0)]
-STICKING = [(0.1, 0.5), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (1e-6, 0.7), (1e-6, 1.0), (1e-5, 5.0), (1.5, 20.0)]
+STICKING = [
+    (0.1, 0.5),
+    (0.05, 3.0),
+    (0.3, 1.0),
+    (0.6, 1.9),
+    (1e-6, 0.7),
+    (1e-6, 1.0),
+    (1e-5, 5.0),
+    (1.5, 20.0),
+]
 SLIDING = [(2.0, 1.0), (0.5, 0.3), (1.0, 3.0), (20.0, 0.01), (30.0, 400.0), (0.05, 0.3)]
 
 
-# --- against the reference ----------------------------------------------------------------------------
+# --- against the reference ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("case", ["random", "creep", "tail_vinf", "tail_y0", "tail_yinf", "border", "corner"])
+@pytest.mark.parametrize(
+    "case", ["random", "creep", "tail_vinf", "tail_y0", "tail_yinf", "border", "corner"]
+)
 def test_reference_points_are_met_to_rounding(case: str, reference: Any, sweep: Sweep) -> None:
     at = reference.case == case
     assert at.sum() >= 12
-    solved = sweep.solve("full", reference.v[at], reference.y[at])  # raises unless every status is success
+    # raises unless every status is success
+    solved = sweep.solve("full", reference.v[at], reference.y[at])
     error = np.abs(solved["mu_ratio"] - reference.mu_ratio[at])
     assert error.max() <= 3e-16
     assert (error / reference.mu_ratio[at]).max() <= 2e-15
     assert (error <= solved["error_estimate"]).all()
-    # the end of slip is a grazing root next to the border, known to about 1e-16 / sqrt(1 - v~/v~crit)
+    # the end of slip is a grazing root next to the border, known to about 1e-16 / sqrt(1 -
+    # v~/v~crit)
     stick = np.abs(solved["stick_fraction"] - reference.stick_fraction[at])
     assert stick.max() <= (2e-12 if case == "border" else 2e-15)
     for v, y, regime in zip(reference.v[at], reference.y[at], reference.regime[at], strict=True):
@@ -56,7 +70,7 @@ def test_a_naive_solver_that_does_not_use_the_symmetry_agrees(v: float, y: float
     assert np.abs(orbit[2_000:] - orbit[:2_000] * (1.0, -1.0)).max() < 1e-14
 
 
-# --- the orbit itself ---------------------------------------------------------------------------------
+# --- the orbit itself -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("v", "y"), SLIDING)
@@ -65,14 +79,17 @@ def test_continuous_orbit_closes_over_a_whole_period(v: float, y: float) -> None
     assert steady.continuous(v, y, w, out) == OK
     start, chart = out[ANGLE], int(out[CHART])  # at sigma = pi/2 half a period has passed
     half_turn = chart * 0.5 * math.pi + start
-    # the other half, with the shaker moving the other way, is the mirror image: start it from the mirrored angle
+    # the other half, with the shaker moving the other way, is the mirror image: start it from the
+    # mirrored angle
     assert slip(v, y, -0.5 * math.pi, 0, -start, -chart, 0.5 * math.pi, False, w, out) == OK
     assert out[CHART] * 0.5 * math.pi + out[ANGLE] == close(half_turn, abs=4e-15)
     assert out[MIN_SPEED] > 0.0
 
 
 @pytest.mark.parametrize(("v", "y"), STICKING)
-def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadrature(v: float, y: float) -> None:
+def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadrature(
+    v: float, y: float
+) -> None:
     w, out, orbit, res = workspace()
     assert solve_raw(v, y, y - 1.0, w, out, orbit, res) == OK
     duration, ux0, _, uy0, start, end = orbit
@@ -97,22 +114,25 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
 
     stick_mean = fixed_quad(ux, start, stop, n=200)[0]
     shaker = fixed_quad(effort, start, stop, n=200)[0]
-    assert v * stick_mean + shaker == close(0.0, abs=1e-13 * (1.0 + y))  # the spring stores no net energy
+    # the spring stores no net energy
+    assert v * stick_mean + shaker == close(0.0, abs=1e-13 * (1.0 + y))
 
     assert (stick_mean + out[SUM_UX]) / math.pi == close(res[steady.MU_RATIO], abs=1e-15)
     assert (shaker + out[WORK]) / math.pi == close(res[steady.POWER], abs=1e-13 * (1.0 + y))
     assert out[PATH] / math.pi == close(res[steady.SLIP_SPEED], rel=1e-15)
-    # the work of drive and shaker during slip equals the dissipation: during stick they do none together, see above
+    # the work of drive and shaker during slip equals the dissipation: during stick they do none
+    # together, see above
     assert (v * out[SUM_UX] + out[WORK]) / math.pi == close(res[steady.SLIP_SPEED], rel=2e-15)
     # and slip ends, mirrored, exactly where stick started
     assert out[SIGMA] == close(start, abs=1e-14)
 
 
-# --- limits -------------------------------------------------------------------------------------------
+# --- limits ---------------------------------------------------------------------------------------
 
 
 def polar(radius: float, psi: float) -> float:
-    """mu~/phi - 1 at polar coordinates of the corner, where mu~ = phi (1 + a(psi) R^2 + ...) at eta = y~ - 1 exact."""
+    """mu~/phi - 1 at polar coordinates of the corner, where mu~ = phi (1 + a(psi) R^2 + ...) at eta
+    = y~ - 1 exact."""
     phi, s0 = radius * math.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * math.cos(psi)
     eta = 0.25 * (s0 * s0 - 2.0 * phi * phi)
     return solve(phi * s0 * s0 / (2.0 * math.pi), 1.0 + eta, eta).mu_ratio / phi - 1.0
@@ -126,17 +146,44 @@ def fast(v: float, r: float) -> float:
     return solve(v, r * v).mu_ratio - float(outer(r))
 
 
-#: error of a limit, the parameter at three places, each a share of the last; the order of the error, and within what
+#: error of a limit, the parameter at three places, each a share of the last; the order of the
+#: error, and within what
 LIMITS: list[tuple[Callable[..., float], tuple[float, float, float], float, float]] = [
-    *((lambda v, y=y: static(v, y), (1e-5, 1e-6, 1e-7), 1.5, 0.05) for y in (0.1, 0.5, 0.9)),  # eq. (16)
-    *((lambda y, v=v: solve(v, y).deficit / (y * y / (4.0 * (1.0 + v * v))) - 1.0, (0.08, 0.04, 0.02), 2.0, 0.05)
-      for v in (0.5, 3.0, 100.0)),  # eq. (31)
+    # eq. (16)
+    *((lambda v, y=y: static(v, y), (1e-5, 1e-6, 1e-7), 1.5, 0.05) for y in (0.1, 0.5, 0.9)),
+    *(
+        (
+            lambda y, v=v: solve(v, y).deficit / (y * y / (4.0 * (1.0 + v * v))) - 1.0,
+            (0.08, 0.04, 0.02),
+            2.0,
+            0.05,
+        )
+        for v in (0.5, 3.0, 100.0)
+    ),  # eq. (31)
     *((lambda x, r=r: fast(1.0 / x, r), (0.02, 0.01, 0.005), 2.0, 0.02) for r in (0.3, 1.0, 7.0)),
-    *((lambda x, r=r: fast(max(1.0, 3.0 * r) / x, r) - float(second_order(r)) * (x / max(1.0, 3.0 * r)) ** 2,
-       (1 / 15, 1 / 30, 1 / 60), 4.0, 0.1) for r in (0.3, 1.0, 7.0)),
-    (lambda v: solve(v, 1.0).mu_ratio / math.cbrt(math.pi * v) - 1.0, (1e-4, 1e-6, 1e-8), 2.0 / 3.0, 0.02),
-    *((lambda radius, psi=psi: polar(radius, psi), (0.02, 0.01, 0.005), 2.0, 0.05) for psi in (0.1, 0.7, 1.3)),
-]  # fmt: skip
+    *(
+        (
+            lambda x, r=r: (
+                fast(max(1.0, 3.0 * r) / x, r)
+                - float(second_order(r)) * (x / max(1.0, 3.0 * r)) ** 2
+            ),
+            (1 / 15, 1 / 30, 1 / 60),
+            4.0,
+            0.1,
+        )
+        for r in (0.3, 1.0, 7.0)
+    ),
+    (
+        lambda v: solve(v, 1.0).mu_ratio / math.cbrt(math.pi * v) - 1.0,
+        (1e-4, 1e-6, 1e-8),
+        2.0 / 3.0,
+        0.02,
+    ),
+    *(
+        (lambda radius, psi=psi: polar(radius, psi), (0.02, 0.01, 0.005), 2.0, 0.05)
+        for psi in (0.1, 0.7, 1.3)
+    ),
+]
 
 
 @pytest.mark.parametrize(("error", "places", "order", "within"), LIMITS)
@@ -148,7 +195,7 @@ def test_a_limit_has_the_order_of_its_error(
     assert math.log(abs(one / two)) / math.log(places[1] / places[2]) == close(order, abs=within)
 
 
-# --- events -------------------------------------------------------------------------------------------
+# --- events ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("y", [0.1, 0.5, 0.9, 1.0])
@@ -166,7 +213,9 @@ def test_slip_shorter_than_any_scan_step_is_found(v: float, y: float) -> None:
 
 @pytest.mark.parametrize("y", [0.01, 0.3, 0.74, 1.0, 1.5, 4.69, 30.0, 1e3, 1e6, 4.4e7])
 @pytest.mark.parametrize("distance", [1e-6, 1e-8, 1e-9, 1e-10, 1e-12])
-def test_dip_of_the_slip_speed_between_two_samples_is_seen(y: float, distance: float, sweep: Sweep) -> None:
+def test_dip_of_the_slip_speed_between_two_samples_is_seen(
+    y: float, distance: float, sweep: Sweep
+) -> None:
     crit, mu_crit = steady.border(y)
     below, above = solve(crit * (1.0 - distance), y), solve(crit * (1.0 + distance), y)
     assert above.regime == "continuous"
@@ -178,7 +227,9 @@ def test_dip_of_the_slip_speed_between_two_samples_is_seen(y: float, distance: f
     assert below.mu_ratio == close(mu_crit, abs=distance)
     if distance <= 1e-8:
         # stick changes mu~ by O(distance^2) only: the continuous orbit has all digits
-        smooth = sweep.solve("continuous", np.array([crit * (1.0 - distance)]), np.array([y]))["mu_ratio"][0]
+        smooth = sweep.solve("continuous", np.array([crit * (1.0 - distance)]), np.array([y]))[
+            "mu_ratio"
+        ][0]
         assert below.mu_ratio == close(smooth, rel=2e-15)
 
 
@@ -187,7 +238,9 @@ def test_at_distances_down_to_the_last_digit_of_the_border_both_orbits_agree(swe
     y = log_uniform(rng, 1e-6, 1e7, 3000)
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
     digits = rng.integers(-9, 10, y.size) * 2.0**-53
-    v = crit * (1.0 - np.where(rng.random(y.size) < 0.5, log_uniform(rng, 1e-15, 1e-8, y.size), digits))
+    v = crit * (
+        1.0 - np.where(rng.random(y.size) < 0.5, log_uniform(rng, 1e-15, 1e-8, y.size), digits)
+    )
     full, smooth = sweep.solve("full", v, y), sweep.solve("continuous", v, y)
     assert np.abs(full["mu_ratio"] / smooth["mu_ratio"] - 1.0).max() <= 2e-14
     assert np.abs(full["mu_ratio"] - smooth["mu_ratio"]).max() <= 5e-15
@@ -203,18 +256,21 @@ def test_at_distances_down_to_the_last_digit_of_the_border_both_orbits_agree(swe
      (2.1166902828860522e-08, 0.0002057518077793017), (162.21066084094238, 115850.92347138077)],
 )  # fmt: skip
 def test_orbit_lost_on_the_border_itself_is_no_answer(v: float, y: float) -> None:
-    # mu~ was once -0.39 here, as "success", or the section failed: its root equals its edge to rounding
+    # mu~ was once -0.39 here, as "success", or the section failed: its root equals its edge to
+    # rounding
     found = solve(v, y)
     assert found.ok
     assert found.mu_ratio == close(steady.border(y)[1], rel=1e-14)
 
 
-# --- inputs and failures ------------------------------------------------------------------------------
+# --- inputs and failures --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, -0.0, math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize(("field", "bounds"), [("v_tilde", V_RANGE), ("y_tilde", Y_RANGE)])
-def test_inputs_out_of_range_are_refused(field: str, bounds: tuple[float, float], bad: float, sweep: Sweep) -> None:
+def test_inputs_out_of_range_are_refused(
+    field: str, bounds: tuple[float, float], bad: float, sweep: Sweep
+) -> None:
     low, high = bounds
     for value in (bad, np.nextafter(low, 0.0), np.nextafter(high, math.inf)):
         point = (value, 0.5) if field == "v_tilde" else (0.5, value)
@@ -241,13 +297,21 @@ def test_an_excess_that_is_not_that_of_the_amplitude_is_refused(eta: float, swee
 
 
 def test_every_status_has_advice() -> None:
-    codes = {model.OK, model.NO_SLIP, model.NO_STICK, model.TOO_MANY_STEPS, model.DIVERGED, sections.NOT_CONVERGED}
+    codes = {
+        model.OK,
+        model.NO_SLIP,
+        model.NO_STICK,
+        model.TOO_MANY_STEPS,
+        model.DIVERGED,
+        sections.NOT_CONVERGED,
+    }
     assert codes == set(ADVICE)
     assert all(ADVICE.values())
 
 
 def test_a_stick_phase_without_end_has_its_own_status() -> None:
-    # slip stops with the spring nearly transverse: a stroke of 2 y~ = 0.4 cannot stretch it to the limit again
+    # slip stops with the spring nearly transverse: a stroke of 2 y~ = 0.4 cannot stretch it to the
+    # limit again
     w, out, orbit, _ = workspace()
     _, status = sections._angle_section(1e-3, 0.2, -0.8, 1.2, 0, w, out, orbit)
     assert status == NO_SLIP

@@ -1,4 +1,5 @@
-"""Contact stiffness: the textbook's relations, the ellipse by brute force, bounds, the list of geometries."""
+"""Contact stiffness: the textbook's relations, the ellipse by brute force, bounds, the list of
+geometries."""
 
 import functools
 import inspect
@@ -11,7 +12,15 @@ import pytest
 
 from mumacro import InputError, Surrogate, stiffness
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
-from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch, in_series
+from mumacro.stiffness import (
+    AXES,
+    Contact,
+    Material,
+    ball_on_flat,
+    cylinder_on_flat,
+    flat_punch,
+    in_series,
+)
 from tests.cases import Case
 from tests.comparing import close
 
@@ -40,7 +49,9 @@ def test_the_ball_follows_hertz() -> None:
 
 @pytest.mark.parametrize(("narrow", "wide"), [(1.0, 3.0), (0.02, 1.0), (1e-4, 1.0)])
 @pytest.mark.parametrize("along", [False, True])
-def test_the_ellipse_is_the_integral_over_all_directions(narrow: float, wide: float, along: bool) -> None:
+def test_the_ellipse_is_the_integral_over_all_directions(
+    narrow: float, wide: float, along: bool
+) -> None:
     phi = (np.arange(4_000_000) + 0.5) * (2.0 * math.pi / 4_000_000)  # smooth and periodic
     chord = 1.0 / np.hypot(np.cos(phi) / narrow, np.sin(phi) / wide)
     cosine = (np.sin(phi) if along else np.cos(phi)) ** 2
@@ -63,9 +74,14 @@ def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_l
 
 
 @pytest.mark.parametrize(("across", "along"), [(1.3, 1.0), (1.0, 1.3)])
-def test_of_two_stiffnesses_the_oscillations_is_the_models(surrogate: Surrogate, across: Any, along: Any) -> None:
-    """Eqs. (9) to (12) with two springs, marched: ``across`` along the sliding, ``along`` along the oscillation."""
-    v, y = (x.ravel() for x in np.meshgrid([0.2, 0.6, 2.0], [0.3, 0.8, 1.2, 3.0, 10.0], indexing="ij"))
+def test_of_two_stiffnesses_the_oscillations_is_the_models(
+    surrogate: Surrogate, across: Any, along: Any
+) -> None:
+    """Eqs. (9) to (12) with two springs, marched: ``across`` along the sliding, ``along`` along the
+    oscillation."""
+    v, y = (
+        x.ravel() for x in np.meshgrid([0.2, 0.6, 2.0], [0.3, 0.8, 1.2, 3.0, 10.0], indexing="ij")
+    )
     steps, springs = 1000, np.array([[across], [along]])
     path = np.sin(np.linspace(0.0, 2.0 * math.pi, steps + 1))
     force = np.zeros((2, v.size))
@@ -89,29 +105,48 @@ def test_of_two_stiffnesses_the_oscillations_is_the_models(surrogate: Surrogate,
 
 def test_stiffness_has_its_scaling_laws_and_adds_in_series() -> None:
     # lengths times 2, forces times 4: the same strains, k twice
-    small, large = (cylinder_on_flat(x, x, 4e6 * x * x, STEEL, STEEL, "across") for x in (5e-3, 1e-2))
-    assert (large.k, large.pressure) == (close(2.0 * small.k, rel=1e-13), close(small.pressure, rel=1e-13))
-    assert (in_series(4.0), in_series(4.0, math.inf), in_series(4.0, 4.0), in_series(math.inf)) == (4, 4, 2, math.inf)
+    small, large = (
+        cylinder_on_flat(x, x, 4e6 * x * x, STEEL, STEEL, "across") for x in (5e-3, 1e-2)
+    )
+    assert (large.k, large.pressure) == (
+        close(2.0 * small.k, rel=1e-13),
+        close(small.pressure, rel=1e-13),
+    )
+    assert (in_series(4.0), in_series(4.0, math.inf), in_series(4.0, 4.0), in_series(math.inf)) == (
+        4,
+        4,
+        2,
+        math.inf,
+    )
     assert Contact(2.0, 1.0, 1.0, 1.0).length_scale(0.5, 8.0) == 2.0
 
 
 @pytest.mark.parametrize(
     ("field", "function", "arguments"),
     [
-        ("E", Material, (0.0, 0.3)), ("E", Material, (math.nan, 0.3)),
-        ("nu", Material, (1e9, 0.6)), ("nu", Material, (1e9, math.nan)),
-        ("radius", ball_on_flat, (-1.0, 1.0, STEEL, STEEL)), ("Fz", ball_on_flat, (1.0, math.inf, STEEL, STEEL)),
-        ("E", ball_on_flat, (1.0, 1.0, RIGID, RIGID)), ("radius", ball_on_flat, (1e-300, 1.0, STEEL, STEEL)),
+        ("E", Material, (0.0, 0.3)),
+        ("E", Material, (math.nan, 0.3)),
+        ("nu", Material, (1e9, 0.6)),
+        ("nu", Material, (1e9, math.nan)),
+        ("radius", ball_on_flat, (-1.0, 1.0, STEEL, STEEL)),
+        ("Fz", ball_on_flat, (1.0, math.inf, STEEL, STEEL)),
+        ("E", ball_on_flat, (1.0, 1.0, RIGID, RIGID)),
+        ("radius", ball_on_flat, (1e-300, 1.0, STEEL, STEEL)),
         ("Fz", cylinder_on_flat, (1.0, 1.0, 1e-300, STEEL, STEEL, "across")),
         ("oscillation", cylinder_on_flat, (1.0, 1.0, 1.0, STEEL, STEEL, "axial")),
         ("length", cylinder_on_flat, (1.0, 1e-6, 1e3, STEEL, STEEL, "across")),
-        ("radius", flat_punch, (0.0, 1.0, STEEL, STEEL)), ("stiffness", in_series, (1.0, -1.0)),
-        ("stiffnesses", in_series, ()), ("stiffness", in_series, ("1e6",)), ("E", Material, ("210 GPa", 0.3)),
-        ("nu", Material, (1e9, "0.3")), ("radius", ball_on_flat, ("5mm", 1.0, STEEL, STEEL)),
-        ("Fz", flat_punch, (1.0, "10N", STEEL, STEEL)), ("second", ball_on_flat, (1.0, 1.0, STEEL, "steel")),
+        ("radius", flat_punch, (0.0, 1.0, STEEL, STEEL)),
+        ("stiffness", in_series, (1.0, -1.0)),
+        ("stiffnesses", in_series, ()),
+        ("stiffness", in_series, ("1e6",)),
+        ("E", Material, ("210 GPa", 0.3)),
+        ("nu", Material, (1e9, "0.3")),
+        ("radius", ball_on_flat, ("5mm", 1.0, STEEL, STEEL)),
+        ("Fz", flat_punch, (1.0, "10N", STEEL, STEEL)),
+        ("second", ball_on_flat, (1.0, 1.0, STEEL, "steel")),
         ("mu0", Contact(1.0, 1.0, 1.0, 1.0).length_scale, (0.0, 1.0)),
     ],
-)  # fmt: skip
+)
 def test_a_bad_value_is_named(field: str, function: Any, arguments: Any) -> None:
     with pytest.raises(InputError) as caught:
         function(*arguments)
@@ -128,17 +163,24 @@ def test_hertz_wants_a_small_contact() -> None:
             Fz = 1e-4 * (share * 5e-3 / one.half_width) ** (2 if more else 3)
             ask = functools.partial(function, 5e-3, *length, Fz, RUBBER, RIGID, *more)
             if share > 1.0:
-                with pytest.raises(InputError, match=r"radius must be >= 0.00505, the half width of the contact"):
+                with pytest.raises(
+                    InputError, match=r"radius must be >= 0.00505, the half width of the contact"
+                ):
                     ask()
             elif share > 0.1:
-                with pytest.warns(UserWarning, match=f"is {share:.2g} of the radius: Hertz's theory holds well below"):
+                with pytest.warns(
+                    UserWarning,
+                    match=f"is {share:.2g} of the radius: Hertz's theory holds well below",
+                ):
                     assert len(ask().warnings) == 1
             else:
                 assert ask().warnings == ()
 
 
 @pytest.mark.parametrize("second", [{}, {"E2": math.inf}])
-@pytest.mark.parametrize("shape", [("ball", {}), ("cylinder", {"length": 5e-3, "oscillation": "across"})])
+@pytest.mark.parametrize(
+    "shape", [("ball", {}), ("cylinder", {"length": 5e-3, "oscillation": "across"})]
+)
 def test_forgotten_gigapascals_are_told(second: Any, shape: tuple[str, Any]) -> None:
     given = {"radius": 5e-3, "Fz": 10.0, "E": 210, "nu": 0.3, **second, **shape[1]}
     with pytest.raises(InputError, match=r"^E must be in pascals: did you mean 210 GPa\?"):
@@ -148,36 +190,52 @@ def test_forgotten_gigapascals_are_told(second: Any, shape: tuple[str, Any]) -> 
         contact_of(shape[0], **{**given, "E": 210, "Fz": 1e12})
 
 
-# --- geometries by name -----------------------------------------------------------------------------------
+# --- geometries by name ---------------------------------------------------------------------------
 
 
 def test_the_list_has_the_arguments_of_the_functions() -> None:
     used = {name for geometry in GEOMETRIES.values() for name in geometry.arguments}
     assert used | {*BODIES} == {*ARGUMENTS}
     for geometry in GEOMETRIES.values():
-        named = [name for name in inspect.signature(geometry.function).parameters if name not in ("first", "second")]
+        named = [
+            name
+            for name in inspect.signature(geometry.function).parameters
+            if name not in ("first", "second")
+        ]
         assert named == list(geometry.arguments)
 
 
 def test_a_named_geometry_is_its_function() -> None:
     steel = {"E": 210e9, "nu": 0.3}
-    assert contact_of("ball", radius=5e-3, Fz=10.0, **steel) == ball_on_flat(5e-3, 10.0, STEEL, STEEL)
-    assert contact_of("flat", radius=1e-3, Fz=10.0, **steel, E2=5e6, nu2=0.5) == flat_punch(1e-3, 10.0, STEEL, RUBBER)
+    assert contact_of("ball", radius=5e-3, Fz=10.0, **steel) == ball_on_flat(
+        5e-3, 10.0, STEEL, STEEL
+    )
+    assert contact_of("flat", radius=1e-3, Fz=10.0, **steel, E2=5e6, nu2=0.5) == flat_punch(
+        1e-3, 10.0, STEEL, RUBBER
+    )
     for axis in AXES:
-        found = contact_of("cylinder", radius=5e-3, length=5e-3, Fz=1e2, oscillation=axis, E2=math.inf, **steel)
+        found = contact_of(
+            "cylinder", radius=5e-3, length=5e-3, Fz=1e2, oscillation=axis, E2=math.inf, **steel
+        )
         assert found == cylinder_on_flat(5e-3, 5e-3, 1e2, STEEL, RIGID, axis)
 
 
 @pytest.mark.parametrize(
     ("geometry", "given", "said"),
-    [("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
-     ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
-     ("cylinder", {"radius": 1.0, "length": 1.0, "Fz": 1.0, "E": 1e9, "nu": 0.3}, "oscillation must be given: how"),
-     ("ball", {"length": 1.0}, "length must be left out: unknown field"),
-     ("ball", {"radius": "5mm"}, "radius must be a real number"),
-     ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
-     ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be finite and > 0")],
-)  # fmt: skip
+    [
+        ("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
+        ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
+        (
+            "cylinder",
+            {"radius": 1.0, "length": 1.0, "Fz": 1.0, "E": 1e9, "nu": 0.3},
+            "oscillation must be given: how",
+        ),
+        ("ball", {"length": 1.0}, "length must be left out: unknown field"),
+        ("ball", {"radius": "5mm"}, "radius must be a real number"),
+        ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
+        ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be finite and > 0"),
+    ],
+)
 def test_a_bad_argument_is_named_with_the_remedy(geometry: Any, given: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         contact_of(geometry, **given)
@@ -187,7 +245,9 @@ def test_a_bad_argument_is_named_with_the_remedy(geometry: Any, given: Any, said
 def test_numbers_of_any_size_are_refused_or_give_a_contact(geometry: str) -> None:
     sizes = [5e-324, stiffness.SMALLEST, 1.0, stiffness.LARGEST, 1.7e308]
     names = [name for name in GEOMETRIES[geometry].arguments if name != "oscillation"]
-    rest: Case = {"nu": 0.3, "E2": math.inf, "nu2": 0.5} | ({"oscillation": "along"} if geometry == "cylinder" else {})
+    rest: Case = {"nu": 0.3, "E2": math.inf, "nu2": 0.5} | (
+        {"oscillation": "along"} if geometry == "cylinder" else {}
+    )
     for numbers in itertools.product(sizes, repeat=len(names) + 1):
         given = dict(zip([*names, "E"], numbers, strict=True))
         try:
@@ -199,10 +259,21 @@ def test_numbers_of_any_size_are_refused_or_give_a_contact(geometry: str) -> Non
 
 
 def test_arguments_are_read_with_units() -> None:
-    read = {"E": ("210 GPa", 210e9), "radius": ("5mm", 5e-3), "Fz": ("10N", 10.0), "nu": ("0.3", 0.3)}
-    for name, (text, value) in {**read, "E2": ("Rigid", math.inf), "oscillation": (" along ", "along")}.items():
+    read = {
+        "E": ("210 GPa", 210e9),
+        "radius": ("5mm", 5e-3),
+        "Fz": ("10N", 10.0),
+        "nu": ("0.3", 0.3),
+    }
+    for name, (text, value) in {
+        **read,
+        "E2": ("Rigid", math.inf),
+        "oscillation": (" along ", "along"),
+    }.items():
         assert read_argument(name, text) == value
-    with pytest.raises(ValueError, match=r"E=210 N: give Young's modulus .* with a unit: Pa, kPa, MPa"):
+    with pytest.raises(
+        ValueError, match=r"E=210 N: give Young's modulus .* with a unit: Pa, kPa, MPa"
+    ):
         read_argument("E", "210 N")
     with pytest.raises(ValueError, match="the decimal sign is a point"):
         read_argument("nu", "0,3")
@@ -211,7 +282,10 @@ def test_arguments_are_read_with_units() -> None:
 def test_a_result_can_be_passed_on(surrogate: Surrogate) -> None:
     case: Case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3, "v0": 0.01}
     punch, ball = flat_punch(1e-3, 10.0, STEEL, STEEL), ball_on_flat(5e-3, 10.0, STEEL, STEEL)
-    assert surrogate.evaluate(**punch, **case).mu_macro == surrogate.evaluate(k=punch.k, **case).mu_macro
+    assert (
+        surrogate.evaluate(**punch, **case).mu_macro
+        == surrogate.evaluate(k=punch.k, **case).mu_macro
+    )
     assert dict(ball) == {"k": ball.k, "contact": "ball"}
     with pytest.raises(KeyError):
         ball["pressure"]

@@ -19,7 +19,7 @@ from tests.comparing import close
 table, fine = tables(), tables(1e-7)
 
 
-# --- answers at the edges -----------------------------------------------------------------------------
+# --- answers at the edges -------------------------------------------------------------------------
 
 N = 1500
 Draw = Callable[..., Array]
@@ -36,7 +36,10 @@ def between(low: float, high: float) -> Draw:
 
 #: where -> amplitudes, and speeds from them and the border
 EDGES: dict[str, tuple[Draw, Draw]] = {
-    "beside the border": (between(1e-4, 1e7), lambda rng, _, crit: crit * beside(3e-16, 1e-12)(rng)),
+    "beside the border": (
+        between(1e-4, 1e7),
+        lambda rng, _, crit: crit * beside(3e-16, 1e-12)(rng),
+    ),
     "on the seams": (
         lambda rng: rng.choice(SEAMS, N) * (1.0 + rng.integers(-3, 4, N) * 2.0**-53),
         lambda rng, *_: between(1e-9, 1e5)(rng),
@@ -53,7 +56,9 @@ EDGES: dict[str, tuple[Draw, Draw]] = {
 
 
 @pytest.mark.parametrize("where", EDGES)
-def test_fresh_solves_at_the_edges_lie_within_tolerance_and_bound(table: Surrogate, where: str, sweep: Sweep) -> None:
+def test_fresh_solves_at_the_edges_lie_within_tolerance_and_bound(
+    table: Surrogate, where: str, sweep: Sweep
+) -> None:
     rng = np.random.default_rng(5)
     amplitudes, speeds = EDGES[where]
     y = amplitudes(rng)
@@ -80,7 +85,10 @@ def test_speeds_whose_square_overflows_still_follow_the_elliptic_integral(table:
     ("name", "v", "y", "value", "bound"),
     [
         *(("power", v, y, 0.0, 0.0) for v, y in ((0.3, 0.0), (math.inf, 2.0), (0.0, 0.5))),
-        *(("stick_fraction", v, y, 0.0, 0.0) for v, y in ((0.3, 0.0), (50.0, 1.0), (math.inf, 2.0), (1e5, 1e3))),
+        *(
+            ("stick_fraction", v, y, 0.0, 0.0)
+            for v, y in ((0.3, 0.0), (50.0, 1.0), (math.inf, 2.0), (1e5, 1e3))
+        ),
         ("stick_fraction", 0.0, 0.5, 1.0, 0.0),
         # y~ = 1 at v~ = 0 is a corner: the last digit of y~ moves both
         ("power", 0.0, 1.0, 0.0, 1e-14),
@@ -89,7 +97,9 @@ def test_speeds_whose_square_overflows_still_follow_the_elliptic_integral(table:
         ("mu_ratio", math.inf, 2.0, 1.0, 0.0),
     ],
 )
-def test_companions_at_the_ends(table: Surrogate, name: str, v: float, y: float, value: float, bound: float) -> None:
+def test_companions_at_the_ends(
+    table: Surrogate, name: str, v: float, y: float, value: float, bound: float
+) -> None:
     found, off, _ = table.quantity(name, v, y)
     assert found == value
     assert 0.0 < off < bound if bound else off == 0.0
@@ -97,7 +107,9 @@ def test_companions_at_the_ends(table: Surrogate, name: str, v: float, y: float,
 
 def test_creep_at_large_amplitude_has_no_step_where_its_formula_changes(table: Surrogate) -> None:
     y = np.geomspace(1e6, 1e60, 20)
-    below, above = (table.mu_ratio(1e-100 * y * side, y) / side for side in (1.0 - 1e-12, 1.0 + 1e-12))
+    below, above = (
+        table.mu_ratio(1e-100 * y * side, y) / side for side in (1.0 - 1e-12, 1.0 + 1e-12)
+    )
     assert np.all(below > 0.0)
     assert below == close(above, rel=1e-11)
 
@@ -108,7 +120,10 @@ def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: S
     power, of_power = table.power_with_bound(v, y)
     _, of_stick = table.stick_fraction_with_bound(v, y)
     assert np.all(np.isfinite(of_power) & (of_power > 0.0))
-    assert np.all((of_stick >= 0.0) & (of_stick <= math.sqrt(table.border.max_rel_error) + 20.0 * table.tolerance))
+    assert np.all(
+        (of_stick >= 0.0)
+        & (of_stick <= math.sqrt(table.border.max_rel_error) + 20.0 * table.tolerance)
+    )
     # the bound is small relative to the power, except for denormal numbers
     assert np.all((of_power <= 1e-3 * power)[power > 1e-280])
     assert table.power_with_bound(float(v[0]), float(y[0])) == (power[0], of_power[0])
@@ -116,22 +131,29 @@ def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: S
 
 
 @pytest.mark.parametrize("v", [1e4, 1e8, 1e50, 1e140, 1e160, 1e250])
-def test_power_at_large_speed_is_that_of_the_shaker_against_friction(table: Surrogate, v: float) -> None:
+def test_power_at_large_speed_is_that_of_the_shaker_against_friction(
+    table: Surrogate, v: float
+) -> None:
     """p = y~^2/(2 v~) for y~ << v~, where a closed form would lose digits."""
     for y in (y for y in (1.5, 2.0, 1e2, 1e5) if y <= 1e-3 * v):
         expected = 0.5 * y * (y / v)
         power, bound = table.power_with_bound(v, y)
-        assert abs(power - expected) <= bound + expected * (1.0 / v**2 if v < 1e100 else 0.0) + expected * (y / v) ** 2
+        assert (
+            abs(power - expected)
+            <= bound + expected * (1.0 / v**2 if v < 1e100 else 0.0) + expected * (y / v) ** 2
+        )
         assert bound <= 2.0 * max(1e-13, table.tolerance) * expected
 
 
-# --- scalars and arrays -------------------------------------------------------------------------------
+# --- scalars and arrays ---------------------------------------------------------------------------
 
 
 def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
     rng, n = np.random.default_rng(6), 400
     ranges = ((0.1, 1.0), (1e-3, 1e4), (1e3, 1e9), (1e-9, 1e-3), (1.0, 1e6), (1e-9, 10.0))
-    columns: Case = {name: log_uniform(rng, *ends, n) for name, ends in zip(CASE, ranges, strict=True)}
+    columns: Case = {
+        name: log_uniform(rng, *ends, n) for name, ends in zip(CASE, ranges, strict=True)
+    }
     columns["v0"][::7] = columns["y0"][::11] = 0.0
     whole = table.evaluate(**columns, gradient=True)
     plain = table.evaluate(**columns)
@@ -139,9 +161,20 @@ def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
     for name in ("v_tilde", "y_tilde", "length_scale"):
         with pytest.raises(AttributeError, match=f"{name} was not requested"):
             getattr(plain, name)
-        np.testing.assert_array_equal(getattr(table.evaluate(**columns, groups=True), name), getattr(whole, name))
+        np.testing.assert_array_equal(
+            getattr(table.evaluate(**columns, groups=True), name), getattr(whole, name)
+        )
     np.testing.assert_array_equal(plain.mu_macro, whole.mu_macro)
-    names = ("mu_macro", "mu_ratio", "error_bound", "v_tilde", "y_tilde", "length_scale", "regime", "source")
+    names = (
+        "mu_macro",
+        "mu_ratio",
+        "error_bound",
+        "v_tilde",
+        "y_tilde",
+        "length_scale",
+        "regime",
+        "source",
+    )
     for i in range(n):
         case: Case = {name: float(values[i]) for name, values in columns.items()}
         one = table.evaluate(**case, gradient=True)
@@ -153,18 +186,29 @@ def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 300])
-def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(fine: Surrogate, n: int) -> None:
+def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(
+    fine: Surrogate, n: int
+) -> None:
     v0 = np.linspace(0.0, 0.02, n)
-    shapes: list[Callable[[float], Any]] = [lambda x: np.full(n, x), float, np.array, lambda x: np.array([[x]])]
+    shapes: list[Callable[[float], Any]] = [
+        lambda x: np.full(n, x),
+        float,
+        np.array,
+        lambda x: np.array([[x]]),
+    ]
     shapes += [lambda x: np.array([x])]
-    cases: list[Case] = [{**{name: shaped(x) for name, x in CASE.items()}, "v0": v0} for shaped in shapes]
+    cases: list[Case] = [
+        {**{name: shaped(x) for name, x in CASE.items()}, "v0": v0} for shaped in shapes
+    ]
     expected, *others = (fine.evaluate(**case).mu_macro for case in cases)
     assert all(np.array_equal(found.ravel(), expected) for found in others)
 
 
 @pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
 @pytest.mark.parametrize("shape", [(0,), (0, 3)])
-def test_empty_arrays_give_empty_answers(fine: Surrogate, shape: tuple[int, ...], asked: Case) -> None:
+def test_empty_arrays_give_empty_answers(
+    fine: Surrogate, shape: tuple[int, ...], asked: Case
+) -> None:
     for mu0 in (0.3, -0.3):
         found = fine.evaluate(**{**CASE, "mu0": mu0, "v0": np.empty(shape)}, **asked)
         assert found.mu_macro.shape == found.error_bound.shape == found.source.shape == shape
@@ -172,7 +216,7 @@ def test_empty_arrays_give_empty_answers(fine: Surrogate, shape: tuple[int, ...]
         fine.evaluate(**{**CASE, "mu0": -0.3, "v0": np.empty(shape)}, illegal="raise", **asked)
 
 
-# --- threads and xarray -------------------------------------------------------------------------------
+# --- threads and xarray ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.0, True, "2", 100_000])

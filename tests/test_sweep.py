@@ -1,4 +1,5 @@
-"""Many solves at once: the same numbers for any division of the work, resumed after a stop, and no missing points."""
+"""Many solves at once: the same numbers for any division of the work, resumed after a stop, and no
+missing points."""
 
 import math
 from pathlib import Path
@@ -70,7 +71,9 @@ def test_a_point_that_fails_is_named_with_advice(monkeypatch: pytest.MonkeyPatch
     assert str(caught.value) == f"2 of 3 points failed, first v~=0.2, y~=0.5: {ADVICE[NO_STICK]}"
 
 
-def test_finished_work_is_kept_and_taken_up_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_finished_work_is_kept_and_taken_up_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     v, y = points(50)
     folder = tmp_path / "work.checkpoint"
     with Sweep(1, checkpoint=folder) as sweep:
@@ -122,10 +125,13 @@ def test_the_digest_covers_sources_and_compiler(
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(source.read_bytes())
     assert list(copies.iterdir())
-    sources = [(copies if entry == (place, pattern) else entry[0], entry[1]) for entry in compiled.SOURCES]
+    sources = [
+        (copies if entry == (place, pattern) else entry[0], entry[1]) for entry in compiled.SOURCES
+    ]
     monkeypatch.setattr(compiled, "SOURCES", sources)
     assert digests == {compiled.source_digest()}  # wherever the sources stand
-    added = copies / "folder" / pattern.replace("*", "zz").replace("[ch]", "h")  # a module that moves is not lost
+    # a module that moves is not lost
+    added = copies / "folder" / pattern.replace("*", "zz").replace("[ch]", "h")
     added.parent.mkdir()
     for text in ("", "x = 1"):
         added.write_text(text)

@@ -1,4 +1,5 @@
-"""Bounds are tight: at the hardest points the worst error is a good part of its bound, which may not be halved."""
+"""Bounds are tight: at the hardest points the worst error is a good part of its bound, which may
+not be halved."""
 
 import functools
 import math
@@ -28,11 +29,12 @@ Ask = Callable[[Surrogate, Array, Array], Any]  # values and bounds
 table = tables(1e-7)
 
 
-# --- every operation of a coarse table against the finest, at the points of every kind ---------------------
+# --- every operation of a coarse table against the finest, at the points of every kind ------------
 
 
 def shares(ask: Ask, coarse: Any, n: int, kinds: Sequence[str] = KINDS) -> tuple[float, float]:
-    """The largest share of its bound that an error has, and the median of bound / error at random points.
+    """The largest share of its bound that an error has, and the median of bound / error at random
+    points.
 
     No error is larger than its bound; what the finest table leaves open itself is not counted.
     """
@@ -60,7 +62,10 @@ def slopes_of(name: str) -> Ask:
 def gradient(s: Surrogate, v: Array, y: Array) -> Any:
     answer = s.evaluate(**UNIT, y0=y, v0=v, gradient=True)
     inputs = {**UNIT, "y0": y, "v0": v}
-    return [[part[name] * x for name, x in inputs.items()] for part in (answer.gradient, answer.gradient_bound)]
+    return [
+        [part[name] * x for name, x in inputs.items()]
+        for part in (answer.gradient, answer.gradient_bound)
+    ]
 
 
 def settled(s: Surrogate, v: Array, y: Array) -> Any:
@@ -92,9 +97,12 @@ def test_a_bound_may_not_be_halved_and_is_never_missed(operation: str, coarse: f
     assert median <= widest
 
 
-@pytest.mark.parametrize("tolerance", [1e-4, *(pytest.param(x, marks=pytest.mark.slow) for x in (1e-7, 1e-10))])
+@pytest.mark.parametrize(
+    "tolerance", [1e-4, *(pytest.param(x, marks=pytest.mark.slow) for x in (1e-7, 1e-10))]
+)
 def test_a_ball_is_never_beyond_its_bounds_and_its_rules_err_as_stated(tolerance: float) -> None:
-    """Over all of the legal range, on a coarse table, and with its rules on the cells of the finest table."""
+    """Over all of the legal range, on a coarse table, and with its rules on the cells of the finest
+    table."""
     v, y = hard_points(3000, along=False, seed=11)
     truths, found = asked(opened(1e-12), v, y, "across", rules(1e-12)), {}
     for s in (opened(tolerance), Surrogate.open(1e-12)):
@@ -102,7 +110,9 @@ def test_a_ball_is_never_beyond_its_bounds_and_its_rules_err_as_stated(tolerance
         for name, (value, bound), (truth, left) in rows:
             error, slope = np.abs(value - truth), name.startswith("slope")
             assert slope or not np.isnan(value).any()
-            assert np.all((error <= (bound + left) * (1.0 + 1e-12)) | (slope & ~np.isfinite(error))), name
+            assert np.all(
+                (error <= (bound + left) * (1.0 + 1e-12)) | (slope & ~np.isfinite(error))
+            ), name
             share = np.where(bound > 1e-290, (error - left) / np.maximum(bound, 1e-290), 0.0)
             found[name] = float(np.nanmax(share))
     assert min(found[name] for name in BALL_NAMES) > (0.4 if tolerance > 1e-10 else 0.25)
@@ -115,7 +125,13 @@ def test_a_ball_is_never_beyond_its_bounds_and_its_rules_err_as_stated(tolerance
 @pytest.mark.parametrize("name", ["v0", "y0", "mu0"])
 def test_the_bound_of_the_standard_deviation_may_not_be_halved(client: Any, name: str) -> None:
     def ask(s: Surrogate, v: Array, y: Array) -> Any:
-        columns = {**UNIT, "y0": y.tolist(), "v0": v.tolist(), "include": ["std"], "std": {name: 1e-3}}
+        columns = {
+            **UNIT,
+            "y0": y.tolist(),
+            "v0": v.tolist(),
+            "include": ["std"],
+            "std": {name: 1e-3},
+        }
         reply = client.post("/v1/mu-macro/batch", json={**columns, "tolerance": s.tolerance})
         assert reply.status_code == 200, reply.text
         return [np.array(reply.json()[part], dtype=float) for part in ("std", "std_bound")]
@@ -125,8 +141,11 @@ def test_the_bound_of_the_standard_deviation_may_not_be_halved(client: Any, name
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", QUANTITY_NAMES)
-def test_the_worst_error_of_every_block_is_about_half_its_bound(table: Surrogate, sweep: Sweep, name: str) -> None:
-    """The builder doubles the largest error that it finds; a search at other points finds nearly as large ones."""
+def test_the_worst_error_of_every_block_is_about_half_its_bound(
+    table: Surrogate, sweep: Sweep, name: str
+) -> None:
+    """The builder doubles the largest error that it finds; a search at other points finds nearly as
+    large ones."""
     worst: dict[str, float] = {}
     for kind in KINDS:
         v, y = draw(kind, 4000, table, seed=77)
@@ -138,26 +157,33 @@ def test_the_worst_error_of_every_block_is_about_half_its_bound(table: Surrogate
         assert np.all(error <= bound)
         share = error / np.maximum(bound, 1e-300)
         for code in np.unique(source[~sliding] if name == "stick_fraction" else source):
-            worst[SOURCES[code]] = max(worst.get(SOURCES[code], 0.0), float(share[source == code].max()))
+            worst[SOURCES[code]] = max(
+                worst.get(SOURCES[code], 0.0), float(share[source == code].max())
+            )
     blocks = [worst[where] for where in NAMES if where in worst]
     assert min(blocks) > 0.3
     assert max(blocks) > 0.5
     assert name != "power" or worst["tail_fast"] > 0.5
 
 
-# --- the border and the regime -----------------------------------------------------------------------------
+# --- the border and the regime --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", QUANTITY_NAMES)
 @pytest.mark.parametrize("coarse", [1e-4, 1e-7, 1e-10])
-def test_bounds_of_slopes_hold_where_the_regime_is_uncertain_and_next_to_it(coarse: float, name: str) -> None:
-    """Of two tables one may say stick-slip and the other continuous sliding; of a root the slope is then unbounded."""
+def test_bounds_of_slopes_hold_where_the_regime_is_uncertain_and_next_to_it(
+    coarse: float, name: str
+) -> None:
+    """Of two tables one may say stick-slip and the other continuous sliding; of a root the slope is
+    then unbounded."""
     ours, fine = opened(coarse), opened(1e-12)
     rng, known_to = np.random.default_rng(5), ours.border.max_rel_error
     smooth = QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border
     for low, high in ((0.0, known_to), (known_to, 4.0 * known_to), (1e-13, 1e-2)):
         y = 10.0 ** rng.uniform(-4.0, 7.0, 20_000)
-        v = ours.v_tilde_crit(y) * (1.0 + rng.choice([-1.0, 1.0], y.size) * rng.uniform(low, high, y.size))
+        v = ours.v_tilde_crit(y) * (
+            1.0 + rng.choice([-1.0, 1.0], y.size) * rng.uniform(low, high, y.size)
+        )
         found, truth = (np.array(table.slopes(v, y, name, bounds=True)) for table in (ours, fine))
         assert np.all(np.abs(found[1:3] - truth[1:3]) <= found[3:] + truth[3:])
         assert not smooth or np.isfinite(found).all()
@@ -166,8 +192,11 @@ def test_bounds_of_slopes_hold_where_the_regime_is_uncertain_and_next_to_it(coar
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.1, 1.88), (1.88, 1e4)])
-def test_what_the_border_does_to_stick_is_well_bounded(table: Surrogate, sweep: Sweep, low: float, high: float) -> None:
-    """Between the border and the table's, where one says stick-slip and the other continuous sliding."""
+def test_what_the_border_does_to_stick_is_well_bounded(
+    table: Surrogate, sweep: Sweep, low: float, high: float
+) -> None:
+    """Between the border and the table's, where one says stick-slip and the other continuous
+    sliding."""
     y = np.geomspace(low, high, 2000)
     v = np.minimum(sweep.solve("border", np.ones_like(y), y)["deficit"], table.v_tilde_crit(y))
     found, bound = table.stick_fraction_with_bound(v, y)
@@ -176,26 +205,34 @@ def test_what_the_border_does_to_stick_is_well_bounded(table: Surrogate, sweep: 
 
 
 @pytest.mark.parametrize(("share", "certain"), [(0.9, False), (1.1, True)])
-def test_a_regime_is_uncertain_within_the_bound_of_the_border(table: Surrogate, share: float, certain: bool) -> None:
+def test_a_regime_is_uncertain_within_the_bound_of_the_border(
+    table: Surrogate, share: float, certain: bool
+) -> None:
     y = np.geomspace(1e-4, 1e6, 200)
     for side in (-share, share):
         v = table.v_tilde_crit(y) * (1.0 + side * table.border.max_rel_error)
         assert np.all(table.evaluate(**UNIT, y0=y, v0=v, groups=True).regime_certain == certain)
 
 
-# --- closed forms ------------------------------------------------------------------------------------------
+# --- closed forms ---------------------------------------------------------------------------------
 
 
 def slow_manifold(v: float, y: float) -> mpmath.mpf:
-    """mu~ of continuous sliding at large v~ in 24 digits: the angle lags by asin(its rate / speed), iterated.
+    """mu~ of continuous sliding at large v~ in 24 digits: the angle lags by asin(its rate / speed),
+    iterated.
 
-    At equal times of half a period; the angle is antiperiodic, its rate that of its trigonometric interpolant.
+    At equal times of half a period; the angle is antiperiodic, its rate that of its trigonometric
+    interpolant.
     """
     m = 2 * int(21.0 / math.asinh(v / y)) + 8
     with mpmath.workdps(24):
-        asin, atan, cos, sqrt = (np.frompyfunc(getattr(mpmath, name), 1, 1) for name in ("asin", "atan", "cos", "sqrt"))
+        asin, atan, cos, sqrt = (
+            np.frompyfunc(getattr(mpmath, name), 1, 1) for name in ("asin", "atan", "cos", "sqrt")
+        )
         row = [mpmath.mpf(0), *((-1) ** j * mpmath.csc(mpmath.pi * j / m) for j in range(1, m))]
-        rate_of = np.array([[row[i - j] if i >= j else -row[j - i] for j in range(m)] for i in range(m)])
+        rate_of = np.array(
+            [[row[i - j] if i >= j else -row[j - i] for j in range(m)] for i in range(m)]
+        )
         across = mpmath.mpf(y) * cos(mpmath.pi * np.arange(m) / m)
         speed, direction = sqrt(mpmath.mpf(v) ** 2 + across * across), atan(across / mpmath.mpf(v))
         angle, change = direction, 1.0
@@ -207,7 +244,8 @@ def slow_manifold(v: float, y: float) -> mpmath.mpf:
 
 @pytest.mark.slow
 def test_the_closed_form_for_large_speed_is_bounded_tightly(table: Surrogate) -> None:
-    """Where it takes over from the blocks: there it leaves out most, up to 6e-16 of mu~, as much as rounding."""
+    """Where it takes over from the blocks: there it leaves out most, up to 6e-16 of mu~, as much as
+    rounding."""
     y = np.geomspace(2.0, 1.2e4, 90)
     v = fast_from(table, y) * (1.0 + 1e-9)
     mu, bound, source = table.ratio_with_bound(v, y)
@@ -219,7 +257,8 @@ def test_the_closed_form_for_large_speed_is_bounded_tightly(table: Surrogate) ->
 
 
 def play(v: Any, a: Any) -> tuple[Any, Any, Any]:
-    """(mu~, share of stick, power) of u <- clip(u + dx, -1, 1), x = v tau + a sin tau, event by event over one period.
+    """(mu~, share of stick, power) of u <- clip(u + dx, -1, 1), x = v tau + a sin tau, event by
+    event over one period.
 
     In the digits of mpmath.  The period starts where the upper point turns back: there u = 1.
     """
@@ -234,7 +273,11 @@ def play(v: Any, a: Any) -> tuple[Any, Any, Any]:
         offset = x(tau) - u
         slips = (x(turn) - offset - limit) * limit >= 0
         crossed = functools.partial(lambda t, level: x(t) - level, level=offset + limit)
-        stop = mpmath.findroot(crossed, (tau, turn), solver="anderson", maxsteps=300, verify=False) if slips else turn
+        stop = (
+            mpmath.findroot(crossed, (tau, turn), solver="anderson", maxsteps=300, verify=False)
+            if slips
+            else turn
+        )
         mean += v * (stop**2 - tau**2) / 2 - a * (cos(stop) - cos(tau)) - offset * (stop - tau)
         work += v * (stop * sin(stop) - tau * sin(tau) + cos(stop) - cos(tau))
         work += a * (sin(stop) ** 2 - sin(tau) ** 2) / 2 - offset * (sin(stop) - sin(tau))
@@ -266,7 +309,10 @@ def test_closed_forms_of_six_inputs_are_bounded_tightly(table: Surrogate, form: 
     direction = form if form in ("along", "normal") else "across"
     kind: Any = direction
     for _ in range(700 if direction != "across" else 500):
-        mu0, Fz, omega, ratio = rng.uniform(0.1, 1.0), *10.0 ** rng.uniform((-2.0, 0.0, -2.0), (3.0, 5.0, 14.0))
+        mu0, Fz, omega, ratio = (
+            rng.uniform(0.1, 1.0),
+            *10.0 ** rng.uniform((-2.0, 0.0, -2.0), (3.0, 5.0, 14.0)),
+        )
         k, v0 = (math.inf, 0.01) if form == "rigid" else (10.0 ** rng.uniform(3.0, 8.0), 0.0)
         y0 = ratio * v0 / omega if form == "rigid" else mu0 * Fz / k * (1.0 - 0.01 / ratio)
         if direction != "across":
@@ -276,20 +322,28 @@ def test_closed_forms_of_six_inputs_are_bounded_tightly(table: Surrogate, form: 
                 y * 10.0 ** rng.uniform(-4, 0) * mu0 * Fz / k * omega,
             )
         six = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
-        given = {"Fz_amplitude" if name == "y0" and form == "normal" else name: x for name, x in six.items()}
+        given = {
+            "Fz_amplitude" if name == "y0" and form == "normal" else name: x
+            for name, x in six.items()
+        }
         found = table.evaluate(given, direction=kind)
         with mpmath.workdps(40):
-            worst = max(worst, float(abs(found.mu_macro - mu0 * exact(form, **six)) / found.error_bound))
+            worst = max(
+                worst, float(abs(found.mu_macro - mu0 * exact(form, **six)) / found.error_bound)
+            )
     assert (0.5 if direction == "across" else 0.3) < worst <= 1.0
 
 
-# --- roots, settling, standard deviations --------------------------------------------------------------------
+# --- roots, settling, standard deviations ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("unknown", ["v0", "y0"])
 @pytest.mark.parametrize("coarse", [1e-4, 1e-7])
-def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(coarse: float, unknown: str) -> None:
-    """The targets are true values where the table's errors are the largest shares of their bounds, seams included."""
+def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(
+    coarse: float, unknown: str
+) -> None:
+    """The targets are true values where the table's errors are the largest shares of their bounds,
+    seams included."""
     ours, fine, worst = opened(coarse), opened(1e-12), 0.0
     for kind in KINDS:
         v, y = draw(kind, 20_000, ours, seed=5)
@@ -309,19 +363,29 @@ def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(coarse: float, u
 
 
 def test_an_enclosure_that_ends_at_the_border_has_the_bound_of_the_other_side() -> None:
-    """mu~ of the table jumps there by more than the bound in stick-slip, and the true root lay in the jump."""
-    case, true = {**UNIT, "y0": 1.698960831811908}, 0.5521812858302085  # beyond the table's border, not the true one
-    ((root,),) = solve_for(opened(1e-4), "v0", float(opened(1e-12).evaluate(**case, v0=true).mu_macro), case).roots
+    """mu~ of the table jumps there by more than the bound in stick-slip, and the true root lay in
+    the jump."""
+    # beyond the table's border, not the true one
+    case, true = {**UNIT, "y0": 1.698960831811908}, 0.5521812858302085
+    ((root,),) = solve_for(
+        opened(1e-4), "v0", float(opened(1e-12).evaluate(**case, v0=true).mu_macro), case
+    ).roots
     assert root.regime == "stick_slip"
     assert root.low <= true <= root.high
 
 
-@pytest.mark.parametrize(("v", "y"), [(0.3, 0.3), (0.02, 0.3), (0.05, 1.2), (2.0, 30.0), (1e-5, 3.0)])
-def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(v: float, y: float) -> None:
+@pytest.mark.parametrize(
+    ("v", "y"), [(0.3, 0.3), (0.02, 0.3), (0.05, 1.2), (2.0, 30.0), (1e-5, 3.0)]
+)
+def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(
+    v: float, y: float
+) -> None:
     coarse = opened(1e-4)
     found = settling(coarse, **UNIT, y0=y, v0=v)
     less = 2.0 * math.pi * (v * coarse.ratio_with_bound(v, y)[1] + coarse.power_with_bound(v, y)[1])
-    assert found.error_bound == close(math.log(100.0) / (found.slip_path - less) - found.periods, rel=1e-9)
+    assert found.error_bound == close(
+        math.log(100.0) / (found.slip_path - less) - found.periods, rel=1e-9
+    )
 
 
 def test_the_standard_deviation_adds_the_inputs_in_squares(client: Any, case: Case) -> None:
@@ -329,12 +393,18 @@ def test_the_standard_deviation_adds_the_inputs_in_squares(client: Any, case: Ca
     each = {"mu0": 0.01, "Fz": 0.5, "k": 2e5, "y0": 3e-7, "omega": 2e3, "v0": 1e-3}
 
     def asked(std: Case) -> Any:
-        return client.post("/v1/mu-macro", json={**case, "include": ["std", "gradient"], "std": std}).json()
+        return client.post(
+            "/v1/mu-macro", json={**case, "include": ["std", "gradient"], "std": std}
+        ).json()
 
     alone, together = {name: asked({name: value}) for name, value in each.items()}, asked(each)
     for name, found in alone.items():
         assert found["std"] == close(abs(found["gradient"][name]) * each[name], rel=1e-14)
         assert found["std_bound"] == close(found["gradient_bound"][name] * each[name], rel=1e-14)
-        assert together["std_share"][name] == close((found["std"] / together["std"]) ** 2, rel=1e-13)
+        assert together["std_share"][name] == close(
+            (found["std"] / together["std"]) ** 2, rel=1e-13
+        )
     for part in ("std", "std_bound"):
-        assert together[part] == close(math.sqrt(sum(found[part] ** 2 for found in alone.values())), rel=1e-13)
+        assert together[part] == close(
+            math.sqrt(sum(found[part] ** 2 for found in alone.values())), rel=1e-13
+        )

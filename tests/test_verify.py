@@ -33,7 +33,9 @@ def damaged(block: str, factor: Any, key: str = "mu_ratio") -> Surrogate:
     return Surrogate(table, TABLE)
 
 
-def test_cases_are_legal_and_repeatable_and_reach_every_block_and_the_fast_tail(sound: Surrogate) -> None:
+def test_cases_are_legal_and_repeatable_and_reach_every_block_and_the_fast_tail(
+    sound: Surrogate,
+) -> None:
     reached: set[str] = set()
     for name in CASES:
         v, y = draw(name, 3000, sound, seed=0)
@@ -52,15 +54,21 @@ def test_the_builder_knows_every_quantity_of_the_kernel(sweep: Sweep) -> None:
     assert tuple(SOLVED) == QUANTITY_NAMES
     solved = sweep.solve("full", np.array([0.1, 2.0]), np.array([0.5, 0.5]))
     for name, about in SOLVED.items():
-        noise = solver_noise(name, np.array([0.1, 2.0]), np.array([0.5, 0.5]), solved, np.array([False, True]))
+        noise = solver_noise(
+            name, np.array([0.1, 2.0]), np.array([0.5, 0.5]), solved, np.array([False, True])
+        )
         assert np.all((noise > 0.0) & (noise < 1e-14))
-        assert not about.complement or np.all(np.abs(solved[about.complement] + solved[name] - 1.0) <= 3e-16)
+        assert not about.complement or np.all(
+            np.abs(solved[about.complement] + solved[name] - 1.0) <= 3e-16
+        )
 
 
-# --- the report -----------------------------------------------------------------------------------------
+# --- the report -----------------------------------------------------------------------------------
 
 
-def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(sound: Surrogate, sweep: Sweep) -> None:
+def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(
+    sound: Surrogate, sweep: Sweep
+) -> None:
     report = verify(sound, sweep, 1000, seed=3)
     assert report["points"] >= 1000
     assert 0.0 < report["max_abs_error"] <= sound.tolerance
@@ -71,7 +79,11 @@ def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(sound: Surrogate,
         assert report["points"] == sum(part["points"] for part in parts.values())
     assert report["slopes"].keys() == {*QUANTITY_NAMES}
     slopes = [(part, "max_abs_error") for part in report["slopes"].values()]
-    for part, error in ((report["power"], "max_rel_error"), (report["stick_fraction"], "max_abs_error"), *slopes):
+    for part, error in (
+        (report["power"], "max_rel_error"),
+        (report["stick_fraction"], "max_abs_error"),
+        *slopes,
+    ):
         assert part[error] > 0.0
         assert part[error] == max(source[error] for source in part["sources"].values())
         assert len(part["sources"]) > 8
@@ -81,10 +93,18 @@ def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(sound: Surrogate,
 
 @pytest.mark.parametrize(
     ("key", "block"),
-    [("mu_ratio", "continuous_mid_1"), ("mu_ratio", "corner"), ("power", "continuous_mid_2"),
-     ("power", "stick_slip_low"), ("stick_fraction", "corner"), ("stick_fraction", "stick_slip_high")],
-)  # fmt: skip
-def test_a_block_off_by_a_hundred_thousandth_is_found_and_named(sweep: Sweep, key: str, block: str) -> None:
+    [
+        ("mu_ratio", "continuous_mid_1"),
+        ("mu_ratio", "corner"),
+        ("power", "continuous_mid_2"),
+        ("power", "stick_slip_low"),
+        ("stick_fraction", "corner"),
+        ("stick_fraction", "stick_slip_high"),
+    ],
+)
+def test_a_block_off_by_a_hundred_thousandth_is_found_and_named(
+    sweep: Sweep, key: str, block: str
+) -> None:
     wrong = damaged(block, 1.0 + 1e-5, key)
     found = verify(wrong, sweep, 1000, seed=3)
     part = found.get(key, found)
@@ -98,16 +118,20 @@ def test_a_block_off_by_a_hundred_thousandth_is_found_and_named(sweep: Sweep, ke
         assert errors.cells[key][:, 1:].max() > 1e-6  # the slopes are wrong by the same factor
 
 
-# --- seams and monotony ---------------------------------------------------------------------------------
+# --- seams and monotony ---------------------------------------------------------------------------
 
 
 class Stepped:
     """A table whose ratio and slopes are larger by a thousandth beyond one line."""
 
-    def __init__(self, table: Surrogate, beyond: Callable[[Surrogate, Array, Array], Array]) -> None:
+    def __init__(
+        self, table: Surrogate, beyond: Callable[[Surrogate, Array, Array], Array]
+    ) -> None:
         self.v_tilde_crit = table.v_tilde_crit
         self.mu_ratio = lambda v, y: table.mu_ratio(v, y) * (1.0 + 1e-3 * beyond(table, v, y))
-        self.slopes = lambda v, y: [part + 1e-3 * beyond(table, v, y) for part in table.slopes(v, y)]
+        self.slopes = lambda v, y: [
+            part + 1e-3 * beyond(table, v, y) for part in table.slopes(v, y)
+        ]
 
 
 @pytest.mark.parametrize(
@@ -133,29 +157,38 @@ def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
     assert monotony(damaged("stick_slip_mid_2", 1.01), n=2000, lines=40) >= 1e-3
 
 
-# --- errors of blocks -----------------------------------------------------------------------------------
+# --- errors of blocks -----------------------------------------------------------------------------
 
 
-def test_the_errors_that_are_measured_are_those_that_the_table_states(sound: Surrogate, sweep: Sweep) -> None:
+def test_the_errors_that_are_measured_are_those_that_the_table_states(
+    sound: Surrogate, sweep: Sweep
+) -> None:
     found = block_errors(sound, sweep, 200, seed=1)
     for chart, block, errors in zip(CHARTS, sound.table.blocks, found, strict=True):
         assert errors.values.keys() == errors.cells.keys() == block.nodes.keys()
         for name in block.nodes:
             assert 0.0 < errors.values[name] <= block.errors[name][0], chart.name
-            assert np.all((errors.cells[name] >= 0.0) & (errors.cells[name] <= block.cell_errors[name])), chart.name
+            assert np.all(
+                (errors.cells[name] >= 0.0) & (errors.cells[name] <= block.cell_errors[name])
+            ), chart.name
         assert errors.absolute <= sound.tolerance
         assert errors.relative <= 10.0 * sound.tolerance
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10, 1e-12])
-def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(tolerance: float, sweep: Sweep) -> None:
-    """The power of the tail is what is left of y~ after its first order is subtracted: the solver's rounding is in it.
+def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(
+    tolerance: float, sweep: Sweep
+) -> None:
+    """The power of the tail is what is left of y~ after its first order is subtracted: the solver's
+    rounding is in it.
 
     Other processors round otherwise: draws of that rounding stand for them.
     """
     table, index = opened(tolerance), NAMES.index("continuous_tail")
     block = table.table.blocks[index]
-    _, _, exact, noise = solve_nodes(index, finer((block.a.size, block.b.size)), table.border, sweep)
+    _, _, exact, noise = solve_nodes(
+        index, finer((block.a.size, block.b.size)), table.border, sweep
+    )
     assert noise["power"].max() > 1e3 * noise["mu_ratio"].max() > 0.0
     c = chebyshev_coefficients(exact["power"])
     c[1, 8:] = c[2:] = 0.0  # all of it is rounding
@@ -170,7 +203,8 @@ def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(tol
 
 @pytest.mark.parametrize("block", ["continuous_low", "stick_slip_mid", "stick_slip_high"])
 def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, block: str) -> None:
-    """Every second node off by half the stated error: values stay within their bound, slopes do not."""
+    """Every second node off by half the stated error: values stay within their bound, slopes do
+    not."""
     table, index = read_table(TABLE), NAMES.index(block)
     part = table.blocks[index]
     values = part.nodes["mu_ratio"]
@@ -186,4 +220,6 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
 def test_an_error_along_one_edge_of_a_block_counts_whole(sweep: Sweep, block: str) -> None:
     table, index = read_table(TABLE), NAMES.index(block)
     table.blocks[index].nodes["mu_ratio"][:, -1] *= 1.0 + 1e-5
-    assert block_errors(Surrogate(table, TABLE), sweep, 200, seed=1)[index].values["mu_ratio"] > 5e-6
+    assert (
+        block_errors(Surrogate(table, TABLE), sweep, 200, seed=1)[index].values["mu_ratio"] > 5e-6
+    )

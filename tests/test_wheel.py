@@ -1,4 +1,5 @@
-"""The wheel in a separate environment, without the checkout and without a compiler: ``pip install mumacro``."""
+"""The wheel in a separate environment, without the checkout and without a compiler: ``pip install
+mumacro``."""
 
 import importlib.metadata
 import importlib.util
@@ -23,14 +24,19 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-PYTHONS = [line.rpartition(" ")[2] for line in PROJECT["project"]["classifiers"] if re.search(r":: 3\.\d+$", line)]
+PYTHONS = [
+    line.rpartition(" ")[2]
+    for line in PROJECT["project"]["classifiers"]
+    if re.search(r":: 3\.\d+$", line)
+]
 PLATFORMS = PROJECT["tool"]["mumacro"]["wheels"]
 CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
 CORE = ("numpy", "h5py", "cffi")
 
 
 class Installed:
-    """A virtual environment with the wheel and its dependencies; nothing else is on the PATH of its programs."""
+    """A virtual environment with the wheel and its dependencies; nothing else is on the PATH of its
+    programs."""
 
     def __init__(self, folder: Path, wheel: Path, python: str = sys.executable) -> None:
         self.folder = folder
@@ -43,11 +49,20 @@ class Installed:
         self.run("python", *pip, "-c", str(pins), str(wheel))
 
     def run(self, *words: Any, code: int = 0) -> Any:
-        kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
+        kept = {
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith(("PYTHON", "MUMACRO_"))
+        }
         done = subprocess.run(
-            [str(self.bin / words[0]), *words[1:]], cwd=self.folder, capture_output=True, text=True, timeout=600,
-            env={**kept, "PATH": str(self.bin)}, check=False,
-        )  # fmt: skip
+            [str(self.bin / words[0]), *words[1:]],
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
+            timeout=600,
+            env={**kept, "PATH": str(self.bin)},
+            check=False,
+        )
         assert done.returncode == code, done.stdout + done.stderr
         assert "Traceback" not in done.stderr
         return done.stdout if code == 0 else done.stderr
@@ -56,8 +71,16 @@ class Installed:
 def find_python(version: str) -> str:
     """A Python of that version, on the PATH or from pyenv; skips the test if there is none."""
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"), "versions")
-    for name in map(str, filter(None, (shutil.which(f"python{version}"), *pyenv.glob(f"{version}.*/bin/python")))):
-        if subprocess.run([name, "-c", "import venv, ensurepip"], capture_output=True, check=False).returncode == 0:
+    for name in map(
+        str,
+        filter(None, (shutil.which(f"python{version}"), *pyenv.glob(f"{version}.*/bin/python"))),
+    ):
+        if (
+            subprocess.run(
+                [name, "-c", "import venv, ensurepip"], capture_output=True, check=False
+            ).returncode
+            == 0
+        ):
             return name
     return pytest.skip(f"Python {version} is neither on the PATH nor in pyenv")
 
@@ -65,16 +88,27 @@ def find_python(version: str) -> str:
 def build(folder: Path, platform: str | None = None) -> Path:
     """The wheel for a platform, by zig; without a name, that which is published for this machine.
 
-    Where ``dev.py wheels`` has made it after the last change of what goes into it, that one; without zig, a wheel of
-    the compiler found here.
+    Where ``dev.py wheels`` has made it after the last change of what goes into it, that one;
+    without zig, a wheel of the compiler found here.
     """
     if platform is None:
         own = {*platform_tags()} if importlib.util.find_spec("ziglang") else set()
         platform = next((tags for tags in PLATFORMS if own & {*tags.split(".")}), "")
     places = (ROOT / name for name in ("mumacro", "builder", "service", "tables"))
-    files = [path for place in places for path in place.rglob("*") if path.suffix not in (".so", ".pyc", "")]
-    newest = max(path.stat().st_mtime for path in (*files, ROOT / "hatch_build.py", ROOT / "pyproject.toml"))
-    made = [path for path in ROOT.glob(f"dist/*-{platform}.whl") if platform and path.stat().st_mtime > newest]
+    files = [
+        path
+        for place in places
+        for path in place.rglob("*")
+        if path.suffix not in (".so", ".pyc", "")
+    ]
+    newest = max(
+        path.stat().st_mtime for path in (*files, ROOT / "hatch_build.py", ROOT / "pyproject.toml")
+    )
+    made = [
+        path
+        for path in ROOT.glob(f"dist/*-{platform}.whl")
+        if platform and path.stat().st_mtime > newest
+    ]
     if not made:
         env = {**os.environ, "MUMACRO_BUILD_PLATFORM": platform}
         command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
@@ -95,7 +129,9 @@ def installed(wheel: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @pytest.mark.parametrize("version", PYTHONS)
-def test_one_wheel_gives_every_python_the_same_bits(wheel: Any, installed: Any, tmp_path: Path, version: Any) -> None:
+def test_one_wheel_gives_every_python_the_same_bits(
+    wheel: Any, installed: Any, tmp_path: Path, version: Any
+) -> None:
     own = version == "{}.{}".format(*sys.version_info)
     python = installed if own else Installed(tmp_path, wheel, find_python(version))
     answer = json.loads(python.run("mumacro", CASE, "--json"))
@@ -104,12 +140,18 @@ def test_one_wheel_gives_every_python_the_same_bits(wheel: Any, installed: Any, 
     assert answer["table"]["id"] == Surrogate.open().id
 
 
-def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(wheel: Any, repository: Path) -> None:
+def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(
+    wheel: Any, repository: Path
+) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
-        (metadata,) = (archive.read(name).decode() for name in names if name.endswith(".dist-info/WHEEL"))
+        (metadata,) = (
+            archive.read(name).decode() for name in names if name.endswith(".dist-info/WHEEL")
+        )
     assert len([name for name in names if name.startswith("mumacro/_kernel.")]) == 1
-    sources = {f"mumacro/kernel/{path.name}" for path in (repository / "mumacro" / "kernel").iterdir()}
+    sources = {
+        f"mumacro/kernel/{path.name}" for path in (repository / "mumacro" / "kernel").iterdir()
+    }
     assert sources == {name for name in names if name.startswith("mumacro/kernel/")}
     assert "Root-Is-Purelib: false" in metadata
     tags = re.findall(r"^Tag: (.*)$", metadata, re.MULTILINE)
@@ -118,12 +160,23 @@ def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(whee
 
 
 @pytest.mark.parametrize("platform", [name for name in PLATFORMS if "linux" in name])
-def test_a_linux_wheel_asks_for_no_newer_system_and_calls_no_mathematics(tmp_path: Path, platform: Any) -> None:
+def test_a_linux_wheel_asks_for_no_newer_system_and_calls_no_mathematics(
+    tmp_path: Path, platform: Any
+) -> None:
     for package in ("ziglang", "auditwheel", "elftools"):
         pytest.importorskip(package, reason=f"the package {package} is not installed")
     wheel = build(tmp_path, platform)
     # an empty folder as the path of libraries: what this machine has must not count
-    command = [sys.executable, "-m", "auditwheel", "show", "--json", "--ldpaths", str(tmp_path), str(wheel)]
+    command = [
+        sys.executable,
+        "-m",
+        "auditwheel",
+        "show",
+        "--json",
+        "--ldpaths",
+        str(tmp_path),
+        str(wheel),
+    ]
     verdict = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
     system, *needs, processor = _parts(verdict["sym_tag"])
     promised_system, *promises, promised_processor = _parts(platform.partition(".")[0])
@@ -132,7 +185,9 @@ def test_a_linux_wheel_asks_for_no_newer_system_and_calls_no_mathematics(tmp_pat
     assert verdict["overall_tag"] == verdict["sym_tag"]
     elffile = importlib.import_module("elftools.elf.elffile")
     with zipfile.ZipFile(wheel) as archive:
-        found = elffile.ELFFile(io.BytesIO(archive.read("mumacro/_kernel.so"))).get_section_by_name(".dynsym")
+        found = elffile.ELFFile(io.BytesIO(archive.read("mumacro/_kernel.so"))).get_section_by_name(
+            ".dynsym"
+        )
     symbols = [(symbol.name, symbol["st_shndx"]) for symbol in found.iter_symbols() if symbol.name]
     harmless = {"memcmp", "memcpy", "memmove", "memset", "strlen"}
     assert {name for name, place in symbols if place == "SHN_UNDEF"} <= harmless
@@ -151,8 +206,14 @@ def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(inst
     assert [Path(path).parent for path in found["bundled"]] == [site / "mumacro" / "data"] * 4
     for name in ("service", "builder", "friction", "tables", "tests"):
         assert not (site / name).exists()
-    program = "import mumacro as f, importlib.metadata as m; print(f.__version__ == m.version('mumacro'), f.__file__)"
-    assert installed.run("python", "-c", program).split() == ["True", str(site / "mumacro" / "__init__.py")]
+    program = (
+        "import mumacro as f, importlib.metadata as m; print(f.__version__ == "
+        "m.version('mumacro'), f.__file__)"
+    )
+    assert installed.run("python", "-c", program).split() == [
+        "True",
+        str(site / "mumacro" / "__init__.py"),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -161,7 +222,9 @@ def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(inst
      ("python -m mumacro.service", "service"),
      ("python -m mumacro.builder solve --v 0.1 --y 0.5", "builder")],
 )  # fmt: skip
-def test_without_an_extra_one_line_says_what_to_install(installed: Any, words: Any, extra: Any) -> None:
+def test_without_an_extra_one_line_says_what_to_install(
+    installed: Any, words: Any, extra: Any
+) -> None:
     message = installed.run(*words.split(), code=1)
     assert len(message.splitlines()) == 1
     assert f"pip install 'mumacro[{extra}]'" in message

@@ -1,7 +1,8 @@
-"""``--format c``: the evaluation's own C sources and a table as C text, in one header or in three files.
+"""``--format c``: the evaluation's own C sources and a table as C text, in one header or in three
+files.
 
-The functions are those of ``mumacro/kernel``, joined into one text; nothing is translated.  Of other packages this
-module needs only what the library itself needs.
+The functions are those of ``mumacro/kernel``, joined into one text; nothing is translated.  Of
+other packages this module needs only what the library itself needs.
 """
 
 import importlib.util
@@ -37,16 +38,19 @@ extern const mumacro_export mumacro_table;
 
 """
 _STATIC = "#ifndef MUMACRO_API\n#define MUMACRO_API static inline\n#endif\n"
-# names of the kernel's own, which a program may have, too; members of structs that have such a name are public
+# names of the kernel's own, which a program may have, too; members of structs that have such a name
+# are public
 _PRIVATE = re.compile(r"\b(mu|MU)_(?!macro\b|ratio\b)(?=\w)")
 
 
 class ExportError(MumacroError):
-    """What cannot be exported, or not there; the message states why, a compiler's in its own words."""
+    """What cannot be exported, or not there; the message states why, a compiler's in its own
+    words."""
 
 
 def zig(target: str) -> list[str] | None:
-    """The command that compiles for a target of zig's; None where the package ziglang is not installed."""
+    """The command that compiles for a target of zig's; None where the package ziglang is not
+    installed."""
     found = importlib.util.find_spec("ziglang")
     return [sys.executable, "-m", "ziglang", "cc", "-target", target] if found else None
 
@@ -65,7 +69,8 @@ def compiled(texts: dict[str, str], command: list[str]) -> bytes:
 
 
 def header_text(table: Table) -> str:
-    """All of it in one header, whose functions are static: it may be included in several files of a program."""
+    """All of it in one header, whose functions are static: it may be included in several files of a
+    program."""
     kernel = joined("kernel.c", set()) + table_text(table, "static ") + _file("interface.c")
     private = _PRIVATE.sub(lambda found: f"mumacro_{found[1]}_", kernel)
     about = _BANNER.format("Declarations, the kernel, the table, the interface")
@@ -74,18 +79,26 @@ def header_text(table: Table) -> str:
 
 
 def files(table: Table) -> dict[str, str]:
-    """The texts of ``mumacro.h``, ``mumacro.c`` and ``mumacro_table.c``; the first two are the same for all tables."""
+    """The texts of ``mumacro.h``, ``mumacro.c`` and ``mumacro_table.c``; the first two are the same
+    for all tables."""
     seen: set[str] = set()
     return {
         "mumacro.h": _BANNER.format("What mumacro.c defines") + _file("mumacro.h"),
-        "mumacro.c": _BANNER.format("The evaluation") + '#include "mumacro.h"\n\n' + joined("kernel.c", seen)
-        + _DECLARED + _file("interface.c"),
-        "mumacro_table.c": _BANNER.format("The table") + joined("data.h", set()) + _DECLARED + table_text(table, ""),
-    }  # fmt: skip
+        "mumacro.c": _BANNER.format("The evaluation")
+        + '#include "mumacro.h"\n\n'
+        + joined("kernel.c", seen)
+        + _DECLARED
+        + _file("interface.c"),
+        "mumacro_table.c": _BANNER.format("The table")
+        + joined("data.h", set())
+        + _DECLARED
+        + table_text(table, ""),
+    }
 
 
 def write_c(table: Table, out: Path) -> list[Path]:
-    """Write one header where ``out`` ends in ``.h``, else three files into the folder ``out``; return the paths.
+    """Write one header where ``out`` ends in ``.h``, else three files into the folder ``out``;
+    return the paths.
 
     Raises
     ------
@@ -96,11 +109,15 @@ def write_c(table: Table, out: Path) -> list[Path]:
     """
     if out.suffix == ".h":
         if out.is_dir():
-            raise ExportError(f"{out} is a folder: name a folder without the suffix .h, or a header in it")
+            raise ExportError(
+                f"{out} is a folder: name a folder without the suffix .h, or a header in it"
+            )
         texts = {out: header_text(table)}
     else:
         if out.exists() and not out.is_dir():
-            raise ExportError(f"{out} is a file: name a folder for three files, or a header that ends in .h")
+            raise ExportError(
+                f"{out} is a file: name a folder for three files, or a header that ends in .h"
+            )
         out.mkdir(exist_ok=True)
         texts = {out / name: text for name, text in files(table).items()}
     for path, text in texts.items():
@@ -125,13 +142,18 @@ def _file(name: str) -> str:
     return (_KERNEL / name).read_text("ascii")
 
 
-# --- the table ------------------------------------------------------------------------------------------
+# --- the table ------------------------------------------------------------------------------------
 
 
 def table_text(table: Table, linkage: str) -> str:
     """The arrays of :class:`mumacro.library.Data` as constants, and ``mumacro_table``."""
     border, pieces = border_cells(table.border)
-    arrays = {"border": border, "pieces": pieces, "blocks": block_rows(table.blocks), "outer": outer_cells()}
+    arrays = {
+        "border": border,
+        "pieces": pieces,
+        "blocks": block_rows(table.blocks),
+        "outer": outer_cells(),
+    }
     rows = [f"{len(border)}, {_names('', arrays)}"]
     quantities = []
     for code, name in enumerate(charts.QUANTITY_NAMES):
@@ -139,8 +161,13 @@ def table_text(table: Table, linkage: str) -> str:
             quantities.append("{0, 0, NULL, NULL, NULL}")
             continue
         polynomials, errors, slope_errors = quantity_cells(table.blocks, code)
-        first = int(polynomials.any(axis=(1, 2)).argmax())  # the stick fraction is zero in continuous sliding
-        parts = {"cells": polynomials[first:], "errors": errors, "slope_errors": slope_errors[first:]}
+        # the stick fraction is zero in continuous sliding
+        first = int(polynomials.any(axis=(1, 2)).argmax())
+        parts = {
+            "cells": polynomials[first:],
+            "errors": errors,
+            "slope_errors": slope_errors[first:],
+        }
         arrays |= {f"{name}_{part}": array for part, array in parts.items()}
         quantities.append(f"{{{first}, {len(polynomials) - first}, {_names(f'{name}_', parts)}}}")
     rows.append("{" + ",\n      ".join(quantities) + "}")
@@ -149,13 +176,16 @@ def table_text(table: Table, linkage: str) -> str:
     for place, (points, errors) in enumerate(rules(float(about["tolerance"]))):
         arrays[f"rule_{place}"] = points
         numbers = ("{" + ",".join(map(_number, row)) + "}" for row in errors.tolist())
-        quadrature.append(f"{{{len(points)}, mumacro_table_rule_{place}, {{{', '.join(numbers)}}}}}")
+        quadrature.append(
+            f"{{{len(points)}, mumacro_table_rule_{place}, {{{', '.join(numbers)}}}}}"
+        )
     rows.append("{" + ",\n      ".join(quadrature) + "}")
     arrays["rule_driven"] = driven_rule()
     rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")
     text = f'{float(about["tolerance"])!r}, "{about["content_sha256"]}", "{__version__}"'
     whole = (
-        f"{linkage}const mumacro_export mumacro_table = {{\n    {{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"
+        f"{linkage}const mumacro_export mumacro_table = {{\n    "
+        f"{{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"
     )
     return "".join(_array(f"mumacro_table_{name}", array) for name, array in arrays.items()) + whole
 

@@ -1,4 +1,5 @@
-"""Two directives that let the interface describe itself: ``command-help`` and ``rest-reference``."""
+"""Two directives that let the interface describe itself: ``command-help`` and
+``rest-reference``."""
 
 from __future__ import annotations
 
@@ -23,7 +24,11 @@ def help_of(command: str) -> str:
     words = [*command.removeprefix("python -m ").split(), "--help"]
     main = importlib.import_module(f"{words[0]}.__main__").main
     text = io.StringIO()
-    with redirect_stdout(text), suppress(SystemExit), patch.dict("os.environ", {"COLUMNS": COLUMNS}):
+    with (
+        redirect_stdout(text),
+        suppress(SystemExit),
+        patch.dict("os.environ", {"COLUMNS": COLUMNS}),
+    ):
         main(words[1:])
     return text.getvalue()
 
@@ -45,7 +50,8 @@ class CommandHelp(SphinxDirective):
 
 
 class RestReference(SphinxDirective):
-    """Every operation of the service with its fields, from the description that it serves as /openapi.json."""
+    """Every operation of the service with its fields, from the description that it serves as
+    /openapi.json."""
 
     def run(self) -> list[nodes.Node]:
         from service.app import create_app
@@ -62,18 +68,31 @@ def _operations(description: dict[str, Any]) -> Iterator[str]:
     yield from _fields(schemas["Problem"], schemas, "problem")
     for path, methods in description["paths"].items():
         for method, operation in methods.items():
-            yield f"\n## {method.upper()} {path}\n\n{operation['summary']}. {operation.get('description', '')}\n"
-            fields = [(p["name"], p["schema"], p.get("required", False)) for p in operation.get("parameters", [])]
+            yield (
+                f"\n## {method.upper()} {path}\n\n{operation['summary']}. "
+                f"{operation.get('description', '')}\n"
+            )
+            fields = [
+                (p["name"], p["schema"], p.get("required", False))
+                for p in operation.get("parameters", [])
+            ]
             yield from _table("query", fields, schemas)
             body = operation.get("requestBody", {}).get("content", {})
             if body:
                 yield f"\nBody: {', '.join(f'`{kind}`' for kind in body)}\n"
-                yield from _fields(body.get("application/json", {}).get("schema", {}), schemas, "body")
+                yield from _fields(
+                    body.get("application/json", {}).get("schema", {}), schemas, "body"
+                )
             for status, response in operation["responses"].items():
                 content = response.get("content", {})
-                yield f"\n**{status}** {response['description']}: {', '.join(f'`{kind}`' for kind in content)}\n"
+                yield (
+                    f"\n**{status}** {response['description']}: "
+                    f"{', '.join(f'`{kind}`' for kind in content)}\n"
+                )
                 if status == "200":
-                    yield from _fields(content.get("application/json", {}).get("schema", {}), schemas, "answer")
+                    yield from _fields(
+                        content.get("application/json", {}).get("schema", {}), schemas, "answer"
+                    )
 
 
 def _resolved(schema: dict[str, Any], schemas: dict[str, Any]) -> list[dict[str, Any]]:
@@ -96,14 +115,18 @@ def _entries(found: dict[str, Any]) -> list[tuple[str, dict[str, Any], bool]]:
     return [(name, entry, name in required) for name, entry in found.get("properties", {}).items()]
 
 
-def _table(what: str, fields: list[tuple[str, dict[str, Any], bool]], schemas: dict[str, Any]) -> Iterator[str]:
+def _table(
+    what: str, fields: list[tuple[str, dict[str, Any], bool]], schemas: dict[str, Any]
+) -> Iterator[str]:
     if fields:
         yield f"\n| {what} | | |\n| --- | --- | --- |"
     for name, schema, required in fields:
         yield from _rows(name, schema, required, schemas)
 
 
-def _rows(name: str, schema: dict[str, Any], required: bool, schemas: dict[str, Any]) -> Iterator[str]:
+def _rows(
+    name: str, schema: dict[str, Any], required: bool, schemas: dict[str, Any]
+) -> Iterator[str]:
     """One field, then the fields within it: ``power.saved``, ``results[].target``."""
     options = _resolved(schema, schemas)
     kinds = " or ".join(dict.fromkeys(_kind(found, schemas) for found in options))
@@ -120,14 +143,21 @@ def _rows(name: str, schema: dict[str, Any], required: bool, schemas: dict[str, 
 
 def _kind(schema: dict[str, Any], schemas: dict[str, Any]) -> str:
     """Type and bounds in words."""
-    words = {"exclusiveMinimum": "> {:g}", "minimum": ">= {:g}", "maximum": "<= {:g}", "maxItems": "at most {}"}
+    words = {
+        "exclusiveMinimum": "> {:g}",
+        "minimum": ">= {:g}",
+        "maximum": "<= {:g}",
+        "maxItems": "at most {}",
+    }
     bounds = [text.format(schema[key]) for key, text in words.items() if key in schema]
     if "enum" in schema or "const" in schema:
         return ", ".join(f"`{value}`" for value in schema.get("enum", [schema.get("const")]))
     kind = str(schema.get("type", "any"))
     inner = schema.get("items") or schema.get("additionalProperties")
     if kind in ("array", "object") and isinstance(inner, dict):
-        kind = f"{kind} of {' or '.join(_kind(found, schemas) for found in _resolved(inner, schemas))}"
+        kind = (
+            f"{kind} of {' or '.join(_kind(found, schemas) for found in _resolved(inner, schemas))}"
+        )
     return " ".join([kind, *bounds])
 
 

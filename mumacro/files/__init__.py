@@ -1,6 +1,8 @@
-"""Files of cases, evaluated without a server: Parquet, CSV and NDJSON, in constant memory, resumable.  Needs pyarrow.
+"""Files of cases, evaluated without a server: Parquet, CSV and NDJSON, in constant memory,
+resumable.  Needs pyarrow.
 
-``answer`` takes one Arrow record batch and is all that other tools need; ``evaluate_files`` takes files.
+``answer`` takes one Arrow record batch and is all that other tools need; ``evaluate_files`` takes
+files.
 """
 
 from mumacro.files.answering import ANSWERS, REJECTS, FilesError, answer

@@ -20,7 +20,8 @@ columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [u
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
   for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N]
   other columns are copied; those of CSV and NDJSON stay text
-added: mu_macro, mu_ratio, regime, error_bound, source; for k_low and k_high also mu_macro_low and mu_macro_high
+added: mu_macro, mu_ratio, regime, error_bound, source; for k_low and k_high also mu_macro_low and
+  mu_macro_high
 rejected rows are in OUT.rejects.csv only: row (from 1), field, value, reason
 
 examples:
@@ -29,7 +30,8 @@ examples:
   mumacro eval - -o - < cases.csv > out.csv
 
 A stopped run goes on when the same command is given again; the output has the same bytes.
-exit codes: 0 every row evaluated, 3 some rows rejected, 1 could not run, 2 wrong arguments, 130 interrupted
+exit codes: 0 every row evaluated, 3 some rows rejected, 1 could not run, 2 wrong arguments,
+  130 interrupted
 """
 
 
@@ -45,27 +47,56 @@ def _spooled(folder: Path) -> Path:
 
 
 def main(words: Sequence[str]) -> int:
-    """Run ``mumacro eval``; return the exit code; what is wrong is an error for :func:`mumacro.command.run`."""
+    """Run ``mumacro eval``; return the exit code; what is wrong is an error for
+    :func:`mumacro.command.run`."""
     parser = OneLineParser(
         prog="mumacro eval",
-        description="Evaluate every case of Parquet, CSV or NDJSON files (text also compressed, .gz).",
+        description="Evaluate every case of Parquet, CSV or NDJSON files (text also compressed, "
+        ".gz).",
         epilog=_COLUMNS,
     )
-    parser.add_argument("cases", nargs="+", help="files, folders or patterns, all of one format; - is standard input")
-    parser.add_argument("-o", "--out", required=True, help="the file to write; its ending sets the format; - is output")
-    add_kind(parser)
-    parser.add_argument("--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table")
-    add_format(parser)
-    parser.add_argument("--rigid", action="store_true", help="there is no column k: all contacts are rigid")
     parser.add_argument(
-        "--include", choices=("gradient",), action="append", default=[], help="add d mu_macro / d input"
+        "cases",
+        nargs="+",
+        help="files, folders or patterns, all of one format; - is standard input",
     )
-    parser.add_argument("--force", action="store_true", help="replace an output, delete the parts of another run")
+    parser.add_argument(
+        "-o",
+        "--out",
+        required=True,
+        help="the file to write; its ending sets the format; - is output",
+    )
+    add_kind(parser)
+    parser.add_argument(
+        "--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table"
+    )
+    add_format(parser)
+    parser.add_argument(
+        "--rigid", action="store_true", help="there is no column k: all contacts are rigid"
+    )
+    parser.add_argument(
+        "--include",
+        choices=("gradient",),
+        action="append",
+        default=[],
+        help="add d mu_macro / d input",
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace an output, delete the parts of another run"
+    )
     chosen = parser.parse_intermixed_args(words)
     surrogate = open_table(chosen.table)
-    options = {name: getattr(chosen, name) for name in ("rigid", "include", "decimal", "contact", "direction", "force")}
+    options = {
+        name: getattr(chosen, name)
+        for name in ("rigid", "include", "decimal", "contact", "direction", "force")
+    }
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
-    bars = (BarColumn(), TaskProgressColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
+    bars = (
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.description}"),
+        TimeRemainingColumn(),
+    )
     # a bar on a terminal, and lines above it; elsewhere lines alone
     bar = Progress(*bars, console=console, disable=not console.is_terminal)
     task = bar.add_task("", total=1.0)
@@ -78,17 +109,26 @@ def main(words: Sequence[str]) -> int:
             cases = [_spooled(Path(folder)) if name == "-" else name for name in chosen.cases]
             out = chosen.out
             if out == "-":
-                out = f"{folder}/standard-output.{'ndjson' if find_files(cases)[1] == 'ndjson' else 'csv'}"
+                ending = "ndjson" if find_files(cases)[1] == "ndjson" else "csv"
+                out = f"{folder}/standard-output.{ending}"
             with bar:
                 done = evaluate_files(
-                    cases, out, surrogate, sep=SEPARATORS[chosen.sep], progress=progress,
-                    say=lambda text: console.print(f"mumacro eval: {text}"), **options,
-                )  # fmt: skip
+                    cases,
+                    out,
+                    surrogate,
+                    sep=SEPARATORS[chosen.sep],
+                    progress=progress,
+                    say=lambda text: console.print(f"mumacro eval: {text}"),
+                    **options,
+                )
             told = f"{done.answered:,} of {done.rows:,} rows evaluated with {surrogate.id}"
             if chosen.out == "-":
                 with done.out.open("rb") as stream:
                     shutil.copyfileobj(stream, sys.stdout.buffer)
-                sys.stderr.write((done.rejects.read_text("utf-8", "replace") if done.rejects else "") + f"{told}\n")
+                sys.stderr.write(
+                    (done.rejects.read_text("utf-8", "replace") if done.rejects else "")
+                    + f"{told}\n"
+                )
             else:
                 rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
                 resumed = f"; {done.resumed:,} were done already" if done.resumed else ""

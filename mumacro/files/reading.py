@@ -30,8 +30,9 @@ LONGEST = 64 * 2**20  # bytes of a line
 class Block(NamedTuple):
     """Some records in order; ``share`` is how much of the file is read after them.
 
-    A record that could not be read is a row of nulls; ``wrong`` has by its index the text and the fault.
-    ``texts`` are the records as they came in, where they are text: cells of CSV, lines of NDJSON.
+    A record that could not be read is a row of nulls; ``wrong`` has by its index the text and the
+    fault. ``texts`` are the records as they came in, where they are text: cells of CSV, lines of
+    NDJSON.
     """
 
     batch: pa.RecordBatch
@@ -48,14 +49,19 @@ def format_of(path: Path) -> tuple[str, bool]:
 
 
 def find_files(given: Sequence[str | Path]) -> tuple[list[Path], str]:
-    """The files that paths, folders and patterns name, in order, and their format; FilesError where there is no one."""
+    """The files that paths, folders and patterns name, in order, and their format; FilesError where
+    there is no one."""
     files: list[Path] = []
     for entry in given:
         path = Path(entry)
         pattern = f"{glob.escape(str(path))}/**/*" if path.is_dir() else str(path)
         found = [path] if path.is_file() else sorted(map(Path, glob.glob(pattern, recursive=True)))
         # in a folder, what begins with _ is metadata
-        fit = [p for p in found if p == path or not (p.name.startswith("_") or p.name.endswith(".rejects.csv"))]
+        fit = [
+            p
+            for p in found
+            if p == path or not (p.name.startswith("_") or p.name.endswith(".rejects.csv"))
+        ]
         files += (named := [p for p in fit if p.is_file() and format_of(p)[0]])
         if not named:
             raise FilesError(f"{entry}: no such file, or none that ends in {ENDINGS}")
@@ -83,7 +89,12 @@ class ParquetSource:
         """The blocks of a file behind the first ``skip`` rows, of the columns ``names``."""
         part, row = self.parts[file], 0
         scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
-        options = {"batch_size": ROWS, "batch_readahead": 1, "fragment_scan_options": scan, "use_threads": False}
+        options = {
+            "batch_size": ROWS,
+            "batch_readahead": 1,
+            "fragment_scan_options": scan,
+            "use_threads": False,
+        }
         try:
             for batch in part.to_batches(self.schema, columns=names, **options):
                 row += len(batch)
@@ -116,9 +127,10 @@ class _Lines:
 class TextSource:
     """CSV, RFC 4180 with a header, or without ``sep`` NDJSON, one object a line; both in UTF-8.
 
-    The columns of NDJSON are those of the first block of every file, and others are refused unless ``verbatim``: then
-    records come out as they came in.  ``head`` has the names as they came in.  FilesError where there is no header, or
-    headers differ, or the separator or decimal sign is another one; then the options to give are named.
+    The columns of NDJSON are those of the first block of every file, and others are refused unless
+    ``verbatim``: then records come out as they came in.  ``head`` has the names as they came in.
+    FilesError where there is no header, or headers differ, or the separator or decimal sign is
+    another one; then the options to give are named.
     """
 
     def __init__(self, files: Sequence[Path], sep: str, decimal: str, verbatim: bool) -> None:
@@ -126,11 +138,17 @@ class TextSource:
         if sep:
             heads = [_head(path, sep, decimal) for path in files]
             names = [[cell.strip("\ufeff \t") for cell in head] for head in heads]
-            if differ := [path for path, found in zip(files, names, strict=True) if found != names[0]]:
+            if differ := [
+                path for path, found in zip(files, names, strict=True) if found != names[0]
+            ]:
                 raise FilesError(f"{differ[0]}: its header differs from that of {files[0]}")
         else:
-            starts = (record for path in files for record in islice(self._records(_Lines(path)), ROWS))
-            heads = names = [[*dict.fromkeys(name for record in starts for name in _object(record)[0])]]
+            starts = (
+                record for path in files for record in islice(self._records(_Lines(path)), ROWS)
+            )
+            heads = names = [
+                [*dict.fromkeys(name for record in starts for name in _object(record)[0])]
+            ]
             if not names[0]:
                 raise FilesError(f"{files[0]}: holds no JSON object, one a line")
         self.head, self.schema = heads[0], pa.schema([(name, pa.string()) for name in names[0]])
@@ -143,7 +161,9 @@ class TextSource:
             where, skip = f"{lines.path}: rows {skip + 1} to {skip + len(texts)}", skip + len(texts)
             columns, faults = self._columns(texts, names, where)
             try:
-                batch = pa.RecordBatch.from_arrays([pa.array(columns[x], pa.string()) for x in names], [*names])
+                batch = pa.RecordBatch.from_arrays(
+                    [pa.array(columns[x], pa.string()) for x in names], [*names]
+                )
             except UnicodeEncodeError as error:
                 raise FilesError(f"{where}: no text in UTF-8 ({error.reason})") from None
             wrong = [(i, self._shown(texts[i]), why) for i, why in enumerate(faults) if why]
@@ -154,7 +174,8 @@ class TextSource:
         if not self.sep:
             yield from filter(None, map(bytes.strip, lines))
             return
-        texts = (line.decode("utf-8", "surrogateescape") for line in lines)  # bytes come out as they came in
+        # bytes come out as they came in
+        texts = (line.decode("utf-8", "surrogateescape") for line in lines)
         count = 0
         try:
             for row in islice(csv.reader(texts, delimiter=self.sep, strict=True), 1, None):
@@ -165,16 +186,23 @@ class TextSource:
             fault = f"a quote is not closed, or not at the end of its cell ({error})"
             raise FilesError(f"{lines.path}: row {count + 1}: {fault}") from None
 
-    def _columns(self, records: Any, names: Sequence[str], where: str) -> tuple[dict[str, Any], Sequence[str | None]]:
+    def _columns(
+        self, records: Any, names: Sequence[str], where: str
+    ) -> tuple[dict[str, Any], Sequence[str | None]]:
         """Values by column, and what is wrong with each record."""
         if self.sep:
             width = len(self.head)
-            faults = [None if len(x) == width else f"has {len(x)} cells, the header has {width}" for x in records]
+            faults = [
+                None if len(x) == width else f"has {len(x)} cells, the header has {width}"
+                for x in records
+            ]
             whole = (row if len(row) == width else [None] * width for row in records)
             return dict(zip(self.schema.names, zip(*whole, strict=True), strict=True)), faults
         objects, faults = zip(*map(_object, records), strict=True)
         if not self.verbatim and (new := {name for found in objects for name in found} - {*names}):
-            raise FilesError(f"{where}: {min(new)!r} is in no earlier row; name it in the first, or write NDJSON")
+            raise FilesError(
+                f"{where}: {min(new)!r} is in no earlier row; name it in the first, or write NDJSON"
+            )
         return {name: [_text(found.get(name)) for found in objects] for name in names}, faults
 
     def _shown(self, record: Any) -> str:
@@ -183,10 +211,16 @@ class TextSource:
 
 
 def _head(path: Path, sep: str, decimal: str) -> list[str]:
-    """The cells of the first line, after a look at the records behind it; a mark of byte order stays."""
+    """The cells of the first line, after a look at the records behind it; a mark of byte order
+    stays."""
     first, *rows = [*islice(_Lines(path), 51)] or [b""]
     try:
-        cells = read_head(first.decode("utf-8-sig"), [row.decode("utf-8", "replace") for row in rows], sep, decimal)
+        cells = read_head(
+            first.decode("utf-8-sig"),
+            [row.decode("utf-8", "replace") for row in rows],
+            sep,
+            decimal,
+        )
     except UnicodeDecodeError:
         raise FilesError(f"{path}: line 1 {NO_UTF8}") from None
     except ValueError as error:
@@ -207,7 +241,9 @@ def _object(text: bytes) -> tuple[dict[str, Any], str | None]:
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found := dict(pairs)) < len(pairs):
-        raise ValueError(f"repeats the key {Counter(name for name, _ in pairs).most_common(1)[0][0]!r}")
+        raise ValueError(
+            f"repeats the key {Counter(name for name, _ in pairs).most_common(1)[0][0]!r}"
+        )
     return found
 
 
@@ -222,6 +258,7 @@ def _text(value: Any) -> str | None:
     """A value as text: strings as they are, others as JSON."""
     if value is None or isinstance(value, str):
         return value
-    if isinstance(value, float):  # JSON has no infinity: too many digits must not pass for a rigid contact
+    # JSON has no infinity: too many digits must not pass for a rigid contact
+    if isinstance(value, float):
         return repr(value) if math.isfinite(value) else "1e999"
     return json.dumps(value)

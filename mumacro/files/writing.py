@@ -1,4 +1,5 @@
-"""Evaluated batches as pieces of a file: CSV, NDJSON, or Arrow streams, of which a Parquet file is made at the end."""
+"""Evaluated batches as pieces of a file: CSV, NDJSON, or Arrow streams, of which a Parquet file is
+made at the end."""
 
 import csv
 import gzip
@@ -21,9 +22,11 @@ def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
 
 
 class Output(NamedTuple):
-    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``packed`` (.gz) piece by piece.
+    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``packed`` (.gz) piece by
+    piece.
 
-    ``sep`` and ``decimal`` are those of CSV; in the column ``stiffness`` infinity is written as ``rigid``.
+    ``sep`` and ``decimal`` are those of CSV; in the column ``stiffness`` infinity is written as
+    ``rigid``.
     """
 
     kind: str
@@ -39,21 +42,38 @@ class Output(NamedTuple):
         return gzip.compress(data, 6, mtime=0) if self.packed else data
 
     def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes:
-        """Rows; where ``texts`` holds the records as they came in, the columns are put behind them."""
+        """Rows; where ``texts`` holds the records as they came in, the columns are put behind
+        them."""
         if self.kind == "parquet":
             sink = pa.BufferOutputStream()
             with pa.ipc.new_stream(sink, batch.schema) as writer:
                 writer.write_batch(batch)
             return bytes(sink.getvalue())
-        cells = [self._cells(name, column) for name, column in zip(batch.schema.names, batch.columns, strict=True)]
+        cells = [
+            self._cells(name, column)
+            for name, column in zip(batch.schema.names, batch.columns, strict=True)
+        ]
         rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
         if self.kind == "csv":
-            rows = rows if texts is None else ([*first, *row] for first, row in zip(texts, rows, strict=True))
+            rows = (
+                rows
+                if texts is None
+                else ([*first, *row] for first, row in zip(texts, rows, strict=True))
+            )
             return self.pack(csv_lines(rows, self.sep))
-        line = ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names) + "}\n"
+        line = (
+            ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names)
+            + "}\n"
+        )
         # a record without the brace that closes it
-        first = ["{"] * batch.num_rows if texts is None else [f"{text[:-1].decode().rstrip()}, " for text in texts]
-        return self.pack("".join(begun + line % row for begun, row in zip(first, rows, strict=True)))
+        first = (
+            ["{"] * batch.num_rows
+            if texts is None
+            else [f"{text[:-1].decode().rstrip()}, " for text in texts]
+        )
+        return self.pack(
+            "".join(begun + line % row for begun, row in zip(first, rows, strict=True))
+        )
 
     def _cells(self, name: str, column: pa.Array) -> list[str | None]:
         """A column as cells of text."""
@@ -66,21 +86,28 @@ class Output(NamedTuple):
         text = pc.cast(column, pa.string())
         if pa.types.is_floating(kind):
             rigid = ('"rigid"' if is_json else "rigid") if name == self.stiffness else None
-            text = pc.if_else(pc.is_finite(column), text, pc.if_else(pc.is_inf(column), rigid, None))
+            text = pc.if_else(
+                pc.is_finite(column), text, pc.if_else(pc.is_inf(column), rigid, None)
+            )
         if not is_json:
             is_real = pa.types.is_floating(kind) or pa.types.is_decimal(kind)
-            return list((pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist())
+            return list(
+                (pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist()
+            )
         if pa.types.is_primitive(kind) and not pa.types.is_temporal(kind):
             return list(pc.fill_null(text, "null").to_pylist())
         return [json.dumps(cell) for cell in text.to_pylist()]
 
     def whole(self, path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
-        """The file of all pieces; doubles in Parquet are written plainly, which is three times as fast."""
+        """The file of all pieces; doubles in Parquet are written plainly, which is three times as
+        fast."""
         if self.kind != "parquet":
             with path.open("wb") as stream:
                 stream.writelines(pieces)
             return
         coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
-        with pa.parquet.ParquetWriter(path, schema, use_dictionary=coded, compression="snappy") as writer:
+        with pa.parquet.ParquetWriter(
+            path, schema, use_dictionary=coded, compression="snappy"
+        ) as writer:
             for piece in pieces:
                 writer.write_table(pa.ipc.open_stream(piece).read_all())

@@ -14,8 +14,9 @@ class Root(NamedTuple):
     """One value of the unknown."""
 
     value: float  #: the unknown [SI]
-    #: between them, and on the root's side of the next turning point, mu_macro is within the surrogate's error bound of
-    #: the target: the true root cannot be distinguished from any of these values [SI]
+    #: between them, and on the root's side of the next turning point, mu_macro is within the
+    #: surrogate's error bound of the target: the true root cannot be distinguished from any of
+    #: these values [SI]
     low: float
     high: float
     mu_macro: float  #: the surrogate's value there [-]
@@ -45,16 +46,20 @@ class Solution:
 
     unknown: str  #: the input that was solved for
     targets: tuple[float, ...]  #: the wanted mu_macro [-]
-    roots: tuple[tuple[Root, ...], ...]  #: of each target, ascending; empty where it is not reachable
+    #: of each target, ascending; empty where it is not reachable
+    roots: tuple[tuple[Root, ...], ...]
     reach: Reach  #: what is reachable in the range that was searched
-    constant: bool  #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
-    #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and its highest value
+    #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
+    constant: bool
+    #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
+    #: its highest value
     ends: tuple["Solution", "Solution"] | None = None
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """A value of the swept input at which the regime changes, mu_macro there, and the regimes below and above."""
+    """A value of the swept input at which the regime changes, mu_macro there, and the regimes below
+    and above."""
 
     value: float
     mu_macro: float
@@ -62,7 +67,8 @@ class Crossing:
 
 
 def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
-    """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an infinite ``k`` is rigid.
+    """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an
+    infinite ``k`` is rigid.
 
     ``f`` [Hz] may stand for ``omega`` [rad/s], the word ``rigid`` for an infinite ``k``.
     """
@@ -70,9 +76,14 @@ def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> 
         raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")
     for name in ("k_range", *ENDS):
         if case.get(name) is not None:
-            told = "left out: over an interval of k a target has an interval of roots; solve for both ends of it"
+            told = (
+                "left out: over an interval of k a target has an interval of roots; solve for "
+                "both ends of it"
+            )
             raise InputError(name, case[name], told)
-    given = {name: value for name, value in case.items() if value is not None or name == "k" != without}
+    given = {
+        name: value for name, value in case.items() if value is not None or name == "k" != without
+    }
     for name in given.keys() & ({"omega", "f"} if without == "omega" else {without}):
         raise InputError(name, given[name], f"left out, because {without} is the unknown")
     given = kind.as_six({**given, without: 1.0})

@@ -1,9 +1,11 @@
-"""Where mu_macro, as a function of one input, reaches a level: bracketed Newton steps for many levels at once.
+"""Where mu_macro, as a function of one input, reaches a level: bracketed Newton steps for many
+levels at once.
 
-All levels of one problem lie on one curve, so the curve is sampled once; a search in the samples brackets every level,
-and Newton's method in the logarithm of the input, with the surrogate's gradient, does the rest.  A step that leaves its
-bracket, that has no finite slope (plateaus, the cusp of the static limit at y~ = 1) or that does not halve the last
-step is replaced by halving the bracket: by its geometric mean, so that any scale is reached.
+All levels of one problem lie on one curve, so the curve is sampled once; a search in the samples
+brackets every level, and Newton's method in the logarithm of the input, with the surrogate's
+gradient, does the rest.  A step that leaves its bracket, that has no finite slope (plateaus, the
+cusp of the static limit at y~ = 1) or that does not halve the last step is replaced by halving the
+bracket: by its geometric mean, so that any scale is reached.
 """
 
 import math
@@ -26,14 +28,20 @@ _MAX_SAMPLES = 20_001
 
 
 class Sweep:
-    """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite ``k`` is rigid."""
+    """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
+    ``k`` is rigid."""
 
-    def __init__(self, surrogate: Surrogate, case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> None:
+    def __init__(
+        self, surrogate: Surrogate, case: Mapping[str, Any], unknown: str, kind: Kind = SPRING
+    ) -> None:
         self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
 
     def answer(self, x: Any, **more: Any) -> Answer[Any]:
-        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in ``evaluate``."""
-        answer: Answer[Any] = self.surrogate.evaluate(**{**self.case, self.unknown: x, **self.kind.names, **more})
+        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in
+        ``evaluate``."""
+        answer: Answer[Any] = self.surrogate.evaluate(
+            **{**self.case, self.unknown: x, **self.kind.names, **more}
+        )
         return answer
 
     def mu(self, x: Array) -> Array:
@@ -41,7 +49,8 @@ class Sweep:
         return np.asarray(self.answer(x).mu_macro)
 
     def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
-        """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN at an edge."""
+        """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN
+        at an edge."""
         answer = self.answer(x, gradient=True)
         with np.errstate(over="ignore", invalid="ignore"):
             return answer, x * answer.gradient[self.unknown]  # type: ignore[index]
@@ -62,7 +71,8 @@ class Sweep:
 
 
 class Curve:
-    """A piece of a sweep on which mu_macro is monotone: samples ``x`` (m,), ascending, and ``mu`` (m,) there."""
+    """A piece of a sweep on which mu_macro is monotone: samples ``x`` (m,), ascending, and ``mu``
+    (m,) there."""
 
     def __init__(self, sweep: Sweep, x: Array, mu: Array) -> None:
         self.sweep, self.x, self.mu = sweep, x, mu
@@ -76,18 +86,26 @@ class Curve:
         return np.asarray((level >= low) & (level <= high))
 
     def end(self) -> float:
-        """Where the piece first has its last value: at its end, or where the plateau begins that ends it."""
+        """Where the piece first has its last value: at its end, or where the plateau begins that
+        ends it."""
         at = int(np.argmax(self.mu == self.mu[-1]))
         before, there = self.x[max(at - 1, 0) : at], self.x[at : at + 1]
-        return float(last_double(lambda x: self.sweep.mu(x) != self.mu[-1], before, there)[1][0] if at else there[0])
+        return float(
+            last_double(lambda x: self.sweep.mu(x) != self.mu[-1], before, there)[1][0]
+            if at
+            else there[0]
+        )
 
     def meet(self, level: Array, leave: ArrayLike = False) -> Array:
-        """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,) [SI].
+        """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,)
+        [SI].
 
         To a rounding error of mu_macro; an end of the piece where it never does.
         """
         going = np.broadcast_to(np.asarray(leave, dtype=np.bool_), level.shape)
-        first, beyond = (np.searchsorted(self._risen, self.sign * level, side) for side in ("left", "right"))
+        first, beyond = (
+            np.searchsorted(self._risen, self.sign * level, side) for side in ("left", "right")
+        )
         j = np.where(going, beyond, first)
         inside = np.flatnonzero((j > 0) & (j < self.x.size))
         out: Array = np.where(j == 0, self.x[0], self.x[-1])
@@ -117,8 +135,11 @@ class Curve:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 step = np.where(steep, -f / np.where(steep, slope, 1.0), np.inf)
                 wanted = at * np.exp(np.clip(step, -1.0e3, 1.0e3))
-                # less than the doubles are apart, though not met (the cusp of the static limit): its neighbour, then
-                wanted = np.where(wanted == at, np.nextafter(at, np.where(below, np.inf, 0.0)), wanted)
+                # less than the doubles are apart, though not met (the cusp of the static limit):
+                # its neighbour, then
+                wanted = np.where(
+                    wanted == at, np.nextafter(at, np.where(below, np.inf, 0.0)), wanted
+                )
                 good = (wanted > a[i]) & (wanted < b[i]) & (2.0 * np.abs(step) <= np.abs(last[i]))
                 x[i] = np.where(good, wanted, _middle(a[i], b[i]))
                 last[i] = np.where(good, step, np.log(x[i] / at))
@@ -138,37 +159,47 @@ def samples(low: float, high: float, per_decade: int) -> Array:
 
 
 def curves_between(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
-    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the whole range."""
+    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the
+    whole range."""
     at = np.array(edges)
     ends = sweep.mu(at)
     curves = []
     for i in range(at.size - 1):
         two = slice(i, i + 2)
-        inside = slice(np.searchsorted(x, at[i], side="right"), np.searchsorted(x, at[i + 1], side="left"))
+        inside = slice(
+            np.searchsorted(x, at[i], side="right"), np.searchsorted(x, at[i + 1], side="left")
+        )
         # next to a turning point a sample may lie beyond it by a rounding error
         between = np.clip(mu[inside], ends[two].min(), ends[two].max())
-        curves.append(Curve(sweep, np.insert(at[two], 1, x[inside]), np.insert(ends[two], 1, between)))
+        curves.append(
+            Curve(sweep, np.insert(at[two], 1, x[inside]), np.insert(ends[two], 1, between))
+        )
     return curves
 
 
 def _middle(a: Array, b: Array) -> Array:
-    """A double between ``a`` and ``b``, in the middle of their logarithms; ``a`` where they are neighbours."""
+    """A double between ``a`` and ``b``, in the middle of their logarithms; ``a`` where they are
+    neighbours."""
     middle = np.sqrt(np.maximum(a, TINY)) * np.sqrt(b)
     # the square roots of subnormal numbers keep fewer digits than the numbers have
     return np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
 
 
 def _ordered(x: ArrayLike) -> NDArray[np.int64]:
-    """Doubles >= 0 as integers of the same order.  Adding 0.0 turns -0.0, the smallest integer, into 0.0."""
+    """Doubles >= 0 as integers of the same order.  Adding 0.0 turns -0.0, the smallest integer,
+    into 0.0."""
     return (np.asarray(x, dtype=np.float64) + 0.0).view(np.int64)
 
 
-def last_double(below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike) -> tuple[Array, Array]:
+def last_double(
+    below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
+) -> tuple[Array, Array]:
     """Neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
 
-    For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like the integers
-    with the same bits, so this ends at two neighbours, whatever the scale.  ``below`` maps (n, m) values, row i for
-    bracket i, to bool; from true at ``low`` (n,) to false at ``high`` it changes once.
+    For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like
+    the integers with the same bits, so this ends at two neighbours, whatever the scale.  ``below``
+    maps (n, m) values, row i for bracket i, to bool; from true at ``low`` (n,) to false at ``high``
+    it changes once.
     """
     a, b = _ordered(low).copy(), _ordered(high).copy()
     rows = np.arange(a.size)
@@ -178,7 +209,10 @@ def last_double(below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
     while np.any(b - a > 1):
         step, rest = np.divmod(b - a, parts)
         cuts = a[:, None] + step[:, None] * inner + rest[:, None] * inner // parts
-        count = np.argmin(np.column_stack((below(cuts.view(np.float64)), np.zeros(a.size, dtype=np.bool_))), axis=1)
+        count = np.argmin(
+            np.column_stack((below(cuts.view(np.float64)), np.zeros(a.size, dtype=np.bool_))),
+            axis=1,
+        )
         ends: NDArray[np.int64] = np.column_stack((a, cuts, b))
         a, b = ends[rows, count], ends[rows, count + 1]
     return a.view(np.float64), b.view(np.float64)

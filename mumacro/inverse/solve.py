@@ -1,25 +1,30 @@
-"""The inverse problem: which value of one input gives a wanted mu_macro; and where a sweep of it crosses the border.
+"""The inverse problem: which value of one input gives a wanted mu_macro; and where a sweep of it
+crosses the border.
 
-What is known of mu_macro as a function of one input, the others constant, for an oscillation across:
+What is known of mu_macro as a function of one input, the others constant, for an oscillation
+across:
 
-=====  =====================================  ====================================================================
-input  course                                 roots
-=====  =====================================  ====================================================================
-v0     rises from the static limit to mu0     one; mu0 itself is not reached
-y0     falls from mu0 to 0                    one; 0 is not reached, unless v0 = 0
-omega  falls from mu0 to the static limit     one; the static limit is not reached
-k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0 above 9.72 it falls to a minimum at y~
-                                              from 4.1 to 6.4, rises to a maximum (at y~ = 0.115 r^2 for large r), and
-                                              falls again
+=====  =====================================
+==================================================================== input  course
+roots =====  =====================================
+==================================================================== v0     rises from the static
+limit to mu0     one; mu0 itself is not reached y0     falls from mu0 to 0                    one; 0
+is not reached, unless v0 = 0 omega  falls from mu0 to the static limit     one; the static limit is
+not reached k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0 above
+9.72 it falls to a minimum at y~
+                                              from 4.1 to 6.4, rises to a maximum (at y~ = 0.115 r^2
+                                              for large r), and falls again
 Fz     the same in 1/Fz                       the same
 mu0    rises: it would fold only where        one
        d ln mu~ / d ln y~ > 1 on a ray of
        constant r; it is 0.09 at the most
-=====  =====================================  ====================================================================
+=====  =====================================
+====================================================================
 
-The figures are of the tightest table, for one spring and r up to 1e8; a ball does the same, later and less.
-Along and normal every input has one root, and mu0 is reached: where the upper point never moves backwards, or the
-springs slide all the time.  There mu_macro falls with k and rises with Fz (along), and rises with both (normal).
+The figures are of the tightest table, for one spring and r up to 1e8; a ball does the same, later
+and less. Along and normal every input has one root, and mu0 is reached: where the upper point never
+moves backwards, or the springs slide all the time.  There mu_macro falls with k and rises with Fz
+(along), and rises with both (normal).
 
 How a level is found on a monotone piece: :mod:`mumacro.inverse.rootfinding`.
 """
@@ -45,22 +50,31 @@ from mumacro.surrogate import Surrogate
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # searched over all their values
 HUGE = 1.7976931348623157e308
 
-# A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.  At r = 10, three
-# percent above its onset, the fold is a sixth of a decade wide; the steep descent (y~ = 1 at large r) holds none.
-# Where mu_macro is monotone, samples only bracket roots, for Newton's method to finish.
+# A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.
+# At r = 10, three percent above its onset, the fold is a sixth of a decade wide; the steep descent
+# (y~ = 1 at large r) holds none. Where mu_macro is monotone, samples only bracket roots, for
+# Newton's method to finish.
 _PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
-# Direction -> y~, for normal v~/z, of a contact as soft and as stiff as it matters.  Across, mu~ = 1 - O(y~^2), along
-# 1 - O(y~); reverse slip may begin at y~ = 3/c^3, where the angle c = arccos(v~/y~) is 1e-8 or more.
+# Direction -> y~, for normal v~/z, of a contact as soft and as stiff as it matters.  Across, mu~ =
+# 1 - O(y~^2), along 1 - O(y~); reverse slip may begin at y~ = 3/c^3, where the angle c =
+# arccos(v~/y~) is 1e-8 or more.
 _ENDS = {"across": (1e-6, 1e8), "along": (1e-17, 1e30), "normal": (1e-17, 10.0)}
-# y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls strictly from 2 to 1/2
-# (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on either side.
+# y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls
+# strictly from 2 to 1/2 (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on
+# either side.
 _Y_CLOSEST = 1.290791
 
 
 def solve_for(
-    surrogate: Surrogate, unknown: str, targets: ArrayLike, case: Mapping[str, Any],
-    within: tuple[float, float] | None = None, *, contact: str = "spring", direction: str = "across",
-) -> Solution:  # fmt: skip
+    surrogate: Surrogate,
+    unknown: str,
+    targets: ArrayLike,
+    case: Mapping[str, Any],
+    within: tuple[float, float] | None = None,
+    *,
+    contact: str = "spring",
+    direction: str = "across",
+) -> Solution:
     """Every value of one input at which mu_macro has the wanted value.
 
     Parameters
@@ -71,11 +85,13 @@ def solve_for(
     targets : array_like
         Wanted mu_macro [-], >= 0, shape (n,) or a scalar.
     case : mapping
-        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand for ``omega``;
-        ``k_range``, lowest and highest stiffness, for ``k``: see :attr:`Solution.ends`.
+        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
+        for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: see
+        :attr:`Solution.ends`.
     within : (float, float), optional
-        Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for k, Fz and mu0 from
-        where the contact is so soft that it does not matter to where it is as good as rigid.
+        Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for
+        k, Fz and mu0 from where the contact is so soft that it does not matter to where it is as
+        good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
 
@@ -89,14 +105,22 @@ def solve_for(
     >>> import mumacro
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
     >>> found = solve_for(mumacro.open(), "y0", [0.15, 0.4], case)
-    >>> [[f"{root.value:.4e} m" for root in roots] for roots in found.roots]      # 0.4 is more than mu0
+    >>> [[f"{root.value:.4e} m" for root in roots] for roots in found.roots]  # 0.4 is above mu0
     [['2.8570e-06 m'], []]
     """
     kind = kind_of(contact, direction)
     case, interval = without_interval(case, unknown)
     if interval:
         softest, middle, stiffest = (
-            solve_for(surrogate, unknown, targets, {**case, "k": k}, within, contact=contact, direction=direction)
+            solve_for(
+                surrogate,
+                unknown,
+                targets,
+                {**case, "k": k},
+                within,
+                contact=contact,
+                direction=direction,
+            )
             for k in (interval["k_low"], case["k"], interval["k_high"])
         )
         return replace(middle, ends=(softest, stiffest))
@@ -104,7 +128,12 @@ def solve_for(
     wanted = np.asarray(targets, dtype=np.float64).ravel()
     bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
     if bad.size:
-        raise InputError("target", float(wanted[bad[0]]), "finite and >= 0", int(bad[0]) if np.ndim(targets) else None)
+        raise InputError(
+            "target",
+            float(wanted[bad[0]]),
+            "finite and >= 0",
+            int(bad[0]) if np.ndim(targets) else None,
+        )
     low, high = _default_range(sweep, wanted) if within is None else _checked_range(sweep, within)
     folds = unknown in ("k", "Fz") and direction == "across"
     x = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
@@ -113,8 +142,12 @@ def solve_for(
     turns = _turning_points(sweep, x, mu, noise) if folds else []
     curves = curves_between(sweep, [low, *turns, high], x, mu)
     if low == 0.0 and unknown != "v0" and abs(curves[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
-        # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other value
-        curves = [Curve(sweep, np.zeros(1), curves[0].mu[:1]), *curves_between(sweep, [TINY, high], x, mu)]
+        # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other
+        # value
+        curves = [
+            Curve(sweep, np.zeros(1), curves[0].mu[:1]),
+            *curves_between(sweep, [TINY, high], x, mu),
+        ]
     ends = np.concatenate([curve.mu[[0, -1]] for curve in curves])
     reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
     constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
@@ -122,18 +155,27 @@ def solve_for(
         reach = _without_limit(sweep, reach)
     levels = tuple(wanted.tolist())
     found = _roots(sweep, [] if constant else curves, wanted)
-    roots = (tuple(some) if reach.holds(level) else () for level, some in zip(levels, found, strict=True))
+    roots = (
+        tuple(some) if reach.holds(level) else () for level, some in zip(levels, found, strict=True)
+    )
     return Solution(unknown, levels, tuple(roots), reach, constant)
 
 
 def border_crossings(
-    surrogate: Surrogate, along: str, case: Mapping[str, Any], low: float, high: float, *,
-    contact: str = "spring", direction: str = "across",
-) -> tuple[Crossing, ...]:  # fmt: skip
-    """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends, ascending.
+    surrogate: Surrogate,
+    along: str,
+    case: Mapping[str, Any],
+    low: float,
+    high: float,
+    *,
+    contact: str = "spring",
+    direction: str = "across",
+) -> tuple[Crossing, ...]:
+    """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends,
+    ascending.
 
-    ``case`` holds the other five inputs.  Of continuous sliding none, one, or (across, over mu0, Fz or k) two places;
-    none for rigid contact (never any stick) and without oscillation.
+    ``case`` holds the other five inputs.  Of continuous sliding none, one, or (across, over mu0, Fz
+    or k) two places; none for rigid contact (never any stick) and without oscillation.
     """
     kind = kind_of(contact, direction)
     sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind)
@@ -146,7 +188,11 @@ def border_crossings(
     for regime in ("continuous", "reverse_slip"):
         state = sweep.answer(edges).regime == regime
         i = np.flatnonzero(state[1:] != state[:-1])
-        cuts = last_double(lambda x: (sweep.answer(x).regime == regime) == state[i, None], edges[i], edges[i + 1])  # noqa: B023
+
+        def before(x: Array, regime: str = regime, states: Array = state[i, None]) -> Array:
+            return (sweep.answer(x).regime == regime) == states
+
+        cuts = last_double(before, edges[i], edges[i + 1])
         found += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
     below, first = np.array(sorted(set(found))).reshape(-1, 2).T
     after = sweep.answer(first)
@@ -173,7 +219,8 @@ def _checked_range(sweep: Sweep, within: tuple[float, float]) -> tuple[float, fl
 
 
 def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
-    """Everywhere; or from a soft contact to a rigid one, to 1e-12 or so, and what the targets need beyond."""
+    """Everywhere; or from a soft contact to a rigid one, to 1e-12 or so, and what the targets need
+    beyond."""
     case, unknown, (least, most) = sweep.case, sweep.unknown, _legal(sweep)
     if unknown in EVERYWHERE:
         return least, most
@@ -185,18 +232,26 @@ def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
     direction = sweep.kind.names["direction"]
     soft, stiff = _ENDS[direction]
     if direction == "across" and case.get("k") != math.inf:
-        log_r = math.log(amplitude) + math.log(case["omega"]) - math.log(case["v0"]) if case["v0"] > 0.0 else 0.0
+        log_r = (
+            math.log(amplitude) + math.log(case["omega"]) - math.log(case["v0"])
+            if case["v0"] > 0.0
+            else 0.0
+        )
         r = math.exp(min(log_r, 230.0))
         stiff = max(stiff, stiff * r, 1e3 * r * r)
     low, high = sorted((_where(sweep, soft), _where(sweep, stiff)))
     if unknown == "mu0":  # mu_macro grows with it without limit
         wanted = targets[targets > 0.0]
-        low, high = 0.5 * float(wanted.min(initial=2.0 * low)), 2.0 * float(wanted.max(initial=0.5 * high))
+        low, high = (
+            0.5 * float(wanted.min(initial=2.0 * low)),
+            2.0 * float(wanted.max(initial=0.5 * high)),
+        )
     return max(low, 1e-300), min(high, 1e300)
 
 
 def _where(sweep: Sweep, place: float) -> float:
-    """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``place``, within double range; of a rigid contact any."""
+    """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``place``, within double range; of a
+    rigid contact any."""
     one = sweep.answer(1.0)
     at_one = float(one.v_tilde / one.y_tilde if sweep.kind.normal else one.y_tilde)
     scale = 1.0 if sweep.case.get("k") == math.inf else min(max(at_one, 1e-300), 1e300)
@@ -204,19 +259,24 @@ def _where(sweep: Sweep, place: float) -> float:
 
 
 def _without_limit(sweep: Sweep, reach: Reach) -> Reach:
-    """``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in general not reached."""
+    """``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in
+    general not reached."""
     if sweep.unknown == "v0":
         return replace(reach, max_included=sweep.kind.direction > 0)
     if sweep.unknown == AMPLITUDE:
         return reach
     vanishes = sweep.unknown == "y0" or sweep.case["k"] == math.inf
     # at rest friction takes its last value at y0 = l0, or at any frequency
-    return replace(reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=sweep.case["v0"] == 0.0)
+    return replace(
+        reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=sweep.case["v0"] == 0.0
+    )
 
 
 def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[float]:
-    """Where mu_macro over k or Fz has its minimum and maximum, ascending, from samples ``x``, ``mu`` (n,)."""
-    order = 1 if sweep.unknown == "k" else -1  # along k it falls, may rise by more than the noise, and falls again
+    """Where mu_macro over k or Fz has its minimum and maximum, ascending, from samples ``x``,
+    ``mu`` (n,)."""
+    # along k it falls, may rise by more than the noise, and falls again
+    order = 1 if sweep.unknown == "k" else -1
     falling = mu[::order]
     rise = falling - np.minimum.accumulate(falling)
     top = int(np.argmax(rise))
@@ -227,7 +287,9 @@ def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[flo
     sign = np.array([[-1.0], [1.0]])[::order]
     inside = (places > 0) & (places < x.size - 1)
     places, sign = places[inside], sign[inside]
-    _, turns = last_double(lambda at: ~(sign * sweep.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1])
+    _, turns = last_double(
+        lambda at: ~(sign * sweep.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1]
+    )
     return [*map(float, turns)]
 
 
@@ -239,7 +301,8 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
         if not which.size:
             continue
         wanted, start = targets[which], curve.x[0]
-        # a target equal to the value at an edge has its root there; just inside, rounding may hide it
+        # a target equal to the value at an edge has its root there; just inside, rounding may hide
+        # it
         value = np.where(wanted == curve.mu[0], start, curve.meet(wanted))
         last = wanted == curve.mu[-1]
         if last.any():
@@ -247,7 +310,9 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
         answer, slope = sweep.with_slope(value)
         low, high = _enclosures(sweep, curve, wanted, value, answer, slope)
         columns = (value, low, high, answer.mu_macro, answer.regime)
-        for i, root in zip(which.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True):
+        for i, root in zip(
+            which.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True
+        ):
             if not found[i] or root.value != found[i][-1].value:
                 found[i].append(root)
     return found
@@ -256,7 +321,8 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
 def _enclosures(
     sweep: Sweep, curve: Curve, wanted: Array, value: Array, answer: Answer[Any], slope: Array
 ) -> tuple[Array, Array]:
-    """Between which values mu_macro is within its error bound of the target: ``low`` and ``high`` of a root, (n,).
+    """Between which values mu_macro is within its error bound of the target: ``low`` and ``high``
+    of a root, (n,).
 
     ``answer`` and ``slope`` (d mu_macro / d ln x) are those at the root.
     """
@@ -264,13 +330,23 @@ def _enclosures(
     if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
         beside = np.minimum(np.nextafter(value, HUGE), curve.x[-1])
         bound = np.maximum(bound, sweep.answer(beside).error_bound)
-    bound = np.maximum(bound, 2.0**-50 * wanted)  # a root is found to rounding, even where mu_macro is exact
-    # an end may be a jump of mu_macro, at the border or a seam, with a larger bound beyond it: then that one counts
+    # a root is found to rounding, even where mu_macro is exact
+    bound = np.maximum(bound, 2.0**-50 * wanted)
+    # an end may be a jump of mu_macro, at the border or a seam, with a larger bound beyond it: then
+    # that one counts
     bounds, left = np.concatenate((bound, bound)), np.arange(2 * value.size)
-    ends, outwards, targets = np.empty(left.size), np.repeat([0.0, HUGE], value.size), np.concatenate((wanted, wanted))
+    ends, outwards, targets = (
+        np.empty(left.size),
+        np.repeat([0.0, HUGE], value.size),
+        np.concatenate((wanted, wanted)),
+    )
     while left.size:
-        ends[left] = _where_off(sweep, curve, left % value.size, left >= value.size, bounds[left], wanted, value, slope)
-        beyond = sweep.answer(np.clip(np.nextafter(ends[left], outwards[left]), curve.x[0], curve.x[-1]))
+        ends[left] = _where_off(
+            sweep, curve, left % value.size, left >= value.size, bounds[left], wanted, value, slope
+        )
+        beyond = sweep.answer(
+            np.clip(np.nextafter(ends[left], outwards[left]), curve.x[0], curve.x[-1])
+        )
         still = np.abs(beyond.mu_macro - targets[left]) < 0.97 * beyond.error_bound
         still &= beyond.error_bound > bounds[left]
         left = left[still]
@@ -279,7 +355,14 @@ def _enclosures(
 
 
 def _where_off(
-    sweep: Sweep, curve: Curve, i: Places, above: Bools, bound: Array, wanted: Array, value: Array, slope: Array
+    sweep: Sweep,
+    curve: Curve,
+    i: Places,
+    above: Bools,
+    bound: Array,
+    wanted: Array,
+    value: Array,
+    slope: Array,
 ) -> Array:
     """Where, above or below the roots ``i``, mu_macro is off its target by ``bound``, each (m,)."""
     sign = np.where(above, 1.0, -1.0)
@@ -288,7 +371,8 @@ def _where_off(
         step = bound / (curve.sign * slope[i])
         ends: Array = value[i] * np.exp(sign * step)
         straight = (ends > curve.x[0]) & (ends < curve.x[-1]) & (step > 0.0)
-    # most often the curve is straight over so short a way; where it is not, the levels are searched for
+    # most often the curve is straight over so short a way; where it is not, the levels are searched
+    # for
     tried = np.where(straight, ends, curve.x[0])
     straight &= np.abs(sweep.mu(tried) - levels) <= 0.01 * bound
     curved = np.flatnonzero(~straight)

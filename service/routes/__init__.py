@@ -1,7 +1,8 @@
-"""The endpoints.  Each is a function from a request to a response, and a record of what OpenAPI says of it.
+"""The endpoints.  Each is a function from a request to a response, and a record of what OpenAPI
+says of it.
 
-FastAPI describes them; requests reach them through a look-up (:class:`Routes`): FastAPI's layers take longer than an
-answer.  What is refused is raised, see :mod:`service.problems`.
+FastAPI describes them; requests reach them through a look-up (:class:`Routes`): FastAPI's layers
+take longer than an answer.  What is refused is raised, see :mod:`service.problems`.
 """
 
 import inspect
@@ -29,11 +30,20 @@ from ..tables import LoadedTable, Tables
 from ..wire.json import decode
 
 _JSON = "application/json"
-_TITLES = {code: "; ".join(kind.title for kind in Kind if kind.status == code) for code in {k.status for k in Kind}}
-_PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()  # of a query that needs no decoding
+_TITLES = {
+    code: "; ".join(kind.title for kind in Kind if kind.status == code)
+    for code in {k.status for k in Kind}
+}
+# of a query that needs no decoding
+_PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
-_ID = {"X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}}
-_RETRY = {"description": "Seconds after which to send the request again", "schema": {"type": "integer"}}
+_ID = {
+    "X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}
+}
+_RETRY = {
+    "description": "Seconds after which to send the request again",
+    "schema": {"type": "integer"},
+}
 _STD = frozenset(f"std_{name}" for name in NAMES)
 
 
@@ -48,10 +58,12 @@ class Endpoint:
     method: str  # GET answers HEAD, too
     answer: Answer  # its name is the operation's id
     summary: str = ""
-    form: type[BaseModel] | None = None  # what is asked: a body; of GET, and beside a ``request``, its query
+    # what is asked: a body; of GET, and beside a ``request``, its query
+    form: type[BaseModel] | None = None
     model: Any = None  # of the answer
     statuses: tuple[int, ...] = ()  # of the problems that it can give, beside those of its kind
-    content: Mapping[int | str, Any] = field(default_factory=dict)  # further descriptions of answers, by status
+    # further descriptions of answers, by status
+    content: Mapping[int | str, Any] = field(default_factory=dict)
     request: Mapping[str, Any] | None = None  # the description of a body that is no model
     tag: str = "answers"
     open: bool = False  # whether it needs no API key
@@ -64,27 +76,48 @@ class Endpoint:
             asked["body"] = Annotated[self.form, Body()]
         elif self.form is not None:
             asked["query"] = Annotated[query_of(self.form), Query()]
-        statuses = {*self.statuses, *(() if self.open else (401, 503)), *((400, 422) if self.form else ())}
+        statuses = {
+            *self.statuses,
+            *(() if self.open else (401, 503)),
+            *((400, 422) if self.form else ()),
+        }
         statuses |= {408, 413, 415} if post else set()
         responses: dict[int | str, dict[str, Any]] = {200: {}, **self.content}
-        responses |= {code: {"description": _TITLES[code], "content": _PROBLEM} for code in sorted(statuses)}
+        responses |= {
+            code: {"description": _TITLES[code], "content": _PROBLEM} for code in sorted(statuses)
+        }
         for code, response in responses.items():
-            headers = {**response.get("headers", {}), **_ID, **({"Retry-After": _RETRY} if code == 503 else {})}
+            headers = {
+                **response.get("headers", {}),
+                **_ID,
+                **({"Retry-After": _RETRY} if code == 503 else {}),
+            }
             responses[code] = {**response, "headers": headers}
 
         async def answer(request: Request, **_: Any) -> Response:
             return await self.answer(request)
 
         answer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=asked[name]) for name in asked]
+            [
+                inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=asked[name])
+                for name in asked
+            ]
         )
         app.add_api_route(
-            self.path, answer, methods=[self.method], summary=self.summary, operation_id=self.answer.__name__,
-            description=" ".join((self.answer.__doc__ or "").split()), tags=[self.tag], responses=responses,
-            response_model=self.model, response_class=JSONResponse if self.model else Response,
-            response_description="The answer", include_in_schema=bool(self.summary),
+            self.path,
+            answer,
+            methods=[self.method],
+            summary=self.summary,
+            operation_id=self.answer.__name__,
+            description=" ".join((self.answer.__doc__ or "").split()),
+            tags=[self.tag],
+            responses=responses,
+            response_model=self.model,
+            response_class=JSONResponse if self.model else Response,
+            response_description="The answer",
+            include_in_schema=bool(self.summary),
             openapi_extra={"requestBody": self.request} if self.request else None,
-        )  # fmt: skip
+        )
 
 
 class Routes(dict[str, dict[str, Answer]]):
@@ -103,10 +136,12 @@ class Routes(dict[str, dict[str, Answer]]):
         if method in methods:
             return methods[method]
         allowed = ", ".join(sorted(methods))
-        raise HTTPException(405, f"{method[:20]} is not allowed here; allowed: {allowed}", {"Allow": allowed})
+        raise HTTPException(
+            405, f"{method[:20]} is not allowed here; allowed: {allowed}", {"Allow": allowed}
+        )
 
 
-# --- requests -------------------------------------------------------------------------------------------
+# --- requests -------------------------------------------------------------------------------------
 
 
 class Asking(NamedTuple):
@@ -118,21 +153,36 @@ class Asking(NamedTuple):
     wanted: Wanted
 
     @classmethod
-    async def of(cls, request: Request, model: type[Options], wanted: str = "", one: bool = False) -> "Asking":
+    async def of(
+        cls, request: Request, model: type[Options], wanted: str = "", one: bool = False
+    ) -> "Asking":
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
-        given = await given_in_body(request) if request.scope["method"] == "POST" else given_in_query(request)
+        given = (
+            await given_in_body(request)
+            if request.scope["method"] == "POST"
+            else given_in_query(request)
+        )
         name = wanted and given.get(wanted, model.model_fields[wanted].default)
         return cls.made(request.app.tables, model, given, [name] if name in NAMES else [], one=one)
 
     @classmethod
     def made(
-        cls, tables: Tables, model: Any, given: Mapping[str, Any], left_out: Sequence[str] = (),
+        cls,
+        tables: Tables,
+        model: Any,
+        given: Mapping[str, Any],
+        left_out: Sequence[str] = (),
         one: bool = False,
-    ) -> "Asking":  # fmt: skip
-        """Check what is given; ``left_out`` are the inputs that are asked for, of which a null says the same."""
+    ) -> "Asking":
+        """Check what is given; ``left_out`` are the inputs that are asked for, of which a null says
+        the same."""
         form, rest, faults = options_of(model, given)
         if left_out:
-            rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
+            rest = {
+                name: value
+                for name, value in rest.items()
+                if value is not None or name not in left_out
+            }
         asked = asked_of(rest, form.kind if form is not None else kind_in(given))
         values, more = checked(rest, left_out, names_in(model)[1], asked)
         if form is None or more:
@@ -151,12 +201,18 @@ async def given_in_body(request: Request) -> dict[str, Any]:
         refuse([FieldFault((), "must be a JSON object", found)])
     if query := request.scope["query_string"]:
         pairs = _pairs(query)[:100]
-        refuse([FieldFault((name,), "belongs in the body", value, parameter=True) for name, value in pairs])
+        refuse(
+            [
+                FieldFault((name,), "belongs in the body", value, parameter=True)
+                for name, value in pairs
+            ]
+        )
     return found
 
 
 def given_in_query(request: Request) -> dict[str, Any]:
-    """The members of a query, as a body has them: numbers as numbers, ``std_mu0`` within ``std``."""
+    """The members of a query, as a body has them: numbers as numbers, ``std_mu0`` within
+    ``std``."""
     found: dict[str, Any] = {}
     names: list[str] = []
     twice: dict[str, None] = {}
@@ -180,7 +236,8 @@ def given_in_query(request: Request) -> dict[str, Any]:
 def _pairs(query: bytes) -> list[tuple[str, str]]:
     """Names and values of a query."""
     text = query.decode("latin-1")
-    if not query.translate(None, _PLAIN) and query.count(b"&") < 100:  # what urllib would take longer to find
+    # what urllib would take longer to find
+    if not query.translate(None, _PLAIN) and query.count(b"&") < 100:
         pairs = (pair.partition("=") for pair in text.split("&") if pair)
         return [(name, value) for name, _, value in pairs]
     try:
@@ -190,7 +247,8 @@ def _pairs(query: bytes) -> list[tuple[str, str]]:
 
 
 def _number(text: str) -> Any:
-    """A number where the text is one, else the text; an unescaped "+" of a query arrives as a space."""
+    """A number where the text is one, else the text; an unescaped "+" of a query arrives as a
+    space."""
     if text.strip("0123456789.eE+- ") == "":
         try:
             number = float(text.replace("e ", "e+").replace("E ", "E+"))
@@ -200,16 +258,24 @@ def _number(text: str) -> Any:
     return text
 
 
-# --- responses ------------------------------------------------------------------------------------------
+# --- responses ------------------------------------------------------------------------------------
 
 
 class Reply(Response):
-    """A complete answer; Starlette's own looks for what the headers may lack, which takes as long as a case."""
+    """A complete answer; Starlette's own looks for what the headers may lack, which takes as long
+    as a case."""
 
-    def __init__(self, content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> None:
+    def __init__(
+        self, content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON
+    ) -> None:
         self.status_code, self.body, self.background = 200, content, None
-        self.raw_headers = [(b"content-length", b"%d" % len(content)), (b"content-type", media_type.encode())]
-        self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in (headers or {}).items()]
+        self.raw_headers = [
+            (b"content-length", b"%d" % len(content)),
+            (b"content-type", media_type.encode()),
+        ]
+        self.raw_headers += [
+            (name.lower().encode(), value.encode()) for name, value in (headers or {}).items()
+        ]
 
     async def __call__(self, _scope: Scope, _receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
@@ -223,7 +289,8 @@ async def in_thread(request: Request, work: Callable[[], Response]) -> Response:
 
 
 def question(model: type[Options], wanted: str) -> Callable[[Callable[[Asking], Response]], Answer]:
-    """Makes the function of a question about the input that the option ``wanted`` names an endpoint's."""
+    """Makes the function of a question about the input that the option ``wanted`` names an
+    endpoint's."""
 
     def made(work: Callable[[Asking], Response]) -> Answer:
         @wraps(work)
@@ -244,7 +311,9 @@ class _File(FileResponse):
 
         async def send_checked(message: Message) -> None:
             if message.get("status") == 416:
-                raise HTTPException(416, f"the file has {size} bytes", {"Content-Range": f"bytes */{size}"})
+                raise HTTPException(
+                    416, f"the file has {size} bytes", {"Content-Range": f"bytes */{size}"}
+                )
             if message.get("status") == 400:
                 raise HTTPException(400, "Range must be such as bytes=0-99, first <= last")
             await send(message)
@@ -252,14 +321,20 @@ class _File(FileResponse):
         await super().__call__(scope, receive, send_checked)
 
 
-def file_answer(request: Request, path: Path, headers: Mapping[str, str], **options: Any) -> Response:
-    """A file, the part of it that Range requests, or 304 if the client has it already; OSError if it is gone.
+def file_answer(
+    request: Request, path: Path, headers: Mapping[str, str], **options: Any
+) -> Response:
+    """A file, the part of it that Range requests, or 304 if the client has it already; OSError if
+    it is gone.
 
     The ETag is that of the headers, or is made from the size and the modification time.
     """
     answer = _File(path, headers=headers, stat_result=path.stat(), **options)
     etag = answer.headers["etag"]
-    offered = [part.strip().removeprefix("W/") for part in request.headers.get("if-none-match", "").split(",")]
+    offered = [
+        part.strip().removeprefix("W/")
+        for part in request.headers.get("if-none-match", "").split(",")
+    ]
     if etag in offered or "*" in offered:
         return Response(status_code=304, headers={**headers, "ETag": etag})
     return answer

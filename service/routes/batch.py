@@ -1,8 +1,9 @@
-"""Many cases at once: ``POST /v1/mu-macro/batch``; the Content-Type gives the form, the answer has the same.
+"""Many cases at once: ``POST /v1/mu-macro/batch``; the Content-Type gives the form, the answer has
+the same.
 
-A body is read whole, evaluated and answered in slices.  A stream of lines is answered line by line while it arrives.
-A slot is taken when more than a small body, or a large computation, is at hand; for a stream at its first complete
-line.  Computing and reading happen in threads.
+A body is read whole, evaluated and answered in slices.  A stream of lines is answered line by line
+while it arrives. A slot is taken when more than a small body, or a large computation, is at hand;
+for a stream at its first complete line.  Computing and reading happen in threads.
 """
 
 import asyncio
@@ -55,7 +56,10 @@ class _Answer(Response):
                 self._query = given_in_query(self._request)
                 _, rest, faults = options_of(Options, self._query, parameter=True)
                 told = "is no option; inputs belong in the body"
-                if faults := [*faults, *(FieldFault((name,), told, parameter=True) for name in rest)]:
+                if faults := [
+                    *faults,
+                    *(FieldFault((name,), told, parameter=True) for name in rest),
+                ]:
                     refuse(faults)
                 form = form_of(self._given, FORMS)
                 await (self._stream if form.streams else self._whole)(form, receive, send)
@@ -69,7 +73,8 @@ class _Answer(Response):
             self._placed = True
 
     async def _run(self, work: Any, cost: float) -> Any:
-        """Do the work at once if it is small, else in a thread, so that it delays no other request."""
+        """Do the work at once if it is small, else in a thread, so that it delays no other
+        request."""
         if cost <= AT_ONCE:
             return work()
         self._place()
@@ -87,16 +92,22 @@ class _Answer(Response):
     def _both(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """What the query and the body give, each name once."""
         if twice := [name for name in given if name in self._query]:
-            refuse([FieldFault.of(name, "is given in the query and in the body", given[name]) for name in twice])
+            refuse(
+                [
+                    FieldFault.of(name, "is given in the query and in the body", given[name])
+                    for name in twice
+                ]
+            )
         return {**given, **self._query}
 
-    # --- bodies that are read whole -------------------------------------------------------------------
+    # --- bodies that are read whole ---------------------------------------------------------------
 
     async def _whole(self, form: Form, receive: Receive, send: Send) -> None:
         text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
         if not text:
             raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
-        # Reading costs by the byte, computing by the case: a small body can request much computation.
+        # Reading costs by the byte, computing by the case: a small body can request much
+        # computation.
         cost = len(text) / _BYTES_PER_UNIT
         columns, given = await self._run(lambda: form.read(text, self._most, self._query), cost)
         text = bytearray()  # freed, unless the columns are views of it
@@ -104,25 +115,35 @@ class _Answer(Response):
         cost += columns.size * batch.wanted.cost
         pieces = _gathered(form.write(batch))
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
-        headers = [(b"content-type", form.media_type.encode()), (b"x-table", batch.table.id.encode("latin-1"))]
+        headers = [
+            (b"content-type", form.media_type.encode()),
+            (b"x-table", batch.table.id.encode("latin-1")),
+        ]
         if following is None:
             headers.append((b"content-length", b"%d" % len(piece)))
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         while following is not None:
-            await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
+            await self._work.client(
+                send({"type": "http.response.body", "body": piece, "more_body": True})
+            )
             piece, following = following, await self._run(lambda: next(pieces, None), cost)
-        await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": False}))
+        await self._work.client(
+            send({"type": "http.response.body", "body": piece, "more_body": False})
+        )
 
-    # --- streams --------------------------------------------------------------------------------------
+    # --- streams ----------------------------------------------------------------------------------
 
     async def _stream(self, form: Form, receive: Receive, send: Send) -> None:
         """Answer each line as soon as it has arrived; memory does not grow with the stream."""
-        # A client that gives a length may send all of the body before it reads: the answer then comes after the body.
-        # A client that gives none may wait for the start of the answer before it sends more.
+        # A client that gives a length may send all of the body before it reads: the answer then
+        # comes after the body. A client that gives none may wait for the start of the answer before
+        # it sends more.
         more = b"content-length" not in self._given
         text = bytearray()
         if not more:
-            text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
+            text = await self._work.client(
+                read_body(self._given, receive, self._limit, self._place)
+            )
         self._app.tables.pick(self._query.get("tolerance"), parameter=True)
         head = [(b"content-type", form.media_type.encode()), (b"x-accel-buffering", b"no")]
         await send({"type": "http.response.start", "status": 200, "headers": head})
@@ -134,28 +155,41 @@ class _Answer(Response):
                 self._place()
                 lines = bytes(text[:cut]).split(b"\n")[:-1]
                 del text[:cut]
-                pieces = await self._run(lambda lines=lines, first=number: self._lines(form, lines, first), 1e9)
+                pieces = await self._run(
+                    lambda lines=lines, first=number: self._lines(form, lines, first), 1e9
+                )
                 number += len(lines)
                 for piece in pieces:
-                    await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
+                    await self._work.client(
+                        send({"type": "http.response.body", "body": piece, "more_body": True})
+                    )
             if not more:
                 break
             if len(text) > SMALL_BODY:
                 self._place()
             if len(text) > self._limit:
-                raise RequestError(Kind.BODY_TOO_LARGE, f"a line may have up to {self._limit} bytes")
+                raise RequestError(
+                    Kind.BODY_TOO_LARGE, f"a line may have up to {self._limit} bytes"
+                )
             more = await self._work.client(_next_line(receive, text))
-        await self._work.client(send({"type": "http.response.body", "body": b"", "more_body": False}))
+        await self._work.client(
+            send({"type": "http.response.body", "body": b"", "more_body": False})
+        )
 
     def _lines(self, form: Form, lines: list[bytes], first: int) -> list[bytes]:
         """The answers to some lines; blank ones are counted and have none."""
-        answers = (self._line(form, line, first + i + 1) for i, line in enumerate(lines) if line.strip())
+        answers = (
+            self._line(form, line, first + i + 1) for i, line in enumerate(lines) if line.strip()
+        )
         return list(_gathered(piece for answer in answers for piece in answer))
 
     def _line(self, form: Form, line: bytes, number: int) -> Iterator[bytes]:
-        """Answer one line: one case, or a block of columns or a list of rows as a batch of its own."""
+        """Answer one line: one case, or a block of columns or a list of rows as a batch of its
+        own."""
         try:
-            columns, given = form.read(bytearray(line), self._most, self._query) if b"[" in line else (None, {})
+            columns, given = (
+                form.read(bytearray(line), self._most, self._query) if b"[" in line else (None, {})
+            )
             if columns is not None and columns.listed:
                 yield from form.write(self._batch(columns, given))
             else:
@@ -176,7 +210,8 @@ class _Answer(Response):
 
 
 async def _next_line(receive: Receive, text: bytearray) -> bool:
-    """Add to the text until a line is complete, or the next piece is large; whether there is more."""
+    """Add to the text until a line is complete, or the next piece is large; whether there is
+    more."""
     while True:
         message = await receive()
         if message["type"] != "http.request":
@@ -200,18 +235,28 @@ def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
 
 
 async def post_mu_macro_batch(request: Request) -> Response:
-    """Answer in the form of the request, order kept.  A bad case has the result null and an entry in ``errors``.
+    """Answer in the form of the request, order kept.  A bad case has the result null and an entry
+    in ``errors``.
 
-    A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
+    A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of
+    rows, or one case.
     """
     return _Answer(request)
 
 
-_BODIES, _ANSWERS = ({form.media_type: getattr(form, part) for form in _FORMS} for part in ("body", "answer"))
+_BODIES, _ANSWERS = (
+    {form.media_type: getattr(form, part) for form in _FORMS} for part in ("body", "answer")
+)
 ENDPOINTS = [
     Endpoint(
-        "/v1/mu-macro/batch", "POST", post_mu_macro_batch, "Macroscopic friction of many cases", Options,
+        "/v1/mu-macro/batch",
+        "POST",
+        post_mu_macro_batch,
+        "Macroscopic friction of many cases",
+        Options,
         request={"required": True, "content": _BODIES},
-        content={200: {"description": "The answers, in the form of the request", "content": _ANSWERS}},
+        content={
+            200: {"description": "The answers, in the form of the request", "content": _ANSWERS}
+        },
     )
-]  # fmt: skip
+]

@@ -21,10 +21,14 @@ _LARGE = 100  # cost from which one case is computed in a thread, in times of a 
 class TextOptions(Options):
     """What is asked for one value as text."""
 
-    value: str = bounded("a name in the answer", "Such as mu_macro, regime or power.saved", "mu_macro")
+    value: str = bounded(
+        "a name in the answer", "Such as mu_macro, regime or power.saved", "mu_macro"
+    )
 
 
-async def _answered(request: Request, asking: type[Options] = Options) -> tuple[Any, dict[str, Any]]:
+async def _answered(
+    request: Request, asking: type[Options] = Options
+) -> tuple[Any, dict[str, Any]]:
     """The options and the answer."""
     table, form, case, wanted = await Asking.of(request, asking, one=True)
     app, told = request.app, MODEL in (form.include or ())
@@ -69,14 +73,33 @@ async def get_mu_macro_text(request: Request) -> Response:
 _KEPT = {"description": "How long, and by whom, it may be cached", "schema": {"type": "string"}}
 _CACHED = {"headers": {"Cache-Control": _KEPT}}
 _TEXT = {"content": {"text/plain": {"schema": {"type": "string"}}}, **_CACHED}
-TextRequest = model("TextRequest", "One case and the value that is wanted.", TextOptions, CaseRequest)
+TextRequest = model(
+    "TextRequest", "One case and the value that is wanted.", TextOptions, CaseRequest
+)
 ENDPOINTS = [
     Endpoint(
-        PATH, "GET", get_mu_macro, "Macroscopic friction of one case", CaseRequest, CaseAnswer, content={200: _CACHED}
+        PATH,
+        "GET",
+        get_mu_macro,
+        "Macroscopic friction of one case",
+        CaseRequest,
+        CaseAnswer,
+        content={200: _CACHED},
     ),
-    Endpoint(PATH, "POST", post_mu_macro, "Macroscopic friction of one case, as JSON", CaseRequest, CaseAnswer),
     Endpoint(
-        f"{PATH}.txt", "GET", get_mu_macro_text, "One value of one case, for spreadsheets (WEBSERVICE)", TextRequest,
+        PATH,
+        "POST",
+        post_mu_macro,
+        "Macroscopic friction of one case, as JSON",
+        CaseRequest,
+        CaseAnswer,
+    ),
+    Endpoint(
+        f"{PATH}.txt",
+        "GET",
+        get_mu_macro_text,
+        "One value of one case, for spreadsheets (WEBSERVICE)",
+        TextRequest,
         content={200: _TEXT},
     ),
-]  # fmt: skip
+]

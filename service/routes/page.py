@@ -1,4 +1,5 @@
-"""``/``: the page, a map of all cases with the user's point on it, and the friction law; ``/docs``: the description.
+"""``/``: the page, a map of all cases with the user's point on it, and the friction law; ``/docs``:
+the description.
 
 What is served from files holds no number of a table and loads nothing from elsewhere.
 """
@@ -20,27 +21,34 @@ _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _FRESH = {"Cache-Control": "no-cache"}
 # Inline styles are allowed at /docs: the interface sets some on its elements.
 _DOCS_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
+    "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
 
 def _file(path: Path, url: str = "", policy: str = "") -> Endpoint:
     """The endpoint of a file.  What is vendored changes with its version only."""
-    headers = {"Cache-Control": "public, max-age=86400"} if path.name.startswith("swagger-ui") else _FRESH
+    headers = (
+        {"Cache-Control": "public, max-age=86400"} if path.name.startswith("swagger-ui") else _FRESH
+    )
     if policy:
         headers = {"Content-Security-Policy": policy, "Referrer-Policy": "no-referrer", **headers}
 
     async def answer(request: Request) -> Response:
         return file_answer(request, path, headers, media_type=_TYPES[path.suffix])
 
-    return Endpoint(url or f"/static/{path.relative_to(STATIC).as_posix()}", "GET", answer, open=True)
+    return Endpoint(
+        url or f"/static/{path.relative_to(STATIC).as_posix()}", "GET", answer, open=True
+    )
 
 
 async def _names(request: Request) -> Response:
-    """The library's inputs, units and bounds, the geometries of a contact, and what this service can do."""
+    """The library's inputs, units and bounds, the geometries of a contact, and what this service
+    can do."""
     guide = ["guide"] if request.app.settings.guide is not None else []
-    return Reply(dump(names(["service", *CaseRequest.model_fields, "stiffness", "fit", *guide])), _FRESH)
+    return Reply(
+        dump(names(["service", *CaseRequest.model_fields, "stiffness", "fit", *guide])), _FRESH
+    )
 
 
 async def _map(request: Request) -> Response:
@@ -57,7 +65,8 @@ async def _description(request: Request) -> Response:
     return await in_thread(request, lambda: Reply(request.app.described))
 
 
-ASSETS, _VENDORED = ([*(STATIC / folder).glob("*.*s")] for folder in ("page", "swagger-ui"))  # .js, .css
+# .js, .css
+ASSETS, _VENDORED = ([*(STATIC / folder).glob("*.*s")] for folder in ("page", "swagger-ui"))
 ENDPOINTS = [
     _file(STATIC / "page" / "index.html", "/", POLICY),
     _file(STATIC / "swagger-ui" / "index.html", "/docs", _DOCS_POLICY),

@@ -1,4 +1,5 @@
-"""Questions about a range of one input: its friction law, ``/v1/law`` and ``/v1/law.csv``, and ``/v1/solve-for``."""
+"""Questions about a range of one input: its friction law, ``/v1/law`` and ``/v1/law.csv``, and
+``/v1/solve-for``."""
 
 import csv
 import io
@@ -13,7 +14,15 @@ from mumacro.contact import SPRING
 from mumacro.errors import InputError
 from mumacro.inputs import field_of, unit_of
 from mumacro.inverse import Solution, solve_for
-from mumacro.law import APPROXIMATIONS, BORDERS, Law, approximations, border_speeds, friction_law, sweep_values
+from mumacro.law import (
+    APPROXIMATIONS,
+    BORDERS,
+    Law,
+    approximations,
+    border_speeds,
+    friction_law,
+    sweep_values,
+)
 
 from ..answers import REGIME_NAMES, Part, answer_columns, nested
 from ..models import Answered, default, grouped, included, many, model, optional, told
@@ -21,27 +30,41 @@ from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded
 from ..wire.json import dump
 from . import Asking, Endpoint, Reply, question
 
-# --- friction law --------------------------------------------------------------------------------------
+# --- friction law ---------------------------------------------------------------------------------
 
 MAX_POINTS = 10_001
 # JSON has one kind of number: 55.0 is an integer there, and in a JSON Schema.
-_whole = BeforeValidator(lambda value: int(value) if isinstance(value, float) and value.is_integer() else value)
+_whole = BeforeValidator(
+    lambda value: int(value) if isinstance(value, float) and value.is_integer() else value
+)
 _Points = Annotated[int, Field(ge=2, le=MAX_POINTS), _whole]
 _APPROXIMATIONS, _SPEEDS = "approximations", "border_speeds"
 #: the columns that belong to a law beside those of its cases
 _STATIC = Part("mu_static", "-", "Static limit (v0 -> 0) of each case")
 _MORE = (
-    *(Part(f"{_APPROXIMATIONS}.{name}", "-", f"{text}; null: outside that") for name, text in APPROXIMATIONS.items()),
-    *(Part(f"{_SPEEDS}.{name}", "m/s", f"{text}; null: outside that") for name, text in BORDERS.items()),
+    *(
+        Part(f"{_APPROXIMATIONS}.{name}", "-", f"{text}; null: outside that")
+        for name, text in APPROXIMATIONS.items()
+    ),
+    *(
+        Part(f"{_SPEEDS}.{name}", "m/s", f"{text}; null: outside that")
+        for name, text in BORDERS.items()
+    ),
 )
-_more: Any = model("_LawInclude", "", include=includes(_APPROXIMATIONS, "those of the paper beside the exact values"))
+_more: Any = model(
+    "_LawInclude",
+    "",
+    include=includes(_APPROXIMATIONS, "those of the paper beside the exact values"),
+)
 
 
 class LawOptions(_more, Options):  # type: ignore[misc]
     """What is asked beside the five other inputs."""
 
     along: Name = bounded(f"one of {', '.join(NAMES)}", "The swept input", "v0")
-    start: NotNegative = bounded("finite and >= 0", "First value [SI]; > 0 on a logarithmic scale", examples=[1e-4])
+    start: NotNegative = bounded(
+        "finite and >= 0", "First value [SI]; > 0 on a logarithmic scale", examples=[1e-4]
+    )
     stop: Positive = bounded("finite and > 0", "Last value [SI], > start", examples=[10.0])
     points: _Points = bounded(f"a whole number from 2 to {MAX_POINTS}", "Number of values", 201)
     scale: Literal["log", "linear"] = bounded("log or linear", "Spacing of the values", "log")
@@ -49,7 +72,11 @@ class LawOptions(_more, Options):  # type: ignore[misc]
     @model_validator(mode="after")
     def _sensible(self) -> Self:
         if _APPROXIMATIONS in (self.include or ()) and self.kind != SPRING:
-            raise InputError("include", _APPROXIMATIONS, "without approximations: they are those of one spring, across")
+            raise InputError(
+                "include",
+                _APPROXIMATIONS,
+                "without approximations: they are those of one spring, across",
+            )
         return self
 
 
@@ -64,7 +91,9 @@ def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     answer[_STATIC.path], parts = law.mu_static, [*wanted.parts, _STATIC]
     if _APPROXIMATIONS in (form.include or ()):
         for group, made in ((_APPROXIMATIONS, approximations), (_SPEEDS, border_speeds)):
-            answer |= {f"{group}.{name}": column for name, column in made(table.surrogate, law).items()}
+            answer |= {
+                f"{group}.{name}": column for name, column in made(table.surrogate, law).items()
+            }
         parts += _MORE
     return law, {part: part.values(answer[part.path]) for part in parts}
 
@@ -82,7 +111,8 @@ def post_law(found: Asking) -> Response:
 
 @question(LawOptions, "along")
 def get_law_csv(found: Asking) -> Response:
-    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their units."""
+    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their
+    units."""
     law, columns = _law(found)
     along, per = found.form.along, field_of(found.form.along)[1]
     heads = {f"{along} [{unit_of(along)}]": (law.values / per).tolist()}
@@ -94,11 +124,14 @@ def get_law_csv(found: Asking) -> Response:
     writer = csv.writer(text)
     writer.writerow(heads)
     writer.writerows(zip(*heads.values(), strict=True))
-    headers = {"Content-Disposition": f'attachment; filename="friction-law-{along}.csv"', "Cache-Control": "no-cache"}
+    headers = {
+        "Content-Disposition": f'attachment; filename="friction-law-{along}.csv"',
+        "Cache-Control": "no-cache",
+    }
     return Reply(text.getvalue().encode(), headers, "text/csv; charset=utf-8; header=present")
 
 
-# --- inverse -------------------------------------------------------------------------------------------
+# --- inverse --------------------------------------------------------------------------------------
 
 MAX_TARGETS = 10_000
 _NO_LIMIT = 1e300
@@ -115,10 +148,14 @@ class SolveForOptions(Options):
         f"a number, finite and >= 0, or a list of 1 to {MAX_TARGETS} of them", "Wanted value [-]"
     )
     quantity: _Quantity = bounded(
-        "mu_macro or mu_ratio", "What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)", "mu_macro"
+        "mu_macro or mu_ratio",
+        "What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)",
+        "mu_macro",
     )
     range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = bounded(
-        "two numbers, finite and >= 0, ascending", "Where to search [SI]; left out: wherever it changes mu_macro", None
+        "two numbers, finite and >= 0, ascending",
+        "Where to search [SI]; left out: wherever it changes mu_macro",
+        None,
     )
 
     @model_validator(mode="after")
@@ -130,38 +167,56 @@ class SolveForOptions(Options):
 
 @question(SolveForOptions, "unknown")
 def post_solve_for(found: Asking) -> Response:
-    """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
+    """Return every root of every target.  A target out of reach has none; ``reachable`` is the
+    range of mu_macro."""
     (table, form, case, wanted), (name, per) = found, field_of(found.form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
     solution = solve_for(
-        table.surrogate, name, [x * unit for x in form.target], case, within, **wanted.asked.kind.names
+        table.surrogate,
+        name,
+        [x * unit for x in form.target],
+        case,
+        within,
+        **wanted.asked.kind.names,
     )
     answer = {"unknown": form.unknown, "unit": unit_of(form.unknown), "quantity": form.quantity}
     answer |= _results(form, solution, _included(found, name, solution), unit, per)
     if solution.ends:
         ks = case["k_low"], case["k_high"]
         answer["ends"] = [
-            {"k": k, **_results(form, end, None, unit, per)} for k, end in zip(ks, solution.ends, strict=True)
+            {"k": k, **_results(form, end, None, unit, per)}
+            for k, end in zip(ks, solution.ends, strict=True)
         ]
     return Reply(dump({**answer, **table.signature}))
 
 
 def _results(
-    form: SolveForOptions, solution: Solution, included: list[dict[str, Any]] | None, unit: float, per: float
+    form: SolveForOptions,
+    solution: Solution,
+    included: list[dict[str, Any]] | None,
+    unit: float,
+    per: float,
 ) -> dict[str, Any]:
     """The roots of every target, what was searched, and what is reachable there."""
     reach, more = solution.reach, itertools.repeat({}) if included is None else iter(included)
     results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
-        in_unit = [root._replace(value=root.value / per, low=root.low / per, high=root.high / per) for root in roots]
-        results.append({"target": target, "roots": [{**root._asdict(), **next(more)} for root in in_unit]})
+        in_unit = [
+            root._replace(value=root.value / per, low=root.low / per, high=root.high / per)
+            for root in roots
+        ]
+        results.append(
+            {"target": target, "roots": [{**root._asdict(), **next(more)} for root in in_unit]}
+        )
         if not roots:
             results[-1]["reason"] = _reason(form, target, solution, unit)
     reachable = {
-        "min": reach.mu_min / unit, "max": reach.mu_max / unit,
-        "min_included": reach.min_included, "max_included": reach.max_included,
-    }  # fmt: skip
+        "min": reach.mu_min / unit,
+        "max": reach.mu_max / unit,
+        "min_included": reach.min_included,
+        "max_included": reach.max_included,
+    }
     searched = [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per]
     return {"results": results, "range": searched, "reachable": reachable}
 
@@ -182,66 +237,117 @@ def _reason(form: SolveForOptions, target: float, solution: Solution, unit: floa
     reach = solution.reach
     low, high = reach.mu_min / unit, reach.mu_max / unit
     if solution.constant:
-        return f"{form.unknown} has no influence here: {form.quantity} is {low!r} for every value in the range"
+        return (
+            f"{form.unknown} has no influence here: {form.quantity} is {low!r} for every value "
+            "in the range"
+        )
     left, right = "[" if reach.min_included else "(", "]" if reach.max_included else ")"
     return f"{target!r} is not in the reachable range {left}{low!r}, {high!r}{right}"
 
 
-# --- models --------------------------------------------------------------------------------------------
+# --- models ---------------------------------------------------------------------------------------
 
 _EXAMPLE = {**example, "along": "v0", "start": 1e-4, "stop": 10.0, "points": 5}
 del _EXAMPLE["v0"]
-LawRequest = model("LawRequest", "mu_macro over a range of one input.", LawOptions, Five, example=_EXAMPLE)
+LawRequest = model(
+    "LawRequest", "mu_macro over a range of one input.", LawOptions, Five, example=_EXAMPLE
+)
 BorderMark = model(
-    "BorderMark", "Where continuous sliding begins or ends.", value=told(float, "The swept input [SI]"),
+    "BorderMark",
+    "Where continuous sliding begins or ends.",
+    value=told(float, "The swept input [SI]"),
     mu_macro=told(float, "[-]"),
-)  # fmt: skip
+)
 LawAnswer = model(
-    "LawAnswer", "A friction law in columns.", Answered,
-    along=Name, unit=str, values=told(list[float], "The swept input [SI]"),
-    **default(True), **included(True), **grouped(_MORE, True, "Beside the exact values"),
-    mu_static=told(list[float], _STATIC.described), border=told(many(BorderMark), "Up to two points inside the range"),
-)  # fmt: skip
+    "LawAnswer",
+    "A friction law in columns.",
+    Answered,
+    along=Name,
+    unit=str,
+    values=told(list[float], "The swept input [SI]"),
+    **default(True),
+    **included(True),
+    **grouped(_MORE, True, "Beside the exact values"),
+    mu_static=told(list[float], _STATIC.described),
+    border=told(many(BorderMark), "Up to two points inside the range"),
+)
 _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
 _INVERSE = {**example, "unknown": "y0", "target": 0.15}
 del _INVERSE["y0"]
 SolveForRequest = model(
-    "SolveForRequest", "Which value of one input gives a wanted mu_macro.", SolveForOptions, Five, example=_INVERSE,
-    target=told(NotNegative | _Targets, f"Wanted value [-], finite and >= 0: one, or a list of up to {MAX_TARGETS}"),
-)  # fmt: skip
+    "SolveForRequest",
+    "Which value of one input gives a wanted mu_macro.",
+    SolveForOptions,
+    Five,
+    example=_INVERSE,
+    target=told(
+        NotNegative | _Targets,
+        f"Wanted value [-], finite and >= 0: one, or a list of up to {MAX_TARGETS}",
+    ),
+)
 Root = model(
-    "Root", "One value of the unknown, and the answer there.", value=told(float, "The unknown [SI]"),
+    "Root",
+    "One value of the unknown, and the answer there.",
+    value=told(float, "The unknown [SI]"),
     low=told(float, "From low ..."),
     high=told(float, "... to high, mu_macro is the target within the table's error bound"),
-    mu_macro=told(float, "Value of the table there [-]"), regime=Literal[tuple(dict.fromkeys(REGIME_NAMES))],
+    mu_macro=told(float, "Value of the table there [-]"),
+    regime=Literal[tuple(dict.fromkeys(REGIME_NAMES))],
     **included(False),
-)  # fmt: skip
+)
 TargetAnswer = model(
-    "TargetAnswer", "All values that give one target.", target=float,
+    "TargetAnswer",
+    "All values that give one target.",
+    target=float,
     roots=told(many(Root), "Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)"),
     reason=optional(str, "Why there is no root"),
-)  # fmt: skip
+)
 Reachable = model(
-    "Reachable", "Range of mu_macro for all values of the unknown in its range.", min=float, max=float,
-    min_included=told(bool, "false: approached, never reached"), max_included=bool,
-)  # fmt: skip
+    "Reachable",
+    "Range of mu_macro for all values of the unknown in its range.",
+    min=float,
+    max=float,
+    min_included=told(bool, "false: approached, never reached"),
+    max_included=bool,
+)
 _solved: dict[str, Any] = {
     "results": told(many(TargetAnswer), "One per target, in order"),
-    "range": told(list[float | None], "The searched range [SI]; null: without limit"), "reachable": Reachable,
-}  # fmt: skip
-SolveForEnd = model("SolveForEnd", "The same for one end of an interval of k.", k=told(float, "[N/m]"), **_solved)
+    "range": told(list[float | None], "The searched range [SI]; null: without limit"),
+    "reachable": Reachable,
+}
+SolveForEnd = model(
+    "SolveForEnd", "The same for one end of an interval of k.", k=told(float, "[N/m]"), **_solved
+)
 SolveForAnswer = model(
-    "SolveForAnswer", "Answer to the inverse problem.", Answered, unknown=Name, unit=str, quantity=_Quantity,
-    **_solved, ends=optional(many(SolveForEnd), "Only with k_range: for k_low and k_high; the rest is for the middle"),
-)  # fmt: skip
+    "SolveForAnswer",
+    "Answer to the inverse problem.",
+    Answered,
+    unknown=Name,
+    unit=str,
+    quantity=_Quantity,
+    **_solved,
+    ends=optional(
+        many(SolveForEnd), "Only with k_range: for k_low and k_high; the rest is for the middle"
+    ),
+)
 ENDPOINTS = [
-    Endpoint("/v1/law", "POST", post_law, "mu_macro over a range of one input", LawRequest, LawAnswer),
     Endpoint(
-        "/v1/law.csv", "GET", get_law_csv, "mu_macro over a range of one input, as a table", LawRequest,
+        "/v1/law", "POST", post_law, "mu_macro over a range of one input", LawRequest, LawAnswer
+    ),
+    Endpoint(
+        "/v1/law.csv",
+        "GET",
+        get_law_csv,
+        "mu_macro over a range of one input, as a table",
+        LawRequest,
         content={200: _CSV},
     ),
     Endpoint(
-        "/v1/solve-for", "POST", post_solve_for, "The value of one input that gives a wanted mu_macro",
-        SolveForRequest, SolveForAnswer,
+        "/v1/solve-for",
+        "POST",
+        post_solve_for,
+        "The value of one input that gives a wanted mu_macro",
+        SolveForRequest,
+        SolveForAnswer,
     ),
-]  # fmt: skip
+]

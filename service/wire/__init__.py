@@ -1,6 +1,7 @@
 """Wire forms of batches: text -> columns, answers -> text.  One file each.
 
-Answers are evaluated and written in slices, so that memory stays small and other threads run between them.
+Answers are evaluated and written in slices, so that memory stays small and other threads run
+between them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +20,8 @@ from ..tables import LoadedTable
 
 
 def check_names(names: Sequence[str], kind: ContactKind, more: Mapping[str, str]) -> None:
-    """Refuse columns that such cases lack, do not have, or have twice; ``more`` are other reasons, by name."""
+    """Refuse columns that such cases lack, do not have, or have twice; ``more`` are other reasons,
+    by name."""
     twice = {name: "is given more than once" for name in names if names.count(name) > 1}
     faults = [FieldFault.of(name, reason) for name, reason in {**more, **twice}.items()]
     columns_of({name: [] for name in names}, 0, faults=faults, kind=kind)
@@ -27,7 +29,8 @@ def check_names(names: Sequence[str], kind: ContactKind, more: Mapping[str, str]
 
 @dataclass
 class Batch:
-    """Cases, and how they are answered.  ``errors`` and ``n_errors`` grow while the slices are taken."""
+    """Cases, and how they are answered.  ``errors`` and ``n_errors`` grow while the slices are
+    taken."""
 
     table: LoadedTable
     columns: Columns
@@ -37,7 +40,8 @@ class Batch:
     count: Callable[[LoadedTable, Codes], None] = lambda _table, _source: None
 
     def slices(self, step: int) -> Iterator[tuple[dict[str, Any], Codes, list[str | None]]]:
-        """Columns by path, source codes and faults of ``step`` cases after another; a bad case has NaN and -1.
+        """Columns by path, source codes and faults of ``step`` cases after another; a bad case has
+        NaN and -1.
 
         At least one slice, which is empty if there is no case.
         """
@@ -68,7 +72,8 @@ class Form(NamedTuple):
 
     media_type: str
     aliases: tuple[str, ...]
-    #: the cases of a body with so many cases at most, and its options beside those of the query; raises RequestError
+    #: the cases of a body with so many cases at most, and its options beside those of the query;
+    #: raises RequestError
     read: Callable[[bytearray, int, Mapping[str, Any]], tuple[Columns, dict[str, Any]]]
     #: the answer, piece by piece
     write: Callable[[Batch], Iterator[bytes]]

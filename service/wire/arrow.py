@@ -21,7 +21,9 @@ from .json import dump
 _SLICE = 32768  # cases of a record batch of the answer
 
 
-def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
+def _read(
+    text: bytearray, max_batch: int, query: Mapping[str, Any]
+) -> tuple[Columns, dict[str, Any]]:
     kind = kind_in(query)
     try:
         buffer = pa.py_buffer(text)
@@ -45,7 +47,9 @@ def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Co
         if isinstance(fault, MemoryError):
             raise
         reason = (str(fault).splitlines() or [type(fault).__name__])[0][:200]
-        raise RequestError(Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}") from None
+        raise RequestError(
+            Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}"
+        ) from None
     return columns_of(found, max_batch, kind=kind), {}
 
 
@@ -53,16 +57,20 @@ def _column(column: Any, name: str) -> Any:
     """A column as float64; as a list where it has nulls, with the word rigid for an infinite k."""
     column = column.cast(pa.float64(), safe=False)
     if column.null_count:
-        return [RIGID if name == "k" and value == math.inf else value for value in column.to_pylist()]
+        return [
+            RIGID if name == "k" and value == math.inf else value for value in column.to_pylist()
+        ]
     return column.to_numpy()
 
 
 def _is_compressed(metadata: Any) -> bool:
-    """Whether a record batch states compressed buffers: member 3 of RecordBatch, which is member 2 of Message.
+    """Whether a record batch states compressed buffers: member 3 of RecordBatch, which is member 2
+    of Message.
 
-    A compressed buffer states its unpacked length, so that a small body could fill the memory; pyarrow has no option
-    that refuses one.  A table of flatbuffers begins with the distance back to the list of its members, which begins
-    with its own size and that of the table; a member stands at its distance from the table, 0 if it is absent.
+    A compressed buffer states its unpacked length, so that a small body could fill the memory;
+    pyarrow has no option that refuses one.  A table of flatbuffers begins with the distance back to
+    the list of its members, which begins with its own size and that of the table; a member stands
+    at its distance from the table, 0 if it is absent.
     """
 
     def member(table: int, index: int) -> int:
@@ -86,7 +94,10 @@ def _write(batch: Batch) -> Iterator[bytes]:
         arrays = {part.path: _array(part, found[part.path], source) for part in batch.wanted.parts}
         made = pa.record_batch({**arrays, "error": pa.array(faults, pa.string())})
         if writer is None:
-            label = {name: value if isinstance(value, str) else dump(value) for name, value in signature.items()}
+            label = {
+                name: value if isinstance(value, str) else dump(value)
+                for name, value in signature.items()
+            }
             writer = pa.ipc.new_stream(sink, made.schema.with_metadata(label))
         writer.write_batch(made)
         yield sink.getvalue()
@@ -106,16 +117,20 @@ def _array(part: Part, column: Any, source: Any) -> Any:
 
 
 FORM = Form(
-    "application/vnd.apache.arrow.stream", (), _read, _write,
+    "application/vnd.apache.arrow.stream",
+    (),
+    _read,
+    _write,
     body=text_form(
-        "Arrow IPC stream, uncompressed, number columns mu0, Fz, k, y0, omega or f, v0; k_low and k_high in place of "
-        "k, Fz_amplitude in place of y0 for direction normal; infinity in k is rigid contact, null is refused",
+        "Arrow IPC stream, uncompressed, number columns mu0, Fz, k, y0, omega or f, v0; k_low and "
+        "k_high in place of k, Fz_amplitude in place of y0 for direction normal; infinity in k is "
+        "rigid contact, null is refused",
         format="binary",
     ),
     answer=text_form(
-        "Arrow IPC stream, order kept: mu_macro, mu_ratio, regime, error_bound, source, what include adds (such as "
-        "power.saved), error; a bad case has null results and a text in error; the table and the version are in the "
-        "schema's metadata",
+        "Arrow IPC stream, order kept: mu_macro, mu_ratio, regime, error_bound, source, what "
+        "include adds (such as power.saved), error; a bad case has null results and a text in "
+        "error; the table and the version are in the schema's metadata",
         format="binary",
     ),
-)  # fmt: skip
+)

@@ -1,4 +1,5 @@
-"""CSV: a head with the names of the inputs, one case per line; the answer likewise, with a text for a bad case."""
+"""CSV: a head with the names of the inputs, one case per line; the answer likewise, with a text for
+a bad case."""
 
 import csv
 import io
@@ -22,7 +23,9 @@ _SLICE = 4096  # lines that are read or written at a time
 _DIGITS = b"0123456789.eE+-"
 
 
-def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
+def _read(
+    text: bytearray, max_batch: int, query: Mapping[str, Any]
+) -> tuple[Columns, dict[str, Any]]:
     kind = kind_in(query)
     lines = csv.reader(_lines(text, max_batch), strict=True)
     reasons: dict[int, Reason] = {}
@@ -34,14 +37,19 @@ def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Co
             rows = [row for row in rows if row]
             for i, row in enumerate(rows):
                 if len(row) != len(scales):
-                    reasons[size + i] = None, f"has {len(row)} cells where the head has {len(scales)}"
+                    reasons[size + i] = (
+                        None,
+                        f"has {len(row)} cells where the head has {len(scales)}",
+                    )
                     rows[i] = ["nan"] * len(scales)
             for (name, scale), cells in zip(scales.items(), zip(*rows, strict=True), strict=False):
                 parts[name].append(_values(name, scale, cells, reasons, size))
             size += len(rows)
     except (UnicodeDecodeError, csv.Error) as error:
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not CSV: {error}") from None
-    columns = columns_of({name: np.concatenate(found) for name, found in parts.items()}, max_batch, kind=kind)
+    columns = columns_of(
+        {name: np.concatenate(found) for name, found in parts.items()}, max_batch, kind=kind
+    )
     columns.reasons = reasons
     return columns, {}
 
@@ -75,7 +83,9 @@ def _head(cells: list[str], kind: ContactKind) -> dict[str, Scale]:
     return scales
 
 
-def _values(name: str, scale: Scale, cells: tuple[str, ...], reasons: dict[int, Reason], first: int) -> Any:
+def _values(
+    name: str, scale: Scale, cells: tuple[str, ...], reasons: dict[int, Reason], first: int
+) -> Any:
     """A part of a column, and why a cell is no number within double range."""
     if all(cells) and not "".join(cells).encode().translate(None, _DIGITS):
         with suppress(ValueError), np.errstate(over="ignore"):
@@ -109,14 +119,18 @@ def _write(batch: Batch) -> Iterator[bytes]:
 
 
 FORM = Form(
-    "text/csv", ("application/csv",), _read, _write,
+    "text/csv",
+    ("application/csv",),
+    _read,
+    _write,
     body=text_form(
-        "RFC 4180 with a head: mu0, Fz, k, y0, omega or f, v0, each in SI or with a unit in brackets; k_low and k_high "
-        "in place of k, Fz_amplitude in place of y0 for direction normal; the word rigid in k is rigid contact, an "
-        "empty cell is refused"
-    ) | {"example": "mu0,Fz,k [N/mm],y0 [um],f,v0\r\n0.3,10,1000,2,20690,0.01\r\n"},
+        "RFC 4180 with a head: mu0, Fz, k, y0, omega or f, v0, each in SI or with a unit in "
+        "brackets; k_low and k_high in place of k, Fz_amplitude in place of y0 for direction "
+        "normal; the word rigid in k is rigid contact, an empty cell is refused"
+    )
+    | {"example": "mu0,Fz,k [N/mm],y0 [um],f,v0\r\n0.3,10,1000,2,20690,0.01\r\n"},
     answer=text_form(
-        "One line per case: mu_macro, mu_ratio, regime, error_bound, source, what include adds, error; the name of "
-        "the table is in the header X-Table"
+        "One line per case: mu_macro, mu_ratio, regime, error_bound, source, what include adds, "
+        "error; the name of the table is in the header X-Table"
     ),
-)  # fmt: skip
+)

@@ -1,8 +1,8 @@
 """JSON in and out: columns, rows, and lines of either (NDJSON).
 
-simdjson reads long lists of numbers into arrays, and msgspec reads rows of numbers, both piece by piece, so that
-other threads run meanwhile.  Everything else, and whatever they refuse, is read by Python's ``json``, which gives
-the reasons.
+simdjson reads long lists of numbers into arrays, and msgspec reads rows of numbers, both piece by
+piece, so that other threads run meanwhile.  Everything else, and whatever they refuse, is read by
+Python's ``json``, which gives the reasons.
 """
 
 import json
@@ -41,11 +41,18 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
         names = [name for name, _ in pairs]
-        refuse([FieldFault.of(name, "is given more than once") for name in found if names.count(name) > 1])
+        refuse(
+            [
+                FieldFault.of(name, "is given more than once")
+                for name in found
+                if names.count(name) > 1
+            ]
+        )
     return found
 
 
-# Numbers are read by functions of Python, so that other threads run meanwhile; int refuses 4300 digits.
+# Numbers are read by functions of Python, so that other threads run meanwhile; int refuses 4300
+# digits.
 _DECODER = json.JSONDecoder(
     object_pairs_hook=_unique,
     parse_int=lambda digits: int(digits) if len(digits) < 4300 else float(digits),
@@ -72,12 +79,16 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
 
 
-def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
+def read(
+    text: bytearray, max_batch: int, query: Mapping[str, Any]
+) -> tuple[Columns, dict[str, Any]]:
     """The cases and the options of a body: columns or one case, or a list of rows."""
     _limit_values(text, max_batch)
     if _OPENS_LIST.match(text):
         kind = kind_in(query)
-        return _quick_rows(text, max_batch, kind) or _rows(decode(text, large=True), max_batch, kind), {}
+        return _quick_rows(text, max_batch, kind) or _rows(
+            decode(text, large=True), max_batch, kind
+        ), {}
     given = _columns(text)
     if not isinstance(given, dict):
         refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
@@ -89,23 +100,28 @@ def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Col
 def _limit_values(text: bytearray, max_batch: int) -> None:
     """Refuse a body that holds more values than a batch may have, before it is decoded.
 
-    Every value but the first of its list or object has a comma before it, every list or object a bracket, every member
-    of an object a colon.
+    Every value but the first of its list or object has a comma before it, every list or object a
+    bracket, every member of an object a colon.
     """
     room = max_batch + 64
     objects = text.count(b"{")
     if text.count(b",") > len(NAMES) * room or text.count(b"[") + objects > room:
         raise too_large(max_batch)
     if text.count(b":") > len(NAMES) * objects + 64:
-        raise RequestError(Kind.INVALID_VALUE, "the body has objects with more members than there are fields")
+        raise RequestError(
+            Kind.INVALID_VALUE, "the body has objects with more members than there are fields"
+        )
 
 
 def _columns(text: bytearray) -> Any:
-    """What ``json`` reads, with long lists of numbers as arrays: a text stands in place of each while it reads."""
+    """What ``json`` reads, with long lists of numbers as arrays: a text stands in place of each
+    while it reads."""
     parser, kept, lists, at = simdjson.Parser(), list[bytes | bytearray](), list[Any](), 0
     while (start := text.find(b"[", at)) >= 0 and (end := text.find(b"]", start) + 1) > 0:
         found = _numbers(parser, text[start:end]) if end - start > _SHORT else None
-        kept.append(text[at:end] if found is None else text[at:start] + b'"%b%d"' % (_TOKEN, len(lists)))
+        kept.append(
+            text[at:end] if found is None else text[at:start] + b'"%b%d"' % (_TOKEN, len(lists))
+        )
         lists += [] if found is None else [found]
         at = end
     given = decode(b"".join([*kept, text[at:]]), large=True)
@@ -149,7 +165,11 @@ def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns |
     at = size = 0
     while at < len(text):
         cut = _BETWEEN.search(text, at + _READ)
-        piece = (b"[" if at else b"") + text[at : cut.start() + 1 if cut else None] + (b"]" if cut else b"")
+        piece = (
+            (b"[" if at else b"")
+            + text[at : cut.start() + 1 if cut else None]
+            + (b"]" if cut else b"")
+        )
         try:
             rows = _rows_of(names).decode(piece)
         except (msgspec.MsgspecError, ValueError, RecursionError):
@@ -185,7 +205,10 @@ def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
             if not faults:
                 six[:, i] = [values[name] for name in fields]
                 continue
-            fault = min(faults, key=lambda fault: names.index(fault.path[0]) if fault.path[0] in names else -1)
+            fault = min(
+                faults,
+                key=lambda fault: names.index(fault.path[0]) if fault.path[0] in names else -1,
+            )
             reason: Reason = str(fault.path[0])[:80], fault.reason
         else:
             reason = None, "must be an object"
@@ -239,7 +262,8 @@ def _values(part: Part, column: Any) -> bytes:
 
 
 def _any_of(*names: str, **more: Any) -> dict[str, Any]:
-    """The description of a text that is one of these models, or a list of one, whose name ends with ``[]``."""
+    """The description of a text that is one of these models, or a list of one, whose name ends with
+    ``[]``."""
     refs = [(name, {"$ref": f"#/components/schemas/{name.removesuffix('[]')}"}) for name in names]
     kinds = [{"type": "array", "items": ref} if name.endswith("[]") else ref for name, ref in refs]
     return {"schema": {"anyOf": kinds, **more}}
@@ -249,13 +273,20 @@ _MANY = {"example": {**example, "v0": [0.01, 0.1]}}
 _LINE = "One of these per line, in the order of the lines"
 FORMS = (
     Form(
-        "application/json", (), read, write,
-        body=_any_of("CaseColumns", "Case[]") | _MANY, answer=_any_of("ColumnsAnswer", "RowsAnswer"),
+        "application/json",
+        (),
+        read,
+        write,
+        body=_any_of("CaseColumns", "Case[]") | _MANY,
+        answer=_any_of("ColumnsAnswer", "RowsAnswer"),
     ),
     Form(
-        "application/x-ndjson", ("application/ndjson", "application/jsonl", "application/x-jsonlines"), read, write,
+        "application/x-ndjson",
+        ("application/ndjson", "application/jsonl", "application/x-jsonlines"),
+        read,
+        write,
         body=_any_of("CaseColumns", "Case", "Case[]", description=_LINE) | _MANY,
         answer=_any_of("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem", description=_LINE),
         streams=True,
     ),
-)  # fmt: skip
+)
