@@ -189,8 +189,9 @@ def border_crossings(
         state = sweep.answer(edges).regime == regime
         i = np.flatnonzero(state[1:] != state[:-1])
 
-        def before(x: Array, regime: str = regime, states: Array = state[i, None]) -> Array:
-            return (sweep.answer(x).regime == regime) == states
+        def before(x: Array, regime: str = regime, states: Bools = state[i, None]) -> Bools:
+            same: Bools = (sweep.answer(x).regime == regime) == states
+            return same
 
         cuts = last_double(before, edges[i], edges[i + 1])
         found += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
