@@ -10,8 +10,9 @@ kernel, ``mumacro/kernel/element.c``; in C they are ``mumacro_element_step``.
 References
 ----------
 V. L. Popov, M. Hess, "Method of Dimensionality Reduction in Contact Mechanics and Friction",
-Springer (2015). J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert
-space", J. Differ. Equ. 26 (1977) 347.
+Springer (2015).
+J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert space",
+J. Differ. Equ. 26 (1977) 347.
 """
 
 import math

@@ -3,22 +3,22 @@ needs.
 
 Half-space elasticity, two smooth elastic bodies, small strains:
 
-    1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2          1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,   G = E / (2
-    (1 + nu))
+    1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
+    1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,   G = E / (2 (1 + nu))
 
     circular contact of radius a      k = 8 a G*  (tangential),    2 a E*  (normal)
     ball of radius R under Fz         a = (3 Fz R / (4 E*))^(1/3)
     rigid flat punch                  a is its radius
-    cylinder of length L lying        half width b = sqrt(4 Fz R / (pi L E*)), k of an elliptic
-    contact: two values
+    cylinder of length L lying        half width b = sqrt(4 Fz R / (pi L E*)),
+                                      k of an elliptic contact: two values
 
 k is the stiffness of a contact that sticks everywhere.  Under a ball the rim slips first, and gross
 slip begins at the displacement 3/2 mu0 Fz/k: ``contact="ball"``, which no single spring stands for.
 Under a flat punch with full contact all of it slips at once, and one spring is exact.  A result
 holds both, k and the kind of the contact::
 
-    surrogate.evaluate(**ball_on_flat(5e-3, 10.0, steel, steel), mu0=0.3, Fz=10.0, y0=2e-6, f=20e3,
-    v0=0.01)
+    ball = ball_on_flat(5e-3, 10.0, steel, steel)
+    surrogate.evaluate(**ball, mu0=0.3, Fz=10.0, y0=2e-6, f=20e3, v0=0.01)
 
 Every function raises :class:`mumacro.InputError` for a value out of bounds or no number, for two
 rigid bodies, and where Hertz's theory has no meaning: a contact wider than the ball.  Above a tenth
@@ -31,9 +31,10 @@ compliance of the holder, in series as well.
 References
 ----------
 R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16 (1949) 259.
-K. L. Johnson, "Contact Mechanics", Cambridge University Press (1985), Secs. 4.2 (Hertz), 7.2
-(tangential loading). V. L. Popov, "Contact Mechanics and Friction", Springer (2010), Secs. 5.2,
-8.2; its G* is four times the one here.
+K. L. Johnson, "Contact Mechanics", Cambridge University Press (1985), Secs. 4.2 (Hertz),
+7.2 (tangential loading).
+V. L. Popov, "Contact Mechanics and Friction", Springer (2010), Secs. 5.2, 8.2; its G* is four
+times the one here.
 """
 
 import math

@@ -4,22 +4,20 @@ crosses the border.
 What is known of mu_macro as a function of one input, the others constant, for an oscillation
 across:
 
-=====  =====================================
-==================================================================== input  course
-roots =====  =====================================
-==================================================================== v0     rises from the static
-limit to mu0     one; mu0 itself is not reached y0     falls from mu0 to 0                    one; 0
-is not reached, unless v0 = 0 omega  falls from mu0 to the static limit     one; the static limit is
-not reached k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0 above
-9.72 it falls to a minimum at y~
-                                              from 4.1 to 6.4, rises to a maximum (at y~ = 0.115 r^2
-                                              for large r), and falls again
+=====  =====================================  =====================================================
+input  course                                 roots
+=====  =====================================  =====================================================
+v0     rises from the static limit to mu0     one; mu0 itself is not reached
+y0     falls from mu0 to 0                    one; 0 is not reached, unless v0 = 0
+omega  falls from mu0 to the static limit     one; the static limit is not reached
+k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0 above 9.72 it falls
+                                              to a minimum at y~ from 4.1 to 6.4, rises to a maximum
+                                              (at y~ = 0.115 r^2 for large r), and falls again
 Fz     the same in 1/Fz                       the same
 mu0    rises: it would fold only where        one
        d ln mu~ / d ln y~ > 1 on a ray of
        constant r; it is 0.09 at the most
-=====  =====================================
-====================================================================
+=====  =====================================  =====================================================
 
 The figures are of the tightest table, for one spring and r up to 1e8; a ball does the same, later
 and less. Along and normal every input has one root, and mu0 is reached: where the upper point never
