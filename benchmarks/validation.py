@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.solver import march
-from builder.steady import border, solve
+from builder.solver.steady import border, solve
 from mumacro import Surrogate, closed_forms
 
 Array = NDArray[np.float64]
