@@ -14,15 +14,8 @@ from mumacro import closed_forms
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.contacts.quadrature import put_rules
 from mumacro.errors import InputError, MumacroError, TableError
-from mumacro.inputs.fields import (
-    FIELDS,
-    RAD_PER_CYCLE,
-    as_columns,
-    check_inputs,
-    length_scale,
-    picked,
-    real,
-)
+from mumacro.inputs.cases import as_columns, check_inputs, length_scale, picked, real
+from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.k_range import ENDS, as_ends, extremes, middle
 from mumacro.inputs.kind import (
     AMPLITUDE,

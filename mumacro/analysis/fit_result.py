@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.analysis.measured_points import STD, UNKNOWNS, Measured
-from mumacro.inputs.fields import real, unit_of
+from mumacro.inputs.cases import real
+from mumacro.inputs.fields import unit_of
 from mumacro.kernel.arrays import Array
 
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import NAMES, as_columns, check_inputs, picked, real, unknown_name
+from mumacro.inputs.cases import as_columns, check_inputs, picked, real
+from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
+from mumacro.inputs.units import unknown_name
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import as_columns, check_inputs
+from mumacro.inputs.cases import as_columns, check_inputs
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 

@@ -15,7 +15,8 @@ import numpy as np
 from mumacro.analysis.measured_points import HARDLY
 from mumacro.analysis.settling import settling
 from mumacro.errors import InputError
-from mumacro.inputs.fields import RAD_PER_CYCLE, as_columns, length_scale
+from mumacro.inputs.cases import as_columns, length_scale
+from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.k_range import without_interval
 from mumacro.inputs.kind import kind_of
 from mumacro.surrogate import Surrogate

@@ -20,19 +20,11 @@ import numpy as np
 from mumacro import plotting
 from mumacro.analysis.validity import digits, k_effect
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.fields import (
-    LIKE,
-    NAMES,
-    RAD_PER_CYCLE,
-    check_inputs,
-    read_number,
-    read_range,
-    scale_of,
-    suggestion,
-    unit_of,
-)
+from mumacro.inputs.cases import check_inputs
+from mumacro.inputs.fields import LIKE, NAMES, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.text_tables import SEPARATORS
+from mumacro.inputs.units import read_number, read_range, scale_of, suggestion
 from mumacro.surrogate import Surrogate
 
 INPUTS = """\

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import check_inputs, real
+from mumacro.inputs.cases import check_inputs, real
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels

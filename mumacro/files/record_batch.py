@@ -14,10 +14,11 @@ import pyarrow.compute as pc
 
 from mumacro.answer import BAND
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.fields import GAP, LIKE, SI, Scale, refusal, split_unit
+from mumacro.inputs.fields import GAP, LIKE, SI, refusal
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.text_tables import TOO_LARGE, absent, find_heads, meant_by, read_cell
+from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES

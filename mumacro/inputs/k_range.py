@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import real
+from mumacro.inputs.cases import real
 from mumacro.kernel.arrays import Array, Places
 
 ENDS = ("k_low", "k_high")  # columns that hold an interval
