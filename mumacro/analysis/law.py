@@ -10,12 +10,12 @@ import numpy as np
 
 from mumacro import closed_forms
 from mumacro.analysis.rootfinding import Sweep
-from mumacro.analysis.roots import Crossing, checked_case
+from mumacro.analysis.roots import Crossing
 from mumacro.analysis.solve_for import border_crossings
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
+from mumacro.inputs.cases import other_five, without_interval
 from mumacro.inputs.fields import FIELDS, POSITIVE
-from mumacro.inputs.k_range import without_interval
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
@@ -176,18 +176,18 @@ def friction_law(
     """
     kind = kind_of(contact, direction)
     case, ends = without_interval(case, along)
-    known = checked_case(case, along, kind)
+    known = other_five(case, along, kind)
     sweep = Sweep(surrogate, known, along, kind)
     border = border_crossings(
         surrogate, along, known, float(values[0]), float(values[-1]), **kind.names
     )
     if refine:
         values = sweep.refined(np.union1d(values, [mark.value for mark in border]))
-    answer = sweep.answer(values, groups=True, illegal="raise")
+    answer = sweep.answer(values, groups=True, strict=True)
     if ends:
         others = {name: value for name, value in known.items() if name != "k"}
         answer = Sweep(surrogate, {**others, **ends}, along, kind).answer(
-            values, groups=True, illegal="raise"
+            values, groups=True, strict=True
         )
     at_rest = sweep.answer(values, v0=0.0) if along != "v0" else sweep.answer(0.0)
     return Law(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.answer import Answer
+from mumacro.inputs.cases import Cases
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.surrogate import Surrogate
@@ -36,13 +37,19 @@ class Sweep:
     ) -> None:
         self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
 
-    def answer(self, x: Any, **more: Any) -> Answer[Any]:
-        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in
-        ``evaluate``."""
-        answer: Answer[Any] = self.surrogate.evaluate(
-            **{**self.case, self.unknown: x, **self.kind.names, **more}
-        )
-        return answer
+    def answer(
+        self,
+        x: Any,
+        *,
+        gradient: bool = False,
+        groups: bool = False,
+        strict: bool = False,
+        **others: Any,
+    ) -> Answer[Any]:
+        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``others`` replace
+        inputs of the case.  InputError for a value out of bounds where ``strict``, else NaN."""
+        cases = Cases.of({**self.case, self.unknown: x, **others}, self.kind, strict)
+        return self.surrogate.answer(cases, gradient, groups)
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""

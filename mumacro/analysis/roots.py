@@ -1,13 +1,7 @@
-"""The results of the inverse problem, and the case that it is solved for."""
+"""The results of the inverse problem."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
-
-from mumacro.errors import InputError
-from mumacro.inputs.cases import as_columns, check_inputs
-from mumacro.inputs.k_range import ENDS
-from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
+from typing import NamedTuple
 
 
 class Root(NamedTuple):
@@ -64,38 +58,3 @@ class Crossing:
     value: float
     mu_macro: float
     regimes: tuple[str, str]
-
-
-def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
-    """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an
-    infinite ``k`` is rigid.
-
-    ``f`` [Hz] may stand for ``omega`` [rad/s], the word ``rigid`` for an infinite ``k``.
-    """
-    if without not in kind.fields:
-        raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")
-    for name in ("k_range", *ENDS):
-        if case.get(name) is not None:
-            told = (
-                "left out: over an interval of k a target has an interval of roots; solve for "
-                "both ends of it"
-            )
-            raise InputError(name, case[name], told)
-    given = {
-        name: value for name, value in case.items() if value is not None or name == "k" != without
-    }
-    for name in given.keys() & ({"omega", "f"} if without == "omega" else {without}):
-        raise InputError(name, given[name], f"left out, because {without} is the unknown")
-    given = kind.as_six({**given, without: 1.0})
-    try:
-        six = as_columns(given)
-        columns = kind.as_given(six)
-        for name, column in columns.items():
-            if column.size != 1:
-                raise InputError(name, given.get(name, given.get("f")), "one number")
-        check_inputs(six, given.get("f"))
-        if kind.normal and without not in ("Fz", AMPLITUDE):
-            kind.check_lift_off(six["y0"], six["Fz"])
-    except InputError as error:
-        raise kind.refused(error) from error.__cause__
-    return {name: float(column.item()) for name, column in columns.items() if name != without}

@@ -36,11 +36,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.analysis.rootfinding import TINY, Curve, Sweep, curves_between, last_double, samples
-from mumacro.analysis.roots import Crossing, Reach, Root, Solution, checked_case
+from mumacro.analysis.roots import Crossing, Reach, Root, Solution
 from mumacro.answer import Answer
 from mumacro.errors import InputError
+from mumacro.inputs.cases import other_five, without_interval
 from mumacro.inputs.fields import POSITIVE
-from mumacro.inputs.k_range import without_interval
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.surrogate import Surrogate
@@ -122,7 +122,7 @@ def solve_for(
             for k in (interval["k_low"], case["k"], interval["k_high"])
         )
         return replace(middle, ends=(softest, stiffest))
-    sweep = Sweep(surrogate, checked_case(case, unknown, kind), unknown, kind)
+    sweep = Sweep(surrogate, other_five(case, unknown, kind), unknown, kind)
     wanted = np.asarray(targets, dtype=np.float64).ravel()
     bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
     if bad.size:
@@ -176,7 +176,7 @@ def border_crossings(
     or k) two places; none for rigid contact (never any stick) and without oscillation.
     """
     kind = kind_of(contact, direction)
-    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind)
+    sweep = Sweep(surrogate, other_five(case, along, kind), along, kind)
     if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values():
         return ()
     low = max(low, TINY)  # at 0 nothing oscillates or slides

@@ -184,7 +184,7 @@ class Kernel:
             data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
         )
 
-    def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:
+    def one(self, pointer: Any, six: Sequence[float], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also
         slopes and bounds."""
         out, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six  # named: a call with *six takes longer
