@@ -37,8 +37,9 @@ from mumacro.kernel.arrays import Array, Places
 from mumacro.kernel.binding import Data, kernels
 from mumacro.kernel.threads import default_threads
 from mumacro.table import atlas
+from mumacro.table.blocks import BorderPiece, Table
 from mumacro.table.bundled import bundled_tables
-from mumacro.table.netcdf import BorderPiece, Table, json_attributes, parse_table, read_image
+from mumacro.table.netcdf import json_attributes, parse_table, read_image
 from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
 
 _KERNEL = kernels[-1]

@@ -19,7 +19,8 @@ from mumacro import InputError, Surrogate, TableError
 from mumacro.table import atlas
 from mumacro.table.atlas import BORDER_PIECES, CHARTS, NAMES
 from mumacro.table.atomic import BusyError, alone_in, write_whole
-from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, Table, _digest, read_table, write_table
+from mumacro.table.blocks import Table
+from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, _digest, read_table, write_table
 from mumacro.table.polynomials import nodes
 from tests.cases import Array
 

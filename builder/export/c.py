@@ -19,7 +19,7 @@ from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas
 from mumacro.table.atomic import write_whole
-from mumacro.table.netcdf import Table
+from mumacro.table.blocks import Table
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.version import __version__
 

@@ -14,7 +14,8 @@ import numpy as np
 from mumacro import MumacroError, Surrogate
 from mumacro.kernel.arrays import Array
 from mumacro.table.atlas import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
-from mumacro.table.netcdf import Block, Table, write_table
+from mumacro.table.blocks import Block, Table
+from mumacro.table.netcdf import write_table
 from mumacro.table.polynomials import Border
 from mumacro.version import __version__
 

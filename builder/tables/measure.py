@@ -21,7 +21,7 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import CHARTS, CONTINUOUS, QUANTITIES, SQRT2, Axis, Chart
-from mumacro.table.netcdf import Block
+from mumacro.table.blocks import Block
 from mumacro.table.polynomials import (
     WIDTH,
     cells_2d,
@@ -39,7 +39,7 @@ class BlockErrors(NamedTuple):
     """Largest errors of a block.
 
     By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in
-    :class:`mumacro.table.netcdf.Block`. ``absolute``, ``relative``: of mu~.
+    :class:`mumacro.table.blocks.Block`. ``absolute``, ``relative``: of mu~.
     """
 
     values: dict[str, float]

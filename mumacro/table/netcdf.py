@@ -10,7 +10,6 @@ import hashlib
 import json
 import tempfile
 import threading
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from mumacro.errors import TableError
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas, hdf5
 from mumacro.table.atomic import write_whole
+from mumacro.table.blocks import BY_NAME, Block, BorderPiece, Table, names_in
 from mumacro.table.polynomials import nodes
 
 FORMAT_VERSION = 3
@@ -50,69 +50,7 @@ _PLAIN = {
     ),
 }
 CELL_AXES = ("quantity", "cell", "derivative")
-_NAMED = {quantity.name: quantity for quantity in atlas.QUANTITIES}
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
-
-
-@dataclass
-class BorderPiece:
-    """One piece of v~crit: Chebyshev ``nodes`` (n,) of its coordinate, ``values`` (n,), cells for
-    evaluation."""
-
-    nodes: Array
-    values: Array
-    cells: int
-    max_rel_error: float = 0.0
-
-
-@dataclass
-class Block:
-    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), cells for evaluation, and what is
-    tabulated."""
-
-    a: Array
-    b: Array
-    cells: tuple[int, int]
-    #: node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity
-    #: is zero
-    nodes: dict[str, Array] = field(default_factory=dict)
-    #: by quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a
-    #: and b, in all cells
-    errors: dict[str, Array] = field(
-        default_factory=lambda: {name: np.zeros(3) for name in atlas.QUANTITY_NAMES}
-    )
-    #: the same for every cell (cells, 3), in the order of the cells, for slopes
-    cell_errors: dict[str, Array] = field(default_factory=dict)
-    max_abs_error: float = 0.0  #: the largest errors of mu~ found
-    max_rel_error: float = 0.0
-
-
-@dataclass
-class Table:
-    """Everything that a table file holds."""
-
-    border: list[BorderPiece]
-    blocks: list[Block]
-    v_tilde: Array
-    y_tilde: Array
-    mu_ratio: Array
-    stick_fraction: Array
-    error_estimate: Array
-    v_tilde_crit: Array
-    attributes: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def quantities(self) -> list[str]:
-        """The names of the tabulated quantities, mu_ratio first."""
-        return _names(self.attributes)
-
-    def held(self, chart: atlas.Chart) -> list[atlas.Quantity]:
-        """Those that the block of ``chart`` tabulates."""
-        return [_NAMED[name] for name in self.quantities if chart.holds(_NAMED[name])]
-
-
-def _names(attributes: dict[str, Any]) -> list[str]:
-    return str(attributes.get("quantities")).split()
 
 
 def _digest(table: Table) -> str:
@@ -350,10 +288,10 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
         json.loads(found.get("builder_options", "{}"))
     except (ValueError, TypeError, RecursionError) as error:
         raise root.refuse(f"attribute 'builder_options' is no JSON ({error})") from None
-    names = _names(found)
-    if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= _NAMED.keys():
+    names = names_in(found)
+    if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= BY_NAME.keys():
         raise root.refuse(
-            f"attribute 'quantities' is {names}, this program knows {', '.join(_NAMED)}"
+            f"attribute 'quantities' is {names}, this program knows {', '.join(BY_NAME)}"
         )
     return found
 
@@ -371,7 +309,7 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
     for name, wanted in _geometry(chart).items():
         _check_same(group, name, wanted)
     a, b = _nodes(group, chart.a), _nodes(group, chart.b)
-    quantities = [_NAMED[name] for name in names if chart.holds(_NAMED[name])]
+    quantities = [BY_NAME[name] for name in names if chart.holds(BY_NAME[name])]
     found = {
         one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities
     }
@@ -396,7 +334,7 @@ def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: list[str]) -
 
 def _read(root: hdf5.Group) -> Table:
     attributes = _attributes(root)
-    names = _names(attributes)
+    names = names_in(attributes)
     below_border = root.group("border")
     below_blocks = below_border.group("blocks")
     border = [

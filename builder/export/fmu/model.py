@@ -25,7 +25,7 @@ from xml.sax.saxutils import quoteattr
 from mumacro.inputs.fields import UNITS
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS
 from mumacro.table import atlas
-from mumacro.table.netcdf import Table
+from mumacro.table.blocks import Table
 from mumacro.version import __version__
 
 from ..c import compiled, header_text, zig
