@@ -11,7 +11,7 @@ from typing import Any
 
 from mumacro import InputError, Surrogate
 from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
-from mumacro.extras import missing
+from mumacro.errors import missing
 from mumacro.kernel.threads import processors
 from mumacro.table.atomic import alone_in
 

@@ -3,6 +3,9 @@ stick-slip model."""
 
 import sys as _sys
 
+from mumacro.errors import InputError, MumacroError, TableError
+from mumacro.errors import missing as _missing
+
 try:
     from mumacro import closed_forms
     from mumacro.analysis import validity
@@ -11,7 +14,6 @@ try:
     from mumacro.answer import Answer
     from mumacro.contacts import stiffness
     from mumacro.contacts.element import Element
-    from mumacro.errors import InputError, MumacroError, TableError
     from mumacro.surrogate import Surrogate
     from mumacro.table.atlas import REGIMES, SOURCES
     from mumacro.version import __version__
@@ -20,8 +22,6 @@ except ImportError as _error:
     # is "-m" meanwhile.
     if _sys.argv[:1] != ["-m"]:
         raise
-    from mumacro.extras import missing as _missing
-
     raise SystemExit(_missing("", _error)) from None
 
 open = Surrogate.open  # noqa: A001 (mumacro.open(), as users of other data libraries expect)

@@ -11,8 +11,7 @@ import numpy as np
 from mumacro.analysis.law import Law
 from mumacro.analysis.roots import Crossing
 from mumacro.answer import Answer
-from mumacro.errors import InputError, MumacroError
-from mumacro.extras import missing
+from mumacro.errors import InputError, MumacroError, missing
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import AMPLITUDE, Kind, kind_of
 from mumacro.surrogate import Surrogate

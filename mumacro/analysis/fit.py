@@ -18,8 +18,7 @@ import numpy as np
 
 from mumacro.analysis.fit_result import Fit, quantile
 from mumacro.analysis.measured_points import HARDLY, STD, Measured
-from mumacro.errors import InputError
-from mumacro.extras import missing
+from mumacro.errors import InputError, missing
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 

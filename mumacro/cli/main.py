@@ -27,7 +27,7 @@ from mumacro.cli.common import (
 )
 from mumacro.cli.fit import FIT, fit_points
 from mumacro.cli.questions import LAW, SOLVE_FOR, STIFFNESS, law, map_, solve, stiffness_of
-from mumacro.extras import missing
+from mumacro.errors import missing
 from mumacro.inputs.fields import LIKE, NAMES, PER_UNIT
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.surrogate import Surrogate

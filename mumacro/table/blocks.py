@@ -73,4 +73,5 @@ class Table:
 
 
 def names_in(attributes: dict[str, Any]) -> list[str]:
+    """The names of the tabulated quantities in the attributes of a table."""
     return str(attributes.get("quantities")).split()
