@@ -10,10 +10,11 @@ from typing import Any, Literal, NoReturn, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro import closed_forms
+from mumacro import closed_forms, plotting
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.contacts.quadrature import put_rules
 from mumacro.errors import InputError, MumacroError, TableError
+from mumacro.frames import evaluate_labelled
 from mumacro.inputs.fields import (
     FIELDS,
     RAD_PER_CYCLE,
@@ -137,11 +138,22 @@ class Surrogate:
             f"{self.max_abs_error:.1e}>"
         )
 
-    def plot(self, axes: Any = None, **more: Any) -> Any:
-        """The map of mu~, see ``mumacro.plotting.plot_map``; needs matplotlib."""
-        from mumacro.plotting import plot_map
-
-        return plot_map(self, axes, **more)
+    def plot(
+        self,
+        axes: Any = None,
+        *,
+        point: tuple[float, float] | None = None,
+        contact: str = "spring",
+        direction: str = "across",
+    ) -> Any:
+        """The map of mu~ with a ``point`` (v~, y~), see ``mumacro.plotting.plot_map``; needs
+        matplotlib."""
+        kind = kind_of(contact, direction)
+        v = np.geomspace(*plotting.V_RANGE, 281)
+        y = np.geomspace(*plotting.y_range(kind.normal), 201)
+        ratio = self.quantity("mu_ratio", v, y[:, None], **kind.names)[0]
+        border = self.v_tilde_crit(y, **kind.names)
+        return plotting.plot_map(v, y, ratio, border, axes, point=point, normal=kind.normal)
 
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
@@ -648,11 +660,17 @@ class Surrogate:
         if interval:
             inputs = as_ends(inputs)
         if _labelled(inputs, cases):
-            # loads pandas, xarray or Dask only where used
-            from mumacro.frames import evaluate_labelled
-
             options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
-            return evaluate_labelled(self, cases, kind.as_given(inputs), kind, interval, options)
+            return evaluate_labelled(
+                self.evaluate,
+                self.on_one_thread().evaluate,
+                functools.partial(self._certain, kind=kind),
+                cases,
+                kind.as_given(inputs),
+                kind,
+                interval,
+                options,
+            )
         try:
             return self._plain(inputs, gradient, groups, illegal, kind, interval)
         except InputError as error:

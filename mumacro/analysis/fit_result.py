@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mumacro import plotting
 from mumacro.analysis.measured_points import STD, UNKNOWNS, Measured
-from mumacro.inputs.fields import real, unit_of
+from mumacro.inputs.fields import real
 from mumacro.kernel.arrays import Array
 
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
@@ -88,9 +89,6 @@ class Fit:
 
         There is a curve for each set of the other inputs; more than 8 of them have no legend.
         """
-        from mumacro.plotting import own
-
-        ax = own(ax)
         given = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(given, key=lambda name: (np.unique(given[name]).size, name == "v0"))
         x, names = given[along], [name for name in self._problem.columns if name != along]
@@ -98,6 +96,7 @@ class Fit:
         low = x[x > 0.0].min(initial=math.inf)
         fine = np.geomspace(low, x.max(), 300) if low < math.inf else x
         width = quantile(None if STD in self.points else x.size - len(self.values))
+        curves = []
         for i, row in enumerate(sets.T):
             mine = member.ravel() == i
             varied = [
@@ -105,26 +104,12 @@ class Fit:
                 for name, x, all_ in zip(names, row, sets, strict=True)
                 if np.ptp(all_) > 0.0
             ]
-            curve = np.unique(np.concatenate([fine, x[mine]]))
-            mu, off = self.predict(**{along: curve}, **dict(zip(names, row, strict=True)))
+            places = np.unique(np.concatenate([fine, x[mine]]))
+            mu, off = self.predict(**{along: places}, **dict(zip(names, row, strict=True)))
             bars = self.points[STD][mine] if STD in self.points else None
-            color = ax.errorbar(x[mine], self.points["mu_macro"][mine], bars, fmt="o")[
-                0
-            ].get_color()
-            ax.plot(curve, mu, color=color, label=", ".join(varied) or "fit")
-            ax.fill_between(
-                curve, mu - width * off, mu + width * off, color=color, alpha=0.25, lw=0
-            )
-        if low < x.max() / 10.0:
-            ax.set_xscale("symlog", linthresh=low) if (x == 0.0).any() else ax.set_xscale("log")
-        ax.set(
-            xlabel=f"{along} [{unit_of(along)}]",
-            ylabel="mu_macro [-]",
-            title=", ".join(self._told()),
-        )
-        if sets.shape[1] <= 8:
-            ax.legend()
-        return ax
+            label, measured = ", ".join(varied) or "fit", self.points["mu_macro"][mine]
+            curves.append(plotting.Curve(label, x[mine], measured, bars, places, mu, width * off))
+        return plotting.plot_fit(along, curves, ", ".join(self._told()), ax)
 
     def _told(self) -> list[str]:
         units = {"k": " N/m", "mu0": ""}

@@ -2,13 +2,13 @@
 paper's approximations."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mumacro import closed_forms
+from mumacro import closed_forms, plotting
 from mumacro.analysis.rootfinding import Sweep
 from mumacro.analysis.roots import Crossing, checked_case
 from mumacro.analysis.solve_for import border_crossings
@@ -97,11 +97,21 @@ class Law:
         found = {name: getattr(self.answer, name) for name in names}
         return {self.along: self.values, **found, "mu_static": self.mu_static}
 
-    def plot(self, axes: Any = None) -> Any:
+    def plot(
+        self, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None
+    ) -> Any:
         """A picture, see ``mumacro.plotting.plot_law``; needs matplotlib."""
-        from mumacro.plotting import plot_law
-
-        return plot_law(self, axes)
+        return plotting.plot_law(
+            self.along,
+            self.values,
+            self.answer.mu_macro,
+            self.mu_static,
+            axes,
+            band=self.band,
+            borders=[(crossing.value, crossing.name) for crossing in self.border],
+            roots=roots,
+            target=target,
+        )
 
 
 def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:

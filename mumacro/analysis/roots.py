@@ -9,6 +9,12 @@ from mumacro.inputs.fields import as_columns, check_inputs
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 
+#: regime -> the border at which it begins or ends
+BORDER_NAMES = {
+    "reverse_slip": "border of reverse slip",
+    "continuous": "border of continuous sliding",
+}
+
 
 class Root(NamedTuple):
     """One value of the unknown."""
@@ -64,6 +70,12 @@ class Crossing:
     value: float
     mu_macro: float
     regimes: tuple[str, str]
+
+    @property
+    def name(self) -> str:
+        """Which border it is."""
+        regime = next(one for one in ("continuous", "reverse_slip") if one in self.regimes)
+        return BORDER_NAMES[regime]
 
 
 def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:

@@ -81,16 +81,11 @@ def law(words: Sequence[str]) -> str:
     }
     form = common.format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
     of_k = ", for the geometric middle of k" if found.band else ""
-    marks = [
-        f"{plotting.mark_of(c)[1]} at {along} = {c.value / scale:{form}} {unit}{of_k}"
-        for c in found.border
-    ]
+    marks = [f"{c.name} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border]
     if chosen.out is not None:
         return "\n".join(
             [
-                common.write_result(
-                    chosen.out, headed, lambda axes: plotting.plot_law(found, axes)
-                ),
+                common.write_result(chosen.out, headed, found.plot),
                 *marks,
             ]
         )
@@ -196,7 +191,7 @@ def solve(words: Sequence[str]) -> str:
         return common.write_result(
             chosen.out,
             columns,
-            lambda axes: plotting.plot_law(curve, axes, roots=at, target=target),
+            lambda axes: curve.plot(axes, roots=at, target=target),
         )
     at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
     form = common.format_for(chosen, surrogate, {**case, inner: at_one}, kind)
@@ -228,7 +223,7 @@ def map_(words: Sequence[str]) -> str:
     if chosen.words:
         case = surrogate.evaluate(**{**read_case(chosen.words, kind, one_k=one_k), **kind.names})
         point = (case.v_tilde, case.y_tilde)
-    ranges = (plotting.V_RANGE, plotting.y_range(kind))
+    ranges = (plotting.V_RANGE, plotting.y_range(kind.normal))
     v, y = (
         x.ravel() for x in np.meshgrid(np.geomspace(*ranges[0], 141), np.geomspace(*ranges[1], 101))
     )
@@ -240,7 +235,7 @@ def map_(words: Sequence[str]) -> str:
     text = common.write_result(
         chosen.out,
         columns,
-        lambda axes: plotting.plot_map(surrogate, axes, point=point, **kind.names),
+        lambda axes: surrogate.plot(axes, point=point, **kind.names),
     )
     if point and not all(low <= x <= high for x, (low, high) in zip(point, ranges, strict=True)):
         text += f"\nthe case lies outside the map: v~ = {point[0]:.6g}, y~ = {point[1]:.6g}"
