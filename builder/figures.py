@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import MumacroError, Surrogate, closed_forms
-from mumacro.analysis.law import approximations, border_speeds, friction_law
+from mumacro.analysis.approximations import approximations, border_speeds
+from mumacro.analysis.law import law as friction_law
 from mumacro.kernel.arrays import Array
 
 from .solver.steady import border
@@ -294,7 +295,7 @@ def _dimensional_law(s: Surrogate) -> list[Panel]:
             "omega": 2.0 * np.pi * 20e3,
             "y0": y0,
         }
-        law = friction_law(s, "v0", v0, case)
+        law = friction_law(s, values=v0, **case)
         paper = approximations(s, law)
         curves.append(Curve(v0, law.answer.mu_macro, look, f"exact, $y_0$ = {y0 * 1e6:g} $l_0$"))
         if y0 > 1e-6:

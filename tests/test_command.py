@@ -568,10 +568,10 @@ def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path)
 
 def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
-    from mumacro.analysis.law import friction_law
+    from mumacro import law as friction_law
 
     known = {name: value for name, value in VALUES.items() if name != "v0"}
-    law = friction_law(surrogate, "v0", np.geomspace(1e-3, 1.0, 20), known)
+    law = friction_law(surrogate, start=1e-3, stop=1.0, points=20, **known)
     axes = law.plot(figure.add_subplot())
     np.testing.assert_array_equal(
         axes.lines[0].get_xydata(), np.column_stack((law.values, law.answer.mu_macro))

@@ -11,7 +11,7 @@ import pytest
 
 import mumacro
 from mumacro import Surrogate
-from mumacro.analysis.law import APPROXIMATIONS, BORDERS
+from mumacro.analysis.approximations import APPROXIMATIONS, BORDERS
 from mumacro.contacts.geometries import contact_of
 from tests.cases import Case
 from tests.comparing import close

@@ -16,9 +16,8 @@ from builder.solver.sweep import Sweep
 from builder.tables.measure import fast_from
 from builder.tables.quantities import solver_noise
 from builder.tables.verify import CASES, draw
-from mumacro import Surrogate
+from mumacro import Surrogate, solve_for
 from mumacro.analysis.settling import settling
-from mumacro.analysis.solve_for import solve_for
 from mumacro.contacts.quadrature import rules
 from mumacro.table.atlas import (
     CONTINUOUS,
@@ -360,7 +359,7 @@ def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(
             point: Case = {"v0": float(v[i]), "y0": float(y[i])}
             target = float(fine.evaluate(**UNIT, **point).mu_macro)
             true = point.pop(unknown)
-            ((root,),) = solve_for(ours, unknown, target, {**UNIT, **point}).roots
+            ((root,),) = solve_for(ours, unknown, target, **{**UNIT, **point}).roots
             far = 4e-15 * true  # the target is rounded, too
             assert root.low - far <= true <= root.high + far, (kind, true, root)
             end = root.high if true > root.value else root.low
@@ -375,7 +374,7 @@ def test_an_enclosure_that_ends_at_the_border_has_the_bound_of_the_other_side() 
     # beyond the table's border, not the true one
     case, true = {**UNIT, "y0": 1.698960831811908}, 0.5521812858302085
     ((root,),) = solve_for(
-        opened(1e-4), "v0", float(opened(1e-12).evaluate(**case, v0=true).mu_macro), case
+        opened(1e-4), "v0", float(opened(1e-12).evaluate(**case, v0=true).mu_macro), **case
     ).roots
     assert root.regime == "stick_slip"
     assert root.low <= true <= root.high

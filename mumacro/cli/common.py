@@ -46,6 +46,9 @@ inputs, each as name=value, in SI units or with a unit as in y0=2um:
 """
 
 
+CURVE = 400  # points of a curve in a picture
+
+
 class UsageError(Exception):
     """The command is written wrongly; one line, with the remedy."""
 

@@ -13,7 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 import mumacro
-from mumacro.analysis.fit_result import Fit, quantile
+from mumacro.analysis.fit import Fit, quantile
 from mumacro.analysis.measured_points import STD, UNKNOWNS
 from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES, contact_of
 from mumacro.errors import missing

@@ -10,17 +10,15 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from starlette.responses import Response
 
-from mumacro.analysis.law import (
+import mumacro
+from mumacro.analysis.approximations import (
     APPROXIMATIONS,
     BORDERS,
-    Law,
     approximations,
     border_speeds,
-    friction_law,
-    sweep_values,
 )
-from mumacro.analysis.roots import Solution
-from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.law import Law, sweep_values
+from mumacro.analysis.solve_for import Solution, solve_for
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
 from mumacro.inputs.kind import SPRING
@@ -86,7 +84,7 @@ def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     (table, form, case, wanted), (along, per) = found, field_of(found.form.along)
     asked = wanted.asked
     values = sweep_values(along, form.start * per, form.stop * per, form.points, form.scale)
-    law = friction_law(table.surrogate, along, values, case, **asked.kind.names)
+    law = mumacro.law(table.surrogate, along, values=values, **case, **asked.kind.names)
     six = [values if name == along else np.array([case[name]]) for name in asked.fields]
     answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
     answer[_STATIC.path], parts = law.mu_static, [*wanted.parts, _STATIC]
@@ -177,8 +175,8 @@ def post_solve_for(found: Asking) -> Response:
         table.surrogate,
         name,
         [x * unit for x in form.target],
-        case,
-        within,
+        within=within,
+        **case,
         **wanted.asked.kind.names,
     )
     answer = {"unknown": form.unknown, "unit": unit_of(form.unknown), "quantity": form.quantity}
