@@ -288,7 +288,7 @@ def _dimensional_law(s: Surrogate) -> list[Panel]:
     """Fig. 11: mu_macro over v0 of one contact at two amplitudes, with the paper's laws."""
     v0, curves = np.linspace(0.0, 1.0, 601) ** 2 * 0.25, []
     for y0, look in ((0.6e-6, "C0-"), (4e-6, "C2-")):
-        case: dict[str, float | None] = {
+        case: dict[str, Any] = {
             "mu0": 0.5,
             "Fz": 10.0,
             "k": 5e6,

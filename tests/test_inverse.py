@@ -279,6 +279,9 @@ REFUSED: list[tuple[str, Any, Case, str]] = [
     ("across", ("v0", ANY, (1.0, 1.0)), {}, "range must"),
     ("across", ("k", ANY, (0.0, 1.0)), {}, "range must"),
     ("across", ("v0", ANY, (0.0, math.inf)), {}, "range must"),
+    ("across", ("v0", ANY, 1.0), {}, "range must"),
+    ("across", ("v0", "fast"), {}, "target must be a real number"),
+    ("across", ("v0", ANY), {"fz": 1.0}, "fz must be one of .*did you mean Fz"),
     ("across", ("omega", ANY), {"f": 1e3}, "f must"),
     ("across", ("v0", ANY), {"omega": None, "f": 1e308}, "f must"),
     ("across", ("v0", ANY), {"k": [1e6, 2e6]}, "k must"),
@@ -353,7 +356,7 @@ def test_a_ray_at_the_border_crosses_it_twice_or_never(
 
 
 def test_a_fold_just_above_its_first_ratio_is_found(surrogate: Surrogate) -> None:
-    case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
+    case: Case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
     # between minimum and maximum, which differ by a thousandth
     target = float(surrogate.mu_ratio(0.6626, 6.626))
     roots = solve_for(surrogate, "k", target, **case).roots[0]

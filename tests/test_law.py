@@ -62,6 +62,38 @@ def test_a_bad_range_names_its_field(field: str, arguments: Any) -> None:
     assert caught.value.field == field
 
 
+@pytest.mark.parametrize(
+    ("field", "options"),
+    [
+        ("start", {"stop": 1.0}),
+        ("stop", {"start": 1.0}),
+        ("start", {"start": "slow", "stop": 1.0}),
+        ("stop", {"start": 1.0, "stop": [2.0, 3.0]}),
+        ("points", {"start": 1.0, "stop": 2.0, "points": 2.5}),
+        ("values", {"values": [1.0, 2.0], "start": 1.0}),
+        ("values", {"values": [2.0, 1.0]}),
+        ("values", {"values": 1.0}),
+        ("values", {"values": []}),
+        ("values", {"values": ["slow"]}),
+    ],
+)
+def test_a_range_that_is_no_range_names_its_field(
+    surrogate: Surrogate, field: str, options: Any
+) -> None:
+    with pytest.raises(InputError) as caught:
+        friction_law(surrogate, **options, **LINE)
+    assert caught.value.field == field
+
+
+def test_a_law_goes_from_start_to_stop(surrogate: Surrogate) -> None:
+    for scale in ("log", "linear"):
+        values = sweep_values("v0", 1e-3, 1.0, 7, scale)
+        law = friction_law(surrogate, start=1e-3, stop=1.0, points=7, scale=scale, **LINE)
+        assert law.values.tolist() == values.tolist()
+        expected = friction_law(surrogate, values=values, **LINE).answer.mu_macro
+        assert law.answer.mu_macro.tolist() == expected.tolist()
+
+
 # --- any contact and direction --------------------------------------------------------------------
 
 
@@ -157,6 +189,7 @@ def test_the_articles_formulas_are_refused_for_another_contact(
         ("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
         ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
         ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high must be given"),
+        ("v0", {**LINE, "step": 9}, "across", "step must be one of mu0, Fz, k"),
         ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude must be left out"),
         (
             "k",
@@ -319,7 +352,7 @@ def test_the_border_of_every_case_is_where_the_law_crosses_it(
 def test_extreme_inputs_give_numbers_or_nan_and_no_warning(
     surrogate: Surrogate, along: Any
 ) -> None:
-    case = {"mu0": 0.3, "Fz": 1e-200, "k": 1e200, "y0": 1e-300, "omega": 1e150, "v0": 1e-150}
+    case: Case = {"mu0": 0.3, "Fz": 1e-200, "k": 1e200, "y0": 1e-300, "omega": 1e150, "v0": 1e-150}
     values = sweep_values(
         along, 1e-300 if along != "v0" else 0.0, 1e300, 41, "log" if along != "v0" else "linear"
     )

@@ -207,7 +207,10 @@ def _legal(sweep: Sweep) -> tuple[float, float]:
 
 
 def _checked_range(sweep: Sweep, within: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(end) for end in within)
+    try:
+        low, high = (float(end) for end in within)
+    except (TypeError, ValueError) as error:
+        raise InputError("range", within, "two ascending, finite numbers") from error
     least, most = _legal(sweep)
     if not least <= low < high <= most:
         bound = "two ascending, finite numbers " + ("> 0" if sweep.unknown in POSITIVE else ">= 0")

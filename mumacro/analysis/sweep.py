@@ -8,7 +8,7 @@ import numpy as np
 
 from mumacro.answer import Answer
 from mumacro.errors import InputError
-from mumacro.inputs.fields import as_columns, check_inputs
+from mumacro.inputs.fields import as_columns, check_inputs, unknown_name
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array
@@ -33,6 +33,10 @@ def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> 
                 "both ends of it"
             )
             raise InputError(name, case[name], told)
+    names = [*kind.columns, *({"y0", AMPLITUDE} - {*kind.columns})]
+    for name in case.keys() - {*names, *ENDS, "k_range"}:
+        bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
+        raise InputError(name, case[name], bound)
     given = {
         name: value for name, value in case.items() if value is not None or name == "k" != without
     }
