@@ -60,7 +60,7 @@ def own(axes: Any) -> Any:
 
 def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
     """Write a picture; ``draw`` gets its axes.  InputError where the name does not end in one of
-    :data:`ENDINGS`."""
+    ``ENDINGS``."""
     path = Path(path)
     if path.suffix not in ENDINGS:
         endings = f"a name that ends in {', '.join(ENDINGS)}, or for the command in .csv"

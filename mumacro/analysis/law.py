@@ -150,7 +150,7 @@ def law(
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: the law has a band, see
-        :attr:`Law.band`.
+        :attr:`mumacro.analysis.law.Law.band`.
 
     Raises
     ------

@@ -130,7 +130,7 @@ def solve_for(
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: see
-        :attr:`Solution.ends`.
+        ``Solution.ends``.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """What a table holds: the pieces of the border, the blocks, and the grid for a person to look at.
 
-Nodes and errors as a table file stores them; :mod:`mumacro.table.netcdf` reads and writes them,
-:mod:`mumacro.table.polynomials` turns nodes into cells for evaluation.
+Nodes and errors as a table file stores them; ``netcdf.py`` reads and writes them,
+``polynomials.py`` turns nodes into cells for evaluation.
 """
 
 from dataclasses import dataclass, field
