@@ -8,7 +8,6 @@ For reading see ``mumacro.table.hdf5``.
 
 import hashlib
 import json
-import tempfile
 import threading
 from pathlib import Path
 from typing import Any
@@ -191,6 +190,8 @@ def write_table(table: Table, path: str | Path) -> str:
     TableError where the folder does not exist or cannot be written, or the disk is full; nothing is
     left behind.
     """
+    import tempfile  # only writing needs it: reading a table starts sooner without
+
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
@@ -217,6 +218,8 @@ def _image(table: Table) -> bytes:
     A temporary file: where the disk is full the netCDF library reports little and keeps the file
     open.  What it makes in memory holds the time of day.
     """
+    import tempfile  # only writing needs it: reading a table starts sooner without
+
     import netCDF4  # installed only to build tables
 
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
