@@ -14,18 +14,10 @@ from benchmarks import validation, validity
 from mumacro import Surrogate, __version__
 from mumacro.law import APPROXIMATIONS, BORDERS, borders
 from tests.comparing import close
+from tests.documents import PAGES, ROOT
 from tests.test_benchmarks import tables
 
-ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-PAGES = sorted(
-    [
-        *ROOT.glob("*.md"),
-        *DOCS.rglob("*.md"),
-        *(ROOT / "tables").glob("*.md"),
-        *ROOT.glob("examples/*.md"),
-    ]
-)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(
     r"^```.*?^```$|^(?:    .*\n)+|<!-- begin .*?<!-- end|`[^`\n]+`|<!--.*?-->",
