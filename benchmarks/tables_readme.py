@@ -92,8 +92,7 @@ def tables(build: bool, workers: int) -> str:
         f"python {' '.join(command(s.tolerance, f'tables/{s.path.name}'))}" for s in opened
     )
     commands = (
-        "Not run by the checks, which build coarser tables:\n\n"
-        f"```bash\n{builds_of_all}\n```"
+        f"Not run by the checks, which build coarser tables:\n\n```bash\n{builds_of_all}\n```"
     )
     note = re.search(r"^Built anew .*\n.*$", old, re.MULTILINE)
     said = note.group() if note else "Not built anew yet."
