@@ -9,10 +9,9 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.page_data import POLICY, map_of, names
-
 from .. import __version__
 from ..options import CaseRequest
+from ..page_data import POLICY, map_of, names
 from ..wire.json import dump
 from . import Endpoint, Reply, file_answer, in_thread
 
