@@ -16,14 +16,14 @@ from scipy.optimize import brentq
 
 from benchmarks import extended
 from benchmarks.measuring import main, markdown, quantity
-from builder.quantities import SOLVED
-from builder.steady import V_RANGE, Y_RANGE
-from builder.sweep import Sweep
-from builder.verify import QUANTILES, Neighbours, bound_over_error, distribution
+from builder.solver.steady import V_RANGE, Y_RANGE
+from builder.solver.sweep import Sweep
+from builder.tables.quantities import SOLVED
+from builder.tables.verify import QUANTILES, Neighbours, bound_over_error, distribution
 from mumacro import Surrogate
-from mumacro.arrays import Array
-from mumacro.charts import QUANTITY_NAMES
-from mumacro.table import RATIOS, error_distribution
+from mumacro.kernel.arrays import Array
+from mumacro.table.atlas import QUANTITY_NAMES
+from mumacro.table.netcdf import RATIOS, error_distribution
 
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
 SLOPES = ("slope_along_v", "slope_along_y")
