@@ -31,6 +31,7 @@ NAMES = (*QUANTITY_NAMES, *SLOPES)  # in the order of extended.ROWS
 #: points of a full run: ball across, its slopes, spring along and normal, ball along
 POINTS = ACROSS, SLOPES_ACROSS, SPRINGS, BALLS = 200, 40, 20_000, 1_000
 LAST_DIGIT = 2.0**-53
+ROOM = 1e-8
 Rows = dict[str, tuple[Array, Array]]  # values and bounds, or values and their own errors, by name
 HEADER = (
     "contact",
@@ -155,9 +156,13 @@ def summed_slopes(sweep: Sweep, table: Surrogate, v: Array, y: Array) -> Rows:
     sums, noise = np.empty((2, v.size)), np.empty((2, v.size))
     for i in range(v.size):
         s, weight = springs(table, float(v[i]), float(y[i]))
-        heavy = weight * s > 1e-18  # the others add nothing, and differences need room
+        x, amplitude = within(v[i], y[i], s)
+        # differences need room: a spring beside its border stands for those that are nearer
+        crit = table.v_tilde_crit(amplitude)
+        x = np.where(np.abs(x / crit - 1.0) < ROOM, crit * (1.0 + ROOM * np.sign(x - crit)), x)
+        heavy = (weight * s > 1e-18) & (x != crit)  # the others add nothing
         s, weight = s[heavy], weight[heavy]
-        slopes, off = Neighbours(table, sweep, *within(v[i], y[i], s)).slopes("mu_ratio")
+        slopes, off = Neighbours(table, sweep, x[heavy], amplitude[heavy]).slopes("mu_ratio")
         sums[:, i] = (1.5 * weight * s * slopes).sum(axis=1)
         noise[:, i] = (1.5 * weight * s * off).sum(axis=1)
     return {name: (sums[row], noise[row]) for row, name in enumerate(SLOPES)}
@@ -231,4 +236,4 @@ def errors(share: float) -> str:
 
 
 if __name__ == "__main__":
-    main(__doc__, {"errors": errors}, share=1.0)
+    main(__doc__, {"error_distribution": errors}, share=1.0)

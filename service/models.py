@@ -163,7 +163,7 @@ TableAnswer = model(
     max_rel_error=told(float | None, "Largest verified relative error of mu_macro [-]"),
     error_distribution=told(
         dict[str, dict[str, float]],
-        "By quantity: the verified error that a share of the points does not exceed, and bound over "
+        "By quantity: the error that a share of the verified points does not exceed; bound over "
         "error",
     ),
     attributes=told(dict[str, Any], "Root attributes of the file"),
