@@ -102,13 +102,16 @@ def springs(table: Surrogate, v: float, y: float) -> tuple[Array, Array]:
     """The loads s of springs and their weights d xi: split where a spring comes to the border and
     at its y~ = 1."""
 
-    def beyond(xi: float) -> float:
+    def beyond(xi: Any) -> Any:
         s = 1.5 * (1.0 - xi * xi)
-        return float(v / s - table.v_tilde_crit(y / s))
+        return v / s - table.v_tilde_crit(y / s)
 
     xi = 1.0 - np.geomspace(1.0, 1e-6, 1500)
-    s = 1.5 * (1.0 - xi * xi)
-    signs = np.sign(v / s - table.v_tilde_crit(y / s))
+    for _ in range(3):  # a narrow ring may stick between two of these
+        least = int(np.argmin(beyond(xi) * (1.0 - xi * xi)))
+        near = np.linspace(xi[max(least - 1, 0)], xi[min(least + 1, xi.size - 1)], 200)
+        xi = np.unique(np.concatenate([xi, near]))
+    signs = np.sign(beyond(xi))
     turns = np.flatnonzero(signs[1:] != signs[:-1])
     cuts = [brentq(beyond, xi[i], xi[i + 1], xtol=1e-16) for i in turns]
     if y < 1.5:

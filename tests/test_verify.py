@@ -113,7 +113,7 @@ def test_the_distribution_of_errors_is_that_of_its_points(sound: Surrogate, swee
     assert spread.keys() == {*largest, "slope_along_v", "slope_along_y"}
     for name, part in spread.items():
         assert part["error_quantiles"] == sorted(part["error_quantiles"]), name
-        assert part["error_quantiles"][0] < 0.1 * part["error_quantiles"][-1], name
+        assert part["error_quantiles"][0] < 0.2 * part["error_quantiles"][-1], name
         least, median, most = part["bound_over_error"]
         assert 1.0 <= least < median < most < math.inf, name
     assert {name: spread[name]["error_quantiles"][-1] for name in largest} == largest
