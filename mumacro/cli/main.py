@@ -8,7 +8,7 @@ import difflib
 import importlib
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -162,12 +162,28 @@ def _table(words: Sequence[str]) -> str:
     }
     bundled = [str(path) for path in bundled_tables()]
     if chosen.json:
-        return as_json({**found, "bundled": bundled})
+        errors = surrogate.error_distribution
+        return as_json({**found, "error_distribution": errors, "bundled": bundled})
     rows = [
         (name, f"{value:.3g}" if isinstance(value, float) else str(value))
         for name, value in found.items()
     ]
-    return in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
+    told_rows = in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
+    return "\n\n".join([told_rows, *_errors(surrogate)])
+
+
+def _errors(surrogate: Surrogate) -> Iterator[str]:
+    """How the verified errors are distributed, as text; nothing for a table without that."""
+    spread = surrogate.error_distribution
+    if spread:
+        heads = [
+            f"{100.0 * float(x):g} %" if x[0].isdigit() else x for x in next(iter(spread.values()))
+        ]
+        rows = [
+            (name, *(f"{value:.2g}" for value in part.values())) for name, part in spread.items()
+        ]
+        text = "errors that a share of the verified points does not exceed; bound over error"
+        yield f"{text}\n{in_columns([('', *heads), *rows])}"
 
 
 def _part(name: str) -> Any:
