@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 schemathesis = pytest.importorskip(
-    "schemathesis", reason="the PyPI package schemathesis is not installed"
+    "schemathesis", reason="schemathesis of requirements/peers.txt is not installed"
 )
 
 from hypothesis import HealthCheck, settings  # noqa: E402
@@ -25,6 +25,7 @@ from schemathesis.config import GenerationConfig, ProjectConfig, ProjectsConfig,
 from service.app import create_app  # noqa: E402
 from service.settings import Settings  # noqa: E402
 
+pytestmark = pytest.mark.peer
 EXAMPLES = 25
 ARROW, NDJSON = "application/vnd.apache.arrow.stream", "application/x-ndjson"
 RELATIONS = (
