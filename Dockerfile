@@ -45,7 +45,7 @@ COPY mumacro/kernel /build/mumacro/kernel
 # headers that the library reads.  Every user of the container may read all files, whatever the
 # umask of the checkout; no user may write them.
 RUN /build/venv/bin/python /build/hatch_build.py mumacro \
-    && find mumacro/kernel -type f -not -name data.h -not -name records.h -not -name library.h -delete \
+    && find mumacro/kernel -name '*.[ch]' -not -name data.h -not -name records.h -not -name library.h -delete \
     && venv/bin/python -m compileall -q mumacro service \
     && chmod -R a+rX,go-w .
 

@@ -7,8 +7,7 @@
     python3 dev.py check           the checks without pytest
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until a signal stops it
-    python3 dev.py wheels          the wheel of every platform and the source distribution, checked,
-                                   in dist
+    python3 dev.py wheels          the wheels of all platforms and the source distribution, checked
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
 

@@ -1,8 +1,9 @@
 """Every equation of the paper against the full model.
 
-    python benchmarks/validation.py [--only SECTION] [--write]  A deviation is formula/exact - 1
-    unless the section
-states otherwise; exact is the solver, or the 1e-12 table where thousands of points are needed.
+    python benchmarks/validation.py [--only SECTION] [--write]
+
+A deviation is formula/exact - 1 unless the section states otherwise; exact is the solver, or the
+1e-12 table where thousands of points are needed.
 """
 
 from benchmarks.measuring import FINEST, ROOT, main, markdown, quantity, sections  # isort: split
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.solver import march
-from builder.steady import border, solve
+from builder.solver.steady import border, solve
 from mumacro import Surrogate, closed_forms
 
 Array = NDArray[np.float64]

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.measuring import main, markdown, quantity, sections
-from builder.steady import V_RANGE, Y_RANGE
-from builder.sweep import Sweep
+from builder.solver.steady import V_RANGE, Y_RANGE
+from builder.solver.sweep import Sweep
 from mumacro import Surrogate
-from mumacro.inputs import FIELDS
-from mumacro.library import kernels
+from mumacro.inputs.fields import FIELDS
+from mumacro.kernel.binding import kernels
 from tests import extended
 from tests.test_driven_bounds import answered, hard, ordinary
 

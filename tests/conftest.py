@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from builder.sweep import Sweep
+from builder.solver.sweep import Sweep
 from mumacro import Surrogate
 from tests import browser as browsing
 from tests import serving as servers

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.contact import points
+from mumacro.contacts.quadrature import points
 
 Long = np.longdouble
 #: mu~, power, stick fraction, slopes along ln v~ and ln y~

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from builder.__main__ import main
-from builder.quantities import ABS_TO_REL
+from builder.tables.quantities import ABS_TO_REL
 from mumacro import Surrogate
-from mumacro.table import read_table, write_table
+from mumacro.table.netcdf import read_table, write_table
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow

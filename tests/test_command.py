@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate, fit
-from mumacro.__main__ import COMMANDS, main
-from mumacro.geometries import GEOMETRIES, contact_of
-from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
-from mumacro.validity import model_rows
+from mumacro.analysis.validity import model_rows
+from mumacro.cli.main import COMMANDS, main
+from mumacro.contacts.geometries import GEOMETRIES, contact_of
+from mumacro.inputs.fields import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
 from tests.cases import Capture, Case
 from tests.comparing import close
 
@@ -568,7 +568,7 @@ def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path)
 
 def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
-    from mumacro.law import friction_law
+    from mumacro.analysis.law import friction_law
     from mumacro.plotting import plot_answer, plot_map
 
     known = {name: value for name, value in VALUES.items() if name != "v0"}

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from builder.assemble import STEPS, build_table, to_step
-from builder.measure import SEAMS
-from builder.quantities import ABS_TO_REL, STICK_NOISE, solver_noise
-from builder.steady import solve
-from builder.sweep import Sweep
-from builder.verify import holds, monotony, seam_jumps, seam_slope_jumps, verify
+from builder.solver.steady import solve
+from builder.solver.sweep import Sweep
+from builder.tables.build import STEPS, build_table, to_step
+from builder.tables.measure import SEAMS
+from builder.tables.quantities import ABS_TO_REL, STICK_NOISE, solver_noise
+from builder.tables.verify import holds, monotony, seam_jumps, seam_slope_jumps, verify
 from mumacro import Surrogate, TableError
-from mumacro.charts import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE, REGIMES
-from mumacro.inputs import FIELDS
+from mumacro.inputs.fields import FIELDS
 from mumacro.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP
-from mumacro.table import read_table
+from mumacro.table.atlas import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE, REGIMES
+from mumacro.table.netcdf import read_table
 from tests.cases import Array, tables
 from tests.comparing import close
 

@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks import validation, validity
 from mumacro import Surrogate, __version__
-from mumacro.law import APPROXIMATIONS, BORDERS, borders
+from mumacro.analysis.law import APPROXIMATIONS, BORDERS, borders
 from tests.comparing import close
 from tests.test_benchmarks import tables
 

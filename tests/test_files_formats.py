@@ -19,7 +19,7 @@ from tests.cases import Capture, Case, opened
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
-from mumacro.__main__ import main  # noqa: E402
+from mumacro.cli.main import main  # noqa: E402
 from mumacro.files import ANSWERS, evaluate_files, reading  # noqa: E402
 from tests.forms import as_csv, as_ndjson  # noqa: E402
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate
-from mumacro.inputs import FIELDS
+from mumacro.inputs.fields import FIELDS
 from tests.serving import CASE
 
 om = pytest.importorskip(

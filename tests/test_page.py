@@ -14,9 +14,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from mumacro import Surrogate
-from mumacro.contact import CONTACTS, DIRECTIONS
-from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
-from mumacro.inputs import UNITS_OF
+from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
+from mumacro.inputs.fields import UNITS_OF
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from service.app import create_app
 from service.settings import Settings
 from tests.browser import START

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.geometries import contact_of
+from mumacro.contacts.geometries import contact_of
 from service.routes.page import ASSETS
 from tests.browser import RECORDED, START
 from tests.comparing import close

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from mumacro.inputs import FIELDS, SI
+from mumacro.inputs.fields import FIELDS, SI
 from tests.cases import Case
 
 STATIC = Path(__file__).resolve().parent.parent / "service" / "static"

@@ -11,8 +11,8 @@ import pytest
 
 import mumacro
 from mumacro import Surrogate
-from mumacro.geometries import contact_of
-from mumacro.law import APPROXIMATIONS, BORDERS
+from mumacro.analysis.law import APPROXIMATIONS, BORDERS
+from mumacro.contacts.geometries import contact_of
 from tests.cases import Case
 from tests.comparing import close
 from tests.serving import CASE

@@ -14,12 +14,13 @@ import netCDF4
 import numpy as np
 import pytest
 
-from builder.assemble import STEPS, bits, to_bits, to_step
-from mumacro import InputError, Surrogate, TableError, charts
-from mumacro.cells import nodes
-from mumacro.charts import BORDER_PIECES, CHARTS, NAMES
-from mumacro.table import MOST_BYTES, MOST_CELLS, Table, _digest, read_table, write_table
-from mumacro.writing import BusyError, alone_in, write_whole
+from builder.tables.build import STEPS, bits, to_bits, to_step
+from mumacro import InputError, Surrogate, TableError
+from mumacro.table import atlas
+from mumacro.table.atlas import BORDER_PIECES, CHARTS, NAMES
+from mumacro.table.atomic import BusyError, alone_in, write_whole
+from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, Table, _digest, read_table, write_table
+from mumacro.table.polynomials import nodes
 from tests.cases import Array
 
 Edit = Callable[..., object]
@@ -238,18 +239,18 @@ def test_another_atlas_is_refused(
     new, told = ATLASES.get(change, (MID, "high: range is"))
     part, (name, axis, quantity) = sound.blocks[index], BORDER_PIECES[2]
     for held in (part.nodes, part.cell_errors):  # the stick fraction, in stick-slip only
-        if not new.holds(charts.QUANTITIES[2]):
+        if not new.holds(atlas.QUANTITIES[2]):
             del held["stick_fraction"]
     part.a, part.b = (
         nodes(x.size, axis.low, axis.high) for x, axis in ((part.a, new.a), (part.b, new.b))
     )
     with monkeypatch.context() as other:
-        other.setattr(charts, "CHARTS", (*CHARTS[:index], new, *CHARTS[index + 1 :]))
-        other.setattr(charts, "NAMES", tuple(chart.name for chart in charts.CHARTS))
+        other.setattr(atlas, "CHARTS", (*CHARTS[:index], new, *CHARTS[index + 1 :]))
+        other.setattr(atlas, "NAMES", tuple(chart.name for chart in atlas.CHARTS))
         if change == "another border":
             wider = replace(axis, high=2.0 * axis.high)
             sound.border[2].nodes = nodes(sound.border[2].nodes.size, wider.low, wider.high)
-            other.setattr(charts, "BORDER_PIECES", (*BORDER_PIECES[:2], (name, wider, quantity)))
+            other.setattr(atlas, "BORDER_PIECES", (*BORDER_PIECES[:2], (name, wider, quantity)))
         checksum = write_table(sound, path)
         assert read_table(path).attributes["content_sha256"] == checksum
     with pytest.raises(TableError, match=told):

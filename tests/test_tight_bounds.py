@@ -12,15 +12,22 @@ import pytest
 
 from benchmarks.contacts import NAMES as BALL_NAMES
 from benchmarks.contacts import asked, hard_points
-from builder.measure import fast_from
-from builder.quantities import solver_noise
-from builder.sweep import Sweep
-from builder.verify import CASES, draw
+from builder.solver.sweep import Sweep
+from builder.tables.measure import fast_from
+from builder.tables.quantities import solver_noise
+from builder.tables.verify import CASES, draw
 from mumacro import Surrogate
-from mumacro.charts import CONTINUOUS, NAMES, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
-from mumacro.contact import rules
-from mumacro.inverse import solve_for
-from mumacro.settling import settling
+from mumacro.analysis.settling import settling
+from mumacro.analysis.solve_for import solve_for
+from mumacro.contacts.quadrature import rules
+from mumacro.table.atlas import (
+    CONTINUOUS,
+    NAMES,
+    QUANTITIES,
+    QUANTITY_NAMES,
+    REGIME_OF_SOURCE,
+    SOURCES,
+)
 from tests.cases import UNIT, Array, Case, opened, tables
 from tests.comparing import close
 

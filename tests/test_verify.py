@@ -8,15 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.blocks import solve_nodes
-from builder.measure import SEAMS, block_errors, cell_errors, fast_from, finer
-from builder.quantities import SOLVED, solver_noise
-from builder.sweep import Sweep
-from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, uncovered, verify
+from builder.solver.sweep import Sweep
+from builder.tables.blocks import solve_nodes
+from builder.tables.measure import SEAMS, block_errors, cell_errors, fast_from, finer
+from builder.tables.quantities import SOLVED, solver_noise
+from builder.tables.verify import (
+    CASES,
+    draw,
+    monotony,
+    seam_jumps,
+    seam_slope_jumps,
+    uncovered,
+    verify,
+)
 from mumacro import Surrogate
-from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
-from mumacro.charts import CHARTS, NAMES, QUANTITY_NAMES, SIGMA_CUT, SOURCES
-from mumacro.table import read_table
+from mumacro.table.atlas import CHARTS, NAMES, QUANTITY_NAMES, SIGMA_CUT, SOURCES
+from mumacro.table.netcdf import read_table
+from mumacro.table.polynomials import chebyshev_coefficients, interpolation_matrix, nodes
 from tests.cases import Array, opened, tables
 from tests.comparing import close
 

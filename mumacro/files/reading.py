@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import pyarrow.dataset
 
-from mumacro.files.answering import FilesError
-from mumacro.tabular import NO_UTF8, read_head
+from mumacro.files.record_batch import FilesError
+from mumacro.inputs.text_tables import NO_UTF8, read_head
 
 FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
 ENDINGS = f"{', '.join(FORMATS)} (text also .gz)"

@@ -9,7 +9,7 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro.page import POLICY, map_of, names
+from service.page_data import POLICY, map_of, names
 
 from .. import __version__
 from ..options import CaseRequest

@@ -10,11 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from starlette.responses import Response
 
-from mumacro.contact import SPRING
-from mumacro.errors import InputError
-from mumacro.inputs import field_of, unit_of
-from mumacro.inverse import Solution, solve_for
-from mumacro.law import (
+from mumacro.analysis.law import (
     APPROXIMATIONS,
     BORDERS,
     Law,
@@ -23,6 +19,11 @@ from mumacro.law import (
     friction_law,
     sweep_values,
 )
+from mumacro.analysis.roots import Solution
+from mumacro.analysis.solve_for import solve_for
+from mumacro.errors import InputError
+from mumacro.inputs.fields import field_of, unit_of
+from mumacro.inputs.kind import SPRING
 
 from ..answers import REGIME_NAMES, Part, answer_columns, nested
 from ..models import Answered, default, grouped, included, many, model, optional, told
