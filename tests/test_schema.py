@@ -48,7 +48,7 @@ RELATIONS = (
     r"must be left out (for direction|beside)",
     r"must be two stiffnesses",
     r"must be across or along for a ball",
-    r"must be without (y0|Fz_amplitude|approx)",
+    r"must be without (y0|Fz_amplitude)",
     r".* is (not computed|for one case)",
     r"must be >= 0 and below Fz",
     r"must be left out: (over an interval|unknown field)",
