@@ -35,8 +35,8 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after linking.
     && if command -v strip >/dev/null; then \
         find venv -name '*.so' -not -path '*.libs/*' -exec strip --strip-unneeded {} +; fi \
-# WebSockets and restarts on changed files are switched off, and pip has no business in a running image.
-    && venv/bin/python -m pip uninstall --quiet --yes websockets watchfiles pip setuptools
+# pip has no business in a running image.
+    && venv/bin/python -m pip uninstall --quiet --yes pip setuptools
 COPY LICENSE ./
 COPY mumacro mumacro
 COPY service service

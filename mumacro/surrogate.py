@@ -352,6 +352,7 @@ class Surrogate:
         return self._data
 
     def derivatives(self, *_: object, **__: object) -> NoReturn:
+        """Gone; the error names what replaces it."""
         raise MumacroError(
             "Surrogate.derivatives is gone: slopes(v_tilde, y_tilde, of) gives v~ d/dv~ and y~ "
             "d/dy~, evaluate(..., gradient=True) the slopes by the six inputs"

@@ -72,7 +72,7 @@ def test_the_readme_has_the_figures_of_the_page_on_accuracy() -> None:
 
 
 def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Surrogate) -> None:
-    page = (DOCS / "http.md").read_text("utf-8")
+    page = (DOCS / "python.md").read_text("utf-8")
     seen = set()
     for column, given, errors in re.findall(
         r"^\| `(\w+)` \| .+ \| (.+) \| (.+ %.*) \|$", page, re.MULTILINE
@@ -260,5 +260,5 @@ def test_metadata_agrees_with_the_package() -> None:
 
 
 def test_the_columns_of_a_law_are_all_described() -> None:
-    page = (DOCS / "http.md").read_text("utf-8")
+    page = (DOCS / "python.md").read_text("utf-8")
     assert [column for column in (*APPROXIMATIONS, *BORDERS) if f"`{column}`" not in page] == []

@@ -50,6 +50,7 @@ class BlockErrors(NamedTuple):
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
+    """``n`` random numbers from ``low`` to ``high``, uniform in their logarithm, (n,)."""
     return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
 
 

@@ -85,7 +85,7 @@ def solve_for(
     case : mapping
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: see
-        :attr:`Solution.ends`.
+        :attr:`mumacro.analysis.roots.Solution.ends`.
     within : (float, float), optional
         Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for
         k, Fz and mu0 from where the contact is so soft that it does not matter to where it is as

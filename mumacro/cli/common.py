@@ -61,6 +61,7 @@ class OneLineParser(argparse.ArgumentParser):
         super().__init__(formatter_class=RawDescriptionHelpFormatter, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
+        """End the program with code 2 and the fault, with the choice that may have been meant."""
         if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
             known = [word.strip(" '") for word in wrong[3].split(",")]
             near = difflib.get_close_matches(wrong[2].lower(), known, n=1)

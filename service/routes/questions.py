@@ -10,24 +10,15 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from starlette.responses import Response
 
-from mumacro.analysis.law import (
-    APPROXIMATIONS,
-    BORDERS,
-    Law,
-    approximations,
-    border_speeds,
-    friction_law,
-    sweep_values,
-)
+from mumacro.analysis.law import Law, friction_law, sweep_values
 from mumacro.analysis.roots import Solution
 from mumacro.analysis.solve_for import solve_for
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
-from mumacro.inputs.kind import SPRING
 
 from ..answers import REGIME_NAMES, Part, answer_columns, nested
-from ..models import Answered, default, grouped, included, many, model, optional, told
-from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes
+from ..models import Answered, default, included, many, model, optional, told
+from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example
 from ..wire.json import dump
 from . import Asking, Endpoint, Reply, question
 
@@ -39,27 +30,11 @@ _whole = BeforeValidator(
     lambda value: int(value) if isinstance(value, float) and value.is_integer() else value
 )
 _Points = Annotated[int, Field(ge=2, le=MAX_POINTS), _whole]
-_APPROXIMATIONS, _SPEEDS = "approximations", "border_speeds"
-#: the columns that belong to a law beside those of its cases
+#: the column that belongs to a law beside those of its cases
 _STATIC = Part("mu_static", "-", "Static limit (v0 -> 0) of each case")
-_MORE = (
-    *(
-        Part(f"{_APPROXIMATIONS}.{name}", "-", f"{text}; null: outside that")
-        for name, text in APPROXIMATIONS.items()
-    ),
-    *(
-        Part(f"{_SPEEDS}.{name}", "m/s", f"{text}; null: outside that")
-        for name, text in BORDERS.items()
-    ),
-)
-_more: Any = model(
-    "_LawInclude",
-    "",
-    include=includes(_APPROXIMATIONS, "those of the paper beside the exact values"),
-)
 
 
-class LawOptions(_more, Options):  # type: ignore[misc]
+class LawOptions(Options):
     """What is asked beside the five other inputs."""
 
     along: Name = bounded(f"one of {', '.join(NAMES)}", "The swept input", "v0")
@@ -70,15 +45,18 @@ class LawOptions(_more, Options):  # type: ignore[misc]
     points: _Points = bounded(f"a whole number from 2 to {MAX_POINTS}", "Number of values", 201)
     scale: Literal["log", "linear"] = bounded("log or linear", "Spacing of the values", "log")
 
-    @model_validator(mode="after")
-    def _sensible(self) -> Self:
-        if _APPROXIMATIONS in (self.include or ()) and self.kind != SPRING:
+    @model_validator(mode="before")
+    @classmethod
+    def _without_approximations(cls, form: dict[str, Any]) -> dict[str, Any]:
+        names = form.get("include")
+        if isinstance(names, list) and "approximations" in names:
             raise InputError(
                 "include",
-                _APPROXIMATIONS,
-                "without approximations: they are those of one spring, across",
+                "approximations",
+                "left out: the formulas of the paper are gone here; mumacro law --approximations "
+                "prints them",
             )
-        return self
+        return form
 
 
 def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
@@ -90,12 +68,6 @@ def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     six = [values if name == along else np.array([case[name]]) for name in asked.fields]
     answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
     answer[_STATIC.path], parts = law.mu_static, [*wanted.parts, _STATIC]
-    if _APPROXIMATIONS in (form.include or ()):
-        for group, made in ((_APPROXIMATIONS, approximations), (_SPEEDS, border_speeds)):
-            answer |= {
-                f"{group}.{name}": column for name, column in made(table.surrogate, law).items()
-            }
-        parts += _MORE
     return law, {part: part.values(answer[part.path]) for part in parts}
 
 
@@ -118,7 +90,7 @@ def get_law_csv(found: Asking) -> Response:
     along, per = found.form.along, field_of(found.form.along)[1]
     heads = {f"{along} [{unit_of(along)}]": (law.values / per).tolist()}
     for part in sorted(columns, key=lambda part: bool(part.names)):  # texts last
-        name = part.path.removeprefix(f"{_APPROXIMATIONS}.").replace(f"{_SPEEDS}.", "border_")
+        name = part.path
         shown = ["" if value != value else value for value in columns[part]]
         heads[name if part.names else f"{name} [{part.unit}]"] = shown
     text = io.StringIO()
@@ -268,7 +240,6 @@ LawAnswer = model(
     values=told(list[float], "The swept input [SI]"),
     **default(True),
     **included(True),
-    **grouped(_MORE, True, "Beside the exact values"),
     mu_static=told(list[float], _STATIC.described),
     border=told(many(BorderMark), "Up to two points inside the range"),
 )

@@ -148,7 +148,7 @@ export function stiffness(use) {
     const model = contact === "ball" ? "ball (Hertz)" : "one spring";
     const said = (warnings ?? []).map((text) => `. Warning: ${text}`).join("");
     const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}${said}`;
-    list("stiffness-result", [[told, { k }, 6, about.knows.includes("contact") ? { contact } : {}]], use);
+    list("stiffness-result", [[told, { k }, 6, { contact }]], use);
   });
 }
 

@@ -2,8 +2,8 @@
 // Nothing here needs a browser; tests/page tests it with node.
 
 /** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
- *  slider's decimal exponents (SI), start value; beside them the choices with their words, what the host `knows`,
- *  geometries and their arguments. */
+ *  slider's decimal exponents (SI), start value; beside them the choices with their words, geometries
+ *  and their arguments, and whether there is a guide. */
 export const about = {};
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
@@ -114,10 +114,7 @@ export function readQuantity(name, text, unit) {
 /** A typed value of an input: a number, or for k "rigid" or "low..high". */
 export function readValue(name, text, unit = about.inputs[name].offered[0]) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return RIGID;
-  if (name === "k" && text.includes("..")) {
-    return about.knows.includes("k_range") ? readInterval(name, text, unit)
-      : refuse("must be one number: this service knows no interval");
-  }
+  if (name === "k" && text.includes("..")) return readInterval(name, text, unit);
   const read = readQuantity(name, text, unit);
   const { positive, bound } = about.inputs[name];
   if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0)) refuse(`must be ${bound}`);
@@ -237,8 +234,7 @@ export const powerOf = ({ direction }) => (direction === "normal" ? [] : ["power
 
 /** The question for the readout. */
 export function question(state) {
-  const model = about.knows.includes("contact") ? ["model"] : []; // of a service that has several
-  const include = ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), ...model];
+  const include = ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), "model"];
   return { ...caseOf(state, [], true), include };
 }
 

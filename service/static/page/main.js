@@ -126,10 +126,9 @@ function showBars({ gradient, mu_macro: mu }, asked) {
 
 function start(names) {
   Object.assign(about, names);
-  for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.includes(part.dataset.needs);
-  const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.includes(name));
+  for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
   parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge),
-    ...panels.map(([, panel]) => panel(setSI))];
+    solver(setSI), stiffness(setSI), fit(setSI)];
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
   addEventListener("change", take);
