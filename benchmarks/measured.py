@@ -148,7 +148,7 @@ def stiffness() -> str:
         "scatter of mu",
         "each point alone",
         "off by at most [%]",
-        "y~",
+        "y0/l0",
     )
     return markdown(header, rows)
 
