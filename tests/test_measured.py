@@ -11,7 +11,7 @@ from mumacro import Surrogate, closed_forms
 from tests.comparing import close
 
 pytest.importorskip("scipy")
-pytest.importorskip("matplotlib")
+pyplot = pytest.importorskip("matplotlib.pyplot")
 
 
 @pytest.fixture(scope="module")
@@ -83,3 +83,13 @@ def test_the_normal_force_obeys_the_published_form(surrogate: Surrogate, alpha: 
     off = 0.75 * (1.0 - b) ** 2 + 0.25 * (1.0 - b) ** 4 - psi
     assert off.min() > -1e-12
     assert off.max() == close(0.01436, abs=1e-4)
+
+
+def test_the_plot_of_points_with_their_own_mu0_is_one_line_through_the_fit() -> None:
+    found = measured.fitted("ball")
+    axes = found.plot()
+    fit_line = axes.get_lines()[-1]
+    assert fit_line.get_xdata() == close(measured.points().v0, rel=1e-15)
+    assert fit_line.get_ydata() == close(found.predict()[0], rel=1e-15)
+    assert len(axes.get_legend().get_texts()) == 1
+    pyplot.close("all")
