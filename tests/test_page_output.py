@@ -33,8 +33,8 @@ def test_it_loads_and_shows_the_known_value(
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
     assert page.text("#regime") == "stick slip"
     assert page.text("#model") == (
-        "Model: one spring of stiffness k, oscillation across the sliding direction; not compared "
-        "with measured points."
+        "Model: one spring of stiffness k, oscillation across the sliding direction; compared "
+        "with one published set of measured points, along."
     )
     assert "k is known: k known to 10 % leaves mu_macro uncertain by" in page.text("#rows")
     stick = surrogate.stick_fraction(answer.v_tilde, answer.y_tilde)

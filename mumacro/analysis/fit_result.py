@@ -87,6 +87,7 @@ class Fit:
         """Points, fit and its 95 % band over the input that varies most; returns matplotlib's axes.
 
         There is a curve for each set of the other inputs; more than 8 of them have no legend.
+        Where each point has its own, such as mu0, there is one line through the fit at the points.
         """
         from mumacro.plotting import own
 
@@ -95,6 +96,8 @@ class Fit:
         along = max(given, key=lambda name: (np.unique(given[name]).size, name == "v0"))
         x, names = given[along], [name for name in self._problem.columns if name != along]
         sets, member = np.unique([self.points[name] for name in names], axis=1, return_inverse=True)
+        if sets.shape[1] == x.size > 1:
+            return self._plot_each(ax, along)
         low = x[x > 0.0].min(initial=math.inf)
         fine = np.geomspace(low, x.max(), 300) if low < math.inf else x
         width = quantile(None if STD in self.points else x.size - len(self.values))
@@ -124,6 +127,28 @@ class Fit:
         )
         if sets.shape[1] <= 8:
             ax.legend()
+        return ax
+
+    def _plot_each(self, ax: Any, along: str) -> Any:
+        """The same where each point has its own other inputs, such as mu0: one line."""
+        order = np.argsort(self.points[along])
+        x, measured = self.points[along][order], self.points["mu_macro"][order]
+        mu, off = (column[order] for column in self.predict())
+        std = self.points.get(STD)
+        width = quantile(None if std is not None else x.size - len(self.values))
+        color = ax.errorbar(x, measured, None if std is None else std[order], fmt="o")[
+            0
+        ].get_color()
+        ax.plot(x, mu, color=color, label="fit, at the inputs of each point")
+        ax.fill_between(x, mu - width * off, mu + width * off, color=color, alpha=0.25, lw=0)
+        if x[0] > 0.0 and x[-1] > 10.0 * x[0]:
+            ax.set_xscale("log")
+        ax.set(
+            xlabel=f"{along} [{unit_of(along)}]",
+            ylabel="mu_macro [-]",
+            title=", ".join(self._told()),
+        )
+        ax.legend()
         return ax
 
     def _told(self) -> list[str]:

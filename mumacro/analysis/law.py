@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mumacro import closed_forms
+from mumacro.analysis.load import Stiffening, stiffening_of
 from mumacro.analysis.rootfinding import Sweep
 from mumacro.analysis.roots import Crossing, checked_case
 from mumacro.analysis.solve_for import border_crossings
@@ -82,6 +83,15 @@ class Law:
     border: tuple[Crossing, ...]
     case: dict[str, float]  #: the other five inputs [SI], checked; an interval of k by its middle
     kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
+    #: how k grows along Fz; None where k is constant
+    stiffening: Stiffening | None = None
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """All six inputs [SI]: ``case``, and the swept one (n,); k (n,), too, where it grows with
+        Fz."""
+        six = {**self.case, self.along: self.values}
+        return six if self.stiffening is None else six | self.stiffening.scaled(six, self.values)
 
     @property
     def band(self) -> tuple[Array, Array] | None:
@@ -95,7 +105,8 @@ class Law:
         """The law as a table: column -> values (n,), the swept input first."""
         names = ["mu_macro", *(BAND if self.band else ()), "regime", "error_bound", "source"]
         found = {name: getattr(self.answer, name) for name in names}
-        return {self.along: self.values, **found, "mu_static": self.mu_static}
+        k = {} if self.stiffening is None else {"k": self.inputs["k"]}
+        return {self.along: self.values, **k, **found, "mu_static": self.mu_static}
 
     def plot(self, axes: Any = None) -> Any:
         """A picture, see ``mumacro.plotting.plot_law``; needs matplotlib."""
@@ -140,6 +151,7 @@ def friction_law(
     contact: str = "spring",
     direction: str = "across",
     refine: bool = False,
+    stiffness_exponent: float | None = None,
 ) -> Law:
     """The friction law: mu_macro over a range of one input.
 
@@ -160,11 +172,16 @@ def friction_law(
     refine : bool
         Also values where mu_macro bends, for pictures: at the borders, and where a straight line
         between neighbours would be wrong by more than a thousandth of the law's height.
+    stiffness_exponent : float, optional
+        Along Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1.  Fz_given, the load at which
+        ``k`` holds, is ``Fz`` of the case.  Left out: 1/3 for a ball whose case has ``Fz``, else 0,
+        a constant k, and the case has no ``Fz``.
 
     Raises
     ------
     InputError
-        An input that is missing, out of bounds, or given twice; an interval of k where k is swept.
+        An input that is missing, out of bounds, or given twice; an interval of k where k is swept;
+        an exponent without the load at which k holds, or along another input than Fz.
 
     Examples
     --------
@@ -176,22 +193,36 @@ def friction_law(
     """
     kind = kind_of(contact, direction)
     case, ends = without_interval(case, along)
+    case, stiffening = stiffening_of(case, along, kind, stiffness_exponent)
     known = checked_case(case, along, kind)
-    sweep = Sweep(surrogate, known, along, kind)
+    sweep = Sweep(surrogate, known, along, kind, stiffening)
     border = border_crossings(
-        surrogate, along, known, float(values[0]), float(values[-1]), **kind.names
+        surrogate,
+        along,
+        known,
+        float(values[0]),
+        float(values[-1]),
+        **kind.names,
+        stiffening=stiffening,
     )
     if refine:
         values = sweep.refined(np.union1d(values, [mark.value for mark in border]))
     answer = sweep.answer(values, groups=True, illegal="raise")
     if ends:
         others = {name: value for name, value in known.items() if name != "k"}
-        answer = Sweep(surrogate, {**others, **ends}, along, kind).answer(
+        answer = Sweep(surrogate, {**others, **ends}, along, kind, stiffening).answer(
             values, groups=True, illegal="raise"
         )
     at_rest = sweep.answer(values, v0=0.0) if along != "v0" else sweep.answer(0.0)
     return Law(
-        along, values, answer, np.broadcast_to(at_rest.mu_macro, values.shape), border, known, kind
+        along,
+        values,
+        answer,
+        np.broadcast_to(at_rest.mu_macro, values.shape),
+        border,
+        known,
+        kind,
+        sweep.stiffening,
     )
 
 
@@ -260,7 +291,7 @@ def _of_one_spring(law: Law) -> dict[str, Any]:
     if law.kind != SPRING:
         told = " ".join(law.kind.names.values())
         raise InputError("approximations", told, "left out: they are those of one spring, across")
-    return {**law.case, law.along: law.values}
+    return law.inputs
 
 
 def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mumacro.analysis.load import Stiffening
 from mumacro.answer import Answer
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.kernel.arrays import Array, Bools, Places
@@ -29,18 +30,28 @@ _MAX_SAMPLES = 20_001
 
 class Sweep:
     """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
-    ``k`` is rigid."""
+    ``k`` is rigid.
+
+    With a ``stiffening`` the unknown is Fz, and ``k`` is that at one load and grows with Fz.
+    """
 
     def __init__(
-        self, surrogate: Surrogate, case: Mapping[str, Any], unknown: str, kind: Kind = SPRING
+        self,
+        surrogate: Surrogate,
+        case: Mapping[str, Any],
+        unknown: str,
+        kind: Kind = SPRING,
+        stiffening: Stiffening | None = None,
     ) -> None:
         self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
+        self.stiffening = None if case.get("k") == math.inf else stiffening
 
     def answer(self, x: Any, **more: Any) -> Answer[Any]:
         """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in
         ``evaluate``."""
+        k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         answer: Answer[Any] = self.surrogate.evaluate(
-            **{**self.case, self.unknown: x, **self.kind.names, **more}
+            **{**self.case, **k, self.unknown: x, **self.kind.names, **more}
         )
         return answer
 
@@ -53,7 +64,11 @@ class Sweep:
         at an edge."""
         answer = self.answer(x, gradient=True)
         with np.errstate(over="ignore", invalid="ignore"):
-            return answer, x * answer.gradient[self.unknown]  # type: ignore[index]
+            slope = x * answer.gradient[self.unknown]  # type: ignore[index]
+            if self.stiffening is not None:
+                k = self.stiffening.stiffness(self.case["k"], x)
+                slope = slope + self.stiffening.exponent * k * answer.gradient["k"]  # type: ignore[index]
+            return answer, slope
 
     def refined(self, values: Array) -> Array:
         """``values`` and more between them, where chords of mu_macro differ from it."""

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from mumacro.analysis.load import Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.fields import as_columns, check_inputs
 from mumacro.inputs.k_range import ENDS
@@ -54,6 +55,8 @@ class Solution:
     #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
     #: its highest value
     ends: tuple["Solution", "Solution"] | None = None
+    #: how k grows with Fz, where that is solved for; None where k is constant
+    stiffening: Stiffening | None = None
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,11 @@ and less. Along and normal every input has one root, and mu0 is reached: where t
 moves backwards, or the springs slide all the time.  There mu_macro falls with k and rises with Fz
 (along), and rises with both (normal).
 
+Where k grows with the load as Fz^m, m < 1, v~ and y~ go like Fz^(m-1) (across and along): mu_macro
+runs through the same values in the same order, its turning points and its border are as many, and
+stand in ln Fz 1/(1 - m) times as far apart.  For m = 1 it is constant.  For normal it rises with Fz
+at constant k and rises with k, so it rises with Fz for every m, up to mu0 where that is reached.
+
 How a level is found on a monotone piece: :mod:`mumacro.analysis.rootfinding`.
 """
 
@@ -35,6 +40,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mumacro.analysis.load import Stiffening, stiffening_of
 from mumacro.analysis.rootfinding import TINY, Curve, Sweep, curves_between, last_double, samples
 from mumacro.analysis.roots import Crossing, Reach, Root, Solution, checked_case
 from mumacro.answer import Answer
@@ -72,6 +78,7 @@ def solve_for(
     *,
     contact: str = "spring",
     direction: str = "across",
+    stiffness_exponent: float | None = None,
 ) -> Solution:
     """Every value of one input at which mu_macro has the wanted value.
 
@@ -92,6 +99,9 @@ def solve_for(
         good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
+    stiffness_exponent : float, optional
+        For Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1, where ``Fz`` of the case is
+        Fz_given: see :func:`mumacro.analysis.law.friction_law`.
 
     Raises
     ------
@@ -118,11 +128,13 @@ def solve_for(
                 within,
                 contact=contact,
                 direction=direction,
+                stiffness_exponent=stiffness_exponent,
             )
             for k in (interval["k_low"], case["k"], interval["k_high"])
         )
         return replace(middle, ends=(softest, stiffest))
-    sweep = Sweep(surrogate, checked_case(case, unknown, kind), unknown, kind)
+    case, stiffening = stiffening_of(case, unknown, kind, stiffness_exponent)
+    sweep = Sweep(surrogate, checked_case(case, unknown, kind), unknown, kind, stiffening)
     wanted = np.asarray(targets, dtype=np.float64).ravel()
     bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
     if bad.size:
@@ -156,7 +168,7 @@ def solve_for(
     roots = (
         tuple(some) if reach.holds(level) else () for level, some in zip(levels, found, strict=True)
     )
-    return Solution(unknown, levels, tuple(roots), reach, constant)
+    return Solution(unknown, levels, tuple(roots), reach, constant, stiffening=sweep.stiffening)
 
 
 def border_crossings(
@@ -168,16 +180,18 @@ def border_crossings(
     *,
     contact: str = "spring",
     direction: str = "across",
+    stiffening: Stiffening | None = None,
 ) -> tuple[Crossing, ...]:
     """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends,
     ascending.
 
-    ``case`` holds the other five inputs.  Of continuous sliding none, one, or (across, over mu0, Fz
+    ``case`` holds the other five inputs, of which k grows with Fz where there is a ``stiffening``.
+    Of continuous sliding none, one, or (across, over mu0, Fz
     or k) two places; none for rigid contact (never any stick) and without oscillation.
     """
     kind = kind_of(contact, direction)
-    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind)
-    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values():
+    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind, stiffening)
+    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values() or _proportional(sweep):
         return ()
     low = max(low, TINY)  # at 0 nothing oscillates or slides
     middle = low if along in EVERYWHERE or direction != "across" else _where(sweep, _Y_CLOSEST)
@@ -223,8 +237,19 @@ def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
     case, unknown, (least, most) = sweep.case, sweep.unknown, _legal(sweep)
     if unknown in EVERYWHERE:
         return least, most
+    low, high = _soft_to_rigid(sweep, targets, least)
+    if sweep.stiffening is not None:
+        lightest, heaviest = sweep.stiffening.range(case["k"])
+        inner = max(low, lightest), min(high, heaviest)
+        low, high = inner if inner[0] < inner[1] else (max(least, lightest), heaviest)
+    return low, high
+
+
+def _soft_to_rigid(sweep: Sweep, targets: Array, least: float) -> tuple[float, float]:
+    """The same for k, Fz and mu0, whose smallest legal value is ``least``."""
+    case, unknown = sweep.case, sweep.unknown
     amplitude = case[AMPLITUDE if sweep.kind.normal else "y0"]
-    if 0.0 in (amplitude, case["omega"]):
+    if 0.0 in (amplitude, case["omega"]) or _proportional(sweep):
         return max(least, 1e-300), 1e300
     if unknown == "Fz" and sweep.kind.normal:
         return least, min(1e17 * amplitude, 1e300)
@@ -251,10 +276,18 @@ def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
 def _where(sweep: Sweep, place: float) -> float:
     """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``place``, within double range; of a
     rigid contact any."""
-    one = sweep.answer(1.0)
+    one = sweep.answer(1.0 if sweep.stiffening is None else sweep.stiffening.load)
     at_one = float(one.v_tilde / one.y_tilde if sweep.kind.normal else one.y_tilde)
     scale = 1.0 if sweep.case.get("k") == math.inf else min(max(at_one, 1e-300), 1e300)
+    if sweep.stiffening is not None:
+        return sweep.stiffening.place(place / scale)
     return place / scale if sweep.unknown == "k" else scale / place
+
+
+def _proportional(sweep: Sweep) -> bool:
+    """Whether k grows in proportion to Fz, so that Fz has no influence."""
+    growth = sweep.stiffening
+    return growth is not None and growth.exponent == 1.0 and not sweep.kind.normal
 
 
 def _without_limit(sweep: Sweep, reach: Reach) -> Reach:

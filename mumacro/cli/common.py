@@ -180,13 +180,15 @@ def read_case(
     *,
     one_k: str = "",
     whole: bool = True,
+    optional: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
     ``Surrogate.evaluate``.
 
     ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
     not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
-    other inputs must be there.  UsageError tells everything that is wrong, in one line.
+    other inputs must be there, but for those that are ``optional``.  UsageError tells everything
+    that is wrong, in one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20.69kHz v0=0.01"])["k"]
     1000000.0
@@ -209,7 +211,8 @@ def read_case(
             case[name] = _read(name, text, kind, one_k)
         except ValueError as error:
             faults.append(str(error))
-    faults += _faults_of_names(case, kind, without, whole)
+    absent = {*optional} - case.keys()
+    faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
         raise UsageError("; ".join(faults))
     return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}

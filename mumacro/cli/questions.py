@@ -11,6 +11,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.analysis.law import approximations, friction_law, sweep_values
 from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.validity import Row, load_rows
 from mumacro.cli import common
 from mumacro.cli.common import (
     ImpossibleError,
@@ -49,22 +50,29 @@ def law(words: Sequence[str]) -> str:
     parser.add_argument(
         "--approximations", action="store_true", help="also the approximations of the article"
     )
+    add_exponent(parser)
     chosen = parser.parse_intermixed_args(words)
     (along, *ends), kind = chosen.along, common.kind_in(chosen)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
     (inner, scale), unit = field_of(along), unit_of(along)
-    case = read_case(chosen.words, kind, [along])
+    case = read_case(chosen.words, kind, **without_or_load(along))
     start, stop = (scale * end for end in common.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     values = sweep_values(
         inner, start, stop, chosen.points or (CURVE if drawn else 25), chosen.scale
     )
     surrogate = open_table(chosen.table)
-    options: dict[str, Any] = {**kind.names, "refine": drawn}
+    options: dict[str, Any] = {
+        **kind.names,
+        "refine": drawn,
+        "stiffness_exponent": chosen.stiffness_exponent,
+    }
     found = friction_law(surrogate, inner, values, case, **options)
+    model = load_rows(inner, found.case, chosen.contact, found.stiffening)
     columns = found.columns | (approximations(surrogate, found) if chosen.approximations else {})
     columns = {along: columns.pop(inner) / scale, **columns}
+    by_unit = {along: unit, "k": unit_of("k")}
     border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
     if chosen.json:
         return as_json(
@@ -73,11 +81,13 @@ def law(words: Sequence[str]) -> str:
                 "unit": unit,
                 **columns,
                 "border": border,
+                **({"model": model} if model else {}),
                 "table": common.about(surrogate),
             }
         )
     headed = {
-        f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()
+        f"{name} [{by_unit[name]}]" if name in by_unit else name: column
+        for name, column in columns.items()
     }
     form = common.format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
     of_k = ", for the geometric middle of k" if found.band else ""
@@ -85,6 +95,7 @@ def law(words: Sequence[str]) -> str:
         f"{plotting.mark_of(c)[1]} at {along} = {c.value / scale:{form}} {unit}{of_k}"
         for c in found.border
     ]
+    marks += model_lines(model)
     if chosen.out is not None:
         return "\n".join(
             [
@@ -102,6 +113,26 @@ def law(words: Sequence[str]) -> str:
     return "\n".join([in_columns([[*headed], *zip(*shown, strict=True)]), *marks])
 
 
+def add_exponent(parser: OneLineParser) -> None:
+    """The option for a stiffness that grows with the load."""
+    text = (
+        "where Fz is swept or the unknown: k grows as Fz^M, 0 to 1, and Fz= in the case is the "
+        "load at which k holds; default with Fz=: 1/3 for a ball"
+    )
+    parser.add_argument("--stiffness-exponent", type=float, metavar="M", help=text)
+
+
+def without_or_load(unknown: str) -> dict[str, Any]:
+    """Keywords of ``read_case``: the unknown must not be there; Fz may be, as the load at which k
+    holds."""
+    return {"optional": ["Fz"]} if unknown == "Fz" else {"without": [unknown]}
+
+
+def model_lines(rows: Sequence[Row]) -> list[str]:
+    """What is said about the model, below a result."""
+    return [in_columns([("model", f"{row['row']}: {row['text']}")]) for row in rows]
+
+
 def _shown(value: float, form: str) -> str:
     return "-" if math.isnan(value) else f"{value:{form}}"
 
@@ -116,6 +147,7 @@ def solve(words: Sequence[str]) -> str:
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
+    add_exponent(parser)
     chosen = parser.parse_intermixed_args(words)
     unknown, (inner, scale), unit = (
         chosen.unknown,
@@ -128,7 +160,7 @@ def solve(words: Sequence[str]) -> str:
             f"{unknown} does not belong to --direction {chosen.direction}: "
             f"{', '.join(kind.columns)} do"
         )
-    case = read_case(chosen.words, kind, [unknown])
+    case = read_case(chosen.words, kind, **without_or_load(unknown))
     if chosen.ratio and unknown == "mu0":
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
@@ -137,8 +169,15 @@ def solve(words: Sequence[str]) -> str:
     ]
     surrogate = open_table(chosen.table)
     found = solve_for(
-        surrogate, inner, target, case, (ends[0], ends[1]) if ends else None, **kind.names
+        surrogate,
+        inner,
+        target,
+        case,
+        (ends[0], ends[1]) if ends else None,
+        **kind.names,
+        stiffness_exponent=chosen.stiffness_exponent,
     )
+    model = load_rows(inner, common.middle_of(case), chosen.contact, found.stiffening)
     reach, two = found.reach, found.ends
     if not found.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
@@ -174,6 +213,7 @@ def solve(words: Sequence[str]) -> str:
                 "unit": unit,
                 "target": target,
                 "roots": listed,
+                **({"model": model} if model else {}),
                 "table": common.about(surrogate),
             }
         )
@@ -190,7 +230,11 @@ def solve(words: Sequence[str]) -> str:
         # a decade around the roots; what is at 0 is shown up to 1
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
         values = sweep_values(inner, low, high, CURVE, "log" if low > 0.0 else "linear")
-        options: dict[str, Any] = {**kind.names, "refine": True}
+        options: dict[str, Any] = {
+            **kind.names,
+            "refine": True,
+            "stiffness_exponent": chosen.stiffness_exponent,
+        }
         curve = friction_law(surrogate, inner, values, case, **options)
         columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
         return common.write_result(
@@ -208,7 +252,7 @@ def solve(words: Sequence[str]) -> str:
         for k, one in places.items()
         if not one.roots[0]
     ]
-    return "\n".join([text, *none])
+    return "\n".join([text, *none, *model_lines(model)])
 
 
 def map_(words: Sequence[str]) -> str:

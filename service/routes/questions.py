@@ -11,14 +11,17 @@ from pydantic import BeforeValidator, Field, model_validator
 from starlette.responses import Response
 
 from mumacro.analysis.law import Law, friction_law, sweep_values
+from mumacro.analysis.load import Stiffening
 from mumacro.analysis.roots import Solution
 from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.validity import load_rows
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
+from mumacro.kernel.arrays import Array
 
 from ..answers import REGIME_NAMES, Part, answer_columns, nested
-from ..models import Answered, default, included, many, model, optional, told
-from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example
+from ..models import Answered, ModelRow, default, included, many, model, optional, told
+from ..options import MODEL, NAMES, Five, Name, NotNegative, Options, Positive, bounded, example
 from ..wire.json import dump
 from . import Asking, Endpoint, Reply, question
 
@@ -32,6 +35,15 @@ _whole = BeforeValidator(
 _Points = Annotated[int, Field(ge=2, le=MAX_POINTS), _whole]
 #: the column that belongs to a law beside those of its cases
 _STATIC = Part("mu_static", "-", "Static limit (v0 -> 0) of each case")
+_K = Part("k", "N/m", "Stiffness at each value, where it grows along Fz")
+_MODEL = "Along Fz, or solved for it: what is said of k"
+_Exponent = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+_exponent = bounded(
+    "a number from 0 to 1",
+    "For Fz only: k grows as Fz to this power, and Fz of the case is the load at which k holds; "
+    "left out: 1/3 for a ball with Fz, else k is constant",
+    None,
+)
 
 
 class LawOptions(Options):
@@ -44,6 +56,7 @@ class LawOptions(Options):
     stop: Positive = bounded("finite and > 0", "Last value [SI], > start", examples=[10.0])
     points: _Points = bounded(f"a whole number from 2 to {MAX_POINTS}", "Number of values", 201)
     scale: Literal["log", "linear"] = bounded("log or linear", "Spacing of the values", "log")
+    stiffness_exponent: _Exponent | None = _exponent
 
     @model_validator(mode="before")
     @classmethod
@@ -64,11 +77,33 @@ def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     (table, form, case, wanted), (along, per) = found, field_of(found.form.along)
     asked = wanted.asked
     values = sweep_values(along, form.start * per, form.stop * per, form.points, form.scale)
-    law = friction_law(table.surrogate, along, values, case, **asked.kind.names)
-    six = [values if name == along else np.array([case[name]]) for name in asked.fields]
+    options: dict[str, Any] = {
+        **asked.kind.names,
+        "stiffness_exponent": form.stiffness_exponent,
+    }
+    law = friction_law(table.surrogate, along, values, case, **options)
+    six = _columns(found, along, values, law.stiffening)
     answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
     answer[_STATIC.path], parts = law.mu_static, [*wanted.parts, _STATIC]
+    if law.stiffening is not None:
+        answer[_K.path], parts = law.inputs["k"], [*parts, _K]
     return law, {part: part.values(answer[part.path]) for part in parts}
+
+
+def _columns(
+    found: Asking, unknown: str, values: Array, stiffening: Stiffening | None
+) -> list[Array]:
+    """The inputs of the cases at values of one of them, by column."""
+    case = {**found.case, unknown: values}
+    if stiffening is not None:
+        case |= stiffening.scaled(found.case, values)
+    return [np.atleast_1d(case[name]) for name in found.wanted.asked.fields]
+
+
+def _said(found: Asking, unknown: str, stiffening: Stiffening | None) -> dict[str, Any]:
+    """What is said of the model, if anything."""
+    rows = load_rows(unknown, found.case, found.form.contact, stiffening)
+    return {MODEL: rows} if rows else {}
 
 
 @question(LawOptions, "along")
@@ -79,7 +114,8 @@ def post_law(found: Asking) -> Response:
     swept = {"along": along, "unit": unit_of(along), "values": law.values / per}
     border = [{"value": mark.value / per, "mu_macro": mark.mu_macro} for mark in law.border]
     answer = nested({part.path: column for part, column in columns.items()})
-    return Reply(dump({**swept, **answer, "border": border, **found.table.signature}))
+    said = _said(found, found.form.along, law.stiffening)
+    return Reply(dump({**swept, **answer, "border": border, **said, **found.table.signature}))
 
 
 @question(LawOptions, "along")
@@ -130,6 +166,7 @@ class SolveForOptions(Options):
         "Where to search [SI]; left out: wherever it changes mu_macro",
         None,
     )
+    stiffness_exponent: _Exponent | None = _exponent
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:
@@ -152,6 +189,7 @@ def post_solve_for(found: Asking) -> Response:
         case,
         within,
         **wanted.asked.kind.names,
+        stiffness_exponent=form.stiffness_exponent,
     )
     answer = {"unknown": form.unknown, "unit": unit_of(form.unknown), "quantity": form.quantity}
     answer |= _results(form, solution, _included(found, name, solution), unit, per)
@@ -161,6 +199,7 @@ def post_solve_for(found: Asking) -> Response:
             {"k": k, **_results(form, end, None, unit, per)}
             for k, end in zip(ks, solution.ends, strict=True)
         ]
+    answer |= _said(found, name, solution.stiffening)
     return Reply(dump({**answer, **table.signature}))
 
 
@@ -196,11 +235,11 @@ def _results(
 
 def _included(found: Asking, unknown: str, solution: Solution) -> list[dict[str, Any]]:
     """The included quantities of every root, in order."""
-    table, _, case, wanted = found
+    table, _, _, wanted = found
     values = np.array([root.value for roots in solution.roots for root in roots])
     if not wanted.include or not values.size:
         return [{}] * values.size
-    six = [values if name == unknown else np.array([case[name]]) for name in wanted.asked.fields]
+    six = _columns(found, unknown, values, solution.stiffening)
     answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
     rows = zip(*(answer[path].tolist() for path in wanted.more), strict=True)
     return [nested(dict(zip(wanted.more, row, strict=True))) for row in rows]
@@ -241,6 +280,8 @@ LawAnswer = model(
     **default(True),
     **included(True),
     mu_static=told(list[float], _STATIC.described),
+    k=optional(list[float], _K.described),
+    model=optional(many(ModelRow), _MODEL),
     border=told(many(BorderMark), "Up to two points inside the range"),
 )
 _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
@@ -301,6 +342,7 @@ SolveForAnswer = model(
     ends=optional(
         many(SolveForEnd), "Only with k_range: for k_low and k_high; the rest is for the middle"
     ),
+    model=optional(many(ModelRow), _MODEL),
 )
 ENDPOINTS = [
     Endpoint(

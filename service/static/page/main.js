@@ -84,7 +84,7 @@ function showAnswer({ asked, ...found }) {
   $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
-  $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; not compared with measured points.`;
+  $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; compared with one published set of measured points, along.`;
   const rows = found.model ?? [];
   const units = rows.find(({ row }) => row === "units"); // beside the number: it is probably wrong
   $("units").textContent = units ? `Check the units: ${units.text}` : "";
