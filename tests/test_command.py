@@ -678,7 +678,10 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
     found = json.loads(said(capsys, 0, "table", "--json"))
     expected = (str(surrogate.path), surrogate.checksum, surrogate.max_abs_error)
     assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
-    assert said(capsys, 0, "table").count(".nc") > len(found["bundled"])
+    assert found["error_distribution"] == surrogate.error_distribution
+    text = said(capsys, 0, "table")
+    assert text.count(".nc") > len(found["bundled"])
+    assert f"{surrogate.error_distribution['border']['0.95']:.2g}" in text
 
 
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:

@@ -124,7 +124,7 @@ def _of_one_spring(law: Law) -> dict[str, Any]:
     if law.kind != SPRING:
         told = " ".join(law.kind.names.values())
         raise InputError("approximations", told, "left out: they are those of one spring, across")
-    return {**law.case, law.along: law.values}
+    return law.inputs
 
 
 def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:

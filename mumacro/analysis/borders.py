@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mumacro.analysis.load import Stiffening
 from mumacro.analysis.rootfinding import TINY, last_double
 from mumacro.analysis.sweep import EVERYWHERE, Sweep, checked_case
 from mumacro.inputs.kind import kind_of
@@ -50,16 +51,18 @@ def border_crossings(
     *,
     contact: str = "spring",
     direction: str = "across",
+    stiffening: Stiffening | None = None,
 ) -> tuple[Crossing, ...]:
     """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends,
     ascending.
 
-    ``case`` holds the other five inputs.  Of continuous sliding none, one, or (across, over mu0, Fz
-    or k) two places; none for rigid contact (never any stick) and without oscillation.
+    ``case`` holds the other five inputs, of which k grows with Fz where there is a ``stiffening``.
+    Of continuous sliding none, one, or (across, over mu0, Fz or k) two places; none for rigid
+    contact (never any stick) and without oscillation.
     """
     kind = kind_of(contact, direction)
-    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind)
-    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values():
+    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind, stiffening)
+    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values() or sweep.proportional:
         return ()
     low = max(low, TINY)  # at 0 nothing oscillates or slides
     middle = low if along in EVERYWHERE or direction != "across" else sweep.where(_Y_CLOSEST)

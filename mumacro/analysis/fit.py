@@ -92,11 +92,14 @@ class Fit:
         """Points, fit and its 95 % band over the input that varies most; returns matplotlib's axes.
 
         There is a curve for each set of the other inputs; more than 8 of them have no legend.
+        Where each point has its own, such as mu0, there is one line through the fit at the points.
         """
         given = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(given, key=lambda name: (np.unique(given[name]).size, name == "v0"))
         x, names = given[along], [name for name in self._problem.columns if name != along]
         sets, member = np.unique([self.points[name] for name in names], axis=1, return_inverse=True)
+        if sets.shape[1] == x.size > 1:
+            return self._plot_each(along, ax)
         low = x[x > 0.0].min(initial=math.inf)
         fine = np.geomspace(low, x.max(), 300) if low < math.inf else x
         width = quantile(None if STD in self.points else x.size - len(self.values))
@@ -114,6 +117,17 @@ class Fit:
             label, measured = ", ".join(varied) or "fit", self.points["mu_macro"][mine]
             curves.append(plotting.Curve(label, x[mine], measured, bars, places, mu, width * off))
         return plotting.plot_fit(along, curves, ", ".join(self._told()), ax)
+
+    def _plot_each(self, along: str, ax: Any) -> Any:
+        """The same where each point has its own other inputs, such as mu0: one line."""
+        order = np.argsort(self.points[along])
+        x, measured = self.points[along][order], self.points["mu_macro"][order]
+        mu, off = (column[order] for column in self.predict())
+        std = self.points.get(STD)
+        width = quantile(None if std is not None else x.size - len(self.values))
+        bars, label = None if std is None else std[order], "fit, at the inputs of each point"
+        curve = plotting.Curve(label, x, measured, bars, x, mu, width * off)
+        return plotting.plot_fit(along, [curve], ", ".join(self._told()), ax)
 
     def _told(self) -> list[str]:
         units = {"k": " N/m", "mu0": ""}

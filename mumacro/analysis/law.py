@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from mumacro import plotting
 from mumacro.analysis.borders import Crossing, border_crossings
+from mumacro.analysis.load import Stiffening, stiffening_of
 from mumacro.analysis.sweep import Sweep, checked_case
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
@@ -36,6 +37,15 @@ class Law:
     border: tuple[Crossing, ...]
     case: dict[str, float]  #: the other five inputs [SI], checked; an interval of k by its middle
     kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
+    #: how k grows along Fz; None where k is constant
+    stiffening: Stiffening | None = None
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """All six inputs [SI]: ``case``, and the swept one (n,); k (n,), too, where it grows with
+        Fz."""
+        six = {**self.case, self.along: self.values}
+        return six if self.stiffening is None else six | self.stiffening.scaled(six, self.values)
 
     @property
     def band(self) -> tuple[Array, Array] | None:
@@ -49,7 +59,8 @@ class Law:
         """The law as a table: column -> values (n,), the swept input first."""
         names = ["mu_macro", *(BAND if self.band else ()), "regime", "error_bound", "source"]
         found = {name: getattr(self.answer, name) for name in names}
-        return {self.along: self.values, **found, "mu_static": self.mu_static}
+        k = {} if self.stiffening is None else {"k": self.inputs["k"]}
+        return {self.along: self.values, **k, **found, "mu_static": self.mu_static}
 
     def plot(
         self, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None
@@ -126,6 +137,7 @@ def law(
     refine: bool = False,
     contact: str = "spring",
     direction: str = "across",
+    stiffness_exponent: float | None = None,
     **case: Any,
 ) -> Law:
     """The friction law: mu_macro over a range of one input.
@@ -147,6 +159,10 @@ def law(
         between neighbours would be wrong by more than a thousandth of the law's height.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
+    stiffness_exponent : float, optional
+        Along Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1.  Fz_given, the load at which
+        ``k`` holds, is ``Fz`` of the case.  Left out: 1/3 for a ball whose case has ``Fz``, else 0,
+        a constant k, and the case has no ``Fz``.
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: the law has a band, see
@@ -156,7 +172,8 @@ def law(
     ------
     InputError
         An input that is missing, out of bounds, or given twice; an interval of k where k is swept;
-        a range out of bounds.
+        a range out of bounds; an exponent without the load at which k holds, or along another input
+        than Fz.
 
     Examples
     --------
@@ -174,15 +191,20 @@ def law(
         raise InputError("values", "an array", "left out beside start and stop")
     kind = kind_of(contact, direction)
     one_k, ends = without_interval(case, along)
+    one_k, stiffening = stiffening_of(one_k, along, kind, stiffness_exponent)
     others = checked_case(one_k, along, kind)
-    sweep = Sweep(surrogate, others, along, kind)
-    border = border_crossings(surrogate, along, others, float(x[0]), float(x[-1]), **kind.names)
+    sweep = Sweep(surrogate, others, along, kind, stiffening)
+    ends_of_range = float(x[0]), float(x[-1])
+    border = border_crossings(
+        surrogate, along, others, *ends_of_range, **kind.names, stiffening=stiffening
+    )
     if refine:
         x = sweep.refined(np.union1d(x, [mark.value for mark in border]))
     answer = sweep.answer(x, groups=True, illegal="raise")
     if ends:
         interval = {**{name: one for name, one in others.items() if name != "k"}, **ends}
-        answer = Sweep(surrogate, interval, along, kind).answer(x, groups=True, illegal="raise")
+        over = Sweep(surrogate, interval, along, kind, stiffening)
+        answer = over.answer(x, groups=True, illegal="raise")
     at_rest = sweep.answer(x, v0=0.0) if along != "v0" else sweep.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
-    return Law(along, x, answer, mu_static, border, others, kind)
+    return Law(along, x, answer, mu_static, border, others, kind, sweep.stiffening)

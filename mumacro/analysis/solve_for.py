@@ -23,6 +23,11 @@ and less. Along and normal every input has one root, and mu0 is reached: where t
 moves backwards, or the springs slide all the time.  There mu_macro falls with k and rises with Fz
 (along), and rises with both (normal).
 
+Where k grows with the load as Fz^m, m < 1, v~ and y~ go like Fz^(m-1) (across and along): mu_macro
+runs through the same values in the same order, its turning points and its border are as many, and
+stand in ln Fz 1/(1 - m) times as far apart.  For m = 1 it is constant.  For normal it rises with Fz
+at constant k and rises with k, so it rises with Fz for every m, up to mu0 where that is reached.
+
 How a level is found on a monotone piece: :mod:`mumacro.analysis.rootfinding`.
 """
 
@@ -33,6 +38,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mumacro.analysis.load import Stiffening, stiffening_of
 from mumacro.analysis.rootfinding import TINY, Curve, curves_between, last_double, samples
 from mumacro.analysis.sweep import EVERYWHERE, Sweep, checked_case
 from mumacro.answer import Answer
@@ -100,6 +106,8 @@ class Solution:
     #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
     #: its highest value
     ends: tuple["Solution", "Solution"] | None = None
+    #: how k grows with Fz, where that is solved for; None where k is constant
+    stiffening: Stiffening | None = None
 
 
 def solve_for(
@@ -110,6 +118,7 @@ def solve_for(
     within: tuple[float, float] | None = None,
     contact: str = "spring",
     direction: str = "across",
+    stiffness_exponent: float | None = None,
     **case: Any,
 ) -> Solution:
     """Every value of one input at which mu_macro is ``target``.
@@ -127,6 +136,9 @@ def solve_for(
         good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
+    stiffness_exponent : float, optional
+        For Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1, where ``Fz`` of the case is
+        Fz_given: see :func:`mumacro.law`.
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: see
@@ -156,12 +168,14 @@ def solve_for(
                 within=within,
                 contact=contact,
                 direction=direction,
+                stiffness_exponent=stiffness_exponent,
                 **{**others, "k": k},
             )
             for k in (interval["k_low"], others["k"], interval["k_high"])
         )
         return replace(middle, ends=(softest, stiffest))
-    sweep = Sweep(surrogate, checked_case(others, unknown, kind), unknown, kind)
+    others, stiffening = stiffening_of(others, unknown, kind, stiffness_exponent)
+    sweep = Sweep(surrogate, checked_case(others, unknown, kind), unknown, kind, stiffening)
     levels = real("target", target).ravel()
     bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:
@@ -195,7 +209,8 @@ def solve_for(
         tuple(some) if reach.holds(level) else ()
         for level, some in zip(levels.tolist(), found, strict=True)
     )
-    return Solution(unknown, tuple(levels.tolist()), tuple(roots), reach, constant)
+    targets = tuple(levels.tolist())
+    return Solution(unknown, targets, tuple(roots), reach, constant, stiffening=sweep.stiffening)
 
 
 def _legal(sweep: Sweep) -> tuple[float, float]:
@@ -225,8 +240,19 @@ def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
     case, unknown, (least, most) = sweep.case, sweep.unknown, _legal(sweep)
     if unknown in EVERYWHERE:
         return least, most
+    low, high = _soft_to_rigid(sweep, targets, least)
+    if sweep.stiffening is not None:
+        lightest, heaviest = sweep.stiffening.range(case["k"])
+        inner = max(low, lightest), min(high, heaviest)
+        low, high = inner if inner[0] < inner[1] else (max(least, lightest), heaviest)
+    return low, high
+
+
+def _soft_to_rigid(sweep: Sweep, targets: Array, least: float) -> tuple[float, float]:
+    """The same for k, Fz and mu0, whose smallest legal value is ``least``."""
+    case, unknown = sweep.case, sweep.unknown
     amplitude = case[AMPLITUDE if sweep.kind.normal else "y0"]
-    if 0.0 in (amplitude, case["omega"]):
+    if 0.0 in (amplitude, case["omega"]) or sweep.proportional:
         return max(least, 1e-300), 1e300
     if unknown == "Fz" and sweep.kind.normal:
         return least, min(1e17 * amplitude, 1e300)

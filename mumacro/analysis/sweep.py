@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mumacro.analysis.load import Stiffening
 from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.fields import as_columns, check_inputs, unknown_name
@@ -59,18 +60,28 @@ def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> 
 
 class Sweep:
     """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
-    ``k`` is rigid."""
+    ``k`` is rigid.
+
+    With a ``stiffening`` the unknown is Fz, and ``k`` is that at one load and grows with Fz.
+    """
 
     def __init__(
-        self, surrogate: Surrogate, case: Mapping[str, Any], unknown: str, kind: Kind = SPRING
+        self,
+        surrogate: Surrogate,
+        case: Mapping[str, Any],
+        unknown: str,
+        kind: Kind = SPRING,
+        stiffening: Stiffening | None = None,
     ) -> None:
         self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
+        self.stiffening = None if case.get("k") == math.inf else stiffening
 
     def answer(self, x: Any, **more: Any) -> Answer[Any]:
         """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in
         ``evaluate``."""
+        k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         answer: Answer[Any] = self.surrogate.evaluate(
-            **{**self.case, self.unknown: x, **self.kind.names, **more}
+            **{**self.case, **k, self.unknown: x, **self.kind.names, **more}
         )
         return answer
 
@@ -83,7 +94,11 @@ class Sweep:
         at an edge."""
         answer = self.answer(x, gradient=True)
         with np.errstate(over="ignore", invalid="ignore"):
-            return answer, x * answer.gradient[self.unknown]  # type: ignore[index]
+            slope = x * answer.gradient[self.unknown]  # type: ignore[index]
+            if self.stiffening is not None:
+                k = self.stiffening.stiffness(self.case["k"], x)
+                slope = slope + self.stiffening.exponent * k * answer.gradient["k"]  # type: ignore[index]
+            return answer, slope
 
     def refined(self, values: Array) -> Array:
         """``values`` and more between them, where chords of mu_macro differ from it."""
@@ -102,7 +117,15 @@ class Sweep:
     def where(self, place: float) -> float:
         """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``place``, within double range; of
         a rigid contact any."""
-        one = self.answer(1.0)
+        one = self.answer(1.0 if self.stiffening is None else self.stiffening.load)
         at_one = float(one.v_tilde / one.y_tilde if self.kind.normal else one.y_tilde)
         scale = 1.0 if self.case.get("k") == math.inf else min(max(at_one, 1e-300), 1e300)
+        if self.stiffening is not None:
+            return self.stiffening.place(place / scale)
         return place / scale if self.unknown == "k" else scale / place
+
+    @property
+    def proportional(self) -> bool:
+        """Whether k grows in proportion to Fz, so that Fz has no influence."""
+        growth = self.stiffening
+        return growth is not None and growth.exponent == 1.0 and not self.kind.normal

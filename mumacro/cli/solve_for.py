@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.validity import load_rows
 from mumacro.cli import common
 from mumacro.cli.common import (
     CURVE,
@@ -30,6 +31,7 @@ def run(words: Sequence[str]) -> str:
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
+    common.add_exponent(parser)
     chosen = parser.parse_intermixed_args(words)
     unknown, (inner, scale), unit = (
         chosen.unknown,
@@ -42,7 +44,7 @@ def run(words: Sequence[str]) -> str:
             f"{unknown} does not belong to --direction {chosen.direction}: "
             f"{', '.join(kind.columns)} do"
         )
-    case = read_case(chosen.words, kind, [unknown])
+    case = read_case(chosen.words, kind, **common.without_or_load(unknown))
     if chosen.ratio and unknown == "mu0":
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
@@ -55,9 +57,11 @@ def run(words: Sequence[str]) -> str:
         inner,
         target,
         within=(ends[0], ends[1]) if ends else None,
+        stiffness_exponent=chosen.stiffness_exponent,
         **kind.names,
         **case,
     )
+    model = load_rows(inner, common.middle_of(case), chosen.contact, found.stiffening)
     reach, two = found.reach, found.ends
     if not found.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
@@ -93,6 +97,7 @@ def run(words: Sequence[str]) -> str:
                 "unit": unit,
                 "target": target,
                 "roots": listed,
+                **({"model": model} if model else {}),
                 "table": common.about(surrogate),
             }
         )
@@ -116,6 +121,7 @@ def run(words: Sequence[str]) -> str:
             points=CURVE,
             scale="log" if low > 0.0 else "linear",
             refine=True,
+            stiffness_exponent=chosen.stiffness_exponent,
             **kind.names,
             **case,
         )
@@ -135,4 +141,4 @@ def run(words: Sequence[str]) -> str:
         for k, one in places.items()
         if not one.roots[0]
     ]
-    return "\n".join([text, *none])
+    return "\n".join([text, *none, *common.model_lines(model)])

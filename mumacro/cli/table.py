@@ -1,10 +1,11 @@
 """``mumacro table``: the table in use and its errors."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table
+from mumacro.surrogate import Surrogate
 from mumacro.table.bundled import bundled_tables
 
 
@@ -35,9 +36,25 @@ def run(words: Sequence[str]) -> str:
     }
     bundled = [str(path) for path in bundled_tables()]
     if chosen.json:
-        return as_json({**found, "bundled": bundled})
+        errors = surrogate.error_distribution
+        return as_json({**found, "error_distribution": errors, "bundled": bundled})
     rows = [
         (name, f"{value:.3g}" if isinstance(value, float) else str(value))
         for name, value in found.items()
     ]
-    return in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
+    text = in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
+    return "\n\n".join([text, *_errors(surrogate)])
+
+
+def _errors(surrogate: Surrogate) -> Iterator[str]:
+    """How the verified errors are distributed, as text; nothing for a table without that."""
+    spread = surrogate.error_distribution
+    if spread:
+        heads = [
+            f"{100.0 * float(x):g} %" if x[0].isdigit() else x for x in next(iter(spread.values()))
+        ]
+        rows = [
+            (name, *(f"{value:.2g}" for value in part.values())) for name, part in spread.items()
+        ]
+        text = "errors that a share of the verified points does not exceed; bound over error"
+        yield f"{text}\n{in_columns([('', *heads), *rows])}"

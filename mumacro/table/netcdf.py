@@ -48,6 +48,8 @@ _PLAIN = {
         ("y_tilde",),
     ),
 }
+#: what is told of bound over error in the attribute ``verified_bound_over_error``
+RATIOS = ("least", "median", "largest")
 CELL_AXES = ("quantity", "cell", "derivative")
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
 
@@ -272,6 +274,16 @@ def _check_same(group: hdf5.Group, name: str, wanted: Any) -> None:
         raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {told!r}")
 
 
+def _check_distribution(root: hdf5.Group, found: dict[str, Any]) -> None:
+    """Refuse a distribution of errors that is not one; an older table has none."""
+    if "verified_quantities" not in found:
+        return
+    shares, names = root.attribute("verified_quantiles"), str(found["verified_quantities"]).split()
+    for name, each in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
+        if np.any(root.numbers(f"verified_{name}", each * len(names)) < 0.0):
+            raise root.refuse(f"attribute 'verified_{name}' has a negative number")
+
+
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
     """Those of the root: what the program uses of them is of the right kind."""
     if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
@@ -285,6 +297,7 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
     for name in ("tolerance", *(key for key in found if key.startswith("verified_max_"))):
         if not root.numbers(name, 1)[0] > 0.0:
             raise root.refuse(f"attribute {name!r} must be > 0, got {found[name]!r}")
+    _check_distribution(root, found)
     if not isinstance(found["content_sha256"], str):
         raise root.refuse("attribute 'content_sha256' is no text")
     try:
@@ -401,10 +414,26 @@ def read_image(path: str | Path) -> bytes:
         raise TableError(path, f"cannot be read: {error.strerror or error}") from error
 
 
+def error_distribution(table: Table) -> dict[str, dict[str, float]]:
+    """By quantity: the error that a share of the verified points does not exceed ("0.5" to "1"),
+    and the :data:`RATIOS` of bound over error; empty for a table that does not state them."""
+    told = table.attributes
+    names = str(told.get("verified_quantities", "")).split()
+    if not names:
+        return {}
+    heads = [f"{share:g}" for share in told["verified_quantiles"]]
+    errors = np.reshape(told["verified_error_quantiles"], (len(names), -1)).tolist()
+    over = np.reshape(told["verified_bound_over_error"], (len(names), -1)).tolist()
+    return {
+        name: dict(zip(heads, error, strict=True)) | dict(zip(RATIOS, ratio, strict=True))
+        for name, error, ratio in zip(names, errors, over, strict=True)
+    }
+
+
 def json_attributes(table: Table) -> dict[str, object]:
-    """Root attributes as plain Python scalars and strings; ``builder_options`` parsed."""
+    """Root attributes as plain Python numbers, lists and strings; ``builder_options`` parsed."""
     out = {
-        key: value.item() if isinstance(value, np.generic) else value
+        key: value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
         for key, value in table.attributes.items()
     }
     if "builder_options" in out:
