@@ -6,9 +6,10 @@ installs.  The compiler is the one that CC names, else cc, clang or gcc, else th
 which then becomes a build dependency.  CFLAGS is not read: other flags give other bits.  Two
 variables change what is made:
 
-    MUMACRO_BUILD_DEBUG=1             no optimization, with debugger symbols and sanitizers; needs
-    gcc or clang MUMACRO_BUILD_PLATFORM=win_amd64  by zig for one of the platforms in
-    pyproject.toml, [tool.mumacro.wheels]
+    MUMACRO_BUILD_DEBUG=1             no optimization, with debugger symbols and sanitizers;
+                                      needs gcc or clang
+    MUMACRO_BUILD_PLATFORM=win_amd64  by zig for one of the platforms in pyproject.toml,
+                                      [tool.mumacro.wheels]
 """
 
 import functools

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from builder.c.source import write_c
+from builder.export.c import write_c
 from mumacro import Surrogate
 
 DRIVER = ROOT / "tests" / "c" / "driver.c"

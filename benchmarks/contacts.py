@@ -2,7 +2,7 @@
 ball's rules.
 
 python benchmarks/contacts.py --only costs    # nanoseconds a point, one thread, log-uniform points
-python benchmarks/contacts.py --only errors   # the constants of mumacro/contact.py, measured anew
+python benchmarks/contacts.py --only errors   # the constants of contacts/quadrature.py, anew
 """
 
 from benchmarks.measuring import main, markdown, sections  # isort: split
@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from mumacro import Surrogate, batch, contact
-from mumacro.contact import driven_rule, put_rules, rules
+from mumacro import Surrogate
+from mumacro.contacts import quadrature
+from mumacro.contacts.quadrature import driven_rule, put_rules, rules
+from mumacro.kernel import slices
 from tests.cases import TOLERANCES, Array, opened
 
 KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
@@ -31,7 +33,7 @@ def costs() -> str:
         spring = 0.0
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
-            ask = functools.partial(batch.values, 0, s._data, v, amplitude, threads=1, kind=kind)
+            ask = functools.partial(slices.values, 0, s._data, v, amplitude, threads=1, kind=kind)
             each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
             spring = spring or each
             rows.append((name, f"{tolerance:g}", f"{1e9 * each:.0f}", f"{each / spring:.1f}"))
@@ -112,7 +114,7 @@ def largest(error: Array, scale: Array) -> float:
 
 def errors(count: int = 15_000) -> str:
     """Every rule against one with :data:`MANY` nodes, alone in the kernel: what
-    ``mumacro.contact._RULES`` states.
+    ``mumacro.inputs.kind._RULES`` states.
 
     The kernel's own scales: the bound of a rule whose constant is huge.  Tables without errors
     leave the bounds that rounding has; what these cover is no error of a rule.
@@ -126,7 +128,7 @@ def errors(count: int = 15_000) -> str:
     whole = [np.abs(pair[0]) for pair in asked(s, v, y, "across", rules(1e-12))]
 
     def by(piece: int, nodes: int, constants: Array) -> list[Array]:
-        alone[piece] = (contact.points(piece, nodes), constants)
+        alone[piece] = (quadrature.points(piece, nodes), constants)
         found = asked(s, v, y, "across", alone)
         alone[piece] = (np.zeros((0, 2)), none)
         return found
@@ -143,7 +145,7 @@ def errors(count: int = 15_000) -> str:
             yield error, *((bound[1] - rule[1]) / HUGE for bound in high)
 
     said = list[str]()
-    for tolerance, pieces in contact._RULES.items():
+    for tolerance, pieces in quadrature._RULES.items():
         said.append(f"    {tolerance!r}: (")
         for piece, (nodes, *_) in enumerate(pieces):
             constants = np.array(

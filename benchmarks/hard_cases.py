@@ -17,12 +17,12 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.solver import march
 from benchmarks.validation import interpolant, orbit, reference
-from builder.model import FALL, OK, SIGMA, STEPS, SUM_UX, slip
-from builder.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, stick_slip
-from builder.steady import border, continuous, solve, workspace
-from builder.stick import stick_excess
+from builder.solver.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, stick_slip
+from builder.solver.slip import FALL, OK, SIGMA, STEPS, SUM_UX, slip
+from builder.solver.steady import border, continuous, solve, workspace
+from builder.solver.stick import stick_excess
 from mumacro import closed_forms
-from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
+from mumacro.table.polynomials import chebyshev_coefficients, interpolation_matrix, nodes
 
 Array = NDArray[np.float64]
 HALF = 0.5 * math.pi

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from benchmarks.validation import interpolant, orbit
-from builder.steady import border, solve
+from builder.solver.steady import border, solve
 from mumacro import closed_forms
 
 

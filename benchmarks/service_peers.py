@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from benchmarks.measuring import FINEST
-from mumacro.inputs import FIELDS
+from mumacro.inputs.fields import FIELDS
 
 
 def raw() -> Any:

@@ -23,7 +23,7 @@ from scipy import ndimage
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator, make_interp_spline
 
 from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
-from builder.sweep import Sweep, solve_chunk
+from builder.solver.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from mumacro import InputError, Surrogate
-from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
+from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
 from mumacro.extras import missing
-from mumacro.processors import processors
-from mumacro.writing import alone_in
+from mumacro.kernel.threads import processors
+from mumacro.table.atomic import alone_in
 
 
 class _Bar:
@@ -49,8 +49,8 @@ def _place(out: Path, folder: bool = False) -> None:
 
 
 def _build(chosen: Namespace) -> str:
-    from .assemble import MAX_TOLERANCE, MIN_TOLERANCE, build_table, stages
-    from .sweep import Sweep
+    from .solver.sweep import Sweep
+    from .tables.build import MAX_TOLERANCE, MIN_TOLERANCE, build_table, stages
 
     out, tolerance = chosen.out, chosen.tolerance
     if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
@@ -75,7 +75,7 @@ def _build(chosen: Namespace) -> str:
 
 
 def _solve(chosen: Namespace) -> int:
-    from .steady import solve
+    from .solver.steady import solve
 
     try:
         steady = solve(chosen.v, chosen.y)
@@ -87,8 +87,9 @@ def _solve(chosen: Namespace) -> int:
 
 
 def _verify(chosen: Namespace) -> int:
-    from .sweep import Sweep
-    from .verify import holds, verify
+    from .solver.sweep import Sweep
+    from .tables.build import write_verified
+    from .tables.verify import holds, verify
 
     surrogate = Surrogate.open(chosen.table)
     with Sweep(chosen.workers) as sweep:
@@ -99,19 +100,21 @@ def _verify(chosen: Namespace) -> int:
         raise ImpossibleError(
             f"{chosen.table} misses its tolerance of {surrogate.tolerance:g} or a bound"
         )
+    if chosen.write:
+        write_verified(chosen.table, report)
     return 0
 
 
 def _export(chosen: Namespace) -> str:
     which, kind, out = chosen.path or chosen.table, chosen.format, chosen.out
     if kind == "c":  # which needs no further package
-        from .c.source import DEFAULT_TOLERANCE, write_c
+        from .export.c import DEFAULT_TOLERANCE, write_c
 
         surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
         written = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
         return as_json({"table": str(surrogate.path), "format": kind, "out": written})
-    from .c.source import ExportError
-    from .export import FORMATS, check_format, export_table
+    from .export.c import ExportError
+    from .export.grid import FORMATS, check_format, export_table
 
     try:
         check_format(kind)
@@ -190,6 +193,8 @@ def _parser(prog: str) -> OneLineParser:
     one.add_argument(
         "--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s"
     )
+    text = "store the errors in the table's attributes, as a build does with --seed 2018"
+    one.add_argument("--write", action="store_true", help=text)
     one.add_argument("--workers", **workers)
     one = command(_export, "Write a table for other tools; print what was written as JSON.")
     one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import MumacroError, Surrogate, closed_forms
-from mumacro.arrays import Array
-from mumacro.law import approximations, border_speeds, friction_law
+from mumacro.analysis.law import approximations, border_speeds, friction_law
+from mumacro.kernel.arrays import Array
 
-from .steady import border
+from .solver.steady import border
 
 SIZE, DPI = (7.2, 4.6), 110
 V, Y, MU = (

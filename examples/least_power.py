@@ -19,7 +19,7 @@ import openmdao.api as om
 from openmdao_component import Friction
 
 from mumacro import Surrogate
-from mumacro.inputs import UNITS
+from mumacro.inputs.fields import UNITS
 
 TABLE = Path(__file__).resolve().parent.parent / "tables" / "mumacro-1e-10.nc"
 TARGET = 0.15

@@ -8,7 +8,7 @@ import numpy as np
 import openmdao.api as om
 
 from mumacro import InputError, Surrogate
-from mumacro.inputs import FIELDS, UNITS
+from mumacro.inputs.fields import FIELDS, UNITS
 
 
 class Friction(om.ExplicitComponent):

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from benchmarks.measuring import ROOT, main, markdown, sections
 from mumacro import Surrogate
-from mumacro.writing import alone_in
+from mumacro.table.atomic import alone_in
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
@@ -117,7 +117,7 @@ def lost_permission(folder: Path) -> str:
     shut, source = closed(folder), folder / "cases.csv"
     source.write_text("mu0,Fz,k,y0,omega,v0\n0.3,10,1e6,2e-6,1.3e5,0.01\n")
     program = (
-        "import sys, mumacro\nfrom mumacro.table import read_table, write_table\ntable = "
+        "import sys, mumacro\nfrom mumacro.table.netcdf import read_table, write_table\ntable = "
         "read_table(sys.argv[1])\n"
         "try:\n    write_table(table, sys.argv[2])\nexcept mumacro.TableError as error:\n    "
         "sys.exit(error.reason)"

@@ -24,8 +24,8 @@ import orjson
 import pyarrow as pa
 
 from benchmarks.measuring import ROOT, main, markdown, progress, sections
-from mumacro.geometries import GEOMETRIES
-from mumacro.stiffness import AXES
+from mumacro.contacts.geometries import GEOMETRIES
+from mumacro.contacts.stiffness import AXES
 from tests.serving import CASE, Server, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"

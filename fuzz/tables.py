@@ -28,9 +28,9 @@ import numpy as np
 
 from benchmarks.measuring import ROOT, main, markdown, sections
 from mumacro import Surrogate, TableError
-from mumacro.cells import nodes
-from mumacro.charts import BORDER_PIECES
-from mumacro.table import Table, parse_table, read_table, write_table
+from mumacro.table.atlas import BORDER_PIECES
+from mumacro.table.netcdf import Table, parse_table, read_table, write_table
+from mumacro.table.polynomials import nodes
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 STEP = 256  # bytes between truncations

@@ -4,13 +4,16 @@ stick-slip model."""
 import sys as _sys
 
 try:
+    from mumacro import closed_forms
+    from mumacro.analysis import validity
+    from mumacro.analysis.fit import fit
+    from mumacro.analysis.fit_result import Fit
     from mumacro.answer import Answer
-    from mumacro.charts import REGIMES, SOURCES
-    from mumacro.element import Element
+    from mumacro.contacts import stiffness
+    from mumacro.contacts.element import Element
     from mumacro.errors import InputError, MumacroError, TableError
-    from mumacro.fitted import Fit
-    from mumacro.fitting import fit
     from mumacro.surrogate import Surrogate
+    from mumacro.table.atlas import REGIMES, SOURCES
     from mumacro.version import __version__
 except ImportError as _error:
     # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing; argv[0]
@@ -34,6 +37,9 @@ __all__ = [
     "Surrogate",
     "TableError",
     "__version__",
+    "closed_forms",
     "fit",
     "open",
+    "stiffness",
+    "validity",
 ]

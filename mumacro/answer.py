@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
-from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.errors import MumacroError
+from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 #: float for one case; an array of float64 for many, or what holds labels in its place
 if TYPE_CHECKING:

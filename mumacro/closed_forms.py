@@ -4,8 +4,8 @@ beside them.
 Every function takes and returns dimensionless arrays that broadcast: ``v`` = v~ = v0/(l0 omega),
 ``y`` = y~ = y0/l0, l0 = mu0 Fz/k.  With mu0 and l0 omega as factors they are the paper's
 dimensional equations: (37) is :func:`outer`, (38) is :func:`static_limit`, (39) is
-:func:`border_24`, (40) is :func:`critical`.  :mod:`mumacro.law` offers them in SI units by their
-numbers.
+:func:`border_24`, (40) is :func:`critical`.  :mod:`mumacro.analysis.law` offers them in SI units by
+their numbers.
 
 "Off by" is the largest deviation from the full model.  docs/validation.md has all deviations with
 the ranges within 1, 5 and 10 %; ``python benchmarks/validation.py`` measures them.
@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mumacro.arrays import Array
-from mumacro.library import kernels
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import kernels
 
 BORDER_CONSTANT = 4.402914  # lim y~ / v~crit^2; the paper rounds it to 4.5 in eq. (26)
 # The blend has both ends of the border built in; this number makes its largest error, y~ from 1e-4

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from mumacro.analysis.law import Law
+from mumacro.analysis.roots import Crossing
 from mumacro.answer import Answer
-from mumacro.charts import REGIMES
-from mumacro.contact import AMPLITUDE, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
 from mumacro.extras import missing
-from mumacro.inputs import unit_of
-from mumacro.inverse import Crossing
-from mumacro.law import Law
+from mumacro.inputs.fields import unit_of
+from mumacro.inputs.kind import AMPLITUDE, Kind, kind_of
 from mumacro.surrogate import Surrogate
+from mumacro.table.atlas import REGIMES
 
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from mumacro import Surrogate
-from mumacro.arrays import Array, Codes
-from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
-from mumacro.contact import AMPLITUDE, SPRING, Kind
-from mumacro.inputs import FIELDS
-from mumacro.interval import middle
+from mumacro.inputs.fields import FIELDS
+from mumacro.inputs.k_range import middle
+from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
+from mumacro.kernel.arrays import Array, Codes
+from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 from .case import PLAIN, Asked
 

@@ -2,7 +2,7 @@
 
 Every form of asking decodes to ``{name: number | list | array}``.  :func:`checked` checks one case
 and :func:`columns_of` many, both entry by entry with :func:`number`; names, bounds and reasons are
-those of :mod:`mumacro.inputs`.  The models of cases describe the same in OpenAPI.
+those of :mod:`mumacro.inputs.fields`.  The models of cases describe the same in OpenAPI.
 """
 
 import math
@@ -13,10 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.arrays import Array
-from mumacro.contact import AMPLITUDE, SPRING
-from mumacro.contact import Kind as ContactKind
-from mumacro.inputs import (
+from mumacro.inputs.fields import (
     BOUNDS,
     GAP,
     MOST_HZ,
@@ -28,8 +25,11 @@ from mumacro.inputs import (
     refusal,
     unknown_name,
 )
-from mumacro.inputs import NAMES as INPUTS
-from mumacro.interval import BOUND, ENDS
+from mumacro.inputs.fields import NAMES as INPUTS
+from mumacro.inputs.k_range import BOUND, ENDS
+from mumacro.inputs.kind import AMPLITUDE, SPRING
+from mumacro.inputs.kind import Kind as ContactKind
+from mumacro.kernel.arrays import Array
 
 from .problems import FieldFault, Kind, RequestError, refuse
 

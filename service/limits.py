@@ -19,7 +19,7 @@ from typing import TypeVar
 from starlette.requests import ClientDisconnect
 from starlette.types import Receive, Scope
 
-from mumacro.processors import processors
+from mumacro.kernel.threads import processors
 
 from .problems import Kind, RequestError
 from .settings import Settings

@@ -38,8 +38,8 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from mumacro.charts import SOURCES
 from mumacro.errors import MumacroError
+from mumacro.table.atlas import SOURCES
 
 from .answers import REGIME_NAMES
 from .limits import check_head, drained, holder_of

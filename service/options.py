@@ -1,5 +1,5 @@
 """The options of a request, and the models that describe cases in OpenAPI; both from
-:mod:`mumacro.inputs`.
+:mod:`mumacro.inputs.fields`.
 
 What every endpoint asks beside its case (``include``, ``tolerance``, ``std``) is a field of
 :class:`Options`.
@@ -13,7 +13,11 @@ from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from mumacro.contact import (
+from mumacro.errors import InputError
+from mumacro.inputs.fields import BOUNDS, LIKE, MOST_HZ, RAD_PER_CYCLE, RIGID, unit_of
+from mumacro.inputs.fields import NAMES as INPUTS
+from mumacro.inputs.k_range import BOUND, ENDS
+from mumacro.inputs.kind import (
     AMPLITUDE,
     CONTACTS,
     DIRECTIONS,
@@ -23,10 +27,6 @@ from mumacro.contact import (
     Kind,
     kind_of,
 )
-from mumacro.errors import InputError
-from mumacro.inputs import BOUNDS, LIKE, MOST_HZ, RAD_PER_CYCLE, RIGID, unit_of
-from mumacro.inputs import NAMES as INPUTS
-from mumacro.interval import BOUND, ENDS
 
 from .answers import QUANTITIES, Wanted, said
 from .case import LEAST, Asked

@@ -9,10 +9,10 @@ from functools import reduce
 
 import numpy as np
 
-from mumacro.arrays import Array
-from mumacro.charts import ROUNDING
-from mumacro.inputs import FIELDS, PER_UNIT
-from mumacro.settling import settling as decay
+from mumacro.analysis.settling import settling as decay
+from mumacro.inputs.fields import FIELDS, PER_UNIT
+from mumacro.kernel.arrays import Array
+from mumacro.table.atlas import ROUNDING
 
 from .answers import QUANTITIES, Cases, Part, register, where
 

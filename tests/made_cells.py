@@ -4,16 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from mumacro import charts
-from mumacro.bundled import bundled_tables
-from mumacro.cells import Border, block_rows, outer_cells
-from mumacro.charts import CHARTS
-from mumacro.library import Data, Kernel, kernels
-from mumacro.table import Block, read_table
+from mumacro.kernel.binding import Data, Kernel, kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import CHARTS
+from mumacro.table.bundled import bundled_tables
+from mumacro.table.netcdf import Block, read_table
+from mumacro.table.polynomials import Border, block_rows, outer_cells
 from tests.cases import Array
 
 # its range has no upper end, and every block tabulates it
-POWER = charts.QUANTITY_NAMES.index("power")
+POWER = atlas.QUANTITY_NAMES.index("power")
 
 
 class Cells:
@@ -42,7 +42,7 @@ class Cells:
 
     def values(self, polynomials: Array, v: Array, y: Array, kernel: Kernel = kernels[-1]) -> Array:
         """The power at points (n,) where the cells of all blocks hold ``polynomials``."""
-        none = np.zeros((len(charts.SOURCES) + 1, 2)), np.zeros((polynomials.shape[0], 3))
+        none = np.zeros((len(atlas.SOURCES) + 1, 2)), np.zeros((polynomials.shape[0], 3))
         self.data.put(POWER, polynomials, *none)
         value = np.empty(v.size)
         kernel.values(self.data, POWER, v, y, value, None, None)

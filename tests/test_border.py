@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from builder import steady
-from builder.sections import NOT_CONVERGED
-from builder.steady import border, solve
-from builder.sweep import Sweep
+from builder.solver import steady
+from builder.solver.sections import NOT_CONVERGED
+from builder.solver.steady import border, solve
+from builder.solver.sweep import Sweep
 from mumacro import InputError, Surrogate
-from mumacro.charts import Y_CONT, Y_TAIL
+from mumacro.table.atlas import Y_CONT, Y_TAIL
 from tests.cases import Array, tables
 from tests.comparing import close
 

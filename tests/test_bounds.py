@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf, workdps
 
-from builder.sweep import Sweep
+from builder.solver.sweep import Sweep
 from mumacro import Surrogate
-from mumacro.charts import CONTINUOUS, REGIME_OF_SOURCE
-from mumacro.inputs import FIELDS
+from mumacro.inputs.fields import FIELDS
+from mumacro.table.atlas import CONTINUOUS, REGIME_OF_SOURCE
 from tests import naive
 from tests.cases import CASE, UNIT, Case, log_uniform, tables
 from tests.comparing import close

@@ -13,20 +13,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.c.source import header_text, write_c
-from builder.verify import CASES, draw
-from mumacro import Surrogate, charts
-from mumacro.contact import CONTACTS, DIRECTIONS, kind_of
-from mumacro.inputs import BOUNDS, FIELDS
-from mumacro.library import kernels
-from mumacro.table import read_table
+from builder.export.c import header_text, write_c
+from builder.tables.verify import CASES, draw
+from mumacro import Surrogate
+from mumacro.inputs.fields import BOUNDS, FIELDS
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS, kind_of
+from mumacro.kernel.binding import kernels
+from mumacro.table import atlas
+from mumacro.table.netcdf import read_table
 from tests import compilers
 from tests.cases import PAIRS, every_pair, tables
 
 pytestmark = pytest.mark.slow
 
 DRIVER = Path(__file__).parent / "c" / "driver.c"
-KERNEL = Path(charts.__file__).parent / "kernel"
+KERNEL = Path(atlas.__file__).parent / "kernel"
 CASE = (0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01)
 MAIN = """\
 #include <stdio.h>
@@ -146,24 +147,24 @@ def points(table: Surrogate, n: int, seed: int) -> Any:
     """Drawn points; both sides of every seam of blocks, cells, the border and the closed forms; and
     the extremes."""
     edges = [
-        charts.Y_STICK_LO,
+        atlas.Y_STICK_LO,
         1.0,
-        charts.Y_CONT,
-        charts.Y_MID,
-        charts.Y_HIGH,
-        charts.Y_TAIL,
+        atlas.Y_CONT,
+        atlas.Y_MID,
+        atlas.Y_HIGH,
+        atlas.Y_TAIL,
         1e-150,
         1e150,
     ]
     y = np.concatenate([neighbours(edges), np.geomspace(1e-8, 1e8, 60)])
     crit = table.v_tilde_crit(y)
-    half = crit * np.sin(0.5 * np.pi * charts.S_CUT) ** 2
+    half = crit * np.sin(0.5 * np.pi * atlas.S_CUT) ** 2
     speeds = [
         crit,
         half,
         0.5 * crit,
-        charts.RHO_MAX * crit,
-        charts.FAST_KAPPA * np.sqrt(y),
+        atlas.RHO_MAX * crit,
+        atlas.FAST_KAPPA * np.sqrt(y),
         crit * 1e-9,
         crit * 1e9,
     ]
@@ -218,9 +219,9 @@ def test_arithmetic_without_infinities_is_refused(folder: Path, name: str, optio
 
 def test_names_of_the_declarations_are_the_kernels() -> None:
     text = (KERNEL / "mumacro.h").read_text("ascii")
-    for prefix, names in (("SOURCE_", charts.SOURCES), ("REGIME_", charts.REGIMES)):
+    for prefix, names in (("SOURCE_", atlas.SOURCES), ("REGIME_", atlas.REGIMES)):
         assert re.findall(rf"MUMACRO_{prefix}(\w+)", text) == [name.upper() for name in names]
-    expected = ", ".join(f"MUMACRO_{name.upper()}" for name in charts.QUANTITY_NAMES)
+    expected = ", ".join(f"MUMACRO_{name.upper()}" for name in atlas.QUANTITY_NAMES)
     assert f"enum {{ {expected}, MUMACRO_QUANTITIES }};" in text
     code = (KERNEL / "interface.c").read_text("ascii")
     said = [
@@ -243,7 +244,7 @@ def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, 
     program = (
         "import sys\nfor name in ('rich', 'scipy', 'netCDF4', 'xarray', 'numba'): "
         "sys.modules[name] = None\n"
-        "from mumacro.__main__ import main\nsys.exit(main(['export', '--format', 'c', '--out', "
+        "from mumacro.cli.main import main\nsys.exit(main(['export', '--format', 'c', '--out', "
         "sys.argv[1]]))"
     )
     command = [sys.executable, "-c", program, str(tmp_path / out)]
@@ -268,7 +269,7 @@ def test_every_level_gives_the_librarys_bits(
     driver = build(*words, *flags[kernel.level])
     v, y = points(table, 4000, 1)
     expected, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, dtype=np.int8)
-    for code, quantity in enumerate(charts.QUANTITY_NAMES):
+    for code, quantity in enumerate(atlas.QUANTITY_NAMES):
         data, rows = table._with(quantity), np.empty((5, v.size))
         kernel.values(data, code, v, y, expected, bound, source)
         kernel.slopes(data, code, v, y, rows)
@@ -281,7 +282,7 @@ def test_every_level_gives_the_librarys_bits(
         assert same(ask(driver.values, v.size, 2, code, v, y).reshape(2, -1), [expected, bound])
         assert np.array_equal(found[7] == 0, source >= 0)
         assert np.array_equal(found[7] == 1, ~(v >= 0.0))
-    assert set(source) >= {-1, *range(charts.SOURCES.index("rigid"))}
+    assert set(source) >= {-1, *range(atlas.SOURCES.index("rigid"))}
     assert same(ask(driver.borders, y.size, 1, y), kernel.border(table._data, y))
 
 
@@ -351,7 +352,7 @@ def test_cases_of_every_contact_and_direction_are_the_librarys(
         answer.y_tilde,
         source,
     ]
-    expected += [np.where(legal, charts.REGIME_OF_SOURCE[source], -1)]
+    expected += [np.where(legal, atlas.REGIME_OF_SOURCE[source], -1)]
     assert same(found[:7], expected)
     assert same(found[7], [first_fault(case, kind.normal) for case in x.T])
     assert same(found[8:14], list(answer.gradient.values()))

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.export import export_table
+from builder.export.grid import export_table
 from mumacro import Surrogate
-from mumacro.inputs import FIELDS
+from mumacro.inputs.fields import FIELDS
 from tests import compilers
 from tests.cases import Case, tables
 from tests.comparing import close

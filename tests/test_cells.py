@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 
-from mumacro import charts
-from mumacro.cells import WIDTH, cells_1d, cells_2d, nodes
-from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
-from mumacro.library import Kernel, kernels
+from mumacro.kernel.binding import Kernel, kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import CHARTS, NAMES, SQRT2, Axis, Chart
+from mumacro.table.polynomials import WIDTH, cells_1d, cells_2d, nodes
 from tests.cases import Array
 from tests.comparing import close
 from tests.made_cells import Cells
@@ -85,7 +85,7 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(
         along = np.linspace(1e-6, 1.0 - 1e-6, 997)
         v, y = made.points(index, *((along, other) if axis == 0 else (other, along)))
         mine = kernels[-1].places(made.data, v, y)[0] == index
-        if chart.regime == charts.CONTINUOUS or axis == 1:
+        if chart.regime == atlas.CONTINUOUS or axis == 1:
             assert np.count_nonzero(mine) > 200
         found = np.rint(made.tabulated(index, number, v[mine], y[mine])).astype(int)
         assert np.all((found >= 0) & (found < n))

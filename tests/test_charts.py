@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from mumacro import Surrogate, charts
-from mumacro.charts import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES
-from mumacro.library import kernels
+from mumacro import Surrogate
+from mumacro.kernel.binding import kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES
 from tests.cases import tables
 from tests.comparing import close
 
@@ -50,13 +51,13 @@ def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surro
             low, high = axis.to_evaluation(np.array([axis.low, axis.high]))
             slack = 1e-12 * max(abs(low), abs(high))
             assert np.all((found >= low - slack) & (found <= high + slack)), (chart.name, axis.name)
-    sliding = REGIME_OF_SOURCE[block] == charts.CONTINUOUS
+    sliding = REGIME_OF_SOURCE[block] == atlas.CONTINUOUS
     np.testing.assert_array_equal(sliding, v >= table.v_tilde_crit(y))
 
 
-@pytest.mark.parametrize("quantity", charts.QUANTITIES, ids=charts.QUANTITY_NAMES)
+@pytest.mark.parametrize("quantity", atlas.QUANTITIES, ids=atlas.QUANTITY_NAMES)
 def test_the_form_of_a_value_is_the_value_at_the_nodes(
-    table: Surrogate, quantity: charts.Quantity
+    table: Surrogate, quantity: atlas.Quantity
 ) -> None:
     """value = base + factor q with q from the file: exact at nodes, to the table's error."""
     for index, (chart, part) in enumerate(zip(CHARTS, table.table.blocks, strict=True)):
@@ -65,7 +66,7 @@ def test_the_form_of_a_value_is_the_value_at_the_nodes(
         v, y, eta = chart.point(a, b, table.border)
         keep = (table.ratio_with_bound(v, y)[2] == index) & (v > 1e-200)
         base, factor = kernels[-1].forms(
-            charts.QUANTITY_NAMES.index(quantity.name), index, v[keep], y[keep], eta[keep]
+            atlas.QUANTITY_NAMES.index(quantity.name), index, v[keep], y[keep], eta[keep]
         )
         value, bound, _ = table.quantity(quantity.name, v[keep], y[keep])
         assert np.all((factor != 0.0) == chart.holds(quantity))

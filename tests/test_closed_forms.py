@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from builder.steady import border, solve
+from builder.solver.steady import border, solve
 from mumacro import closed_forms
 from tests.comparing import close
 

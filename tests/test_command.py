@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate, fit
-from mumacro.__main__ import COMMANDS, main
-from mumacro.geometries import GEOMETRIES, contact_of
-from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
-from mumacro.validity import model_rows
+from mumacro.analysis.validity import model_rows
+from mumacro.cli.main import COMMANDS, main
+from mumacro.contacts.geometries import GEOMETRIES, contact_of
+from mumacro.inputs.fields import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
 from tests.cases import Capture, Case
 from tests.comparing import close
 
@@ -568,7 +568,7 @@ def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path)
 
 def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
-    from mumacro.law import friction_law
+    from mumacro.analysis.law import friction_law
     from mumacro.plotting import plot_answer, plot_map
 
     known = {name: value for name, value in VALUES.items() if name != "v0"}
@@ -681,7 +681,10 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
     found = json.loads(said(capsys, 0, "table", "--json"))
     expected = (str(surrogate.path), surrogate.checksum, surrogate.max_abs_error)
     assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
-    assert said(capsys, 0, "table").count(".nc") > len(found["bundled"])
+    assert found["error_distribution"] == surrogate.error_distribution
+    text = said(capsys, 0, "table")
+    assert text.count(".nc") > len(found["bundled"])
+    assert f"{surrogate.error_distribution['border']['0.95']:.2g}" in text
 
 
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from mumacro import Surrogate
-from mumacro.charts import QUANTITY_NAMES, SOURCES
+from mumacro.table.atlas import QUANTITY_NAMES, SOURCES
 from tests.cases import CASE, Case, tables
 from tests.comparing import close
 from tests.naive import march_ball

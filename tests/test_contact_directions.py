@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import brentq
 
 from mumacro import Surrogate
-from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.closed_forms import master_curve_limit
+from mumacro.table.atlas import QUANTITY_NAMES, SOURCES
 from tests.cases import CASE, UNIT, Case, opened, tables, without
 from tests.comparing import close
 from tests.test_contact_ball import by_quad

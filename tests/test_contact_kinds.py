@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from mumacro import InputError, Surrogate
-from mumacro.charts import QUANTITY_NAMES, SOURCES
-from mumacro.contact import kind_of
+from mumacro.inputs.kind import kind_of
+from mumacro.table.atlas import QUANTITY_NAMES, SOURCES
 from tests.cases import CASE, PAIRS, TOLERANCES, Case, as_kind, every_pair, opened, tables, without
 from tests.comparing import close
 

@@ -13,10 +13,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mumacro import InputError, Surrogate, fit
-from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, STIFFNESS
-from mumacro.inverse import solve_for
-from mumacro.law import friction_law
-from mumacro.settling import settling
+from mumacro.analysis.law import friction_law
+from mumacro.analysis.settling import settling
+from mumacro.analysis.solve_for import solve_for
+from mumacro.inputs.fields import BOUNDS, FIELDS, POSITIVE, STIFFNESS
 from tests.cases import CASE, Case, log_uniform, tables, without
 from tests.comparing import close
 

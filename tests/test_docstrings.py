@@ -32,10 +32,10 @@ def test_there_are_examples() -> None:
     }
     used = {
         "answer.Answer",
-        "bundled.bundled_tables",
-        "settling.settling",
-        "fitting.fit",
-        "element.Element",
+        "table.bundled.bundled_tables",
+        "analysis.settling.settling",
+        "analysis.fit.fit",
+        "contacts.element.Element",
     }
     used |= {f"surrogate.Surrogate.{name}" for name in ("evaluate", "mu_ratio", "open", "slopes")}
     assert {f"mumacro.{name}" for name in used} <= shown

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from builder.__main__ import main
-from builder.c.source import ExportError
-from builder.export import FORMATS, GONE, export_table
+from builder.export.c import ExportError
+from builder.export.grid import FORMATS, GONE, export_table
 from mumacro.errors import TableError
-from mumacro.table import Table, read_table
+from mumacro.table.netcdf import Table, read_table
 from tests.cases import Capture
 
 pytestmark = pytest.mark.slow

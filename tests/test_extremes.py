@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from builder.steady import RELATIVE_ERROR, V_RANGE, Y_RANGE, solve
-from builder.sweep import Sweep
+from builder.solver.steady import RELATIVE_ERROR, V_RANGE, Y_RANGE, solve
+from builder.solver.sweep import Sweep
 from mumacro.closed_forms import outer, second_order
 from tests.cases import log_uniform, opened
 from tests.comparing import close

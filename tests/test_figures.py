@@ -15,7 +15,7 @@ import pytest
 from builder import figures
 from builder.__main__ import main
 from builder.figures import CASES, FIGURES, Curve, Panel, draw_figures, steady_cycle
-from builder.steady import border, solve
+from builder.solver.steady import border, solve
 from mumacro import MumacroError, Surrogate
 from tests.comparing import close
 

@@ -12,7 +12,7 @@ pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
 from mumacro import InputError, Surrogate  # noqa: E402 (after pyarrow was looked for)
 from mumacro.files import ANSWERS, FilesError, answer  # noqa: E402
-from mumacro.files.answering import find_columns  # noqa: E402
+from mumacro.files.record_batch import find_columns  # noqa: E402
 from tests.serving import CASE  # noqa: E402
 
 NAMES = (*CASE,)

@@ -20,7 +20,7 @@ from tests.test_files_formats import write
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
-from mumacro.__main__ import main  # noqa: E402
+from mumacro.cli.main import main  # noqa: E402
 from mumacro.files import FilesError, evaluate_files, reading, run  # noqa: E402
 
 TABLE = opened(1e-12)
@@ -335,7 +335,7 @@ def test_a_full_disk_is_told_and_the_run_goes_on_later(
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     program = (
         "import resource, sys; from mumacro.files import reading; reading.ROWS = 400; "
-        "from mumacro.__main__ import main; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, "
+        "from mumacro.cli.main import main; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, "
         f"200_000)); sys.exit(main(['eval', {str(source)!r}, '-o', {str(out)!r}]))"
     )
     words = [sys.executable, "-c", program]
@@ -355,7 +355,7 @@ def test_memory_does_not_grow_with_the_file(tmp_path: Path, repository: Path) ->
     def peak(n: int) -> Any:
         pq.write_table(table_of(n), tmp_path / "cases.parquet", row_group_size=100_000)
         program = (
-            "import resource; from mumacro.__main__ import main; "
+            "import resource; from mumacro.cli.main import main; "
             f"main(['eval', {str(tmp_path / 'cases.parquet')!r}, '-o', "
             f"{str(tmp_path / 'out.parquet')!r}, '--force']); "
             "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, fit
-from mumacro.contact import CONTACTS
+from mumacro.inputs.kind import CONTACTS
 from tests.cases import Case
 from tests.comparing import close
 

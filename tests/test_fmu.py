@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.export import export_table
+from builder.export.grid import export_table
 from mumacro import Surrogate
-from mumacro.contact import CONTACTS, DIRECTIONS
-from mumacro.inputs import FIELDS
+from mumacro.inputs.fields import FIELDS
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from tests import compilers
 from tests.cases import CASE, PAIRS, as_kind, tables
 from tests.comparing import close
@@ -36,7 +36,7 @@ def unit(
 def fmpy() -> Any:
     """FMPy, and a compiler that has built the unit's binary."""
     compilers.compiler("gcc")
-    pytest.importorskip("fmpy.validation", reason="fmpy is not installed")
+    pytest.importorskip("fmpy.validation", reason="fmpy of requirements/peers.txt is not installed")
     import fmpy
 
     return fmpy

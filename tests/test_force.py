@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.c.source import write_c
+from builder.export.c import write_c
 from mumacro import Element, Surrogate
-from mumacro.contact import CONTACTS, DIRECTIONS
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from tests import compilers
 from tests.cases import Case, every_pair, tables
 from tests.comparing import close

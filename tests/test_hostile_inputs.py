@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate
-from mumacro.charts import QUANTITY_NAMES
+from mumacro.table.atlas import QUANTITY_NAMES
 from tests.cases import CASE, tables, without
 
 #: methods of (v~, y~)

@@ -11,8 +11,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mumacro import InputError, Surrogate
-from mumacro.inverse import border_crossings, solve_for
-from mumacro.inverse.rootfinding import TINY, Curve, Sweep, last_double
+from mumacro.analysis.rootfinding import TINY, Curve, Sweep, last_double
+from mumacro.analysis.solve_for import border_crossings, solve_for
 from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.comparing import close
 

@@ -7,19 +7,19 @@ from typing import Any
 
 import pytest
 
-from builder.c.source import files
-from mumacro import library
-from mumacro.table import read_table
+from builder.export.c import files
+from mumacro.kernel import binding
+from mumacro.table.netcdf import read_table
 from tests import compilers
 
 pytestmark = pytest.mark.slow
 
-KERNEL = Path(library.__file__).parent / "kernel"
+KERNEL = Path(binding.__file__).parent / "kernel"
 DRIVER = Path(__file__).parent / "c" / "sanitized.c"
 CHECKS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 #: instructions that the compiler may use, and by how many doubles at a time the kernel then
 #: computes
-NATIVE = {"base": 2, "avx2": 4, "avx512": 8}[library.kernels[-1].level]
+NATIVE = {"base": 2, "avx2": 4, "avx512": 8}[binding.kernels[-1].level]
 RANDOM, NASTY, TABLES = 100_000, 172_800, 300
 
 

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from mumacro import REGIMES, SOURCES, InputError, Surrogate
-from mumacro.inputs import FIELDS
+from mumacro.inputs.fields import FIELDS
 from tests.cases import CASE, Case, tables
 
 N = 60

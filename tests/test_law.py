@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, closed_forms
-from mumacro.contact import kind_of
-from mumacro.inputs import FIELDS
-from mumacro.law import (
+from mumacro.analysis.law import (
     APPROXIMATIONS,
     BORDERS,
     approximations,
@@ -18,6 +16,8 @@ from mumacro.law import (
     friction_law,
     sweep_values,
 )
+from mumacro.inputs.fields import FIELDS
+from mumacro.inputs.kind import kind_of
 from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.comparing import close
 

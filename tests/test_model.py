@@ -8,10 +8,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from builder.model import ANGLE, CHART, NO_STICK, OK, PATH, SIGMA, STEPS, SUM_UX, TURNED, WORK, slip
-from builder.radau import RADAU_DIFF, RADAU_NODES, RADAU_WEIGHTS
-from builder.steady import workspace
-from builder.stick import stick_excess
+from builder.solver.radau import RADAU_DIFF, RADAU_NODES, RADAU_WEIGHTS
+from builder.solver.slip import (
+    ANGLE,
+    CHART,
+    NO_STICK,
+    OK,
+    PATH,
+    SIGMA,
+    STEPS,
+    SUM_UX,
+    TURNED,
+    WORK,
+    slip,
+)
+from builder.solver.steady import workspace
+from builder.solver.stick import stick_excess
 from tests.cases import Array
 from tests.comparing import close
 

@@ -15,8 +15,8 @@ import pytest
 
 import mumacro
 import service
-from mumacro import bundled
 from mumacro.extras import missing
+from mumacro.table import bundled
 from service.settings import load_settings
 
 

@@ -6,11 +6,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mumacro import Surrogate, batch, charts
-from mumacro.cells import outer_cells
-from mumacro.charts import CHARTS, RHO_MAX, SIGMA_CUT, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
-from mumacro.contact import put_rules
-from mumacro.library import Kernel, kernels
+from mumacro import Surrogate
+from mumacro.contacts.quadrature import put_rules
+from mumacro.kernel import slices
+from mumacro.kernel.binding import Kernel, kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import (
+    CHARTS,
+    RHO_MAX,
+    SIGMA_CUT,
+    Y_CONT,
+    Y_HIGH,
+    Y_MID,
+    Y_STICK_LO,
+    Y_TAIL,
+)
+from mumacro.table.polynomials import outer_cells
 from tests.cases import Array, log_uniform, tables
 from tests.comparing import close
 
@@ -20,14 +31,14 @@ table = tables(1e-4, 1e-12)
 
 def one_by_one(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> list[Array]:
     """Value, bound, source, slopes and their bounds of points (n,), each an array of one."""
-    data, code = table._with(name), charts.QUANTITY_NAMES.index(name)
+    data, code = table._with(name), atlas.QUANTITY_NAMES.index(name)
     found = []
     for i in range(v.size):
         one = slice(i, i + 1)
         found.append(
             (
-                *batch.values(code, data, v[one], y[one], 1),
-                *batch.slopes(code, data, v[one], y[one], 1),
+                *slices.values(code, data, v[one], y[one], 1),
+                *slices.slopes(code, data, v[one], y[one], 1),
             )
         )
     return [np.concatenate(part) for part in zip(*found, strict=True)]
@@ -56,7 +67,7 @@ def same(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> None:
         assert np.all(value <= 1.0)
 
 
-@pytest.mark.parametrize("name", charts.QUANTITY_NAMES)
+@pytest.mark.parametrize("name", atlas.QUANTITY_NAMES)
 def test_over_the_whole_quadrant_and_next_to_the_corner(table: Surrogate, name: str) -> None:
     rng, n = np.random.default_rng(5), 3000
     v = [log_uniform(rng, *ends, n) for ends in ((1e-14, 1e10), (1e-3, 1e3), (1e-8, 0.1))]
@@ -68,7 +79,7 @@ def test_over_the_whole_quadrant_and_next_to_the_corner(table: Surrogate, name: 
     same(table, np.concatenate(v), np.concatenate(y), name)
     source = table.quantity(name, np.concatenate(v), np.concatenate(y))[2]
     assert np.unique(source).size >= len(CHARTS) - 1
-    assert np.count_nonzero(source == charts.NAMES.index("corner")) > 500
+    assert np.count_nonzero(source == atlas.NAMES.index("corner")) > 500
 
 
 def test_on_both_sides_of_every_seam(table: Surrogate) -> None:
@@ -89,7 +100,7 @@ def test_on_every_edge_of_every_cell(table: Surrogate) -> None:
     ]
     axes += [
         (axis, p.cells)
-        for (_, axis, _), p in zip(charts.BORDER_PIECES, table.table.border, strict=True)
+        for (_, axis, _), p in zip(atlas.BORDER_PIECES, table.table.border, strict=True)
     ]
     ends = []
     for axis, cells in axes:
@@ -149,13 +160,13 @@ def test_cells_of_the_limit_of_large_speed_are_the_closed_form() -> None:
 # --- the levels of the processor ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", charts.QUANTITY_NAMES)
+@pytest.mark.parametrize("name", atlas.QUANTITY_NAMES)
 def test_every_level_with_fused_multiply_add_gives_the_same_bits(
     table: Surrogate, name: str
 ) -> None:
     rng, n = np.random.default_rng(12), 20_000
     v, y = log_uniform(rng, 1e-9, 1e6, n), log_uniform(rng, 1e-6, 1e8, n)
-    code, data = charts.QUANTITY_NAMES.index(name), table._with(name)
+    code, data = atlas.QUANTITY_NAMES.index(name), table._with(name)
 
     def asked(kernel: Kernel) -> list[Any]:
         found: list[Any] = [np.empty(n), np.empty(n), np.empty(n, np.int8), np.empty((5, n))]

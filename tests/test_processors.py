@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builder.verify import CASES, draw
+from builder.tables.verify import CASES, draw
 from mumacro import Surrogate
-from mumacro.charts import QUANTITY_NAMES
+from mumacro.table.atlas import QUANTITY_NAMES
 from tests.cases import opened
 
 pytestmark = [

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.steady import Y_RANGE, solve
-from builder.sweep import CheckpointError, Sweep
+from builder.solver.steady import Y_RANGE, solve
+from builder.solver.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer
 from mumacro.files import evaluate_files

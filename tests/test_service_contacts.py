@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.validity import digits, k_effect, model_rows
+from mumacro.analysis.validity import digits, k_effect, model_rows
 from tests.cases import Case
 from tests.comparing import close
 from tests.forms import BATCH, as_csv, asked, posted, read

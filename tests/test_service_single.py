@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mumacro import Surrogate
-from mumacro.settling import settling
+from mumacro.analysis.settling import settling
 from tests.cases import Case
 from tests.comparing import close
 

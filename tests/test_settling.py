@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.steady import solve, solve_raw, workspace
+from builder.solver.steady import solve, solve_raw, workspace
 from mumacro import InputError, Surrogate
-from mumacro.settling import settling
+from mumacro.analysis.settling import settling
 from tests import naive
 from tests.cases import CASE, UNIT
 from tests.comparing import close

@@ -12,10 +12,22 @@ import numpy as np
 import pytest
 from scipy.integrate import fixed_quad
 
-from builder import model, sections, steady
-from builder.model import ANGLE, CHART, MIN_SPEED, NO_SLIP, OK, PATH, SIGMA, SUM_UX, WORK, slip
-from builder.steady import ADVICE, V_RANGE, Y_RANGE, border, solve, solve_raw, workspace
-from builder.sweep import Sweep
+from builder.solver import sections, steady
+from builder.solver import slip as model
+from builder.solver.slip import (
+    ANGLE,
+    CHART,
+    MIN_SPEED,
+    NO_SLIP,
+    OK,
+    PATH,
+    SIGMA,
+    SUM_UX,
+    WORK,
+    slip,
+)
+from builder.solver.steady import ADVICE, V_RANGE, Y_RANGE, border, solve, solve_raw, workspace
+from builder.solver.sweep import Sweep
 from mumacro import InputError
 from mumacro.closed_forms import outer, second_order
 from tests import naive

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, stiffness
-from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
-from mumacro.stiffness import (
+from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
+from mumacro.contacts.stiffness import (
     AXES,
     Contact,
     Material,

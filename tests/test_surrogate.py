@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.measure import SEAMS
-from builder.quantities import ABS_TO_REL, SOLVER_NOISE
-from builder.sweep import Sweep
+from builder.solver.sweep import Sweep
+from builder.tables.measure import SEAMS
+from builder.tables.quantities import ABS_TO_REL, SOLVER_NOISE
 from mumacro import InputError, Surrogate
-from mumacro.charts import SIGMA_CUT, SOURCES, Y_STICK_HI, Y_STICK_LO
 from mumacro.closed_forms import outer
+from mumacro.table.atlas import SIGMA_CUT, SOURCES, Y_STICK_HI, Y_STICK_LO
 from tests.cases import CASE, Array, Case, log_uniform, tables
 from tests.comparing import close
 

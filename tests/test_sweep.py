@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder import compiled
-from builder import sweep as module
-from builder.model import NO_STICK
-from builder.steady import ADVICE, border, solve
-from builder.sweep import CHUNK, COLUMNS, SolveError, Sweep, solve_chunk
+from builder.solver import compiled
+from builder.solver import sweep as module
+from builder.solver.slip import NO_STICK
+from builder.solver.steady import ADVICE, border, solve
+from builder.solver.sweep import CHUNK, COLUMNS, SolveError, Sweep, solve_chunk
 from mumacro import InputError
 
 

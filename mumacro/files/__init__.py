@@ -5,7 +5,7 @@ resumable.  Needs pyarrow.
 files.
 """
 
-from mumacro.files.answering import ANSWERS, REJECTS, FilesError, answer
+from mumacro.files.record_batch import ANSWERS, REJECTS, FilesError, answer
 from mumacro.files.run import Summary, evaluate_files
 
 __all__ = ["ANSWERS", "REJECTS", "FilesError", "Summary", "answer", "evaluate_files"]

@@ -23,13 +23,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from mumacro.contact import Kind, kind_of
 from mumacro.files import reading
-from mumacro.files.answering import REJECTS, FilesError, added_fields, answer_columns, find_columns
+from mumacro.files.record_batch import (
+    REJECTS,
+    FilesError,
+    added_fields,
+    answer_columns,
+    find_columns,
+)
 from mumacro.files.writing import Output, csv_lines
+from mumacro.inputs.kind import Kind, kind_of
 from mumacro.surrogate import Surrogate
+from mumacro.table.atomic import alone_in, put, write_whole
 from mumacro.version import __version__
-from mumacro.writing import alone_in, put, write_whole
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-/* A table as evaluation reads it: arrays of doubles, prepared by mumacro/cells.py. */
+/* A table as evaluation reads it: arrays of doubles, prepared by mumacro/table/polynomials.py. */
 #ifndef MU_DATA_H
 #define MU_DATA_H
 #include <stdint.h>

@@ -1,4 +1,4 @@
-/* What the shared object offers.  mumacro/library.py reads this file, data.h and records.h too: declarations only, no
+/* What the shared object offers.  mumacro/kernel/binding.py reads this file, data.h and records.h too: declarations only, no
  * macros. */
 #ifndef MU_LIBRARY_H
 #define MU_LIBRARY_H

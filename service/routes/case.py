@@ -5,7 +5,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro.validity import digits, k_effect, model_rows
+from mumacro.analysis.validity import digits, k_effect, model_rows
 
 from ..answers import answer_case
 from ..models import CaseAnswer, model

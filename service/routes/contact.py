@@ -13,13 +13,13 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 import mumacro
-from mumacro.contact import AMPLITUDE, ContactName, DirectionName
+from mumacro.analysis.fit_result import Fit, quantile
+from mumacro.analysis.measured_points import STD, UNKNOWNS
+from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES, contact_of
 from mumacro.extras import missing
-from mumacro.fitted import Fit, quantile
-from mumacro.geometries import ARGUMENTS, GEOMETRIES, contact_of
-from mumacro.inputs import NAMES as INPUTS
-from mumacro.inputs import RIGID, is_rigid
-from mumacro.measured import STD, UNKNOWNS
+from mumacro.inputs.fields import NAMES as INPUTS
+from mumacro.inputs.fields import RIGID, is_rigid
+from mumacro.inputs.kind import AMPLITUDE, ContactName, DirectionName
 
 from .. import API_VERSION
 from ..case import Asked, not_finite, stranger

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.arrays import Codes
-from mumacro.contact import Kind as ContactKind
+from mumacro.inputs.kind import Kind as ContactKind
+from mumacro.kernel.arrays import Codes
 
 from ..answers import Wanted, answer_columns
 from ..case import MAX_ERRORS, Columns, columns_of

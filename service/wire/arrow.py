@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from mumacro.inputs import RIGID
+from mumacro.inputs.fields import RIGID
 
 from ..answers import Part
 from ..case import Columns, columns_of, too_large

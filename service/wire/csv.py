@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.contact import Kind as ContactKind
-from mumacro.inputs import LIKE, UNITS_OF, Scale, scale_of, split_unit
+from mumacro.inputs.fields import LIKE, UNITS_OF, Scale, scale_of, split_unit
+from mumacro.inputs.kind import Kind as ContactKind
 
 from ..case import Columns, Reason, columns_of, numbers, too_large
 from ..options import kind_in

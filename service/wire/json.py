@@ -21,8 +21,8 @@ import orjson
 import simdjson
 from msgspec.structs import astuple
 
-from mumacro.contact import Kind as ContactKind
-from mumacro.inputs import RAD_PER_CYCLE
+from mumacro.inputs.fields import RAD_PER_CYCLE
+from mumacro.inputs.kind import Kind as ContactKind
 
 from ..answers import Part, nested
 from ..case import MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, too_large

@@ -1,1 +1,0 @@
-"""The table and the evaluation as C, and what is compiled of them."""

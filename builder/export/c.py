@@ -1,0 +1,184 @@
+"""``--format c``: the evaluation's own C sources and a table as C text, in one header or in three
+files.
+
+The functions are those of ``mumacro/kernel``, joined into one text; nothing is translated.  Of
+other packages this module needs only what the library itself needs.
+"""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import mumacro
+from mumacro.contacts.quadrature import driven_rule, rules
+from mumacro.errors import MumacroError
+from mumacro.kernel.arrays import Array
+from mumacro.table import atlas
+from mumacro.table.atomic import write_whole
+from mumacro.table.netcdf import Table
+from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
+from mumacro.version import __version__
+
+#: of the bundled table that is written if none is named: a C program holds it in its text
+DEFAULT_TOLERANCE = 1e-7
+_KERNEL = Path(mumacro.__file__).parent / "kernel"
+_BANNER = f"/* Written by mumacro {__version__}; do not edit.  {{}}. */\n"
+_DECLARED = """
+#ifdef __cplusplus
+extern "C" {
+#endif
+extern const mumacro_export mumacro_table;
+#ifdef __cplusplus
+}
+#endif
+
+"""
+_STATIC = "#ifndef MUMACRO_API\n#define MUMACRO_API static inline\n#endif\n"
+# names of the kernel's own, which a program may have, too; members of structs that have such a name
+# are public
+_PRIVATE = re.compile(r"\b(mu|MU)_(?!macro\b|ratio\b)(?=\w)")
+
+
+class ExportError(MumacroError):
+    """What cannot be exported, or not there; the message states why, a compiler's in its own
+    words."""
+
+
+def header_text(table: Table) -> str:
+    """All of it in one header, whose functions are static: it may be included in several files of a
+    program."""
+    kernel = joined("kernel.c", set()) + table_text(table, "static ") + _file("interface.c")
+    private = _PRIVATE.sub(lambda found: f"mumacro_{found[1]}_", kernel)
+    about = _BANNER.format("Declarations, the kernel, the table, the interface")
+    guard = "#ifndef MUMACRO_WHOLE_H\n#define MUMACRO_WHOLE_H\n"
+    return f"{about}{guard}{_STATIC}{_file('mumacro.h')}\n{private}#endif\n"
+
+
+def files(table: Table) -> dict[str, str]:
+    """The texts of ``mumacro.h``, ``mumacro.c`` and ``mumacro_table.c``; the first two are the same
+    for all tables."""
+    seen: set[str] = set()
+    return {
+        "mumacro.h": _BANNER.format("What mumacro.c defines") + _file("mumacro.h"),
+        "mumacro.c": _BANNER.format("The evaluation")
+        + '#include "mumacro.h"\n\n'
+        + joined("kernel.c", seen)
+        + _DECLARED
+        + _file("interface.c"),
+        "mumacro_table.c": _BANNER.format("The table")
+        + joined("data.h", set())
+        + _DECLARED
+        + table_text(table, ""),
+    }
+
+
+def write_c(table: Table, out: Path) -> list[Path]:
+    """Write one header where ``out`` ends in ``.h``, else three files into the folder ``out``;
+    return the paths.
+
+    Raises
+    ------
+    ExportError
+        ``out`` is neither a folder nor the name of a new one, or ends in ``.h`` and is a folder.
+    OSError
+        It cannot be written.
+    """
+    if out.suffix == ".h":
+        if out.is_dir():
+            raise ExportError(
+                f"{out} is a folder: name a folder without the suffix .h, or a header in it"
+            )
+        texts = {out: header_text(table)}
+    else:
+        if out.exists() and not out.is_dir():
+            raise ExportError(
+                f"{out} is a file: name a folder for three files, or a header that ends in .h"
+            )
+        out.mkdir(exist_ok=True)
+        texts = {out / name: text for name, text in files(table).items()}
+    for path, text in texts.items():
+        write_whole(path, text.encode("ascii"))
+    return list(texts)
+
+
+def joined(name: str, seen: set[str]) -> str:
+    """A file of the kernel with those that it includes, each once."""
+    seen.add(name)
+    lines = []
+    for line in _file(name).splitlines(keepends=True):
+        found = re.fullmatch(r'#include "(.+)"\n', line)
+        if found is None:
+            lines.append(line)
+        elif found[1] not in seen:
+            lines.append("\n" + joined(found[1], seen))
+    return "".join(lines)
+
+
+def _file(name: str) -> str:
+    return (_KERNEL / name).read_text("ascii")
+
+
+# --- the table ------------------------------------------------------------------------------------
+
+
+def table_text(table: Table, linkage: str) -> str:
+    """The arrays of :class:`mumacro.kernel.binding.Data` as constants, and ``mumacro_table``."""
+    border, pieces = border_cells(table.border)
+    arrays = {
+        "border": border,
+        "pieces": pieces,
+        "blocks": block_rows(table.blocks),
+        "outer": outer_cells(),
+    }
+    rows = [f"{len(border)}, {_names('', arrays)}"]
+    quantities = []
+    for code, name in enumerate(atlas.QUANTITY_NAMES):
+        if name not in table.quantities:
+            quantities.append("{0, 0, NULL, NULL, NULL}")
+            continue
+        polynomials, errors, slope_errors = quantity_cells(table.blocks, code)
+        # the stick fraction is zero in continuous sliding
+        first = int(polynomials.any(axis=(1, 2)).argmax())
+        parts = {
+            "cells": polynomials[first:],
+            "errors": errors,
+            "slope_errors": slope_errors[first:],
+        }
+        arrays |= {f"{name}_{part}": array for part, array in parts.items()}
+        quantities.append(f"{{{first}, {len(polynomials) - first}, {_names(f'{name}_', parts)}}}")
+    rows.append("{" + ",\n      ".join(quantities) + "}")
+    about = table.attributes
+    quadrature = []
+    for place, (points, errors) in enumerate(rules(float(about["tolerance"]))):
+        arrays[f"rule_{place}"] = points
+        numbers = ("{" + ",".join(map(_number, row)) + "}" for row in errors.tolist())
+        quadrature.append(
+            f"{{{len(points)}, mumacro_table_rule_{place}, {{{', '.join(numbers)}}}}}"
+        )
+    rows.append("{" + ",\n      ".join(quadrature) + "}")
+    arrays["rule_driven"] = driven_rule()
+    rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")
+    text = f'{float(about["tolerance"])!r}, "{about["content_sha256"]}", "{__version__}"'
+    whole = (
+        f"{linkage}const mumacro_export mumacro_table = {{\n    "
+        f"{{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"
+    )
+    return "".join(_array(f"mumacro_table_{name}", array) for name, array in arrays.items()) + whole
+
+
+def _names(before: str, parts: Iterable[str]) -> str:
+    return ", ".join(f"mumacro_table_{before}{part}" for part in parts)
+
+
+def _array(name: str, values: Array) -> str:
+    """Eight numbers a line, each in the fewest digits that read back exactly."""
+    rows = values.reshape(-1, 8 if values.size % 8 == 0 else values.shape[-1]).tolist()
+    lines = (",".join(map(_number, row)) for row in rows)
+    return f"static const double {name}[{values.size}] = {{\n{f',{chr(10)}'.join(lines)}}};\n\n"
+
+
+def _number(value: float) -> str:
+    if value == int(value) and abs(value) < 1e6:
+        return str(int(value)) if value else "0"
+    mantissa, _, exponent = repr(value).partition("e")
+    return mantissa.removesuffix(".0") + (f"e{int(exponent)}" if exponent else "")

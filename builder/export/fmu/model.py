@@ -1,0 +1,253 @@
+"""``--format fmu``: a table as a Functional Mock-up Unit, FMI 2.0 or 3.0, made of the C header; no
+Python inside.
+
+Inputs are mu0, Fz, k, y0, omega, v0 and Fz_amplitude; outputs mu_macro, mu_ratio and force, the
+friction force along v0 that is regularised below the parameter v_rest, with directional derivatives
+by all inputs; beside them error_bound, v_tilde, y_tilde, regime and source.  v0 may be negative:
+all but the force are those of its absolute value.  The parameters contact and direction are
+enumerations, in the order of :data:`mumacro.inputs.kind.CONTACTS` and ``DIRECTIONS``; Fz_amplitude
+counts for direction normal alone, y0 for the others.  Model Exchange and Co-Simulation.  An illegal
+input makes a simulator's call return "discard", with the reason in its log.
+
+The unit holds its sources, the binary of the machine it is made on, and where zig is installed
+those of Linux and Windows for 64-bit Intel and AMD; without any compiler the sources alone.
+"""
+
+import importlib.util
+import io
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from mumacro.inputs.fields import UNITS
+from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS
+from mumacro.table import atlas
+from mumacro.table.netcdf import Table
+from mumacro.version import __version__
+
+from ..c import ExportError, header_text
+
+_HERE = Path(__file__).parent
+STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01, AMPLITUDE: 0.0}
+REST = 1e-4  # v_rest at the start [m/s]
+OPTIONS = ("-O2", "-std=c99", "-fPIC", "-shared", "-fvisibility=hidden")
+_TEXTS = {
+    "mu0": "Coulomb friction coefficient",
+    "Fz": "normal force",
+    "k": "tangential stiffness; infinite: rigid contact",
+    "y0": "amplitude of the oscillation, across or along",
+    "omega": "angular frequency of the oscillation",
+    "v0": "sliding velocity; all but force are those of its absolute value",
+    AMPLITUDE: "amplitude of the normal force, for direction normal",
+    "mu_macro": "macroscopic friction coefficient",
+    "mu_ratio": "mu_macro / mu0",
+    "error_bound": "bound of the absolute error of mu_macro",
+    "v_tilde": "v0 k / (mu0 Fz omega)",
+    "y_tilde": "y0 k / (mu0 Fz); normal: Fz_amplitude / Fz",
+    "regime": ", ".join(f"{i}: {name}" for i, name in enumerate(atlas.REGIMES)),
+    "source": ", ".join(f"{i}: {name}" for i, name in enumerate(atlas.SOURCES)),
+    "contact": "one spring, or a ball on a flat: k is that before slip",
+    "direction": "of the oscillation: across the sliding direction, along it, or of the normal "
+    "force (not of a ball)",
+    "force": "friction force along v0, mu_macro Fz from v_rest on",
+    "v_rest": "speed below which force is regularised",
+}
+_OUTPUTS, _WHOLE = ("mu_macro", "mu_ratio", "force"), ("regime", "source")
+_CHOICES: dict[str, tuple[str, ...]] = {"contact": CONTACTS, "direction": DIRECTIONS}
+_UNITS = """<UnitDefinitions>
+<Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>
+<Unit name="N/m"><BaseUnit kg="1" s="-2"/></Unit>
+<Unit name="m"><BaseUnit m="1"/></Unit><Unit name="rad/s"><BaseUnit s="-1" rad="1"/></Unit>
+<Unit name="m/s"><BaseUnit m="1" s="-1"/></Unit>
+</UnitDefinitions>"""
+_BUILD = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiBuildDescription fmiVersion="3.0"><BuildConfiguration modelIdentifier="mumacro">
+<SourceFileSet language="C99"><SourceFile name="fmu3.c"/></SourceFileSet>
+</BuildConfiguration></fmiBuildDescription>
+"""
+
+
+def fmu2(table: Table) -> bytes:
+    """An FMU of FMI 2.0."""
+    return _unit(table, 2)
+
+
+def fmu3(table: Table) -> bytes:
+    """An FMU of FMI 3.0."""
+    return _unit(table, 3)
+
+
+def _unit(table: Table, version: int) -> bytes:
+    starts = ", ".join(map(repr, STARTS.values()))
+    sources = {
+        name: (_HERE / name).read_text("ascii") for name in ("instance.h", f"fmu{version}.c")
+    }
+    defined = f"#define MUMACRO_FMU_STARTS {{{starts}}}\n#define MUMACRO_FMU_REST {REST!r}\n"
+    sources["instance.h"] = defined + sources["instance.h"]
+    sources["mumacro.h"] = header_text(table)
+    described = _description(version, str(table.attributes["content_sha256"]))
+    files: dict[str, str | bytes] = {"modelDescription.xml": described}
+    files |= {f"sources/{name}": text for name, text in sources.items()}
+    if version == 3:
+        files["sources/buildDescription.xml"] = _BUILD
+    binaries: dict[str, str | bytes] = {}
+    for place, command in _targets(version):
+        if f"binaries/{place}" not in binaries:
+            library = [] if place.endswith(".dll") else ["-lm"]
+            binaries[f"binaries/{place}"] = _compiled(
+                sources, [*command, *OPTIONS, f"fmu{version}.c", *library]
+            )
+    if not binaries:
+        print(
+            "mumacro: no C compiler is installed: the FMU has sources and no binary",
+            file=sys.stderr,
+        )
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in (files | binaries).items():
+            entry = zipfile.ZipInfo(name)  # 1980: the same table gives the same bytes
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            archive.writestr(entry, content)
+    return out.getvalue()
+
+
+def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
+    """Files below ``binaries`` and the commands that make them; zig first, which binds to an old C
+    library."""
+    folders = {
+        "x86_64-linux": "linux64",
+        "x86_64-windows": "win64",
+        "x86_64-darwin": "darwin64",
+    }
+
+    def place(three: str) -> str:
+        suffix = {"windows": ".dll", "darwin": ".dylib"}.get(three.partition("-")[2], ".so")
+        return f"{folders.get(three, three) if version == 2 else three}/mumacro{suffix}"
+
+    for three, target in (
+        ("x86_64-linux", "x86_64-linux-gnu.2.17"),
+        ("x86_64-windows", "x86_64-windows-gnu"),
+    ):
+        if command := _zig(target):
+            yield place(three), [*command, "-s"]
+    processor = {"arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    found = next((path for path in map(shutil.which, ("gcc", "clang", "cc")) if path), None)
+    if found and platform.system() in ("Linux", "Darwin") and processor in ("x86_64", "aarch64"):
+        yield place(f"{processor}-{platform.system().lower()}"), [found]
+
+
+def _zig(target: str) -> list[str] | None:
+    """The command that compiles for a target of zig's; None where the package ziglang is not
+    installed."""
+    found = importlib.util.find_spec("ziglang")
+    return [sys.executable, "-m", "ziglang", "cc", "-target", target] if found else None
+
+
+def _compiled(texts: dict[str, str], command: list[str]) -> bytes:
+    """What ``command`` makes in a folder that holds ``texts`` by name."""
+    with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
+        for name, text in texts.items():
+            Path(folder, name).write_text(text, "ascii")
+        # the folder by its whole name: zig's cache would take two files "./mumacro.h" for one
+        words = [*command, f"-I{folder}", "-o", "made"]
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        if done.returncode != 0:
+            raise ExportError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
+        return Path(folder, "made").read_bytes()
+
+
+def _description(version: int, token: str) -> str:
+    """modelDescription.xml."""
+    second, numbers = version == 2, {name: number for number, name in enumerate(_TEXTS, 1)}
+    token_name, state, able = (
+        ("guid", "canGetAndSetFMUstate", "providesDirectionalDerivative")
+        if second
+        else ("instantiationToken", "canGetAndSetFMUState", "providesDirectionalDerivatives")
+    )
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<fmiModelDescription fmiVersion="{version}.0" modelName="mumacro" {token_name}="{token}"'
+        ' description="Macroscopic friction of a contact that is oscillated"'
+        f' version="{__version__}" license="Apache-2.0" generationTool="mumacro {__version__}"'
+        f' variableNamingConvention="flat"'
+        f"{' numberOfEventIndicators=' + quoteattr('0') if second else ''}>",
+    ]
+    for kind, extra in (
+        ("ModelExchange", ""),
+        ("CoSimulation", ' canHandleVariableCommunicationStepSize="true"'),
+    ):
+        inside = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if second else ""
+        lines.append(
+            f'<{kind} modelIdentifier="mumacro" {state}="true" '
+            f'{able}="true"{extra}>{inside}</{kind}>'
+        )
+    lines += [
+        _UNITS,
+        "<TypeDefinitions>",
+        *(_type(second, name) for name in _CHOICES),
+        "</TypeDefinitions>",
+    ]
+    lines += ['<DefaultExperiment startTime="0" stopTime="1"/>', "<ModelVariables>"]
+    if not second:
+        lines.append(
+            '<Float64 name="time" valueReference="0" causality="independent" '
+            'variability="continuous"/>'
+        )
+    lines += [_variable(second, *item) for item in numbers.items()]
+    lines += ["</ModelVariables>", "<ModelStructure>"]
+    known = " ".join(str(numbers[name]) for name in STARTS)
+    for group in ("Output", "InitialUnknown"):
+        name, index = ("Unknown", "index") if second else (group, "valueReference")
+        rows = [
+            f'<{name} {index}="{numbers[output]}" dependencies="{known}"/>' for output in _OUTPUTS
+        ]
+        lines += [f"<{group}s>", *rows, f"</{group}s>"] if second else rows
+    return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>", ""])
+
+
+def _type(second: bool, name: str) -> str:
+    """The enumeration of a parameter."""
+    items = "".join(f'<Item name="{item}" value="{i}"/>' for i, item in enumerate(_CHOICES[name]))
+    if second:
+        return f'<SimpleType name="{name}"><Enumeration>{items}</Enumeration></SimpleType>'
+    return f'<EnumerationType name="{name}">{items}</EnumerationType>'
+
+
+def _variable(second: bool, name: str, reference: int) -> str:
+    parameter = name in _CHOICES or name == "v_rest"
+    kind = (
+        "input"
+        if name in STARTS
+        else "output"
+        if name in _OUTPUTS
+        else "parameter"
+        if parameter
+        else "local"
+    )
+    varies = "discrete" if name in _WHOLE else "fixed" if parameter else "continuous"
+    held = "Enumeration" if name in _CHOICES else "Real" if second else "Float64"
+    if name in _WHOLE:
+        held = "Integer" if second else "Int32"
+    about = (
+        f'name="{name}" valueReference="{reference}" description={quoteattr(_TEXTS[name])} '
+        f'causality="{kind}" variability="{varies}"'
+    )
+    unit = {**UNITS, AMPLITUDE: "N", "force": "N", "v_rest": "m/s"}.get(name, "-")
+    value = "" if unit == "-" else f' unit="{unit}"'
+    if name in STARTS:
+        value += f' start="{STARTS[name]!r}"' + (' min="0"' if name != "v0" else "")
+    elif name == "v_rest":
+        value += f' start="{REST!r}" min="0"'
+    elif name in _CHOICES:
+        value = f' declaredType="{name}" start="0"'
+    else:
+        about += ' initial="calculated"'
+    if second:
+        return f"<ScalarVariable {about}><{held}{value}/></ScalarVariable>"
+    return f"<{held} {about}{value}/>"

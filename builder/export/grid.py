@@ -1,0 +1,90 @@
+"""A table in the formats of other tools: C sources, FMU; its plain grid as CSV.
+
+The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and
+``error_estimate`` over (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all
+dimensionless.  It is a grid for tools with their own interpolation: its nodes are solved, the
+values between them depend on that tool.  The tolerance of the table is kept by
+:class:`mumacro.Surrogate` alone.
+
+Every file is written beside its name and then renamed, and the same table gives the same bytes.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from mumacro.kernel.arrays import Array
+from mumacro.table.atomic import write_whole
+from mumacro.table.netcdf import Table, read_table
+
+from .c import ExportError, write_c
+from .fmu.model import fmu2, fmu3
+
+PLANE = ("mu_ratio", "stick_fraction", "error_estimate")
+
+
+def long_columns(table: Table) -> dict[str, Array]:
+    """The grid with a row a node, ``y_tilde`` running fastest; columns (m n,) [-]."""
+    v, y, crit = np.broadcast_arrays(table.v_tilde[:, None], table.y_tilde, table.v_tilde_crit)
+    plane = {name: np.asarray(getattr(table, name)) for name in PLANE}
+    columns = {"v_tilde": v, "y_tilde": y, **plane, "v_tilde_crit": crit}
+    return {name: column.ravel() for name, column in columns.items()}
+
+
+def _csv(table: Table) -> bytes:
+    """RFC 4180, a header, a row a node; numbers with all their digits."""
+    columns = long_columns(table)
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return "".join(",".join(map(str, row)) + "\r\n" for row in (columns, *rows)).encode("ascii")
+
+
+#: format -> (name of the file after the table's, its content; C alone may be a folder of files)
+FORMATS: dict[str, tuple[str, Callable[[Table], bytes] | None]] = {
+    "c": ("mumacro.h", None),
+    "csv": ("{}.csv", _csv),
+    "fmu": ("mumacro.fmu", fmu2),
+    "fmu3": ("mumacro-fmi3.fmu", fmu3),
+}
+
+
+#: format that is gone -> what does its work
+GONE = {
+    "mat": "csv, or the netCDF file itself, which MATLAB and Octave read",
+    "modelica": "fmu, or csv for a table of your own",
+    "parquet": "csv",
+    "wasm": "c, which clang and zig compile for WebAssembly",
+}
+
+
+def check_format(kind: str) -> None:
+    """Raise ExportError for what is no format, in a line that names those that there are."""
+    if kind in GONE:
+        raise ExportError(f"format {kind!r} is gone: use {GONE[kind]}")
+    if kind not in FORMATS:
+        raise ExportError(f"format must be one of {', '.join(FORMATS)}, got {kind!r}")
+
+
+def export_table(path: str | Path, kind: str, out: str | Path) -> Table:
+    """Write the table at ``path`` to ``out`` in the format ``kind``, one of :data:`FORMATS`.
+
+    Raises
+    ------
+    ExportError
+        Unknown format, a compiler that fails, ``out`` is the table itself or no place for C
+        sources.
+    TableError
+        The table cannot be read.
+    OSError
+        ``out`` cannot be written; what was there before is still there.
+    """
+    check_format(kind)
+    path, out = Path(path), Path(out)
+    if path.resolve() == out.resolve():
+        raise ExportError(f"{out} is the table itself")
+    table, content_of = read_table(path), FORMATS[kind][1]
+    if content_of is None:
+        write_c(table, out)
+    else:
+        write_whole(out, content_of(table))
+    return table

@@ -1,0 +1,1 @@
+"""The full model: slip, stick and the steady cycle."""

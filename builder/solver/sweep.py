@@ -1,0 +1,154 @@
+"""Nodes to solved values: in parallel and resumable.
+
+Work is cut into chunks of points; a chunk is a pure function of its inputs, so the values do not
+depend on how many workers there are or on whether a build was interrupted.
+"""
+
+import hashlib
+import io
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from mumacro.errors import MumacroError
+from mumacro.kernel.arrays import Array
+from mumacro.table.atomic import write_whole
+
+from . import steady
+from .compiled import solver_kernel, source_digest
+from .slip import OK
+
+CHUNK = 128  # points; about 10 ms of work
+#: the steady state; the continuous orbit whether or not lam stays positive, analytic across the
+#: border; the border, where the column deficit holds v~crit
+KINDS = {"full": 0, "continuous": 1, "border": 2}
+_RESULTS = steady.REGIME
+COLUMNS = (*steady.RESULTS[:_RESULTS], "error_estimate", "status")
+_MU, _DEFICIT, _ERROR, _STATUS = map(
+    COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status")
+)
+
+
+class SolveError(MumacroError):
+    """A node could not be solved; the message states which and what to do."""
+
+
+class CheckpointError(MumacroError):
+    """Finished work cannot be stored."""
+
+
+@solver_kernel
+def _solve_rows(kind: int, points: Array, out: Array) -> None:
+    """Solve ``points`` (n, 3) into rows of COLUMNS; ``kind`` as in KINDS."""
+    w, end, orbit, res = steady.workspace()
+    for i in range(points.shape[0]):
+        v, y, eta = points[i]
+        if kind == 2:
+            res[_DEFICIT], res[_MU], status = steady.border_raw(y, w, end)
+            error = steady.RELATIVE_ERROR * res[_MU]
+        else:
+            if kind == 0:
+                status = steady.solve_raw(v, y, eta, w, end, orbit, res)
+            else:
+                status = steady.continuous(v, y, w, end)
+                steady.sliding(v, y, end, res)
+            error = steady.error_estimate(res[_MU], res[_DEFICIT])
+        out[i, :_RESULTS], out[i, _ERROR], out[i, _STATUS] = res[:_RESULTS], error, status
+
+
+def solve_chunk(kind: str, points: Array) -> Array:
+    """Solve ``points`` (n, 3) of v~, y~, y~ - 1 as one of :data:`KINDS`; rows of
+    :data:`COLUMNS`."""
+    out = np.empty((points.shape[0], len(COLUMNS)))
+    _solve_rows(KINDS[kind], np.ascontiguousarray(points), out)
+    return out
+
+
+class Sweep:
+    """Solves arrays of points and counts them.
+
+    Parameters
+    ----------
+    workers : int
+        Threads on this machine (the solver releases the interpreter lock).
+    checkpoint : Path, optional
+        Folder for finished sweeps; a later build with the same nodes reads them instead of solving
+        again.
+    """
+
+    def __init__(self, workers: int = 1, checkpoint: Path | None = None) -> None:
+        self.n_solves = 0
+        self.checkpoint = checkpoint
+        self._pool = ThreadPoolExecutor(max_workers=workers)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+    def solve(self, kind: str, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
+        """Solve at every (v~, y~); returns arrays of the broadcast shape by name of
+        :data:`COLUMNS`.
+
+        ``eta`` = y~ - 1 may be given where it is known better than ``y``.
+
+        Raises
+        ------
+        InputError
+            A point outside the solver's range, :mod:`.steady`.
+        SolveError
+            When any point fails: a table must have no missing node.
+        """
+        v, y = np.broadcast_arrays(np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        eta = (
+            y - 1.0 if eta is None else np.broadcast_to(np.asarray(eta, dtype=np.float64), y.shape)
+        )
+        steady.check_range(v, y, eta)
+        points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
+        out = (
+            self._run(kind, points)
+            if self.checkpoint is None
+            else self._kept(self.checkpoint, kind, points)
+        )
+        self.n_solves += points.shape[0]
+        failed = np.flatnonzero(out[:, _STATUS] != OK)
+        if failed.size:
+            (v_bad, y_bad, _), status = points[failed[0]].tolist(), int(out[failed[0], _STATUS])
+            text = (
+                f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, "
+                f"y~={y_bad!r}: "
+            )
+            raise SolveError(text + steady.ADVICE[status])
+        return {name: out[:, i].reshape(v.shape) for i, name in enumerate(COLUMNS)}
+
+    def _run(self, kind: str, points: Array) -> Array:
+        chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
+        done = self._pool.map(lambda c: solve_chunk(kind, c), chunks)
+        return np.concatenate([np.empty((0, len(COLUMNS))), *done])
+
+    def _kept(self, folder: Path, kind: str, points: Array) -> Array:
+        """What the checkpoint holds of these points; else they are solved and stored."""
+        # the digest of the sources: results of another version of the solver are not reused
+        text = (source_digest() + kind).encode() + np.ascontiguousarray(
+            points, dtype="<f8"
+        ).tobytes()
+        file = folder / f"{kind}-{hashlib.sha256(text).hexdigest()[:32]}.npy"
+        with suppress(OSError, ValueError, EOFError):  # a damaged file is solved again
+            out: Array = np.load(file, allow_pickle=False)
+            if out.shape == (points.shape[0], len(COLUMNS)):
+                return out
+        out, content = self._run(kind, points), io.BytesIO()
+        np.save(content, out)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_whole(file, content.getvalue())
+        except OSError as error:
+            why = f"{folder}: finished work cannot be stored: {error.strerror or error}"
+            raise CheckpointError(
+                f"{why}; repair that and give the same command again: it resumes"
+            ) from error
+        return out

@@ -1,0 +1,1 @@
+"""From solved points to a verified table."""

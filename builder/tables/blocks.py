@@ -1,0 +1,186 @@
+"""Nodes of a block, and their refinement until the interpolant meets the tolerance."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
+from mumacro.table.netcdf import Block, BorderPiece
+from mumacro.table.polynomials import (
+    LOCAL,
+    WIDTH,
+    Border,
+    cell_scale,
+    chebyshev_coefficients,
+    interpolation_matrix,
+    nodes,
+)
+
+from ..solver.sweep import Sweep
+from .quantities import SOLVED, solver_noise
+
+MAX_NODES = 96
+MAX_CELLS = 160
+SHARE = 0.1  # of the tolerance that the nodes' truncation in one direction may take
+CELL_SHARE = 0.4  # the same of the cells: fewer cells are faster, nodes cost nothing
+NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more nodes gain nothing
+
+
+def solve_nodes(
+    index: int, shape: tuple[int, int], border: Border, sweep: Sweep
+) -> tuple[Array, Array, dict[str, Array], dict[str, Array]]:
+    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from
+    fresh solves.
+
+    The last is the solver's rounding in it where a base is subtracted: 1 - mu~ and q without a base
+    keep their digits, but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to
+    0.
+    """
+    chart, found, cancelled = atlas.CHARTS[index], {}, {}
+    a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
+    v, y, eta = chart.point(a[:, None], b[None, :], border)
+    solved = sweep.solve("continuous" if chart.regime == CONTINUOUS else "full", v, y, eta)
+    for code, quantity in enumerate(QUANTITIES):
+        if chart.holds(quantity):
+            base, factor = kernels[-1].forms(code, index, v, y, eta)
+            rest, complement = solved[quantity.name] - base, SOLVED[quantity.name].complement
+            if complement:  # next to 1 it has the digits
+                rest = np.where(base == 1.0, -solved[complement], rest)
+            found[quantity.name] = rest / factor
+            noise = solver_noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
+            cancelled[quantity.name] = np.where(
+                (base == 0.0) | (base == 1.0), 0.0, noise / np.abs(factor)
+            )
+    return a, b, found, cancelled
+
+
+def _next(n: int) -> int:
+    return n + max(2, n // 6)
+
+
+def _tail(coefficients: Array, axis: int) -> float:
+    """What the interpolant still misses along one axis: its last two Chebyshev coefficients, summed
+    over the other."""
+    c = np.abs(np.moveaxis(coefficients, axis, 0)).reshape(coefficients.shape[axis], -1)
+    return float(c[-2:].sum(axis=1).max())
+
+
+_CHECK = np.linspace(-1.0, 1.0, 25)
+_FOLLOW = interpolation_matrix(WIDTH, _CHECK) @ np.linalg.inv(interpolation_matrix(WIDTH, LOCAL))
+LINES = 33  # across an axis, along which cells are tried
+
+
+def _fewest(axis: Axis, exact: Callable[[Array], Array], wanted: float, relative: bool) -> int:
+    """Fewest cells along an axis for which polynomials of a cell's degree follow ``exact``.
+
+    ``exact`` (points) -> (points, lines) takes evaluation's coordinate; errors are compared with
+    ``wanted``.
+    """
+    low, high = axis.span
+    step = 2 if axis.name == "s" else 1  # the knot of sigma is an edge of cells
+    for cells in range(step, MAX_CELLS + 1, step):
+        centre = 2.0 * np.arange(cells)[:, None] + 1.0
+        at, check = (low + (high - low) * 0.5 * (centre + x) / cells for x in (LOCAL, _CHECK))
+        live = axis.to_file(check[:, -1]) > axis.low  # cells below the block are never visited
+        at, check = at[live], check[live]
+        local = exact(at.ravel()).reshape(*at.shape, -1)
+        truth = exact(check.ravel()).reshape(*check.shape, -1)
+        off = np.abs(truth - np.einsum("ij,cjl->cil", _FOLLOW, local))
+        if relative:
+            off /= np.abs(truth)
+        inside = axis.to_file(check.ravel()).reshape(check.shape) >= axis.low - 1e-12
+        if off[inside].max() <= wanted:
+            return cells
+    return MAX_CELLS
+
+
+def _position(axis: Axis, x: Array) -> Array:
+    """Position of evaluation's ``x`` on the axis of nodes, [-1, 1]."""
+    return (2.0 * axis.to_file(x) - axis.low - axis.high) / (axis.high - axis.low)
+
+
+def _block_cells(chart: Chart, values: Array, axis: int, wanted: float) -> int:
+    """:func:`_fewest` along one axis of a block, on lines that cover the other."""
+    own, lines = (chart.a, chart.b)[axis], np.cos(np.linspace(0.0, np.pi, LINES))
+    c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
+    across = c @ interpolation_matrix(values.shape[1 - axis], lines).T
+    return _fewest(
+        own, lambda x: interpolation_matrix(len(c), _position(own, x)) @ across, wanted, False
+    )
+
+
+def _border_cells(piece: int, values: Array, wanted: float) -> int:
+    axis, c = BORDER_PIECES[piece][1], chebyshev_coefficients(values)
+
+    def exact(x: Array) -> Array:
+        return (interpolation_matrix(c.size, _position(axis, x)) @ c * cell_scale(piece, x))[
+            :, None
+        ]
+
+    return _fewest(axis, exact, wanted, True)
+
+
+def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
+    """The stored border; its own tolerance is tighter than the table's, since every stick-slip node
+    is built on it."""
+    wanted = max(1e-3 * tolerance, 4e-15)
+    pieces = []
+    for piece, (_, axis, _) in enumerate(BORDER_PIECES):
+        to_infinity = axis.name == "inverse_y"
+        n = 4 if to_infinity else 12
+        while True:
+            x = nodes(n, axis.low, axis.high)
+            y = axis.amplitude(x)
+            values = (
+                sweep.solve("border", np.ones_like(y), y)["deficit"]
+                / kernels[-1].border_scales(piece, y)[0]
+            )
+            if _tail(chebyshev_coefficients(values), 0) <= wanted or n >= MAX_NODES or to_infinity:
+                break
+            n = _next(n)
+        pieces.append(BorderPiece(x, values, _border_cells(piece, values, wanted)))
+    return pieces
+
+
+def build_block(
+    index: int,
+    border: Border,
+    sweep: Sweep,
+    tolerance: float,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Block:
+    """Solve nodes until the Chebyshev tail in both directions is below SHARE * tolerance, then cut
+    the cells."""
+    chart = atlas.CHARTS[index]
+    wanted = max(SHARE * tolerance, NODE_FLOOR)
+    tail_block = chart.a.name == "inverse_y"
+    na, nb = 3 if tail_block else 8, 8
+    best, stuck = [math.inf, math.inf], [0, 0]
+    while True:
+        progress(f"{chart.name} {na} x {nb}")
+        a, b, found, _ = solve_nodes(index, (na, nb), border, sweep)
+        values = found["mu_ratio"]
+        left = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
+        for axis in (0, 1):
+            # twice no better by a third: what is left is the solver's rounding, to which more nodes
+            # only add
+            stuck[axis] = 0 if left[axis] < 0.67 * best[axis] else stuck[axis] + 1
+            best[axis] = min(best[axis], left[axis])
+        grow = [
+            left[axis] > wanted and (na, nb)[axis] < MAX_NODES and stuck[axis] < 3
+            for axis in (0, 1)
+        ]
+        if tail_block:
+            grow[0] = False
+        if not any(grow):
+            break
+        na, nb = (_next(n) if more else n for n, more in zip((na, nb), grow, strict=True))
+    follow = [max(CELL_SHARE * tolerance, NODE_FLOOR, min(best[axis], 1.0)) for axis in (0, 1)]
+    if tail_block:
+        follow[0] = wanted
+    cells = (_block_cells(chart, values, 0, follow[0]), _block_cells(chart, values, 1, follow[1]))
+    return Block(a, b, cells, found)

@@ -1,0 +1,263 @@
+"""From a tolerance to a verified table file: border, blocks, plain grid, fresh solves,
+provenance."""
+
+import dataclasses
+import json
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mumacro import MumacroError, Surrogate
+from mumacro.kernel.arrays import Array
+from mumacro.table.atlas import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
+from mumacro.table.netcdf import Block, Table, read_table, write_table
+from mumacro.table.polynomials import Border
+from mumacro.version import __version__
+
+from ..solver.sweep import Sweep
+from .blocks import build_block, build_border
+from .measure import block_errors, border_errors
+from .quantities import ABS_TO_REL, SOLVED
+from .verify import QUANTILES, holds, uncovered, verify
+
+MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
+SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
+#: the same in every cell.  Less, since nothing is left to chance there: the error of a cell is
+#: known on 17 x 17 of its points, edges included; what is allowed for is the rest that the finer
+#: interpolant misses, see builder/tables/measure.py
+CELL_SAFETY = 1.5
+BLOCK_POINTS = 1500
+FINAL_POINTS = 20_000
+ATTEMPTS = 4
+#: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to
+#: rounding
+STEPS = 256
+ERROR_BITS = 3  # digits of the errors of the plain grid and of cells
+REFERENCE = (
+    "Benad J., Nakano K., Popov V. L., Popov M.: Active control of friction by transverse "
+    "oscillations. Friction (2018)"
+)
+
+
+class BuildError(MumacroError):
+    """The tolerance was not reached; the message states where and by how much."""
+
+
+# --- rounding: bits below the tolerance are zero, which zlib compresses; errors are those of the
+# rounded numbers ---
+
+
+def bits(tolerance: float) -> int:
+    """Binary digits after the point of which the last one is at most
+    ``tolerance``/:data:`STEPS`."""
+    return math.ceil(math.log2(STEPS / tolerance))
+
+
+def to_step(values: Array, tolerance: float) -> Array:
+    """``values`` at multiples of a power of two; none moves by more than half of
+    ``tolerance``/:data:`STEPS`."""
+    return np.asarray(np.ldexp(np.round(np.ldexp(values, bits(tolerance))), -bits(tolerance)))
+
+
+def to_bits(values: Array, digits: int, up: bool = False) -> Array:
+    """``values`` with ``digits`` binary digits each, to the nearest or, with ``up``, away from
+    zero."""
+    mantissa, exponent = np.frexp(values)
+    scaled = np.ldexp(mantissa, digits)
+    whole = np.copysign(np.ceil(np.abs(scaled)), scaled) if up else np.round(scaled)
+    return np.asarray(np.ldexp(whole, exponent - digits))
+
+
+def round_block(block: Block, tolerance: float) -> Block:
+    """``block`` with its node values rounded.
+
+    All that a block tabulates is of order one, and mu~ changes by at most about as much as what is
+    tabulated: a step that is the same for all values of a block suits the relative error of mu~
+    too.
+    """
+    return dataclasses.replace(
+        block, nodes={name: to_step(x, tolerance) for name, x in block.nodes.items()}
+    )
+
+
+# --- the table ------------------------------------------------------------------------------------
+
+
+def stages() -> int:
+    """The least number of calls of ``progress``, one for each finished stage."""
+    return 1 + len(CHARTS) + 3
+
+
+def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
+    """The log-spaced grid for plots; finer for finer tables, nodes solved, not interpolated.
+
+    mu~ and the stick fraction keep as many digits as the table's tolerance needs;
+    ``error_estimate`` is the solver's and that of the rounding.
+    """
+    n = 31 if tolerance > 1e-5 else (61 if tolerance > 1e-9 else 121)
+    v, y = np.geomspace(1e-3, 1e3, n), np.geomspace(1e-3, 1e3, n)
+    solved = sweep.solve("full", v[:, None], y[None, :])
+    crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    mu, stick = (to_bits(solved[name], bits(tolerance)) for name in ("mu_ratio", "stick_fraction"))
+    error = to_bits(solved["error_estimate"] + np.abs(mu - solved["mu_ratio"]), ERROR_BITS, up=True)
+    return {
+        "v_tilde": v,
+        "y_tilde": y,
+        "mu_ratio": mu,
+        "stick_fraction": stick,
+        "error_estimate": error,
+        "v_tilde_crit": crit,
+    }
+
+
+def build_table(
+    out: Path,
+    tolerance: float,
+    sweep: Sweep,
+    progress: Callable[[str, bool], None] = lambda _text, _done: None,
+) -> Surrogate:
+    """Build the table for ``tolerance`` (largest absolute error of mu~), verify it and write it to
+    ``out``.
+
+    ``progress(text, done)`` is called while a stage runs and when it is done.  A block whose fresh
+    solves miss the tolerance is built again for a third of it.
+
+    Raises
+    ------
+    BuildError
+        When the verified error does not come below the tolerance.
+    """
+    border = Border(pieces := build_border(sweep, tolerance))
+    largest = float(border_errors(border, sweep, np.random.default_rng(23), 600).max())
+    for piece in pieces:
+        piece.max_rel_error = SAFETY * largest
+    progress("border", True)
+    targets = [tolerance] * len(CHARTS)
+
+    def build(i: int) -> Block:
+        return round_block(
+            build_block(i, border, sweep, targets[i], lambda text: progress(text, False)),
+            targets[i],
+        )
+
+    blocks: list[Block] = []
+    for i, chart in enumerate(CHARTS):
+        blocks.append(build(i))
+        progress(chart.name, True)
+    grid = plain_grid(sweep, tolerance)
+    progress("plain grid", True)
+    for attempt in range(ATTEMPTS):
+        table = Table(pieces, blocks, **grid)
+        table.attributes = {"tolerance": tolerance, "quantities": " ".join(QUANTITY_NAMES)}
+        late = _state_errors(table, out, sweep, attempt)
+        if not late or attempt == ATTEMPTS - 1:
+            break
+        for i in late:
+            targets[i] /= 3.0
+            blocks[i] = build(i)
+    progress("errors of the blocks", True)
+    return _finish(table, out, targets, sweep, progress)
+
+
+def _state_errors(table: Table, out: Path, sweep: Sweep, seed: int) -> list[int]:
+    """Measure the errors of the blocks and write them into the table; the blocks that miss its
+    tolerance."""
+    tolerance = float(table.attributes["tolerance"])
+    late = []
+    for i, found in enumerate(block_errors(Surrogate(table, out), sweep, BLOCK_POINTS, seed)):
+        block = table.blocks[i]
+        for name, value in found.values.items():
+            block.cell_errors[name] = to_bits(CELL_SAFETY * found.cells[name], ERROR_BITS, up=True)
+            block.errors[name] = np.array(
+                [SAFETY * value, *block.cell_errors[name].max(axis=0)[1:]]
+            )
+        block.max_abs_error, block.max_rel_error = found.absolute, found.relative
+        if found.absolute > 0.8 * tolerance or found.relative > 0.8 * ABS_TO_REL * tolerance:
+            late.append(i)
+    return late
+
+
+def _verified(quantity: Quantity, found: dict[str, Any]) -> tuple[str, float]:
+    """Name and value of the attribute that states the verified error of a quantity."""
+    if SOLVED[quantity.name].relative:
+        return f"verified_max_rel_{quantity.variable}_error", found["max_rel_error"]
+    return f"verified_max_{quantity.variable}_error", found["max_abs_error"]
+
+
+def verified_attributes(report: dict[str, Any], quantities: list[str]) -> dict[str, Any]:
+    """The attributes that state what a report of :func:`.verify.verify` found."""
+    spread = report["distribution"]
+    return {
+        "verified_max_abs_error": report["max_abs_error"],
+        "verified_max_rel_error": report["max_rel_error"],
+        **dict(
+            _verified(quantity, report[quantity.name])
+            for quantity in QUANTITIES[1:]
+            if quantity.name in quantities
+        ),
+        "verified_max_slope_error": report["slopes"]["mu_ratio"]["max_abs_error"],
+        "verified_points": np.int32(report["points"]),
+        # few and flat: each attribute costs about a hundred bytes
+        "verified_quantiles": np.array(QUANTILES),
+        "verified_quantities": " ".join(spread),
+        "verified_error_quantiles": np.concatenate(
+            [part["error_quantiles"] for part in spread.values()]
+        ),
+        "verified_bound_over_error": np.concatenate(
+            [part["bound_over_error"] for part in spread.values()]
+        ),
+    }
+
+
+def write_verified(path: Path, report: dict[str, Any]) -> None:
+    """Put what a report of :func:`.verify.verify` found into the attributes of a table file; no
+    other number of it changes."""
+    table = read_table(path)
+    table.attributes |= verified_attributes(report, table.quantities)
+    write_table(table, path)
+
+
+def _finish(
+    table: Table,
+    out: Path,
+    targets: list[float],
+    sweep: Sweep,
+    progress: Callable[[str, bool], None],
+) -> Surrogate:
+    """Verify the table on fresh solves, write it to ``out`` with its provenance, and open it."""
+    tolerance = float(table.attributes["tolerance"])
+    surrogate = Surrogate(table, out)
+    report = verify(surrogate, sweep, FINAL_POINTS)
+    progress("fresh solves", True)
+    if not holds(report, tolerance):
+        missed = {what: count for what, count in uncovered(report).items() if count}
+        raise BuildError(
+            f"verified error {report['max_abs_error']:.2e} absolute, {report['max_rel_error']:.2e} "
+            f"relative against a tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; "
+            f"outside their bound: {missed or 'none'}; no table was written"
+        )
+    table.attributes = {
+        "title": "Macroscopic friction coefficient under transverse oscillation",
+        "summary": "mu_macro/mu0 of a contact dragged at constant speed and shaken across, as a "
+        "function of the dimensionless speed and amplitude; plain grid for reading, border-fitted "
+        "Chebyshev blocks for evaluation",
+        "history": f"mumacro {__version__}: python -m builder build --tolerance {tolerance:g}",
+        "source": "full stick-slip model, steady cycle by root-finding on half a period",
+        "references": REFERENCE,
+        "license": "Apache-2.0",
+        "product_version": __version__,
+        "Conventions": "CF-1.11",
+        "tolerance": tolerance,
+        "quantities": " ".join(table.quantities),
+        **verified_attributes(report, table.quantities),
+        "n_solves": np.int32(sweep.n_solves),
+        "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),
+    }
+    write_table(table, out)
+    if sweep.checkpoint is not None:
+        shutil.rmtree(sweep.checkpoint, ignore_errors=True)
+    return Surrogate.open(out)

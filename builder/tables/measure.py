@@ -1,0 +1,281 @@
+"""How far each block is off: the errors that a table states, measured on fresh solves.
+
+Values are compared with solves at points that crowd towards edges and seams.
+
+How far q and its derivatives are off is measured cell by cell.  The truth is a second interpolant
+of the model, through more nodes, none of which is a node of the table, and which are not rounded.
+What it misses itself is far below what the table misses, or as small as the solver's rounding,
+which both have.  The difference is a smooth function in every cell; it is taken at the Chebyshev
+points of a cell, edges included, where a derivative errs most.
+"""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from mumacro import Surrogate
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import CHARTS, CONTINUOUS, QUANTITIES, SQRT2, Axis, Chart
+from mumacro.table.netcdf import Block
+from mumacro.table.polynomials import (
+    WIDTH,
+    Border,
+    cells_2d,
+    chebyshev_coefficients,
+    coefficient_matrix,
+    interpolation_matrix,
+)
+
+from ..solver.sweep import Sweep
+from .blocks import solve_nodes
+from .quantities import solver_noise
+
+
+class BlockErrors(NamedTuple):
+    """Largest errors of a block.
+
+    By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in
+    :class:`mumacro.table.netcdf.Block`. ``absolute``, ``relative``: of mu~.
+    """
+
+    values: dict[str, float]
+    absolute: float
+    relative: float
+    cells: dict[str, Array]
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
+    """``n`` random numbers from ``low`` to ``high``, uniform in their logarithm, (n,)."""
+    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
+
+
+def fast_from(s: Surrogate, y: Array) -> Array:
+    """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
+    below = atlas.RHO_MAX * s.v_tilde_crit(y)
+    return np.asarray(np.where(y <= atlas.Y_TAIL, below, atlas.FAST_KAPPA * np.sqrt(y)))
+
+
+SEAMS = (atlas.Y_STICK_LO, atlas.Y_CONT, atlas.Y_MID, atlas.Y_HIGH, atlas.Y_TAIL)
+
+
+def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
+    """Points (v~, y~) beside the lines where two blocks or a block and a tail meet."""
+    y, v = log_uniform(rng, 1e-3, 1e6, n), log_uniform(rng, 1e-6, 1e4, n)
+    off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
+    which = rng.integers(0, 4, n)
+    y = np.where(which < 2, rng.choice(SEAMS, n) * off, y)
+    cut, fast = which == 2, which == 3
+    y[cut] = rng.uniform(atlas.Y_STICK_LO, atlas.Y_STICK_HI, int(cut.sum()))
+    v[cut] = s.v_tilde_crit(y[cut]) * atlas.SIGMA_CUT**2 * off[cut]
+    y[fast] = log_uniform(rng, atlas.Y_CONT, 1e6, int(fast.sum()))
+    v[fast] = fast_from(s, y[fast]) * off[fast]
+    return v, y
+
+
+def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int) -> Array:
+    """Relative errors of v~crit on ``n`` fresh solves, (n,)."""
+    y = 10.0 ** rng.uniform(-4.0, 6.0, n)
+    exact = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    return np.asarray(np.abs(border(y) / exact - 1.0))
+
+
+def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:
+    """The same table with one error for all that it tabulates, and a share of the border's.
+
+    With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the
+    table's error.
+    """
+    table, replace = surrogate.table, dataclasses.replace
+    border = [
+        replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border
+    ]
+    stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
+    blocks = [replace(block, errors=stated) for block in table.blocks]
+    return Surrogate(
+        replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads
+    )
+
+
+def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:
+    """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
+    neighbour."""
+    stating = tuple(_stating(surrogate, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
+    found = []
+    for index, block in enumerate(surrogate.table.blocks):
+        errors = _value_errors(
+            surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n
+        )
+        _, _, *exact = solve_nodes(
+            index, finer((block.a.size, block.b.size)), surrogate.border, sweep
+        )
+        found.append(BlockErrors(*errors, cell_errors(index, block, *exact)))
+    return found
+
+
+def _value_errors(
+    surrogate: Surrogate,
+    stating: tuple[Surrogate, ...],
+    sweep: Sweep,
+    index: int,
+    rng: np.random.Generator,
+    n: int,
+) -> tuple[dict[str, float], float, float]:
+    """Of what is tabulated by quantity; absolute and relative of mu~."""
+    chart = CHARTS[index]
+    v, y, _ = chart.point(_crowded(rng, chart.a, n), _crowded(rng, chart.b, n), surrogate.border)
+    v_seam, y_seam = near_seams(rng, 2 * n, surrogate)
+    v, y = np.concatenate([v, v_seam]), np.concatenate([y, y_seam])
+    mu, _, source = surrogate.ratio_with_bound(v, y)
+    v, y, mu = v[source == index], y[source == index], mu[source == index]
+    solved = sweep.solve("full", v, y)
+    error = np.abs(mu - solved["mu_ratio"])
+    errors = {}
+    for name in surrogate.table.blocks[index].nodes:
+        value, *_ = surrogate.quantity(name, v, y)
+        scale, beside, rounding = (table.quantity(name, v, y)[1] for table in stating)
+        # what the bound allows anyway: half of rounding, and what the border's error does, of which
+        # it states twice
+        noise = (
+            solver_noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
+        )
+        errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
+    return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
+
+
+def _crowded(rng: np.random.Generator, axis: Axis, n: int) -> Array:
+    """File coordinates that crowd towards both ends."""
+    low, high = axis.low, axis.high
+    if axis.name == "radius":
+        half = n // 2
+        return np.concatenate(
+            [10.0 ** rng.uniform(-5.0, math.log10(high), half), high * rng.beta(0.5, 0.5, n - half)]
+        )
+    t = rng.beta(0.5, 0.5, n)
+    edge = 10.0 ** rng.uniform(-6.0, -1.0, n // 4)
+    t[: edge.size] = np.where(rng.random(edge.size) < 0.5, edge, 1.0 - edge)
+    return low + (high - low) * np.clip(t, 1e-7, 1.0 - 1e-7)
+
+
+# --- cell by cell ---------------------------------------------------------------------------------
+
+# along either side of a cell: a polynomial of that degree is what an error of T_8 to T_16 is
+POINTS = 17
+_AT = -np.cos(np.arange(POINTS) * math.pi / (POINTS - 1))
+_TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_AT, POINTS - 1))
+_TO_DERIVATIVE = chebyshev.chebvander(_AT, POINTS - 2) @ chebyshev.chebder(_TO_COEFFICIENTS)
+
+
+def finer(shape: tuple[int, int]) -> tuple[int, int]:
+    """Numbers of nodes along both coordinates of the interpolant that stands for the model."""
+    a, b = (n + max(6, n // 2) for n in shape)
+    return a, b
+
+
+class _Along:
+    """The points of all cells along one axis, (cells, POINTS); none below the low end of the block.
+
+    ``wide``: the width that the points of a cell cover; zero where the block never reads it.
+    """
+
+    def __init__(self, axis: Axis, cells: int, nodes: int) -> None:
+        start, stop = axis.span
+        edges = start + (stop - start) * np.arange(cells + 1) / cells
+        low = np.clip(edges[:-1], axis.to_evaluation(np.array([axis.low])), edges[1:])
+        self.wide = edges[1:] - low
+        self.x = low[:, None] + 0.5 * (1.0 + _AT) * self.wide[:, None]
+        local = 2.0 * (self.x - edges[:-1, None]) * cells / (stop - start) - 1.0
+        self.powers = local[..., None] ** np.arange(WIDTH - 1, -1, -1)
+        self.shares, at_border = (
+            x.reshape(local.shape) for x in kernels[-1].cell_shares(local.ravel())
+        )
+        self.share_at_border = at_border[-1]
+        at = np.clip(axis.to_file(self.x.ravel()), axis.low, axis.high)
+        self.follow = interpolation_matrix(
+            nodes, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
+        )
+        scale = np.divide(2.0, self.wide, out=np.zeros(cells), where=self.wide > 0.0)
+        self.to_derivative = scale[:, None, None] * _TO_DERIVATIVE
+
+
+def _difference(
+    chart: Chart, block: Block, values: Array, exact: Array, noise: Array
+) -> tuple[Array, _Along, _Along]:
+    """Cells through node ``values`` minus the interpolant through ``exact``, (cells a, POINTS,
+    cells b, POINTS)."""
+    a, b = (
+        _Along(axis, n, m)
+        for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
+    )
+    own = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
+    found = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
+    return found - (a.follow @ _without_noise(exact, noise) @ b.follow.T).reshape(found.shape), a, b
+
+
+#: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to
+#: reach 2.6 of them
+DEVIATIONS = 4.0
+
+
+def _without_noise(exact: Array, noise: Array) -> Array:
+    """Chebyshev coefficients of the interpolant through ``exact``, without those that are the
+    solver's rounding.
+
+    At an edge a second derivative multiplies them by the fourth power of their number, which would
+    hide what the table errs by.  They are those at the level of the last ones, and those that the
+    ``noise`` of the nodes explains.
+
+    The last ones do not tell the second: a node next to an edge has hardly a share in them.
+    """
+    c = chebyshev_coefficients(exact)
+    last = max(np.abs(c[-2:]).max(), np.abs(c[:, -2:]).max())
+    along_a, along_b = (coefficient_matrix(n) ** 2 for n in noise.shape)
+    deviation = np.sqrt(along_a @ noise**2 @ along_b.T)
+    c[np.abs(c) <= np.maximum(last, DEVIATIONS * deviation)] = 0.0
+    return c
+
+
+def _without_edge(off: Array, b: _Along, cells: int) -> None:
+    """Errors along b of the last cells below the border as evaluation has them, see
+    ``mumacro/kernel/points.c``.
+
+    It takes the derivative at the border out of them.  What is left is linear in the distance to
+    the border, by which the chain rule divides; the bound counts it at most half the number of
+    cells per unit of b times.
+    """
+    root = SQRT2 - b.x[-1, :-1]
+    weight = np.maximum(1.0, (1.0 - root * root) / root / (cells / SQRT2))
+    b.shares[-1] = b.share_at_border
+    off[:, :, -1, :-1] = (off[:, :, -1, :-1] - off[:, :, -1, -1:]) * weight
+    off[:, :, -1, -1] = off[:, :, -1, -2]
+
+
+def cell_errors(
+    index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
+) -> dict[str, Array]:
+    """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and
+    along b.
+
+    ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`;
+    ``noise`` their rounding.
+    """
+    chart, found = CHARTS[index], {}
+    for quantity in QUANTITIES:
+        if quantity.name in block.nodes:
+            name = quantity.name
+            off, a, b = _difference(chart, block, block.nodes[name], exact[name], noise[name])
+            along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)
+            along_b = np.einsum("jrq,ipjq->ipjr", b.to_derivative, off)
+            if quantity.smooth_at_border and chart.regime != CONTINUOUS and chart.b.name == "s":
+                _without_edge(along_b, b, block.cells[1])
+            along_a /= a.shares[:, :, None, None]
+            along_b /= b.shares
+            largest = np.stack(
+                [np.abs(x).max(axis=(1, 3)) for x in (off, along_a, along_b)], axis=-1
+            )
+            found[quantity.name] = largest.reshape(-1, 3)
+    return found

@@ -1,0 +1,327 @@
+"""The table against fresh solves: error off the nodes, coverage of every bound, seams, monotony."""
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro import Surrogate
+from mumacro.kernel.arrays import Array
+from mumacro.table import atlas
+from mumacro.table.atlas import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
+
+from ..solver.sweep import Sweep
+from .measure import SEAMS, border_errors, fast_from, near_seams
+from .measure import log_uniform as _log
+from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE, solver_noise
+
+# of v~crit: nearer, slopes of what is not smooth at the border are not compared
+BESIDE_BORDER = 1e-3
+# differences of fresh solves stand for the slopes of the model
+_STENCIL = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+_SIXTH_ORDER = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+_FOURTH_ORDER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
+# in ln v~ and ln y~: beside the corner 0.01 leaves out more than the finest table errs by
+_STEP = 0.003
+# one point in so many is also compared with differences, which take twelve solves each
+SLOPE_SHARE = 20
+BORDER_POINTS = 2000  # fresh solves of v~crit
+#: shares of the points; the error below which such a share lies is published, the last is the
+#: largest error
+QUANTILES = (0.5, 0.95, 0.99, 1.0)
+
+
+def _corner(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    radius, psi = _log(rng, 1e-6, 1.3, n), rng.uniform(0.0, 0.5 * math.pi, n)
+    phi, s0 = radius * np.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * np.cos(psi)
+    return phi * s0 * s0 / (2.0 * math.pi), 1.0 + 0.25 * s0 * s0 - 0.5 * phi * phi
+
+
+def _border(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
+    y = _log(rng, 1e-4, 1e6, n)
+    return s.v_tilde_crit(y) * (1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 0.1, n)), y
+
+
+def _tails(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """Large amplitude at every speed, large speed at every amplitude, small amplitude."""
+    which = rng.integers(0, 3, n)
+    v, y = _log(rng, 1e-6, 1e8, n), _log(rng, 1e5, 1e12, n)
+    v = np.where(which == 1, _log(rng, 1e3, 1e8, n), v)
+    y = np.where(which == 1, _log(rng, 1e-3, 1e8, n), y)
+    return v, np.where(which == 2, _log(rng, 1e-9, 1e-3, n), y)
+
+
+_How = Callable[[np.random.Generator, int, Surrogate], tuple[Array, Array]]
+#: kind of case -> share of the points, how they are drawn
+CASES: dict[str, tuple[float, _How]] = {
+    "random": (0.30, lambda rng, n, _: (_log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n))),
+    "wide": (0.20, lambda rng, n, _: (_log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n))),
+    "border": (0.12, _border),
+    "corner": (0.12, lambda rng, n, _: _corner(rng, n)),
+    "seams": (0.10, near_seams),
+    "creep": (0.08, lambda rng, n, _: (_log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n))),
+    "tails": (0.08, lambda rng, n, _: _tails(rng, n)),
+}
+
+
+def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
+    """``n`` points (v~, y~) of one kind of :data:`CASES`."""
+    return CASES[case][1](np.random.default_rng(seed), n, surrogate)
+
+
+def _both_sides(
+    surrogate: Surrogate, n: int, seed: int
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of
+    the closed form."""
+    rng = np.random.default_rng(seed)
+    low, high = 1 - 1e-13, 1 + 1e-13
+    for seam in SEAMS:
+        v = _log(rng, 1e-9, 1e5, n)
+        yield v, v, np.full(n, seam * low), np.full(n, seam * high)
+    y = _log(rng, 1e-3, 1e7, n)
+    yield (v := surrogate.v_tilde_crit(y)) * low, v * high, y, y
+    y = rng.uniform(atlas.Y_STICK_LO, atlas.Y_STICK_HI, n)
+    yield (v := surrogate.v_tilde_crit(y) * atlas.SIGMA_CUT**2) * low, v * high, y, y
+    y = _log(rng, atlas.Y_CONT, 1e8, n)
+    yield (v := fast_from(surrogate, y)) * low, v * high, y, y
+
+
+def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
+    """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13
+    apart."""
+    pairs = _both_sides(surrogate, n, seed)
+    sides = ((surrogate.mu_ratio(v1, y1), surrogate.mu_ratio(v2, y2)) for v1, v2, y1, y2 in pairs)
+    return max(float((np.abs(one - two) / np.maximum(one, two)).max()) for one, two in sides)
+
+
+def seam_slope_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
+    """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are
+    continuous, too."""
+    pairs = _both_sides(surrogate, n, seed)
+    sides = ((surrogate.slopes(v1, y1), surrogate.slopes(v2, y2)) for v1, v2, y1, y2 in pairs)
+    return max(float(np.abs(np.subtract(one[1:], two[1:])).max()) for one, two in sides)
+
+
+def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11) -> float:
+    """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across
+    all seams [-]."""
+    rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
+    for fixed in _log(np.random.default_rng(seed), 1e-4, 1e6, lines):
+        steps = -np.diff(surrogate.mu_ratio(rise, fixed)), np.diff(surrogate.mu_ratio(fixed, rise))
+        worst = max(worst, float(np.max(steps)))
+    return worst
+
+
+class Neighbours:
+    """Fresh solves around points (n,): three on either side along ln v~ and along ln y~.
+
+    A step is a share of the distance to what is not smooth: border and corner.
+    """
+
+    def __init__(self, surrogate: Surrogate, sweep: Sweep, v: Array, y: Array) -> None:
+        self.v, self.y, self.crit, mu = v, y, surrogate.v_tilde_crit(y), surrogate.mu_ratio(v, y)
+        gap = np.abs(np.log(v / self.crit))
+        stiff = np.maximum(mu * mu, np.abs(1.0 - y * y))
+        self.steps = (
+            np.minimum(_STEP, gap / 32.0),
+            np.minimum(np.minimum(_STEP, gap / 64.0), _STEP * stiff),
+        )
+        around_v, around_y = (
+            x[:, None] * np.exp(_STENCIL * step[:, None])
+            for x, step in zip((v, y), self.steps, strict=True)
+        )
+        self.solved = (
+            sweep.solve("full", around_v, y[:, None]),
+            sweep.solve("full", v[:, None], around_y),
+        )
+
+    def slopes(self, name: str) -> tuple[Array, Array]:
+        """Slopes along ln v~ and ln y~, (2, n), by central differences, and what these may be wrong
+        by."""
+        slope, noise = np.empty((2, self.v.size)), np.empty((2, self.v.size))
+        sliding = (self.v > self.crit)[:, None]
+        for row, (step, solved) in enumerate(zip(self.steps, self.solved, strict=True)):
+            slope[row] = solved[name] @ _SIXTH_ORDER / step
+            # what the fourth order leaves out; the sixth leaves out up to a seventh of it
+            left_out = np.abs(slope[row] - solved[name] @ _FOURTH_ORDER / step)
+            each = solver_noise(name, self.v[:, None], self.y[:, None], solved, sliding).max(axis=1)
+            noise[row] = (2.0 * each + 4e-16 * np.abs(slope[row])) / step + 0.2 * left_out
+        return slope, noise
+
+
+class _Compared(NamedTuple):
+    """Errors, which are beyond the solver's own for all but mu~, the same relative to the value,
+    bounds, bounds over errors, sources.
+
+    ``over``: bound and solver's own error together, over the difference to the fresh solve; NaN
+    where that difference is no larger than the solver's own error.
+    """
+
+    error: Array
+    relative: Array
+    bound: Array
+    over: Array
+    missed: NDArray[np.bool_]
+    source: NDArray[np.int8]
+
+
+def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
+    """What :class:`_Compared` has as ``over``."""
+    with np.errstate(all="ignore"):
+        return np.where(difference > noise, (bound + noise) / difference, np.nan)
+
+
+def _values(
+    surrogate: Surrogate, name: str, v: Array, y: Array, solved: dict[str, Array]
+) -> _Compared:
+    value, bound, source = surrogate.quantity(name, v, y)
+    truth = solved[name]
+    noise = solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
+    error = np.abs(value - truth)
+    missed, over = error > bound + noise, bound_over_error(bound, noise, error)
+    if name != "mu_ratio":
+        error = np.maximum(error - noise, 0.0)
+    scale = np.where(truth == 0.0, 1.0, truth)
+    return _Compared(error, error / scale, bound, over, missed, source)
+
+
+def _slopes(surrogate: Surrogate, around: Neighbours, name: str) -> _Compared:
+    """The logarithmic slopes, both of each point."""
+    (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
+    source = surrogate.ratio_with_bound(v, y)[2]
+    _, along_v, along_y, *bounds = surrogate.slopes(v, y, name, bounds=True)
+    difference, bound = np.abs(np.stack((along_v, along_y)) - truth), np.stack(bounds)
+    off, over = np.maximum(difference - noise, 0.0), bound_over_error(bound, noise, difference)
+    # at the border of one that is not smooth there, the last digits of v~crit decide
+    keep = np.full(v.shape, True)
+    if not QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border:
+        keep = np.abs(v / around.crit - 1.0) > BESIDE_BORDER
+    off, bound, over = (x[:, keep].ravel() for x in (off, bound, over))
+    return _Compared(off, off, bound, over, off > bound, np.tile(source[keep], 2))
+
+
+def _said(found: _Compared, at: Any = slice(None)) -> dict[str, Any]:
+    return {
+        "points": int(found.error[at].size),
+        "max_abs_error": float(found.error[at].max()),
+        "max_rel_error": float(found.relative[at].max()),
+        "max_bound": float(found.bound[at].max()),
+        "not_covered": int(np.count_nonzero(found.missed[at])),
+    }
+
+
+def _report(parts: list[_Compared]) -> dict[str, Any]:
+    """All together, and by source."""
+    whole = _Compared(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    names = sorted((SOURCES[code], code) for code in np.unique(whole.source))
+    return {
+        **_said(whole),
+        "sources": {name: _said(whole, whole.source == code) for name, code in names},
+    }
+
+
+def distribution(error: Array, over: Array) -> dict[str, list[float]]:
+    """Errors at :data:`QUANTILES`; least, median and largest bound over error, 0 where no error is
+    beyond the solver's own."""
+    known = over[~np.isnan(over)]
+    return {
+        "error_quantiles": np.quantile(error, QUANTILES).tolist(),
+        "bound_over_error": np.quantile(known, (0.0, 0.5, 1.0)).tolist()
+        if known.size
+        else [0.0, 0.0, 0.0],
+    }
+
+
+def _distributions(
+    values: dict[str, list[_Compared]], slopes: list[_Compared], border: _Compared
+) -> dict[str, dict[str, list[float]]]:
+    """By quantity, then of the slopes of mu~ along ln v~ and ln y~, and of v~crit, relative."""
+    found = {}
+    for name, parts in values.items():
+        error = [part.relative if SOLVED[name].relative else part.error for part in parts]
+        found[name] = np.concatenate(error), np.concatenate([part.over for part in parts])
+    for row, name in enumerate(("slope_along_v", "slope_along_y")):
+        error, over = (
+            [x.reshape(2, -1)[row] for x in column]
+            for column in ([part.error for part in slopes], [part.over for part in slopes])
+        )
+        found[name] = np.concatenate(error), np.concatenate(over)
+    found["border"] = border.relative, border.over
+    return {name: distribution(*both) for name, both in found.items()}
+
+
+def _border_found(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Compared:
+    """Errors of v~crit, all relative."""
+    error = border_errors(surrogate.border, sweep, rng, BORDER_POINTS)
+    bound, noise = (
+        np.full_like(error, surrogate.border.max_rel_error),
+        np.full_like(error, SOLVER_NOISE),
+    )
+    off = np.maximum(error - noise, 0.0)
+    return _Compared(
+        off,
+        off,
+        bound,
+        bound_over_error(bound, noise, error),
+        off > bound,
+        np.zeros(error.size, np.int8),
+    )
+
+
+def uncovered(report: dict[str, Any]) -> dict[str, int]:
+    """Of the report of :func:`verify`: how many values and slopes of each quantity, and
+    speeds of the border, miss their bound."""
+    found = {name: report.get(name, report)["not_covered"] for name in report["slopes"]}
+    found["border"] = report["border"]["not_covered"]
+    return found | {
+        f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()
+    }
+
+
+def holds(report: dict[str, Any], tolerance: float) -> bool:
+    """Whether a report of :func:`verify` keeps the tolerance and every bound."""
+    errors = (
+        report["max_abs_error"] <= tolerance and report["max_rel_error"] <= ABS_TO_REL * tolerance
+    )
+    return errors and not any(uncovered(report).values())
+
+
+def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
+    """Compare the table with ``points`` fresh solves drawn as in :data:`CASES`.
+
+    Returns
+    -------
+    dict
+        Of mu~: ``points``, ``max_abs_error``, ``max_rel_error``, ``max_bound``, ``not_covered``
+        (values whose error exceeds their bound), and the same by kind of case in ``cases`` and by
+        block or closed form in ``sources``; ``seam_jump``, ``seam_slope_jump``, ``monotony``.  By
+        name the same of each other quantity, beyond the solver's own error, and in ``slopes`` of
+        the slopes of each along ln v~ and ln y~, absolute, of one point in twenty; in ``border`` of
+        v~crit, relative.  ``distribution``: errors at :data:`QUANTILES` and bounds over errors.
+    """
+    names = surrogate.table.quantities
+    values: dict[str, list[_Compared]] = {name: [] for name in names}
+    slopes: dict[str, list[_Compared]] = {name: [] for name in names}
+    for i, (share, how) in enumerate(CASES.values()):
+        v, y = how(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
+        v, y = v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)]
+        solved = sweep.solve("full", v, y)
+        around = Neighbours(surrogate, sweep, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
+        for name in names:
+            values[name].append(_values(surrogate, name, v, y, solved))
+            slopes[name].append(_slopes(surrogate, around, name))
+    border = _border_found(surrogate, sweep, np.random.default_rng([seed, len(CASES)]))
+    return {
+        **_report(values["mu_ratio"]),
+        "cases": {case: _said(part) for case, part in zip(CASES, values["mu_ratio"], strict=True)},
+        **{name: _report(values[name]) for name in names[1:]},
+        "slopes": {name: _report(parts) for name, parts in slopes.items()},
+        "border": _said(border),
+        "distribution": _distributions(values, slopes["mu_ratio"], border),
+        "seam_jump": seam_jumps(surrogate),
+        "seam_slope_jump": seam_slope_jumps(surrogate),
+        "monotony": monotony(surrogate),
+    }

@@ -1,0 +1,1 @@
+"""Questions to a surrogate: friction law, inverse problem, settling, validity, fit to points."""

@@ -1,0 +1,338 @@
+"""k and mu0 from measured points: least squares with the exact gradient of the table, and what the
+points do not tell.
+
+mu_macro = mu0 mu~(p) with p = k/mu0: at each p the best mu0 follows from a linear equation, so that
+one scan of p sees every minimum, the limits of a soft and of a rigid contact, and the ranges that
+the points allow.  Each minimum is then refined by :func:`scipy.optimize.least_squares`.  Needs
+scipy, a plot matplotlib.
+"""
+
+import functools
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mumacro.analysis.fit_result import Fit, quantile
+from mumacro.analysis.measured_points import HARDLY, STD, Measured
+from mumacro.errors import InputError
+from mumacro.extras import missing
+from mumacro.kernel.arrays import Array
+from mumacro.surrogate import Surrogate
+
+_PER_DECADE, _MOST_NODES = 10, 600  # of the sweep
+
+
+def fit(
+    data: Any,
+    unknowns: str | Sequence[str] | None = None,
+    *,
+    contact: str = "spring",
+    direction: str = "across",
+    surrogate: Surrogate | None = None,
+    **fixed: Any,
+) -> Fit:
+    """k and mu0 of a contact, or one of them, from measured friction.
+
+    Parameters
+    ----------
+    data : mapping, DataFrame, Arrow table or Dataset
+        Columns ``v0`` [m/s] and ``mu_macro`` [-]; where they vary also ``Fz`` [N], ``y0`` [m],
+        ``omega`` [rad/s] or ``f`` [Hz]; if known ``std``, the standard deviation of mu_macro [-],
+        and ``mu0`` of each point, such as from the force without oscillation.  Other columns are
+        ignored.
+    unknowns : str or sequence of str, optional
+        "k", "mu0" or both.  Left out: both, and k alone where ``mu0`` is a column.
+    contact, direction : str
+        As in :meth:`mumacro.Surrogate.evaluate`.
+    surrogate : Surrogate, optional
+        The table; the tightest bundled one if left out.
+    **fixed : float or array_like
+        Inputs that are not columns: ``Fz=10.0, y0=2e-6, f=20e3``, and k or mu0 where it is known.
+
+    Returns
+    -------
+    Fit
+        Its warnings are also issued by ``warnings``.
+
+    Raises
+    ------
+    InputError
+        A column or input is missing, out of bounds, given twice or of another length; fewer points
+        than unknowns; points without information; more friction than the known mu0 allows; an
+        unknown contact or unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rig = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
+    >>> v0 = np.geomspace(1e-3, 1.0, 30)
+    >>> measured = Surrogate.open().evaluate(mu0=0.3, k=1e6, v0=v0, **rig).mu_macro
+    >>> found = fit({"v0": v0, "mu_macro": measured + 1e-3 * np.cos(17.0 * np.arange(30))}, **rig)
+    >>> f"{found.values['k']:.2g} {found.values['mu0']:.3f}"
+    '1e+06 0.300'
+    """
+    names = (
+        (unknowns,) if isinstance(unknowns, str) else None if unknowns is None else tuple(unknowns)
+    )
+    problem = _Problem(data, names, contact, direction, surrogate or _bundled(), fixed)
+    with np.errstate(all="ignore"):  # numbers of any size: what they cannot tell is infinite
+        found = problem.solve()
+    for text in found.warnings:
+        warnings.warn(text, stacklevel=2)
+    return found
+
+
+@functools.cache
+def _bundled() -> Surrogate:
+    return Surrogate.open()
+
+
+@dataclass
+class _Scan:
+    """Profile of chi2 over the unknowns, (nodes,); chi2 rises with mu0 by ``rise`` (mu0 - best)^2
+    at fixed k/mu0."""
+
+    k: Array
+    mu0: Array
+    chi2: Array
+    rise: Array
+
+
+class _Problem(Measured):
+    """Where the points and the model agree best."""
+
+    def _scan(self) -> _Scan:
+        """Every legal k from so soft that friction is mu0 to rigid, the last node; or every mu0 of
+        a known k."""
+        if "k" not in self.unknowns:
+            mu0 = np.geomspace(0.2, 1e6, 7 * _PER_DECADE) * self.mu.max()
+            return self._scanned(self.columns["k"][:1].repeat(mu0.size), mu0)
+        force, omega, v0 = (self.columns[name] for name in ("Fz", "omega", "v0"))
+        with np.errstate(all="ignore"):
+            pull = v0 / omega
+            reach = self.columns["y0"] if self.amplitude == "y0" else pull
+            alive = (reach > 0.0) & (omega > 0.0)
+            # v~ = 100, and 100 times y~/v~, where it slides; where it only rests y~ = 100
+            stiff = (
+                100.0
+                * (force / np.where(pull > 0.0, np.minimum(pull, pull / reach * pull), reach))[
+                    alive
+                ]
+            )
+            ends = np.log([1e-3 * (force / reach)[alive].min(), stiff.max()])
+        low, high = np.clip(ends, -650.0, 650.0)
+        nodes = int(np.clip((high - low) / math.log(10.0) * _PER_DECADE, 16, _MOST_NODES))
+        p = np.append(np.exp(np.linspace(low, high, nodes)), math.inf)
+        if "mu0" not in self.unknowns:
+            return self._scanned(
+                p * float(np.median(self.columns["mu0"])), np.full(p.size, math.nan)
+            )
+        ratio, w2 = self.at(p, np.ones(p.size)), self.weight**2
+        rise = (w2 * ratio**2).sum(axis=1)
+        mu0 = np.divide(
+            (w2 * ratio * self.mu).sum(axis=1), rise, out=np.zeros(p.size), where=rise > 0.0
+        )
+        return _Scan(p * np.maximum(mu0, 1e-300), mu0, self.chi2(mu0[:, None] * ratio), rise)
+
+    def _scanned(self, k: Array, mu0: Array) -> _Scan:
+        return _Scan(k, mu0, self.chi2(self.at(k, mu0)), np.zeros(k.size))
+
+    # --- solutions --------------------------------------------------------------------------------
+
+    def solve(self) -> Fit:
+        """Scan, refine every minimum, and say what is known."""
+        scan, size = self._scan(), float(((self.weight * self.mu) ** 2).sum())
+        if "k" in self.unknowns and np.ptp(scan.chi2) <= 1e-12 * size:
+            bound = (
+                "points in which k matters: up to a factor, every k fits these alike; vary v0 "
+                f"or {self.amplitude}"
+            )
+            raise InputError("data", f"{self.n} points", bound)
+        padded = np.concatenate(([math.inf], scan.chi2, [math.inf]))
+        lowest = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
+        refined = sorted((self._refine(scan, int(i)) for i in lowest), key=lambda one: one[0])
+        chi2, dof = refined[0][0], self.n - len(self.unknowns)
+        rounding = 1e-30 * size  # of exact points: mu_macro has sixteen digits
+        variance = 1.0 if self.std is not None else max(chi2 / dof, rounding) if dof else math.inf
+        width = quantile(dof if self.std is None else None)
+        least = 1e-12 * size if math.isinf(variance) else max(variance, 1e-14 * size)
+        solutions: list[tuple[float, dict[str, float], int]] = []
+        # an island of its own, above whose shores all ways lead by one standard deviation
+        for one in refined:
+            walls = (
+                scan.chi2[min(one[2], other[2]) : max(one[2], other[2]) + 1].max()
+                for other in solutions
+            )
+            if one[0] - chi2 <= width**2 * least and all(wall > one[0] + least for wall in walls):
+                solutions.append(one)
+        values = solutions[0][1]
+        logs = self._covariance(values, variance)
+        scale = np.array([x if math.isfinite(x) else 1.0 for x in values.values()])
+        covariance = np.where(np.isinf(logs), logs, logs * np.outer(scale, scale))
+        off = np.sqrt(np.diag(logs))
+        std = dict(zip(values, (scale * off).tolist(), strict=True))
+        interval = self._interval(scan, chi2, width, variance, values, off)
+        for _, other, _ in solutions[1:]:  # one of which is the truth
+            apart = width * np.sqrt(np.diag(self._covariance(other, variance)))
+            ends = _around(other, apart)
+            interval = {
+                name: (min(low, ends[name][0]), max(high, ends[name][1]))
+                for name, (low, high) in interval.items()
+            }
+        listed = tuple({**found, "chi2": value} for value, found, _ in solutions)
+        points = {
+            **self.columns,
+            "mu_macro": self.mu,
+            **({} if self.std is None else {STD: self.std}),
+        }
+        return Fit(
+            values,
+            std,
+            covariance,
+            interval,
+            self.mu - self.model(values, self.columns)[0],
+            chi2,
+            chi2 / dof if dof else math.nan,
+            listed,
+            tuple(self._warnings(values, interval, listed, chi2, dof)),
+            self.contact,
+            self.direction,
+            points,
+            self,
+        )
+
+    def _refine(self, scan: _Scan, node: int) -> tuple[float, dict[str, float], int]:
+        """chi2 and values at the minimum beside a node."""
+        try:
+            from scipy.optimize import least_squares
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(missing("fit", error), name=error.name) from None
+        values = {name: float(getattr(scan, name)[node]) for name in self.unknowns}
+        if not all(0.0 < x < math.inf for x in values.values()):
+            return float(scan.chi2[node]), values, node
+
+        def residuals(logs: Array) -> Array:
+            return self.weight * (self.model(self._values(logs), self.columns)[0] - self.mu)
+
+        def slopes(logs: Array) -> Array:
+            return self._log_slopes(self._values(logs))
+
+        start = np.log(list(values.values()))
+        bounds = start - 2.5, start + 2.5
+        # by the step alone: what the points hardly determine changes chi2 and its slope by next to
+        # nothing
+        found = least_squares(residuals, start, slopes, bounds, xtol=1e-12, ftol=None, gtol=None)
+        if not np.isfinite(found.x).all():  # scipy divides 0 by 0 where no point tells k
+            return float(scan.chi2[node]), values, node
+        return 2.0 * float(found.cost), self._values(found.x), node
+
+    def _values(self, logs: Array) -> dict[str, float]:
+        return dict(zip(self.unknowns, np.exp(logs).tolist(), strict=True))
+
+    def _log_slopes(self, values: Mapping[str, float]) -> Array:
+        """d(weighted mu_macro) / d ln(unknown), (points, unknowns); 0 for an infinite k."""
+        slopes = self.model(values, self.columns)[1]
+        columns = [slopes[name] * (x if math.isfinite(x) else 0.0) for name, x in values.items()]
+        return np.stack(columns, axis=-1) * self.weight[:, None]
+
+    def _covariance(self, values: Mapping[str, float], variance: float) -> Array:
+        """Of the logarithms; infinite on the diagonal where the points do not tell."""
+        slopes = self._log_slopes(values)
+        told = np.abs(slopes).max(axis=0) > 1e-12 * np.abs(self.weight * self.mu).max()
+        out = np.diag(np.where(told, 0.0, math.inf))
+        _, sizes, right = np.linalg.svd(slopes[:, told], full_matrices=False)
+        if math.isinf(variance) or (sizes.size and sizes[-1] <= 1e-10 * sizes[0]):
+            return np.diag(np.full(told.size, math.inf))
+        out[np.ix_(told, told)] = right.T * (variance / sizes**2) @ right
+        return out
+
+    def _interval(
+        self,
+        scan: _Scan,
+        chi2: float,
+        width: float,
+        variance: float,
+        values: Mapping[str, float],
+        off: Array,
+    ) -> dict[str, tuple[float, float]]:
+        """From the profile where it is wide, which ends of it may be open; else from the
+        covariance."""
+        room = width**2 * variance - (scan.chi2 - chi2)
+        inside = room >= 0.0
+        if np.count_nonzero(inside) < 6 or math.isinf(variance):
+            return _around(values, width * off)
+        found = {"k": (scan.k[inside], scan.k[inside]), "mu0": (scan.mu0[inside], scan.mu0[inside])}
+        if len(self.unknowns) == 2:
+            mu0, k = scan.mu0[inside], scan.k[inside]
+            side = np.sqrt(room[inside] / scan.rise[inside])
+            apart = side / mu0
+            low = k * np.where(apart < 1.0, 1.0 - apart, 0.0)
+            found = {
+                "k": (low, k * (1.0 + apart)),
+                "mu0": (np.maximum(mu0 - side, 0.0), mu0 + side),
+            }
+        ends = {name: (float(found[name][0].min()), float(found[name][1].max())) for name in values}
+        if "k" in ends and inside[0]:
+            ends["k"] = 0.0, ends["k"][1]
+        return ends
+
+    def _warnings(
+        self,
+        values: Mapping[str, float],
+        interval: Mapping[str, tuple[float, float]],
+        solutions: Sequence[Mapping[str, float]],
+        chi2: float,
+        dof: int,
+    ) -> list[str]:
+        said = []
+        low, high = interval.get("k", (1.0, 1.0))
+        if self.std is None and dof == 0:
+            said.append("as many points as unknowns, without std: there is no measure of the error")
+        elif low == 0.0 and high == math.inf:
+            said.append("k is not determined: every k fits within 95 %")
+        elif high == math.inf:
+            said.append(
+                f"k has only a lower bound, {low:.3g} N/m (95 %): a rigid contact fits, too"
+            )
+        elif low == 0.0:
+            said.append(f"k has only an upper bound, {high:.3g} N/m (95 %)")
+        if "k" in values and self.amplitude == "y0":
+            mu0 = values["mu0"] if "mu0" in values else self.columns["mu0"]
+            y = self.columns["y0"] / (mu0 * self.columns["Fz"]) * values["k"]
+            if y.min() > HARDLY:
+                said.append(
+                    f"y~ >= {y.min():.3g} in all points: above {HARDLY:g} mu_macro hardly depends "
+                    "on k"
+                )
+        if len(solutions) > 1:
+            told = "; ".join(
+                ", ".join(f"{name} = {one[name]:.4g}" for name in values) for one in solutions
+            )
+            said.append(
+                f"{len(solutions)} solutions fit within 95 %, the interval covers them all: {told}"
+            )
+        if self.std is not None and dof:
+            from scipy.special import chdtrc
+
+            if chdtrc(dof, chi2) < 1e-3:
+                said.append(
+                    f"reduced chi2 {chi2 / dof:.3g}: the points scatter by more than their std"
+                )
+        if self.contact == "ball" and "k" in values and np.ptp(self.columns["Fz"]) > 0.0:
+            said.append(
+                "one k for all loads, while k of a ball grows like Fz^(1/3): fit each load alone"
+            )
+        return said
+
+
+def _around(values: Mapping[str, float], apart: Array) -> dict[str, tuple[float, float]]:
+    """Intervals about values whose logarithms may be off by ``apart`` (unknowns,)."""
+    with np.errstate(over="ignore"):
+        return {
+            name: (float(x * np.exp(-o)) if x < math.inf else 0.0, float(x * np.exp(o)))
+            for (name, x), o in zip(values.items(), apart, strict=True)
+        }

@@ -1,0 +1,204 @@
+"""Measured points of friction: their columns, checked, and the model at them; for
+:mod:`mumacro.analysis.fit`."""
+
+from collections.abc import Container, Mapping
+from typing import Any
+
+import numpy as np
+
+from mumacro.errors import InputError
+from mumacro.inputs.fields import NAMES, as_columns, check_inputs, picked, real, unknown_name
+from mumacro.inputs.kind import AMPLITUDE, kind_of
+from mumacro.kernel.arrays import Array, Bools
+from mumacro.surrogate import Surrogate
+
+UNKNOWNS = ("k", "mu0")
+HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
+STD = "std"  # the column of standard deviations
+#: how far a point may lie outside of what is possible: standard deviations; where they are not
+#: given, of mu0
+_SCATTER, _SHARE = 5.0, 0.05
+_LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
+
+
+def unknowns_beside(columns: Container[str]) -> list[str]:
+    """What is fitted by default: k and mu0, or k alone where mu0 is a column."""
+    return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
+
+
+class Measured:
+    """Points (n,) with their friction, and the model at them; parameters and errors are those of
+    :func:`mumacro.fit`.
+
+    ``columns`` has the known inputs [SI], (n,), by the names that ``evaluate`` takes; ``mu`` is
+    mu_macro [-], ``std`` its standard deviations, None where not known, ``weight`` one over them,
+    or 1; ``amplitude`` is the input that says how far the contact is moved or unloaded: y0, or
+    Fz_amplitude.
+    """
+
+    def __init__(
+        self,
+        data: Any,
+        unknowns: tuple[str, ...] | None,
+        contact: str,
+        direction: str,
+        surrogate: Surrogate,
+        fixed: Mapping[str, Any],
+    ) -> None:
+        both = picked("data", data, UNKNOWNS)
+        unknowns = tuple(unknowns_beside(both)) if unknowns is None else unknowns
+        if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
+            raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
+        self.unknowns, self.contact, self.direction, self.surrogate = (
+            unknowns,
+            contact,
+            direction,
+            surrogate,
+        )
+        self.said = kind_of(contact, direction).names
+        self.amplitude = AMPLITUDE if direction == "normal" else "y0"
+        self._read(self._given(data, fixed))
+        self._check()
+
+    def _given(self, data: Any, fixed: Mapping[str, Any]) -> dict[str, Any]:
+        known = [
+            name
+            for name in NAMES
+            if name not in self.unknowns and (name != "y0" or name == self.amplitude)
+        ]
+        known += [self.amplitude] if self.amplitude not in known else []
+        for name in fixed:
+            if name in self.unknowns:
+                raise InputError(
+                    name,
+                    fixed[name],
+                    f"left out, or taken from unknowns={self.unknowns}: it is fitted",
+                )
+            if name not in (*known, "mu_macro", STD):
+                raise InputError(
+                    name, fixed[name], f"one of {', '.join(known)}; {unknown_name(name, known)}"
+                )
+        columns = picked("data", data, [*known, "mu_macro", STD])
+        if twice := [name for name in picked("data", data, UNKNOWNS) if name in self.unknowns]:
+            raise InputError(
+                twice[0],
+                "a column",
+                f"left out, or taken from unknowns={self.unknowns}: it is fitted",
+            )
+        if twice := sorted(columns.keys() & fixed.keys()):
+            raise InputError(twice[0], fixed[twice[0]], "given once: as a column or as a keyword")
+        given = {**columns, **fixed}
+        for name in ("mu_macro", "v0"):
+            if name not in given:
+                raise InputError(
+                    name, sorted(columns), f"a column of the data: {name} of each point"
+                )
+        return given
+
+    def _read(self, given: dict[str, Any]) -> None:
+        """Columns of one length, (n,), in SI."""
+        measured = {
+            name: real(name, np.asarray(given.pop(name)))
+            for name in ("mu_macro", STD)
+            if name in given
+        }
+        six = {"y0": 0.0, **given, **dict.fromkeys(self.unknowns, 1.0)}
+        frequency, six = (
+            six.get("f"),
+            {n: x if x is None else np.asarray(x) for n, x in six.items() if n in NAMES},
+        )
+        if self.amplitude == "y0" and "y0" not in given:
+            raise InputError("y0", None, "given [m]")
+        columns = as_columns(six)
+        check_inputs(columns, frequency)
+        if self.amplitude != "y0":
+            if self.amplitude not in given:
+                raise InputError(self.amplitude, None, "given [N]")
+            columns[self.amplitude] = real(self.amplitude, np.asarray(given[self.amplitude]))
+            del columns["y0"]
+        whole = {**columns, **measured}
+        lengths = {name: x.shape for name, x in whole.items() if x.ndim}
+        if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in whole.values()):
+            raise InputError("data", lengths, "columns of one length, or single values")
+        n = max((x.size for x in whole.values() if x.ndim), default=1)
+        whole = {name: np.ascontiguousarray(np.broadcast_to(x, n)) for name, x in whole.items()}
+        self.mu, self.std = whole.pop("mu_macro"), whole.pop(STD, None)
+        self.columns = {name: x for name, x in whole.items() if name not in self.unknowns}
+        self.n = n
+
+    def _check(self) -> None:
+        if "mu0" in self.columns:
+            _refuse("mu0", self.columns["mu0"], self.columns["mu0"] <= _MOST, f"<= {_MOST:g}")
+        if self.std is not None:
+            bound = f"finite and > 0, from {_LEAST:g} to {_MOST:g}"
+            _refuse("std", self.std, (self.std >= _LEAST) & (self.std <= _MOST), bound)
+        self.weight = np.ones(self.n) if self.std is None else 1.0 / self.std
+        top = self.columns.get("mu0", np.full(self.n, np.fmax.reduce(np.abs(self.mu), initial=0.0)))
+        scatter, told = (
+            _SHARE * top,
+            f"within {100.0 * _SHARE:g} %; give std where the points scatter more",
+        )
+        if self.std is not None:
+            scatter, told = _SCATTER * self.std, f"within {_SCATTER:g} standard deviations"
+        legal = (self.mu <= _MOST) & (self.mu >= -scatter)
+        _refuse("mu_macro", self.mu, legal, f"finite and >= 0, <= {_MOST:g}, {told}")
+        settings = len(np.unique(np.column_stack([*self.columns.values()]), axis=0))
+        if settings < len(self.unknowns):
+            raise InputError(
+                "data",
+                f"{self.n} points with {settings} different inputs",
+                f"points with at least {len(self.unknowns)} different inputs, one for each unknown "
+                f"({', '.join(self.unknowns)}); measure more, or fix one of the two",
+            )
+        if self.mu.max() < _LEAST:
+            bound = f"> 0 in at least one point, >= {_LEAST:g}: friction of zero tells nothing"
+            raise InputError("mu_macro", float(self.mu.max()), bound)
+        oscillates = (self.columns[self.amplitude] > 0.0) & (self.columns["omega"] > 0.0)
+        if "k" in self.unknowns and not oscillates.any():
+            raise InputError(
+                "data",
+                f"{self.n} points without oscillation",
+                f"points with {self.amplitude} > 0 and omega > 0: without oscillation mu_macro = "
+                "mu0 for every k",
+            )
+        if "mu0" not in self.unknowns:
+            bound = (
+                f"<= mu0, {told}: oscillation only lowers friction; or fit mu0, or look at "
+                "the units"
+            )
+            _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
+
+    # --- the model --------------------------------------------------------------------------------
+
+    def model(
+        self, values: Mapping[str, float], columns: Mapping[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        """mu_macro, and its slopes along the unknowns."""
+        inputs: dict[str, Any] = {**columns, **values, **self.said}
+        found = self.surrogate.evaluate(**inputs, gradient=True)
+        slopes = {
+            name: np.nan_to_num(found.gradient[name], posinf=0.0, neginf=0.0)
+            for name in self.unknowns
+        }
+        return found.mu_macro, slopes
+
+    def chi2(self, model: Array) -> Array:
+        """Sum of the squared residuals of rows of mu_macro (..., n), each over its variance."""
+        return np.asarray(((self.weight * (self.mu - model)) ** 2).sum(axis=-1))
+
+    def at(self, k: Array, mu0: Array) -> Array:
+        """mu_macro at rows of k and mu0, those that are unknown: (rows, points)."""
+        rows = {"k": k[:, None], "mu0": mu0[:, None]}
+        inputs: dict[str, Any] = {
+            **self.columns,
+            **self.said,
+            **{name: rows[name] for name in self.unknowns},
+        }
+        return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
+
+
+def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:
+    """An error for the first value that is not legal."""
+    if not legal.all():
+        at = int(np.argmin(legal))
+        raise InputError(name, float(column[at]), bound, at)

@@ -1,0 +1,233 @@
+"""Where mu_macro, as a function of one input, reaches a level: bracketed Newton steps for many
+levels at once.
+
+All levels of one problem lie on one curve, so the curve is sampled once; a search in the samples
+brackets every level, and Newton's method in the logarithm of the input, with the surrogate's
+gradient, does the rest.  A step that leaves its bracket, that has no finite slope (plateaus, the
+cusp of the static limit at y~ = 1) or that does not halve the last step is replaced by halving the
+bracket: by its geometric mean, so that any scale is reached.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mumacro.analysis.load import Stiffening
+from mumacro.answer import Answer
+from mumacro.inputs.kind import SPRING, Kind
+from mumacro.kernel.arrays import Array, Bools, Places
+from mumacro.surrogate import Surrogate
+
+TINY = 5e-324
+_ROUNDING = 2.0**-52
+_PER_CALL = 512
+_CHORD, _HALVINGS = 1e-3, 8  # of a refined sweep: error of a straight line over the height, rounds
+_MAX_SAMPLES = 20_001
+
+
+class Sweep:
+    """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
+    ``k`` is rigid.
+
+    With a ``stiffening`` the unknown is Fz, and ``k`` is that at one load and grows with Fz.
+    """
+
+    def __init__(
+        self,
+        surrogate: Surrogate,
+        case: Mapping[str, Any],
+        unknown: str,
+        kind: Kind = SPRING,
+        stiffening: Stiffening | None = None,
+    ) -> None:
+        self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
+        self.stiffening = None if case.get("k") == math.inf else stiffening
+
+    def answer(self, x: Any, **more: Any) -> Answer[Any]:
+        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in
+        ``evaluate``."""
+        k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
+        answer: Answer[Any] = self.surrogate.evaluate(
+            **{**self.case, **k, self.unknown: x, **self.kind.names, **more}
+        )
+        return answer
+
+    def mu(self, x: Array) -> Array:
+        """mu_macro [-] at ``x`` (n,)."""
+        return np.asarray(self.answer(x).mu_macro)
+
+    def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
+        """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN
+        at an edge."""
+        answer = self.answer(x, gradient=True)
+        with np.errstate(over="ignore", invalid="ignore"):
+            slope = x * answer.gradient[self.unknown]  # type: ignore[index]
+            if self.stiffening is not None:
+                k = self.stiffening.stiffness(self.case["k"], x)
+                slope = slope + self.stiffening.exponent * k * answer.gradient["k"]  # type: ignore[index]
+            return answer, slope
+
+    def refined(self, values: Array) -> Array:
+        """``values`` and more between them, where chords of mu_macro differ from it."""
+        mu = self.mu(values)
+        for _ in range(_HALVINGS):
+            low, high = values[:-1], values[1:]
+            middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
+            inside = self.mu(middle)
+            bent = np.abs(inside - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
+            at = np.flatnonzero(bent & (middle > low) & (middle < high))
+            if not at.size:
+                break
+            values, mu = np.insert(values, at + 1, middle[at]), np.insert(mu, at + 1, inside[at])
+        return values
+
+
+class Curve:
+    """A piece of a sweep on which mu_macro is monotone: samples ``x`` (m,), ascending, and ``mu``
+    (m,) there."""
+
+    def __init__(self, sweep: Sweep, x: Array, mu: Array) -> None:
+        self.sweep, self.x, self.mu = sweep, x, mu
+        self.sign = 1.0 if mu[-1] >= mu[0] else -1.0
+        # Rounding may make a plateau go down by a digit; what counts is where a level is first met.
+        self._risen = np.maximum.accumulate(self.sign * mu)
+
+    def holds(self, level: Array) -> Bools:
+        """Which of the levels (n,) lie between the ends of the piece, these included."""
+        low, high = sorted((float(self.mu[0]), float(self.mu[-1])))
+        return np.asarray((level >= low) & (level <= high))
+
+    def end(self) -> float:
+        """Where the piece first has its last value: at its end, or where the plateau begins that
+        ends it."""
+        at = int(np.argmax(self.mu == self.mu[-1]))
+        before, there = self.x[max(at - 1, 0) : at], self.x[at : at + 1]
+        return float(
+            last_double(lambda x: self.sweep.mu(x) != self.mu[-1], before, there)[1][0]
+            if at
+            else there[0]
+        )
+
+    def meet(self, level: Array, leave: ArrayLike = False) -> Array:
+        """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,)
+        [SI].
+
+        To a rounding error of mu_macro; an end of the piece where it never does.
+        """
+        going = np.broadcast_to(np.asarray(leave, dtype=np.bool_), level.shape)
+        first, beyond = (
+            np.searchsorted(self._risen, self.sign * level, side) for side in ("left", "right")
+        )
+        j = np.where(going, beyond, first)
+        inside = np.flatnonzero((j > 0) & (j < self.x.size))
+        out: Array = np.where(j == 0, self.x[0], self.x[-1])
+        if inside.size:
+            out[inside] = self._newton(level[inside], j[inside], going[inside])
+        return out
+
+    def _newton(self, level: Array, j: Places, leave: Bools) -> Array:
+        """The same for levels between the samples j - 1 and j, (n,)."""
+        a, b = self.x[j - 1].copy(), self.x[j].copy()
+        fa, fb = self.sign * (self.mu[j - 1] - level), self.sign * (self.mu[j] - level)
+        start = np.log(np.maximum(a, TINY))
+        width = np.log(b) - start
+        x = np.exp(start + np.clip(fa / np.where(fb > fa, fa - fb, -1.0), 0.02, 0.98) * width)
+        last = width.copy()  # the last step, in ln x
+        found: Array = np.empty_like(a)
+        i = np.arange(level.size)
+        while i.size:
+            lower, upper = a[i], b[i]
+            at = np.where((x[i] > lower) & (x[i] < upper), x[i], _middle(lower, upper))
+            answer, slope = self.sweep.with_slope(at)
+            f, slope = self.sign * (np.asarray(answer.mu_macro) - level[i]), self.sign * slope
+            below = (f < 0.0) | (leave[i] & (f == 0.0))
+            a[i], fa[i] = np.where(below, at, lower), np.where(below, f, fa[i])
+            b[i], fb[i] = np.where(below, upper, at), np.where(below, fb[i], f)
+            steep = np.isfinite(slope) & (slope > 0.0)
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                step = np.where(steep, -f / np.where(steep, slope, 1.0), np.inf)
+                wanted = at * np.exp(np.clip(step, -1.0e3, 1.0e3))
+                # less than the doubles are apart, though not met (the cusp of the static limit):
+                # its neighbour, then
+                wanted = np.where(
+                    wanted == at, np.nextafter(at, np.where(below, np.inf, 0.0)), wanted
+                )
+                good = (wanted > a[i]) & (wanted < b[i]) & (2.0 * np.abs(step) <= np.abs(last[i]))
+                x[i] = np.where(good, wanted, _middle(a[i], b[i]))
+                last[i] = np.where(good, step, np.log(x[i] / at))
+            met = steep & (np.abs(f) <= 2.0 * _ROUNDING * np.abs(level[i]))
+            shut = np.nextafter(a[i], np.inf) >= b[i]
+            found[i] = np.where(met, at, np.where(np.abs(fa[i]) < np.abs(fb[i]), a[i], b[i]))
+            i = i[~(met | shut)]
+        return found
+
+
+def samples(low: float, high: float, per_decade: int) -> Array:
+    """Values > 0 from ``low`` to ``high``, ascending, evenly spread over the logarithm."""
+    start, stop = math.log(max(low, TINY)), math.log(high)
+    count = min(max(int((stop - start) / math.log(10.0) * per_decade), 64) + 1, _MAX_SAMPLES)
+    with np.errstate(over="ignore"):
+        return np.clip(np.exp(np.linspace(start, stop, count)), max(low, TINY), high)
+
+
+def curves_between(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
+    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the
+    whole range."""
+    at = np.array(edges)
+    ends = sweep.mu(at)
+    curves = []
+    for i in range(at.size - 1):
+        two = slice(i, i + 2)
+        inside = slice(
+            np.searchsorted(x, at[i], side="right"), np.searchsorted(x, at[i + 1], side="left")
+        )
+        # next to a turning point a sample may lie beyond it by a rounding error
+        between = np.clip(mu[inside], ends[two].min(), ends[two].max())
+        curves.append(
+            Curve(sweep, np.insert(at[two], 1, x[inside]), np.insert(ends[two], 1, between))
+        )
+    return curves
+
+
+def _middle(a: Array, b: Array) -> Array:
+    """A double between ``a`` and ``b``, in the middle of their logarithms; ``a`` where they are
+    neighbours."""
+    middle = np.sqrt(np.maximum(a, TINY)) * np.sqrt(b)
+    # the square roots of subnormal numbers keep fewer digits than the numbers have
+    return np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
+
+
+def _ordered(x: ArrayLike) -> NDArray[np.int64]:
+    """Doubles >= 0 as integers of the same order.  Adding 0.0 turns -0.0, the smallest integer,
+    into 0.0."""
+    return (np.asarray(x, dtype=np.float64) + 0.0).view(np.int64)
+
+
+def last_double(
+    below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
+) -> tuple[Array, Array]:
+    """Neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
+
+    For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like
+    the integers with the same bits, so this ends at two neighbours, whatever the scale.  ``below``
+    maps (n, m) values, row i for bracket i, to bool; from true at ``low`` (n,) to false at ``high``
+    it changes once.
+    """
+    a, b = _ordered(low).copy(), _ordered(high).copy()
+    rows = np.arange(a.size)
+    # a call costs as much as some hundred points: few brackets are cut into many parts at once
+    parts = min(max(_PER_CALL // max(a.size, 1), 2), 64)
+    inner = np.arange(1, parts)
+    while np.any(b - a > 1):
+        step, rest = np.divmod(b - a, parts)
+        cuts = a[:, None] + step[:, None] * inner + rest[:, None] * inner // parts
+        count = np.argmin(
+            np.column_stack((below(cuts.view(np.float64)), np.zeros(a.size, dtype=np.bool_))),
+            axis=1,
+        )
+        ends: NDArray[np.int64] = np.column_stack((a, cuts, b))
+        a, b = ends[rows, count], ends[rows, count + 1]
+    return a.view(np.float64), b.view(np.float64)

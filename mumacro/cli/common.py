@@ -1,0 +1,381 @@
+"""What all commands share: one look of the arguments, exit codes, cases and tables as a person
+writes them."""
+
+import argparse
+import csv
+import difflib
+import json
+import math
+import os
+import re
+import sys
+from argparse import RawDescriptionHelpFormatter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from mumacro import plotting
+from mumacro.analysis.validity import digits, k_effect
+from mumacro.errors import InputError, MumacroError
+from mumacro.inputs.fields import (
+    LIKE,
+    NAMES,
+    RAD_PER_CYCLE,
+    check_inputs,
+    read_number,
+    read_range,
+    scale_of,
+    suggestion,
+    unit_of,
+)
+from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
+from mumacro.inputs.text_tables import SEPARATORS
+from mumacro.surrogate import Surrogate
+
+INPUTS = """\
+inputs, each as name=value, in SI units or with a unit as in y0=2um:
+  mu0    Coulomb friction coefficient [-], > 0
+  Fz     normal force [N], > 0
+  k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
+  y0     amplitude of the oscillation [m], >= 0; of the normal force Fz_amplitude [N], < Fz
+  omega  its angular frequency [rad/s], or f, its frequency [Hz], >= 0
+  v0     sliding speed [m/s], >= 0
+"""
+
+
+class UsageError(Exception):
+    """The command is written wrongly; one line, with the remedy."""
+
+
+class ImpossibleError(MumacroError):
+    """The request is valid and has no result; one line, with the reason."""
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """A fault, reported in one line."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(formatter_class=RawDescriptionHelpFormatter, allow_abbrev=False, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """End the program with code 2 and the fault, with the choice that may have been meant."""
+        if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
+            known = [word.strip(" '") for word in wrong[3].split(",")]
+            near = difflib.get_close_matches(wrong[2].lower(), known, n=1)
+            message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
+        self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
+
+
+def question(
+    name: str,
+    told: str,
+    epilog: str,
+    words: str,
+    least: str = "+",
+    first: tuple[str, dict[str, Any]] | None = None,
+) -> OneLineParser:
+    """The parser of a command that is given a case and has ``-o``; ``first`` is an argument that
+    stands before it."""
+    parser = OneLineParser(prog=f"mumacro {name}", description=told, epilog=epilog)
+    if first:
+        parser.add_argument(first[0], **first[1])
+    add_case(parser, words, least)
+    parser.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        help="write the result there: a picture, .png, .svg or .pdf, or .csv",
+    )
+    return parser
+
+
+def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
+    """The inputs, explained by ``words``, the kind of contact, and the options of all commands that
+    answer."""
+    parser.add_argument("words", nargs=least, metavar="name=value", help=words)
+    add_kind(parser)
+    add_table(parser)
+
+
+def add_kind(parser: argparse.ArgumentParser) -> None:
+    """The options for the contact and the direction of its oscillation; :func:`kind_in` reads
+    them."""
+    parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
+    text = (
+        "of the oscillation to the sliding direction; normal: the normal force oscillates; "
+        "default: across"
+    )
+    parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
+
+
+def kind_in(chosen: argparse.Namespace) -> Kind:
+    """The contact and direction that were chosen; InputError for a ball whose normal force
+    oscillates."""
+    return kind_of(chosen.contact, chosen.direction)
+
+
+def add_table(parser: OneLineParser) -> None:
+    """The options of all commands that read a table and answer."""
+    text = (
+        "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: "
+        "the tightest one"
+    )
+    parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
+    add_form(parser)
+
+
+def add_format(parser: OneLineParser) -> None:
+    """The options for the form of CSV."""
+    parser.add_argument(
+        "--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,"
+    )
+    parser.add_argument(
+        "--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: ."
+    )
+
+
+def add_form(parser: argparse.ArgumentParser) -> None:
+    """The options for the form of a result."""
+    parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
+    text = "digits to print; default: as many as k supports, 4 to 6; 15: all"
+    parser.add_argument("--digits", type=int, choices=range(1, 18), metavar="N", help=text)
+
+
+def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
+    """Run a command, print the text that it returns, and return the exit code; an error is one line
+    on stderr."""
+    try:
+        found = command(given)
+        if isinstance(found, str):
+            print(found, flush=True)
+            return 0
+        sys.stdout.flush()
+        return found
+    except BrokenPipeError:  # the reader, such as head, has closed the pipe
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        code, text = 130, "interrupted"
+    except (UsageError, InputError) as error:
+        code, text = 2, str(error)
+    except MumacroError as error:
+        code, text = 1, str(error)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        code, text = 1, where + (error.strerror or str(error))
+    print(f"{title}: {' '.join(text.split())}", file=sys.stderr)
+    return code
+
+
+# --- what a person writes -------------------------------------------------------------------------
+
+
+def read_case(
+    words: Sequence[str],
+    kind: Kind = SPRING,
+    without: Sequence[str] = (),
+    *,
+    one_k: str = "",
+    whole: bool = True,
+    optional: Sequence[str] = (),
+) -> dict[str, Any]:
+    """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
+    ``Surrogate.evaluate``.
+
+    ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
+    not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
+    other inputs must be there, but for those that are ``optional``.  UsageError tells everything
+    that is wrong, in one line.
+
+    >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20.69kHz v0=0.01"])["k"]
+    1000000.0
+    """
+    case: dict[str, Any] = {}
+    faults = []
+    for name, text in _pairs(words):
+        if text is None:
+            faults.append(f"{name!r} is no name=value such as Fz=10")
+            continue
+        if name not in kind.columns:
+            meant = suggestion(name)
+            case[meant or name] = math.nan  # not reported as missing, too
+            faults.append(_unknown(name, text, meant, kind))
+            continue
+        if name in case:
+            faults.append(f"{name} is given twice")
+        case[name] = math.nan
+        try:
+            case[name] = _read(name, text, kind, one_k)
+        except ValueError as error:
+            faults.append(str(error))
+    absent = {*optional} - case.keys()
+    faults += _faults_of_names(case, kind, [*without, *absent], whole)
+    if faults:
+        raise UsageError("; ".join(faults))
+    return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}
+
+
+def _read(name: str, text: str, kind: Kind, one_k: str) -> float | tuple[float, float]:
+    """The value of an input, or the ends of k; ValueError where it is none, or out of bounds."""
+    if name == "k" and ".." in text:
+        ends = read_range(name, text)
+        if one_k:
+            raise ValueError(f"k={text}: {one_k}")
+        return ends
+    value = read_number(name, text)
+    field, in_model = ("omega", value * RAD_PER_CYCLE) if name == "f" else (name, value)
+    try:
+        check_inputs(kind.as_six({field: np.asarray(in_model)}), value if name == "f" else None)
+    except InputError as error:
+        raise kind.refused(error) from None
+    return value
+
+
+def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
+    """Why a name is refused, and what to write."""
+    if name in ("contact", "direction"):
+        return f"{name} is an option: --{name} {text}"
+    if name == AMPLITUDE:
+        return f"{name} is the amplitude of --direction normal; otherwise it is y0"
+    if name == "y0":
+        return f"y0 does not belong to --direction normal, whose amplitude is {AMPLITUDE}"
+    advice = f"did you mean {meant}?" if meant else f"there are {', '.join(kind.columns)}"
+    return f"unknown input {name!r}: {advice}"
+
+
+def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
+    """Name and value of each ``name=value``; a unit may stand apart; other words have no value."""
+    found: list[tuple[str, str | None]] = []
+    for word in re.sub(r"\s*=\s*", "=", " ".join(words)).split():
+        name, equals, text = word.strip(",;").partition("=")
+        last, value = found[-1] if found else ("", None)
+        if equals:
+            found.append((name, text))
+        elif value is not None and last in (*NAMES, *LIKE) and scale_of(last, name):
+            found[-1] = last, f"{value} {name}"
+        else:
+            found.append((name, None))
+    return found
+
+
+def _faults_of_names(
+    case: Mapping[str, Any], kind: Kind, without: Sequence[str], whole: bool
+) -> list[str]:
+    frequencies = {"f", "omega"}
+    left_out = {*without} | (frequencies if frequencies & {*without} else set())
+    names = " and ".join(without)
+    told = f"{names} {'is' if len(without) == 1 else 'are'} the unknown or the swept input"
+    faults = [f"leave {name} out: {told}" for name in case if name in left_out]
+    if frequencies <= case.keys():
+        faults.append("give exactly one of omega [rad/s] and f [Hz]")
+    given = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
+    hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
+    absent = [
+        hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in given
+    ]
+    return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
+
+
+def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
+    """A case with the geometric middle in place of an interval of k."""
+    found = dict(case)
+    if "k_range" in found:
+        low, high = found.pop("k_range")
+        found["k"] = math.sqrt(low) * math.sqrt(high)
+    return found
+
+
+def in_words(text: str, case: Mapping[str, Any]) -> str:
+    """The advice of a model line with what the command takes in place of Python's keyword."""
+    k = case["k"]
+    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}")
+
+
+def format_for(
+    chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING
+) -> str:
+    """How numbers are printed: with ``--digits``, or as many as the stiffness of a case
+    supports."""
+    if chosen.digits is not None:
+        return f".{chosen.digits}g"
+    contact, direction = kind.names.values()
+    return f".{digits(k_effect(surrogate, case, contact, direction))}g"
+
+
+def read_values(
+    given: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
+) -> list[Any]:
+    """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
+    are none."""
+    values, faults = [], []
+    for name, text in given:
+        try:
+            values.append(read(name, text))
+        except ValueError as error:
+            faults.append(str(error))
+    if faults:
+        raise UsageError("; ".join(dict.fromkeys(faults)))
+    return values
+
+
+def open_table(which: str | None) -> Surrogate:
+    """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled
+    one."""
+    try:
+        return Surrogate.open(None if which is None else float(which))
+    except ValueError:
+        if which is None or not re.search(r"[^\d.eE+-]", which):
+            raise
+        return Surrogate.open(Path(which))
+
+
+# --- results --------------------------------------------------------------------------------------
+
+
+def about(surrogate: Surrogate) -> dict[str, Any]:
+    """What names a table in JSON."""
+    return {"id": surrogate.id, "tolerance": surrogate.tolerance}
+
+
+def in_columns(rows: Iterable[Sequence[str]]) -> str:
+    """Rows of cells as text in columns."""
+    columns = list(zip_longest(*rows, fillvalue=""))
+    widths = [max(map(len, column)) for column in columns]
+    padded = (
+        [cell.ljust(width) for cell in column]
+        for column, width in zip(columns, widths, strict=True)
+    )
+    return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
+
+
+def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:
+    """Write ``-o x.csv``, the columns under their heads with all digits, or a picture; a line that
+    names the file."""
+    if path.suffix == ".csv":
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            rows = csv.writer(stream, lineterminator="\n")
+            rows.writerow(columns)
+            rows.writerows(
+                zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
+            )
+    else:
+        plotting.save(path, draw)
+    return f"written: {path}"
+
+
+def as_json(value: object) -> str:
+    """JSON in which what is not finite is null."""
+
+    def clean(item: Any) -> Any:
+        if isinstance(item, dict):
+            return {key: clean(entry) for key, entry in item.items()}
+        if isinstance(item, (list, tuple)):
+            return [clean(entry) for entry in item]
+        if isinstance(item, (np.generic, np.ndarray)):
+            return clean(item.tolist())
+        return None if isinstance(item, float) and not math.isfinite(item) else item
+
+    return json.dumps(clean(value), indent=2)

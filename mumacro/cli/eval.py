@@ -1,0 +1,139 @@
+"""``mumacro eval``: files of cases from the command line."""
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from mumacro.cli.common import OneLineParser, add_format, add_kind, open_table
+from mumacro.files.reading import find_files
+from mumacro.files.run import evaluate_files
+from mumacro.inputs.text_tables import SEPARATORS
+
+_COLUMNS = """\
+columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
+  mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
+  "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
+  for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N]
+  other columns are copied; those of CSV and NDJSON stay text
+added: mu_macro, mu_ratio, regime, error_bound, source; for k_low and k_high also mu_macro_low and
+  mu_macro_high
+rejected rows are in OUT.rejects.csv only: row (from 1), field, value, reason
+
+examples:
+  mumacro eval cases.parquet -o out.parquet
+  mumacro eval german.csv -o out.csv --sep ';' --decimal ,
+  mumacro eval - -o - < cases.csv > out.csv
+
+A stopped run goes on when the same command is given again; the output has the same bytes.
+exit codes: 0 every row evaluated, 3 some rows rejected, 1 could not run, 2 wrong arguments,
+  130 interrupted
+"""
+
+
+def _spooled(folder: Path) -> Path:
+    """Standard input as a file, in the format that it begins like."""
+    path = folder / "standard-input"
+    with path.open("w+b") as stream:
+        shutil.copyfileobj(sys.stdin.buffer, stream, 2**20)
+        stream.seek(0)
+        begin = stream.read(4)
+    kind = ".parquet" if begin == b"PAR1" else ".ndjson" if begin.lstrip()[:1] == b"{" else ".csv"
+    return path.rename(f"{path}{kind}" + ".gz" * (begin[:2] == b"\x1f\x8b"))
+
+
+def main(words: Sequence[str]) -> int:
+    """Run ``mumacro eval``; return the exit code; what is wrong is an error for
+    :func:`mumacro.cli.common.run`."""
+    parser = OneLineParser(
+        prog="mumacro eval",
+        description="Evaluate every case of Parquet, CSV or NDJSON files (text also compressed, "
+        ".gz).",
+        epilog=_COLUMNS,
+    )
+    parser.add_argument(
+        "cases",
+        nargs="+",
+        help="files, folders or patterns, all of one format; - is standard input",
+    )
+    parser.add_argument(
+        "-o",
+        "--out",
+        required=True,
+        help="the file to write; its ending sets the format; - is output",
+    )
+    add_kind(parser)
+    parser.add_argument(
+        "--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table"
+    )
+    add_format(parser)
+    parser.add_argument(
+        "--rigid", action="store_true", help="there is no column k: all contacts are rigid"
+    )
+    parser.add_argument(
+        "--include",
+        choices=("gradient",),
+        action="append",
+        default=[],
+        help="add d mu_macro / d input",
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace an output, delete the parts of another run"
+    )
+    chosen = parser.parse_intermixed_args(words)
+    surrogate = open_table(chosen.table)
+    options = {
+        name: getattr(chosen, name)
+        for name in ("rigid", "include", "decimal", "contact", "direction", "force")
+    }
+    console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    bars = (
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.description}"),
+        TimeRemainingColumn(),
+    )
+    # a bar on a terminal, and lines above it; elsewhere lines alone
+    bar = Progress(*bars, console=console, disable=not console.is_terminal)
+    task = bar.add_task("", total=1.0)
+
+    def progress(share: float, rows: int, rejected: int) -> None:
+        bar.update(task, completed=share, description=f"{rows:,} rows, {rejected:,} rejected")
+
+    try:
+        with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
+            cases = [_spooled(Path(folder)) if name == "-" else name for name in chosen.cases]
+            out = chosen.out
+            if out == "-":
+                ending = "ndjson" if find_files(cases)[1] == "ndjson" else "csv"
+                out = f"{folder}/standard-output.{ending}"
+            with bar:
+                done = evaluate_files(
+                    cases,
+                    out,
+                    surrogate,
+                    sep=SEPARATORS[chosen.sep],
+                    progress=progress,
+                    say=lambda text: console.print(f"mumacro eval: {text}"),
+                    **options,
+                )
+            told = f"{done.answered:,} of {done.rows:,} rows evaluated with {surrogate.id}"
+            if chosen.out == "-":
+                with done.out.open("rb") as stream:
+                    shutil.copyfileobj(stream, sys.stdout.buffer)
+                sys.stderr.write(
+                    (done.rejects.read_text("utf-8", "replace") if done.rejects else "")
+                    + f"{told}\n"
+                )
+            else:
+                rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
+                resumed = f"; {done.resumed:,} were done already" if done.resumed else ""
+                print(f"{told}: {done.out}{rejects}{resumed}")
+    except KeyboardInterrupt:
+        print("mumacro eval: stopped; the same command goes on", file=sys.stderr)
+        return 130
+    return 3 if done.rejected else 0

@@ -1,0 +1,122 @@
+"""The geometries of :mod:`mumacro.contacts.stiffness` by name, with arguments, units and meaning:
+the one list of them.
+
+Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from mumacro.contacts.stiffness import (
+    AXES,
+    Contact,
+    Material,
+    flat_punch,
+    hertz_ball,
+    hertz_cylinder,
+)
+from mumacro.errors import InputError
+from mumacro.inputs.fields import UNITS_OF, Scale, read_quantity, real, unknown_name
+
+
+class Argument(NamedTuple):
+    """One argument: SI unit, units that a person may write, meaning; its only values, for a
+    choice."""
+
+    unit: str
+    units: Mapping[str, Scale]
+    meaning: str
+    choices: tuple[str, ...] = ()
+
+
+class Geometry(NamedTuple):
+    """One geometry: its function, what it is, and its own arguments beside those of the two
+    bodies."""
+
+    function: Callable[..., Contact]
+    meaning: str
+    arguments: tuple[str, ...]
+
+
+_PASCAL = {
+    "Pa": Scale(),
+    "kPa": Scale(1e3),
+    "MPa": Scale(1e6),
+    "N/mm2": Scale(1e6),
+    "GPa": Scale(1e9),
+}
+_ONE = {"": Scale(), "-": Scale()}
+ARGUMENTS = {
+    "radius": Argument(
+        "m", UNITS_OF["y0"], "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)"
+    ),
+    "length": Argument("m", UNITS_OF["y0"], "length of the cylinder"),
+    "Fz": Argument("N", UNITS_OF["Fz"], "normal force"),
+    "oscillation": Argument(
+        "", {}, "how the contact oscillates beside the axis of the cylinder", AXES
+    ),
+    "E": Argument("Pa", _PASCAL, "Young's modulus of the first body; rigid, or a number"),
+    "nu": Argument("-", _ONE, "its Poisson's ratio"),
+    "E2": Argument(
+        "Pa",
+        _PASCAL,
+        "Young's modulus of the second body; left out, the bodies are of one material",
+    ),
+    "nu2": Argument("-", _ONE, "its Poisson's ratio; left out, that of the first body"),
+}
+#: arguments of every geometry; the first two are required
+BODIES = ("E", "nu", "E2", "nu2")
+GEOMETRIES = {
+    "ball": Geometry(hertz_ball, "a ball on a flat, or two balls", ("radius", "Fz")),
+    "flat": Geometry(
+        flat_punch,
+        "a flat circular end in full contact, such as a pin that has run in",
+        ("radius", "Fz"),
+    ),
+    "cylinder": Geometry(
+        hertz_cylinder, "a lying cylinder", ("radius", "length", "Fz", "oscillation")
+    ),
+}
+
+
+def contact_of(geometry: str, /, **given: Any) -> Contact:
+    """The contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies in SI.
+
+    Its warnings are in it.  InputError for an unknown geometry, and an argument that is missing,
+    unknown, no number or out of bounds.
+
+    >>> contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3).contact
+    'ball'
+    """
+    if geometry not in GEOMETRIES:
+        raise InputError("geometry", geometry, f"one of {', '.join(GEOMETRIES)}")
+    found = GEOMETRIES[geometry]
+    known = (*found.arguments, *BODIES)
+    for name, value in given.items():
+        if name not in known:
+            raise InputError(name, value, f"left out: {unknown_name(name, known)}")
+        if not ARGUMENTS[name].choices and real(name, value).ndim:
+            raise InputError(name, value, "one number")
+    if absent := next((name for name in (*found.arguments, "E", "nu") if name not in given), None):
+        unit = ARGUMENTS[absent].unit
+        raise InputError(
+            absent, None, f"given{f' [{unit}]' if unit else ''}: {ARGUMENTS[absent].meaning}"
+        )
+    first = Material(given["E"], given["nu"])
+    second = Material(given.get("E2", first.E), given.get("nu2", first.nu))
+    return found.function(
+        first=first, second=second, **{name: given[name] for name in found.arguments}
+    )
+
+
+def read_argument(name: str, text: str) -> Any:
+    """The value of an argument in SI from text, as :func:`read_quantity`; ``rigid`` is an infinite
+    modulus.
+
+    >>> read_argument("E", "210 GPa"), read_argument("radius", "5mm"), read_argument("E2", "rigid")
+    (210000000000.0, 0.005, inf)
+    """
+    about = ARGUMENTS[name]
+    if about.choices:
+        return text.strip()
+    return read_quantity(name, text, about.meaning, about.units, rigid=name in ("E", "E2"))

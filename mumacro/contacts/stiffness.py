@@ -1,0 +1,353 @@
+"""Tangential contact stiffness from materials and geometry: the input k that every evaluation
+needs.
+
+Half-space elasticity, two smooth elastic bodies, small strains::
+
+    1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
+    1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,   G = E / (2 (1 + nu))
+
+    circular contact of radius a      k = 8 a G*  (tangential),    2 a E*  (normal)
+    ball of radius R under Fz         a = (3 Fz R / (4 E*))^(1/3)
+    rigid flat punch                  a is its radius
+    cylinder of length L lying        half width b = sqrt(4 Fz R / (pi L E*)),
+                                      k of an elliptic contact: two values
+
+k is the stiffness of a contact that sticks everywhere.  Under a ball the rim slips first, and gross
+slip begins at the displacement 3/2 mu0 Fz/k: ``contact="ball"``, which no single spring stands for.
+Under a flat punch with full contact all of it slips at once, and one spring is exact.  A result
+holds both, k and the kind of the contact::
+
+    ball = ball_on_flat(5e-3, 10.0, steel, steel)
+    surrogate.evaluate(**ball, mu0=0.3, Fz=10.0, y0=2e-6, f=20e3, v0=0.01)
+
+Every function raises :class:`mumacro.InputError` for a value out of bounds or no number, for two
+rigid bodies, and where Hertz's theory has no meaning: a contact wider than the ball.  Above a tenth
+of the ball's radius it warns.
+
+Not included: roughness, which adds compliance in series (:func:`in_series`); layers; plastic flow,
+which begins below the surface at a Hertz pressure of about 1.6 times the yield strength; the
+compliance of the holder, in series as well.
+
+References
+----------
+R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16 (1949) 259.
+K. L. Johnson, "Contact Mechanics", Cambridge University Press (1985), Secs. 4.2 (Hertz),
+7.2 (tangential loading).
+V. L. Popov, "Contact Mechanics and Friction", Springer (2010), Secs. 5.2, 8.2; its G* is four
+times the one here.
+"""
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+from mumacro.errors import InputError
+from mumacro.inputs.fields import real
+
+SMALLEST, LARGEST = 1e-60, 1e60  # of numbers in SI: every product of them below is a double
+AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
+# of the radius of a ball or cylinder: the half width of a contact above which Hertz's theory is off
+WIDE = 0.1
+SOFT = 1e6  # [Pa]; a modulus below it may be meant in GPa
+
+
+def _number(name: str, value: Any) -> float:
+    found = real(name, value)
+    if found.ndim:
+        raise InputError(name, value, "one number")
+    return float(found)
+
+
+def _positive(**values: Any) -> None:
+    for name, given in values.items():
+        value = _number(name, given)
+        if not SMALLEST <= value <= LARGEST:
+            raise InputError(name, value, f"finite and > 0, from {SMALLEST:g} to {LARGEST:g}")
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic elastic body: Young's modulus E [Pa] > 0, ``math.inf`` if rigid; Poisson's ratio
+    -1 < nu <= 0.5.
+
+    >>> steel = Material(E=210e9, nu=0.3)
+    >>> round(steel.G / 1e9, 2)
+    80.77
+    """
+
+    E: float
+    nu: float
+
+    def __post_init__(self) -> None:
+        _positive(E=LARGEST if _number("E", self.E) == math.inf else self.E)
+        if not -1.0 < _number("nu", self.nu) <= 0.5:
+            raise InputError("nu", self.nu, "> -1 and <= 0.5")
+
+    @property
+    def G(self) -> float:
+        """Shear modulus [Pa]."""
+        return self.E / (2.0 * (1.0 + self.nu))
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its
+    ``contact``."""
+
+    k: float  #: tangential stiffness [N/m] while it sticks everywhere: the input of the model
+    k_normal: float  #: normal stiffness [N/m]
+    half_width: float  #: radius of a circular contact, half width of a line contact [m]
+    #: the largest [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge
+    pressure: float
+    contact: str = "spring"  #: the kind that ``evaluate`` computes with this k: "spring" or "ball"
+    warnings: tuple[str, ...] = ()  #: where the theory behind k is off; also issued by ``warnings``
+
+    def keys(self) -> tuple[str, ...]:
+        """What is passed on: k, and the kind of contact where it is not the usual one."""
+        return ("k",) if self.contact == "spring" else ("k", "contact")
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self.keys():
+            raise KeyError(name)
+        return getattr(self, name)
+
+    def length_scale(self, mu0: float, Fz: float) -> float:
+        """l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""
+        _positive(mu0=mu0, Fz=Fz)
+        return mu0 * (Fz / self.k)
+
+
+def _moduli(first: Material, second: Material) -> tuple[float, float]:
+    """E* and G* [Pa]."""
+    for name, body in (("first", first), ("second", second)):
+        if not isinstance(body, Material):
+            raise InputError(name, body, "a Material, such as Material(E=210e9, nu=0.3)")
+    compliance = (1.0 - first.nu**2) / first.E + (1.0 - second.nu**2) / second.E
+    shear = (2.0 - first.nu) / first.G + (2.0 - second.nu) / second.G
+    if not compliance > 0.0:
+        raise InputError("E", math.inf, "finite in at least one of the two bodies")
+    return 1.0 / compliance, 1.0 / shear
+
+
+def _narrow(
+    half_width: float, radius: float, first: Material, second: Material, power: float
+) -> tuple[str, ...]:
+    """What to say of a Hertzian contact beside the radius of the body; InputError where it is the
+    wider one.
+
+    The half width is proportional to E* to the power -``power``.
+    """
+    share = half_width / radius
+    if share <= WIDE:
+        return ()
+    if share <= 1.0:
+        return (
+            f"the contact's half width {half_width:.3g} m is {share:.2g} of the radius: "
+            f"Hertz's theory holds well below {WIDE:g}, k is rough",
+        )
+    soft = [body for body in (first, second) if body.E < SOFT]
+    if soft:
+        meant = (
+            Material(1e9 * body.E, body.nu) if body in soft else body for body in (first, second)
+        )
+        sound = share * (_moduli(first, second)[0] / _moduli(*meant)[0]) ** power
+        if sound <= WIDE:
+            given = soft[0].E
+            told = (
+                f"in pascals: did you mean {given:g} GPa? With {given:g} Pa the contact is "
+                f"{share:.3g} radii wide"
+            )
+            raise InputError("E", given, told)
+    told = (
+        f">= {half_width:.3g}, the half width of the contact: Hertz's theory holds for a small "
+        "contact only"
+    )
+    raise InputError("radius", radius, told)
+
+
+def _warned(contact: Contact) -> Contact:
+    """The contact, whose warnings are issued to the caller of the caller."""
+    for text in contact.warnings:
+        warnings.warn(text, stacklevel=3)
+    return contact
+
+
+def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) -> Contact:
+    """A ball on a flat, or two balls: Hertz's radius, Mindlin's stiffness.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the ball [m]; of two balls 1/(1/R1 + 1/R2).
+    Fz : float
+        Normal force [N]; k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
+    first, second : Material
+        The two bodies.
+
+    Notes
+    -----
+    Johnson (1985), eqs. (4.22), (7.42).  Holds for half_width << radius: above 0.1 of it there is a
+    warning, above the radius an error.  The normal stiffness is the tangent dFz/dz.
+
+    Examples
+    --------
+    >>> steel = Material(E=210e9, nu=0.3)
+    >>> contact = ball_on_flat(radius=5e-3, Fz=10.0, first=steel, second=steel)
+    >>> f"{contact.k:.3g} N/m, {1e6 * contact.half_width:.1f} um, {contact.pressure / 1e9:.2f} GPa"
+    '1.31e+07 N/m, 68.8 um, 1.01 GPa'
+    >>> f"{1e6 * contact.length_scale(mu0=0.3, Fz=10.0):.2f} um"
+    '0.23 um'
+    """
+    return _warned(hertz_ball(radius, Fz, first, second))
+
+
+def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> Contact:
+    """:func:`ball_on_flat`, whose warnings are in the result alone."""
+    _positive(radius=radius, Fz=Fz)
+    modulus, shear = _moduli(first, second)
+    a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
+    told = _narrow(a, radius, first, second, 1.0 / 3.0)
+    return Contact(
+        8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a), "ball", told
+    )
+
+
+def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> Contact:
+    """A flat circular end in full contact, such as a pin that has run in.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the face [m].
+    Fz : float
+        Normal force [N]; sets the pressure only, k does not depend on it.
+    first, second : Material
+        The two bodies; exact for a rigid punch on a half-space.
+
+    Examples
+    --------
+    >>> steel, rigid = Material(E=210e9, nu=0.3), Material(E=float("inf"), nu=0.3)
+    >>> contact = flat_punch(radius=1e-3, Fz=10.0, first=rigid, second=steel)
+    >>> f"{contact.k:.3g} N/m"
+    '3.8e+08 N/m'
+    """
+    _positive(radius=radius, Fz=Fz)
+    modulus, shear = _moduli(first, second)
+    return Contact(
+        8.0 * radius * shear, 2.0 * radius * modulus, radius, Fz / (math.pi * radius * radius)
+    )
+
+
+def cylinder_on_flat(
+    radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
+) -> Contact:
+    """A cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact in one
+    of two directions.
+
+    With nu > 0 k across the axis is the larger one, by up to 1/(1 - nu); the model has one k.
+    **The direction of the oscillation decides**: where the two differ by 1.3, mu~ with its k is
+    right to 0.02, with the other one to 0.13 only (y~ from 0.3 to 10, v~ from 0.2 to 2).
+
+    A line contact of unlimited length has no stiffness.  Here it is finite, and is replaced by the
+    ellipse of the same area and proportions, which under a tangential force moves as one: right to
+    about 10 % where the bodies are large beside ``length``.
+
+    Parameters
+    ----------
+    radius, length : float
+        Of the cylinder [m].
+    Fz : float
+        Normal force [N].
+    first, second : Material
+        The two bodies.
+    oscillation : str
+        "across" or "along" the cylinder's axis: how the contact oscillates, whichever way it
+        slides.
+
+    Raises
+    ------
+    InputError
+        Also for a contact wider than long, which is no line contact.
+
+    Notes
+    -----
+    Half width: Johnson (1985), eq. (4.43).  Stiffness: Mindlin (1949), by integrating Cerruti's
+    solution under the traction that moves an ellipse as one.
+
+    Examples
+    --------
+    >>> steel = Material(E=210e9, nu=0.3)
+    >>> for oscillation in AXES:
+    ...     contact = cylinder_on_flat(5e-3, 5e-3, 100.0, steel, steel, oscillation)
+    ...     print(f"{oscillation} {contact.k:.3g} N/m, {1e6 * contact.half_width:.1f} um")
+    across 1.67e+08 N/m, 33.2 um
+    along 1.32e+08 N/m, 33.2 um
+    """
+    return _warned(hertz_cylinder(radius, length, Fz, first, second, oscillation))
+
+
+def hertz_cylinder(
+    radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
+) -> Contact:
+    """:func:`cylinder_on_flat`, whose warnings are in the result alone."""
+    if oscillation not in AXES:
+        raise InputError(
+            "oscillation",
+            oscillation,
+            f"{' or '.join(AXES)} the axis: its k is the one of the model",
+        )
+    along = oscillation == "along"
+    _positive(radius=radius, length=length, Fz=Fz)
+    modulus, _ = _moduli(first, second)
+    b = math.sqrt(4.0 * (Fz / length) * radius / (math.pi * modulus))
+    told = _narrow(b, radius, first, second, 0.5)
+    if 2.0 * b > length:
+        raise InputError(
+            "length",
+            length,
+            f">= {2.0 * b:.3g}, the width of the contact; a shorter one is a punch",
+        )
+    scale = 2.0 / math.sqrt(math.pi)  # of the ellipse whose area is that of the rectangle
+    narrow, wide = scale * b, scale * 0.5 * length
+    shear = 1.0 / sum(_ellipse_compliance(narrow, wide, body, along) for body in (first, second))
+    normal = 1.0 / sum(
+        _ellipse_compliance(narrow, wide, Material(body.E, 0.0), along) * (1.0 - body.nu**2)
+        for body in (first, second)
+    )
+    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length), warnings=told)
+
+
+def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool) -> float:
+    """Tangential displacement over force [m/N] of a half-space under q ~ (1 - x^2/narrow^2 -
+    y^2/wide^2)^(-1/2).
+
+    At the middle it is (1/(8 pi G narrow wide)) times the integral over all directions of R ((1 -
+    nu) + nu c^2), R the half chord, c the cosine with the force.  With the complete elliptic
+    integrals of modulus m = sqrt(1 - (narrow/wide)^2) this is K ((1 - nu) + nu s) / (2 pi G wide),
+    s = (K - E)/(m^2 K) along the wide axis, else 1 - s.
+    """
+    a, g = 1.0, narrow / wide  # K = pi / (2 agm(1, narrow/wide)), and s is a sum of the same means
+    share = term = 0.5
+    while a - g > 1e-15 * a:
+        term *= 0.5 * (a - g) / (a + g)
+        share += term
+        a, g = 0.5 * (a + g), math.sqrt(a * g)
+    bend = (1.0 - body.nu) + body.nu * (share if along else 1.0 - share)
+    return bend / (4.0 * a * body.G * wide)
+
+
+def in_series(*stiffnesses: float) -> float:
+    """Stiffness [N/m] > 0 of springs in series, such as contact, roughness and holder; ``math.inf``
+    is a rigid part.
+
+    >>> round(in_series(3e6, 6e6))
+    2000000
+    """
+    if not stiffnesses:
+        raise InputError("stiffnesses", stiffnesses, "at least one")
+    for value in stiffnesses:
+        if not _number("stiffness", value) > 0.0:
+            raise InputError("stiffness", value, "> 0")
+    total = sum(1.0 / value for value in stiffnesses)
+    return math.inf if total == 0.0 else 1.0 / total

@@ -1,0 +1,269 @@
+"""One Arrow record batch of cases in, the same batch with results out, and a list of rejected rows.
+
+Columns that are named like a missing input are refused.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from mumacro.answer import BAND
+from mumacro.errors import InputError, MumacroError
+from mumacro.inputs.fields import GAP, LIKE, SI, Scale, refusal, split_unit
+from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
+from mumacro.inputs.text_tables import TOO_LARGE, absent, find_heads, meant_by, read_cell
+from mumacro.kernel.arrays import Array, Bools, Codes
+from mumacro.surrogate import Surrogate
+from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
+
+#: columns that are added
+ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+#: of a row without a result: its index, the input (null: the row itself), the value, the reason
+REJECTS = pa.schema(
+    [("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())]
+)
+
+
+class FilesError(MumacroError):
+    """A file of cases cannot be read, understood or written; one line that names it, the reason and
+    the remedy."""
+
+
+def added_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
+    """The Arrow fields of the columns that :func:`answer` adds."""
+    words = pa.dictionary(pa.int8(), pa.string())
+    return [
+        pa.field(name, words if name in ("regime", "source") else pa.float64()) for name in names
+    ]
+
+
+def answer(
+    batch: pa.RecordBatch,
+    surrogate: Surrogate | None = None,
+    *,
+    rigid: bool = False,
+    include: Sequence[str] = (),
+    contact: str = "spring",
+    direction: str = "across",
+) -> tuple[pa.RecordBatch, pa.RecordBatch]:
+    """Evaluate every case of a batch.
+
+    Parameters
+    ----------
+    batch : pyarrow.RecordBatch
+        Columns ``mu0`` [-], ``Fz`` [N], ``k`` [N/m], ``y0`` [m], ``omega`` [rad/s] or ``f`` [Hz],
+        ``v0`` [m/s], with another unit where the heading has it in brackets; numbers or text.  An
+        infinite k, or the word ``rigid``, is a rigid contact.  A null, a NaN or an empty cell is
+        missing, in k as elsewhere.  ``k_low`` and ``k_high`` may stand for k; ``Fz_amplitude`` [N]
+        stands for y0 in direction normal.  Other columns are copied unchanged.
+    surrogate : Surrogate, optional
+        Left out, the tightest table that comes with the library.
+    rigid : bool
+        All contacts are rigid and there is no column k.
+    include : sequence of str
+        ``"gradient"`` adds d mu_macro / d input, ``d_mu_macro_d_mu0`` and so on.
+    contact, direction : str
+        Of all cases, as in :meth:`mumacro.Surrogate.evaluate`.
+
+    Returns
+    -------
+    batch : pyarrow.RecordBatch
+        As many rows in the same order, with mu_macro (for an interval of k also mu_macro_low and
+        mu_macro_high), mu_ratio, regime, error_bound and source; null where a case has no result.
+    rejects : pyarrow.RecordBatch
+        One row of ``REJECTS`` for each of those.
+
+    Raises
+    ------
+    FilesError
+        A column is missing, has a wrong name or no numbers.
+
+    Examples
+    --------
+    >>> case = {"mu0": [0.3], "Fz": [10], "k": ["rigid"], "y0 [um]": [2.0]}
+    >>> case |= {"f": [20690], "v0": [-1.0]}
+    >>> answered, rejects = answer(pa.RecordBatch.from_pydict(case))
+    >>> rejects.to_pylist()
+    [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
+    """
+    kind = kind_of(contact, direction)
+    places, names = find_columns(batch.schema.names, rigid, include, kind)
+    added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), places, names, kind)
+    schema = pa.schema([*batch.schema, *added_fields(names)], batch.schema.metadata)
+    answered = pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema)
+    return answered, pa.RecordBatch.from_pylist(
+        [dict(zip(REJECTS.names, row, strict=True)) for row in rejects], REJECTS
+    )
+
+
+def find_columns(
+    names: Sequence[str],
+    rigid: bool = False,
+    include: Sequence[str] = (),
+    kind: Kind = SPRING,
+    where: str = "",
+) -> tuple[dict[str, tuple[str, Scale]], list[str]]:
+    """By input, in their order, the heading and what its unit is in SI; and the names of the
+    columns that are added.
+
+    FilesError names, after ``where``, all columns that are there twice, would be written twice,
+    have an unknown unit, or are missing; for those it lists the columns that were seen, or names a
+    similar one.
+
+    >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"])[0]["Fz"]
+    ('Fz [kN]', Scale(times=1000.0, over=1.0))
+    """
+    found, faults = find_heads(
+        names, {name: LIKE.get(name, name) for name in (*kind.columns, *ENDS)}
+    )
+    others = dict.fromkeys(name for name in names if split_unit(name)[0] not in found)
+    faults += [f"the column {name!r} is there twice" for name in others if names.count(name) > 1]
+    stiff = [column for column in names if meant_by(column, loosely=False) == "k"]
+    if rigid and stiff:
+        faults.append(
+            f"--rigid is given, but the column {stiff[0]!r} looks like a stiffness; leave one out"
+        )
+    if "k" in found and (end := [name for name in ENDS if name in found]):
+        faults.append(f"there are both k and {end[0]}; leave one out")
+    ends = ENDS if found.keys() & {*ENDS} else () if rigid else ("k",)
+    wanted = [name for field in kind.fields for name in (ends if field == "k" else (field,))]
+    for name in wanted:
+        if name not in found and (name != "omega" or "f" not in found):
+            told = absent(name, names)
+            if name == "y0" and AMPLITUDE in (split_unit(column)[0] for column in names):
+                told = f"there is no column y0, but {AMPLITUDE}: give --direction normal"
+            or_rigid = "; rename the one that holds it, or give --rigid if all contacts are rigid"
+            faults.append(told + or_rigid if name == "k" and "similar" not in told else told)
+    slopes = [f"d_mu_macro_d_{name}" for name in kind.fields] if "gradient" in include else []
+    added = [ANSWERS[0], *(BAND if ends == ENDS else ()), *ANSWERS[1:], *slopes]
+    faults += [
+        f"the column {name!r} would be written twice; rename it" for name in added if name in names
+    ]
+    if faults:
+        raise FilesError(where + "; ".join(faults))
+    return {
+        name: (names[found[name][0]], found[name][1]) for name in (*wanted, "f") if name in found
+    }, added
+
+
+def answer_columns(
+    batch: pa.RecordBatch,
+    surrogate: Surrogate,
+    places: Mapping[str, tuple[str, Scale]],
+    names: Sequence[str],
+    kind: Kind,
+    decimal: str = ".",
+) -> tuple[list[pa.Array], list[tuple[int, str, str | None, str]], dict[str, Array]]:
+    """The columns ``names`` that :func:`answer` adds, rows of the rejects, and the inputs in their
+    units by heading."""
+    given: dict[str, Array] = {}
+    values: dict[str, Array] = (
+        {} if {"k", *ENDS} & places.keys() else {"k": np.full(len(batch), math.inf)}
+    )
+    faults: dict[str, dict[int, str]] = {}
+    for name, (heading, scale) in places.items():
+        given[heading], faults[name] = numbers(batch.column(heading), name, decimal)
+        values[name] = _in_si(given[heading], scale, faults[name])
+    inputs: dict[str, Any] = {**values, **kind.names, "gradient": "d_mu_macro_d_mu0" in names}
+    with np.errstate(over="ignore"):  # omega of a frequency beyond double range, which is refused
+        found = surrogate.evaluate(**inputs)
+    bad = found.source_code < 0
+    mask = bad if bad.any() else None
+    code = np.where(bad, 0, found.source_code).astype(np.int8)
+    arrays = {
+        "regime": _words(REGIME_OF_SOURCE[code], REGIMES, mask),
+        "source": _words(code, SOURCES, mask),
+    }
+    for name, slope in (found.gradient or {}).items():
+        # the slope along k is 0 for a rigid contact, which has no k
+        told = (
+            slope
+            if name != "k" or name not in values
+            else np.where(np.isinf(values["k"]), math.nan, slope)
+        )
+        arrays[f"d_mu_macro_d_{name}"] = pa.array(told, mask=np.isnan(told))
+    columns = [
+        arrays[name] if name in arrays else pa.array(getattr(found, name), mask=mask)
+        for name in names
+    ]
+    rejects = []
+    for i in np.flatnonzero(bad).tolist():
+        name, why = _refused(
+            surrogate, {name: float(column[i]) for name, column in values.items()}, kind
+        )
+        cell = batch.column(places[name][0])[i].as_py()
+        rejects.append((i, name, None if cell is None else str(cell), faults[name].get(i, why)))
+    return columns, rejects, given
+
+
+def _words(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
+    return pa.DictionaryArray.from_arrays(
+        pa.array(codes, pa.int8(), mask=mask), pa.array(words, pa.string())
+    )
+
+
+def _in_si(found: Array, scale: Scale, faults: dict[int, str]) -> Array:
+    """Values in SI; a power of ten below one divides, so that 2 um is the double 2e-6."""
+    if scale == Scale():
+        return found
+    with np.errstate(over="ignore"):
+        values: Array = found * scale.times / scale.over
+    beyond = np.isinf(values) & np.isfinite(found)  # a large stiffness is not a rigid contact
+    values[beyond] = math.nan
+    faults |= dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)
+    return values
+
+
+def numbers(array: pa.Array, name: str, decimal: str = ".") -> tuple[Array, dict[int, str]]:
+    """A column of the input ``name`` as doubles (n,), NaN where it holds none, and what is wrong
+    with cells of text.
+
+    FilesError where its type is none of numbers or text.
+    """
+    if pa.types.is_dictionary(array.type):
+        array = array.dictionary_decode()
+    kind, text = array.type, array
+    is_text = (
+        pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
+    )
+    is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
+    if not (is_text or is_number or pa.types.is_null(kind)):
+        raise FilesError(f"the column {name} holds {kind}, not numbers")
+    with suppress(pa.ArrowInvalid):
+        if is_text and decimal != ".":  # with a decimal comma 1.5 may mean 1500: it is no number
+            text = pc.replace_substring(pc.replace_substring(array, ".", "?"), decimal, ".")
+        found = pc.fill_null(pc.cast(text, pa.float64(), safe=False), math.nan).to_numpy(
+            zero_copy_only=False
+        )
+        if not is_text or np.isfinite(found).all():
+            return found, {}
+    # cell by cell, as not all of them are numbers
+    found, faults = np.full(len(array), math.nan), {}
+    for i, cell in enumerate(array.to_pylist()):
+        try:
+            found[i] = read_cell(name, cell or "", decimal)
+        except ValueError as error:
+            faults[i] = str(error)
+    return found, faults
+
+
+def _refused(surrogate: Surrogate, row: Mapping[str, Any], kind: Kind) -> tuple[str, str]:
+    """The first input of a row that has no result, and why."""
+    try:
+        surrogate.evaluate(**row, **kind.names)
+    except InputError as error:
+        name = (
+            error.field
+            if error.field in row
+            else next((end for end in ENDS if math.isnan(row[end])), ENDS[0])
+        )
+        if math.isnan(row[name]):
+            return name, GAP if name == "k" else "is missing"
+        return name, refusal(name, row[name]) if name in SI else f"must be {error.bound}"
+    raise AssertionError(f"{row} has a result")

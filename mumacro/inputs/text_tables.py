@@ -1,0 +1,193 @@
+"""Tables with a head: separator and decimal sign of CSV, which column is which input, its unit,
+cells as numbers."""
+
+import csv
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from mumacro.inputs.fields import (
+    LIKE,
+    PLAIN,
+    UNITS_OF,
+    Scale,
+    is_rigid,
+    number_hint,
+    scale_of,
+    split_unit,
+    suggestion,
+    unit_of,
+)
+
+#: what may stand between the cells of CSV, by the word for it
+SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
+TOO_LARGE = "is beyond double range"
+NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
+_SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
+
+
+def _advice(
+    header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]
+) -> str | None:
+    """The options to give, where a file is not as they say; None where it is."""
+    found, sign = _recognised(header, rows, sep, decimal, more)
+    if (found, sign) == (sep, decimal):
+        return None
+    word = next(word for word, known in SEPARATORS.items() if known == found)
+    told = f"the columns are separated by {word!r} and the decimal sign is {sign!r}"
+    return f"{told}: give --sep '{word}' --decimal '{sign}'"
+
+
+def _recognised(
+    header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]
+) -> tuple[str, str]:
+    """The separator that gives most names of inputs or ``more``, and the decimal sign of most
+    numbers; or as given."""
+
+    def inputs(given: str) -> list[int]:
+        names = [split_unit(name)[0] for name in header.replace('"', "").split(given)]
+        return [
+            i for i, name in enumerate(names) if name in more or suggestion(name, loosely=False)
+        ]
+
+    best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
+    places = inputs(best)
+    cells = [
+        cell.strip()
+        for row in csv.reader(rows, delimiter=best)
+        for i, cell in enumerate(row)
+        if i in places
+    ]
+
+    def cells_with(sign: str) -> int:
+        return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
+
+    return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
+
+
+def read_text(data: bytes, where: str) -> str:
+    """A file of CSV as text, without the mark of byte order; ValueError with the remedy where it is
+    no UTF-8.
+
+    >>> read_text(b"v0 [mm/s];\\xb5", "points.csv")
+    Traceback (most recent call last):
+    ValueError: points.csv: line 1 is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"{where}: line {line} {NO_UTF8}") from None
+
+
+def read_head(
+    line: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str] = ()
+) -> list[str]:
+    """The names in the first line of CSV; ValueError where it is none, or the ``rows`` behind it
+    ask for other options.
+
+    ``more`` are names of columns that are no inputs.
+
+    >>> read_head("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
+    Traceback (most recent call last):
+    ValueError: the columns are separated by ';' and the decimal sign is ',': give --sep ';'
+    --decimal ','
+    """
+    try:
+        cells = next(csv.reader([line], delimiter=sep, strict=True), [])
+    except csv.Error as error:
+        raise ValueError(f"is no header of CSV ({error})") from None
+    if not any(map(str.strip, cells)):
+        raise ValueError("must name the columns, and is empty")
+    if remedy := _advice(line, rows, sep, decimal, more):
+        raise ValueError(remedy)
+    return cells
+
+
+def find_heads(
+    heads: Sequence[str], like: Mapping[str, str]
+) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
+    """Where the columns are, what one unit of each is, and what is wrong with the heads.
+
+    ``like`` has the names of the columns, and for each the input whose units it has; other columns
+    are left out.
+
+    >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
+    ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
+    """
+    places: dict[str, tuple[int, Scale]] = {}
+    faults = []
+    for i, head in enumerate(heads):
+        name, unit = split_unit(head)
+        if name not in like:
+            continue
+        scale = Scale() if unit is None else scale_of(like[name], unit)
+        if scale is None:
+            hint = (
+                "; a frequency is f [Hz]" if name == "omega" and scale_of("f", unit or "") else ""
+            )
+            known = ", ".join(sorted(UNITS_OF[like[name]]))
+            faults.append(
+                f"the column {head!r} has a unit that {name} cannot have{hint}; known are {known}"
+            )
+        if name in places:
+            faults.append(
+                f"{name} is there twice: {heads[places[name][0]]!r} and {head!r}; rename one"
+            )
+        places[name] = i, scale or Scale()
+    if {"f", "omega"} <= places.keys():
+        faults.append("there are both f [Hz] and omega [rad/s]; leave one out")
+    return places, faults
+
+
+def meant_by(head: str, *, loosely: bool = True) -> str | None:
+    """The input that a head is taken for, as a whole or by its first word: ``k_N_per_mm`` for k."""
+    name = split_unit(head)[0]
+    first = re.split(r"[\W_]+", name.strip("_ "))[0]
+    return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
+
+
+def absent(name: str, heads: Sequence[str]) -> str:
+    """What to do about a column that is not there.
+
+    >>> absent("v0", ["speed", "mu_macro"])
+    "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
+    brackets)"
+    """
+    for head in heads:
+        meant = meant_by(head)
+        if meant and meant in (name, {"omega": "f"}.get(name)):
+            remedy = (
+                f"rename that column to {meant} [{unit_of(meant)}] (or another unit in brackets)"
+            )
+            return f"there is no column {name}; {head!r} is similar: {remedy}"
+    unit = f"{name} [{unit_of(name) if name in (*UNITS_OF, *LIKE) else '-'}]"
+    told = f"{unit} or f [Hz]" if name == "omega" else unit
+    return f"there is no column {told}; there are {', '.join(map(repr, heads))}"
+
+
+def read_cell(name: str, cell: str, decimal: str = ".") -> float:
+    """The number in a cell of the column ``name``: NaN where it is empty, infinity for the word
+    rigid in k.
+
+    With a decimal comma 1.5 is refused: it may be meant for 1500.  ValueError says what is wrong.
+
+    >>> read_cell("v0", " 0,5 ", ","), read_cell("k", "Rigid"), read_cell("k", "")
+    (0.5, inf, nan)
+    """
+    text = cell.strip()
+    if not text:
+        return math.nan
+    if name == "k" and is_rigid(text):
+        return math.inf
+    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
+    if not PLAIN.fullmatch(plain):
+        told = decimal == "." or (name == "k" and ".." in text)
+        raise ValueError(
+            number_hint(name, text) if told else f"must be a number such as 0{decimal}5"
+        )
+    value = float(plain)
+    # too many digits must not pass for an infinite stiffness
+    if math.isinf(value) and any(map(str.isdigit, plain)):
+        raise ValueError(TOO_LARGE)
+    return value

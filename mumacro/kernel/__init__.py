@@ -1,0 +1,1 @@
+"""The compiled kernel, and the only Python that calls it."""

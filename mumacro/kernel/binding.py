@@ -1,0 +1,299 @@
+"""The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
+
+It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``,
+``records.h`` and ``library.h``.  A call runs without the interpreter's lock.  There is a kernel for
+every instruction level of the processor; the best one is used, and those with fused multiply-add
+(AVX2, AVX-512, NEON) give the same bits.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cffi import FFI
+
+from mumacro.kernel.arrays import Array, Codes
+
+#: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
+BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
+
+_HERE = Path(__file__).resolve().parent.parent
+_SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
+_DECLARED = "".join(
+    (_HERE / "kernel" / name).read_text("ascii") for name in ("data.h", "records.h", "library.h")
+)
+_FFI = FFI()
+_FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
+_NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"))
+_POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
+_SIX, _STRIDES, _COLUMNS = map(_FFI.typeof, ("double[6]", "int64_t[6]", "double *[6]"))
+_NOTHING: Any = _FFI.NULL
+_new, _unpack = _FFI.new, _FFI.unpack
+
+
+def _numbers(array: Array | None) -> Any:
+    return _NOTHING if array is None else _FFI.from_buffer(_NUMBERS, array)
+
+
+def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, Any, list[Any]]:
+    """Six columns, (n,) or one number, as pointers with their strides, and what these point to."""
+    constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
+    kept = [constants]
+    for i, column in enumerate(columns):
+        if isinstance(column, float):
+            constants[i] = column
+            pointers[i] = constants + i
+        else:
+            pointers[i], strides[i] = pointer, _ = _numbers(column), 1
+            kept.append(pointer)
+    return pointers, strides, kept
+
+
+class Data:
+    """A table as the kernel reads it.
+
+    ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3,
+    PIECE_COLUMNS): first cell, offset, step, relative error.  ``blocks`` (sources + 1,
+    BLOCK_COLUMNS): first cell, cells along b, offset and step along a, along b; zero where no
+    cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
+    """
+
+    def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
+        self.pointer = _new("mumacro_data *")
+        self._kept: list[Any] = []
+        #: points (nodes, 2) and errors (2, 5) of the pieces of a ball, see ``mumacro_rule``; none
+        #: until they are put
+        self.rules: list[tuple[Array, Array]] = []
+        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by
+        #: code of the quantity
+        self.quantities: dict[int, tuple[Array, Array, Array]] = {}
+        self.border, self.pieces, self.blocks, self.outer = (
+            self._keep(self.pointer, name, array)
+            for name, array in (
+                ("border", border),
+                ("pieces", pieces),
+                ("blocks", blocks),
+                ("outer", outer),
+            )
+        )
+        self.pointer.border_cells = self.border.shape[0]
+
+    def put(self, quantity: int, polynomials: Array, errors: Array, slope_errors: Array) -> None:
+        """Add the cells of a quantity, see :attr:`quantities`."""
+        place = self.pointer.quantities[quantity]
+        place.cells = polynomials.shape[0]
+        self.quantities[quantity] = (
+            self._keep(place, "polynomials", polynomials),
+            self._keep(place, "errors", errors),
+            self._keep(place, "slope_errors", slope_errors),
+        )
+
+    def put_rules(self, rules: Sequence[tuple[Array, Array]], driven: Array) -> None:
+        """Add the quadrature of a ball, see :attr:`rules` and ``mumacro_driven_rule``."""
+        for place, (points, errors) in zip(self.pointer.rules, rules, strict=True):
+            self._keep(place, "points", points)
+            place.errors = errors.tolist()
+            place.nodes = points.shape[0]
+        self._keep(self.pointer.driven, "points", driven)
+        self.pointer.driven.nodes = driven.shape[0]
+        self.rules = list(rules)
+
+    def _keep(self, place: Any, name: str, array: Array) -> Array:
+        """Point ``place.name`` to the numbers, which live as long as this object."""
+        array = np.require(array, np.float64, ["C", "A"])
+        pointer = _numbers(array)
+        setattr(place, name, pointer)
+        self._kept.append(pointer)
+        return array
+
+
+class Kernel:
+    """The functions of one instruction level; arrays are contiguous float64 (sources: int8), of one
+    length.
+
+    Illegal points and cases give NaN and the source -1.  See ``kernel/library.h``.
+    """
+
+    def __init__(self, found: Any) -> None:
+        self._found = found
+        self.level: str = _FFI.string(found.level).decode()
+        self.atlas = found.atlas
+        self.ratio = found.ratio  # (data.pointer, v~, y~) -> mu~
+        self._values, self._one, self._cases = found.values, found.one, found.cases
+
+    def text(self, pointer: Any) -> str:
+        """A text of the kernel."""
+        return str(_FFI.string(pointer).decode())
+
+    def quantity(self, code: int) -> Any:
+        """The record of a quantity."""
+        return self._found.quantity(code)
+
+    def values(
+        self,
+        data: Data,
+        quantity: int,
+        v: Array,
+        y: Array,
+        value: Array,
+        bound: Array | None,
+        source: Codes | None,
+        kind: tuple[int, int] = (0, 0),
+    ) -> None:
+        """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where
+        wanted.
+
+        Of another ``kind``, see :meth:`cases`, all three are.
+        """
+        codes = _NOTHING if source is None else _FFI.from_buffer(_CODES, source)
+        arrays = _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
+        self._values(data.pointer, *kind, quantity, v.size, *arrays)
+
+    def value(self, data: Data, quantity: int, v: float, y: float) -> tuple[float, float, int]:
+        """A quantity at one point in plain numbers, its bound and the source."""
+        point, code = _new(_POINT, (v, y)), _new(_CODE)
+        self._values(data.pointer, 0, 0, quantity, 1, point, point + 1, point + 2, point + 3, code)
+        return point[2], point[3], code[0]
+
+    def slopes(
+        self, data: Data, quantity: int, v: Array, y: Array, rows: Array, start: int = 0
+    ) -> None:
+        """Value, slopes along ln v~ and ln y~ and their bounds: ``rows`` (5, N) from column
+        ``start`` on."""
+        out = _numbers(rows.reshape(-1)[start:])
+        self._found.slopes(
+            data.pointer, quantity, v.size, _numbers(v), _numbers(y), out, rows.shape[1]
+        )
+
+    def cases(
+        self,
+        data: Data,
+        n: int,
+        columns: Sequence[Array | float],
+        rows: Array,
+        source: Codes,
+        start: int = 0,
+        kind: tuple[int, int] = (0, 0),
+    ) -> None:
+        """Cases ``start`` to ``start`` + n: fill ``rows`` (3, 5 or 17, N) and ``source`` (n,).
+
+        ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~,
+        y~; slopes by input and their bounds.  ``kind``: another contact and direction, see
+        :class:`mumacro.inputs.kind.Kind`.
+        """
+        pointers, strides, _kept = _columns_of(columns)
+        out = _numbers(rows.reshape(-1)[start:] if start else rows)
+        codes = _FFI.from_buffer(_CODES, source)
+        self._cases(
+            data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
+        )
+
+    def intervals(
+        self,
+        data: Data,
+        n: int,
+        columns: Sequence[Array | float],
+        high: Array,
+        rows: Array,
+        start: int = 0,
+        kind: tuple[int, int] = (0, 0),
+    ) -> None:
+        """As :meth:`cases`, with k from its column to ``high`` (n,): smallest and largest mu_macro
+        and the largest bound met there, ``rows`` (3, N)."""
+        pointers, strides, _kept = _columns_of(columns)
+        out = _numbers(rows.reshape(-1)[start:])
+        self._found.intervals(
+            data.pointer, *kind, n, pointers, strides, _numbers(high), out, rows.shape[1]
+        )
+
+    def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:
+        """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also
+        slopes and bounds."""
+        out, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six  # named: a call with *six takes longer
+        self._one(pointer, mu0, Fz, k, y0, omega, v0, numbers, out)
+        return _unpack(out, numbers)  # type: ignore[no-any-return]
+
+    def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
+        """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
+        out = np.empty(y.size)
+        self._found.border_as(data.pointer, *kind, y.size, _numbers(y), _numbers(out))
+        return out
+
+    def places(self, data: Data, v: Array, y: Array) -> tuple[Codes, Array, Array]:
+        """Blocks of points (n,) with 0 < v~, y~ < infinity, and their coordinates as evaluation
+        counts them."""
+        block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
+        codes = _FFI.from_buffer(_CODES, block)
+        self._found.places(
+            data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
+        )
+        return block, a, b
+
+    def element_steps(
+        self, limit: Array, k: Array, dx: Array, dy: Array, forces: Array, sums: Array
+    ) -> None:
+        """Move contacts (n,) by (dx, dy): ``forces`` (n, springs, 2) in place, ``sums`` (n, 2)
+        filled."""
+        given = map(_numbers, (limit, k, dx, dy, forces, sums))
+        self._found.element_steps(limit.size, forces.shape[1], *given)
+
+    # --- for the builder --------------------------------------------------------------------------
+
+    def forms(
+        self, quantity: int, block: int, v: Array, y: Array, eta: Array
+    ) -> tuple[Array, Array]:
+        """(base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1 counts
+        in the corner."""
+        base, factor = np.empty(v.shape), np.empty(v.shape)
+        v, y, eta = (np.ascontiguousarray(x, np.float64) for x in (v, y, eta))
+        self._found.forms(quantity, block, v.size, *map(_numbers, (v, y, eta, base, factor)))
+        return base, factor
+
+    def border_scales(self, piece: int, y: Array) -> tuple[Array, Array]:
+        """What node values of a piece of the border, and what its cells, are multiplied by to give
+        v~crit, (n,)."""
+        of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
+        self._found.border_scales(
+            piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells))
+        )
+        return of_nodes, of_cells
+
+    def cell_shares(self, w: Array) -> tuple[Array, Array]:
+        """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below
+        the border, (n,)."""
+        inside, at_border = np.empty(w.size), np.empty(w.size)
+        self._found.cell_shares(
+            w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border))
+        )
+        return inside, at_border
+
+    def normal_form_root(self, v: Array, eta: Array) -> Array:
+        """Positive root of phi^3 + 2 eta phi = pi v~, (n,)."""
+        out = np.empty(v.size)
+        self._found.normal_form_root(v.size, *map(_numbers, (v, eta, out)))
+        return out
+
+    def outer_expansion(self, r: Array) -> Array:
+        """f, g, r f', r g', r (r f')' of mu~ = f(r) + g(r)/v~^2 + ... at r = y~/v~, shape (n,
+        5)."""
+        out = np.empty((r.size, 5))
+        self._found.outer_expansion(r.size, _numbers(r), _numbers(out))
+        return out
+
+
+def _shared() -> Any:
+    try:
+        return _FFI.dlopen(str(_SHARED_OBJECT))
+    except OSError as error:
+        raise ImportError(
+            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing or does not fit this "
+            f"machine ({error}): install a wheel for this platform, or build one with a C compiler "
+            "or the package ziglang: pip install ."
+        ) from None
+
+
+_LIBRARY = _shared()
+#: the kernels that this processor can run, the best one last
+kernels = [Kernel(one) for one in map(_LIBRARY.mumacro_kernel_at, range(3)) if one != _NOTHING]

@@ -1,0 +1,185 @@
+"""The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of each.
+
+The list of blocks, of pieces of the border and of quantities is in ``kernel/atlas.c`` and
+``kernel/records.c``; this module reads it.  What a table file calls a coordinate is defined here,
+with both ways between a chart and (v~, y~).
+
+Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the
+drive is v~ mu~. The stick fraction f is the share of the period during which the contact sticks.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import kernels
+
+_ATLAS = kernels[-1].atlas
+_text = kernels[-1].text
+
+Y_STICK_LO, Y_STICK_HI, Y_CONT = _ATLAS.y_stick_lo, _ATLAS.y_stick_hi, _ATLAS.y_cont
+Y_MID, Y_HIGH, Y_TAIL = _ATLAS.y_mid, _ATLAS.y_high, _ATLAS.y_tail
+S_CUT, SIGMA_CUT = _ATLAS.s_cut, _ATLAS.sigma_cut
+RHO_MAX, FAST_KAPPA = _ATLAS.rho_max, _ATLAS.fast_kappa
+ROUNDING = _ATLAS.rounding  # of coordinates and sums, relative to the scale of the value
+SQRT2 = math.sqrt(2.0)
+REGIMES = tuple(_text(_ATLAS.regime_name[i]) for i in range(_ATLAS.regimes))
+CONTINUOUS, STICK_SLIP, STATIC = (
+    REGIMES.index(name) for name in ("continuous", "stick_slip", "static")
+)
+
+#: coordinate of a table file -> what it is
+COORDINATES = {
+    "y_squared": "square of the dimensionless amplitude",
+    "v_squared_share": "v_tilde^2/(1 + v_tilde^2)",
+    "ln_y": "natural logarithm of y_tilde",
+    "ln_rho": "natural logarithm of v_tilde/v_tilde_crit",
+    "ln_kappa": "natural logarithm of v_tilde/sqrt(y_tilde)",
+    "inverse_y": "1/y_tilde",
+    "s": "s with v_tilde = v_tilde_crit sin^2(pi s/2)",
+    "y": "dimensionless amplitude y_tilde",
+    "radius": "distance R from the corner y_tilde = 1, v_tilde = 0 in normal-form coordinates",
+    "angle": "polar angle of the normal form, 2 psi/pi",
+}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One coordinate of a chart: its name in :data:`COORDINATES` and its range in the table file.
+
+    Evaluation uses a coordinate that costs less than the file's where the two differ: sigma for s
+    and tan(psi/2) for the angle.  sigma is sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho =
+    v~/v~crit = 1/2 on: both square-root edges become smooth for one square root, and the knot
+    between the halves is an edge of cells.
+    """
+
+    name: str
+    low: float
+    high: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The range of evaluation's coordinate; along s the cells cover all of [0, sqrt 2]."""
+        return (0.0, SQRT2) if self.name == "s" else (self.low, self.high)
+
+    def to_file(self, x: Array) -> Array:
+        """The table file's coordinate at evaluation's ``x`` (n,)."""
+        if self.name == "angle":
+            return np.asarray(4.0 / np.pi * np.arctan(x), dtype=np.float64)
+        if self.name != "s":
+            return x
+        low = np.arcsin(np.minimum(x, math.sqrt(0.5)))
+        high = 0.5 * math.pi - np.arcsin(np.clip(SQRT2 - x, 0.0, math.sqrt(0.5)))
+        return np.asarray(2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high))
+
+    def to_evaluation(self, x: Array) -> Array:
+        """Evaluation's coordinate at the table file's ``x`` (n,)."""
+        if self.name == "angle":
+            return np.asarray(np.tan(0.25 * np.pi * x), dtype=np.float64)
+        if self.name != "s":
+            return x
+        return np.where(x <= 0.5, np.sin(0.5 * np.pi * x), SQRT2 - np.cos(0.5 * np.pi * x))
+
+    def amplitude(self, x: Array) -> Array:
+        """y~ at the table file's coordinate ``x``, if this is an axis of amplitudes."""
+        if self.name == "y_squared":
+            return np.asarray(np.sqrt(x), dtype=np.float64)
+        if self.name == "ln_y":
+            return np.asarray(np.exp(x), dtype=np.float64)
+        return np.asarray(1.0 / x if self.name == "inverse_y" else x.copy(), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One tabulated quantity: name, variable in a block of a table file, meaning.
+
+    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a
+    jump there.
+    """
+
+    name: str
+    variable: str
+    meaning: str
+    while_sliding: bool
+    smooth_at_border: bool
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One block: name, regime, coordinates with their ranges, and what its nodes hold for mu~.
+
+    ``floor`` and ``rounding`` are what the bound of mu~ allows for rounding, absolute and relative
+    to the factor.
+    """
+
+    name: str
+    regime: int
+    a: Axis
+    b: Axis
+    quantity: str
+    floor: float = field(repr=False)
+    rounding: float = field(repr=False)
+
+    def point(
+        self, a: Array, b: Array, border_of: Callable[[Array], Array]
+    ) -> tuple[Array, Array, Array]:
+        """(v~, y~, eta = y~ - 1) at the table file's coordinates ``a``, ``b`` (broadcast together).
+
+        eta is exact in the corner, where rounding y~ to double costs 1e-16/mu~.  ``border_of``
+        gives v~crit(y~): the stored curve, so that nodes and evaluation use the same one.
+        """
+        a, b = np.broadcast_arrays(a, b)
+        if self.a.name == "radius":
+            phi = a * np.sin(0.5 * math.pi * b) / SQRT2
+            s0 = SQRT2 * a * np.cos(0.5 * math.pi * b)
+            eta = 0.25 * s0 * s0 - 0.5 * phi * phi
+            return phi * s0 * s0 / (2.0 * math.pi), 1.0 + eta, eta
+        y = self.a.amplitude(a)
+        if self.b.name == "v_squared_share":
+            v = np.sqrt(b / (1.0 - b))
+        elif self.b.name == "ln_rho":
+            v = np.exp(b) * border_of(y)
+        elif self.b.name == "ln_kappa":
+            v = np.exp(b) * np.sqrt(y)
+        else:
+            v = border_of(y) * np.sin(0.5 * math.pi * b) ** 2
+        return v, y, y - 1.0
+
+    def holds(self, quantity: Quantity) -> bool:
+        """Whether the block tabulates a quantity; elsewhere it is zero."""
+        return self.regime != CONTINUOUS or quantity.while_sliding
+
+
+def _axis(found: Any) -> Axis:
+    return Axis(_text(found.name), found.low, found.high)
+
+
+def _quantity(q: Any) -> Quantity:
+    said = _text(q.name), _text(q.variable), _text(q.meaning)
+    return Quantity(*said, bool(q.while_sliding), bool(q.smooth_at_border))
+
+
+#: a block's place in this list is the source code of its values
+CHARTS = tuple(
+    Chart(_text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding)
+    for c in (_ATLAS.chart[i] for i in range(_ATLAS.charts))
+)
+NAMES = tuple(chart.name for chart in CHARTS)
+#: v~crit in pieces: name, coordinate, what its nodes hold
+BORDER_PIECES = tuple(
+    (_text(p.name), _axis(p.axis), _text(p.tabulated))
+    for p in (_ATLAS.piece[i] for i in range(_ATLAS.pieces))
+)
+QUANTITIES = tuple(_quantity(kernels[-1].quantity(i)) for i in range(_ATLAS.quantities))
+QUANTITY_NAMES = tuple(quantity.name for quantity in QUANTITIES)
+MU, POWER, STICK = map(QUANTITY_NAMES.index, ("mu_ratio", "power", "stick_fraction"))
+#: where an answer comes from: a block, or a limit in closed form
+SOURCES = tuple(_text(_ATLAS.source_name[i]) for i in range(_ATLAS.sources))
+#: regime code of every source code
+REGIME_OF_SOURCE = np.array(
+    [_ATLAS.regime_of_source[i] for i in range(_ATLAS.sources)], dtype=np.int8
+)

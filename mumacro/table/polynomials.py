@@ -1,0 +1,223 @@
+"""From the Chebyshev nodes of the file to the cells of the evaluation; and the value of one cell.
+
+The file holds the values at tensor-product Chebyshev points of the first kind: no node is on an
+edge, where a solve would be ill conditioned, and the interpolant is the near-best polynomial on the
+closed rectangle.  Every block is cut into cells; each cell holds a polynomial of degree 7 in both
+local coordinates u, w in [-1, 1] as power-basis coefficients.
+"""
+
+import functools
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import BLOCK_COLUMNS, PIECE_COLUMNS, Data, kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import Axis
+
+if TYPE_CHECKING:
+    from mumacro.table.netcdf import Block, BorderPiece
+
+WIDTH = 8  # coefficients of a cell along each coordinate: one vector
+
+# Chebyshev points of one cell and the matrix that takes values there to power-basis coefficients,
+# highest power first
+LOCAL = -np.cos((np.arange(WIDTH) + 0.5) * np.pi / WIDTH)
+_TO_POWERS: Array = np.linalg.inv(np.vander(LOCAL, WIDTH))
+
+
+def nodes(n: int, low: float, high: float) -> Array:
+    """Chebyshev points of the first kind on [low, high], ascending, shape (n,)."""
+    x = -np.cos((np.arange(n) + 0.5) * np.pi / n)
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * x, dtype=np.float64)
+
+
+def coefficient_matrix(n: int) -> Array:
+    """Matrix (n, n) from values at ``n`` :func:`nodes` to the Chebyshev coefficients of the
+    interpolant."""
+    # the angle in whole parts of a turn: rounding it is seen in second derivatives at the edges
+    parts = np.outer(np.arange(n), 2 * np.arange(n, 0, -1) - 1) % (4 * n)
+    matrix = 2.0 / n * np.cos(np.pi * parts / (2 * n))
+    matrix[0] *= 0.5
+    return np.asarray(matrix, dtype=np.float64)
+
+
+def chebyshev_coefficients(values: Array) -> Array:
+    """Chebyshev coefficients of the interpolant through ``values`` at :func:`nodes`, along every
+    axis."""
+    out = np.asarray(values, dtype=np.float64)
+    for axis in range(out.ndim):
+        matrix = coefficient_matrix(out.shape[axis])
+        out = np.moveaxis(np.tensordot(matrix, out, axes=(1, axis)), 0, axis)
+    return out
+
+
+def interpolation_matrix(n: int, t: Array) -> Array:
+    """Matrix (len(t), n) from Chebyshev coefficients to values at ``t`` in [-1, 1]."""
+    return np.asarray(chebyshev.chebvander(t, n - 1), dtype=np.float64)
+
+
+def _count(axis: Axis, cells: int) -> tuple[float, float]:
+    """(offset, step) with which step * coordinate + offset counts cells from 0; its whole part is
+    the cell.
+
+    The far end is slightly below ``cells``, so that it belongs to the last cell.
+    """
+    start, stop = axis.span
+    step = cells / (stop - start) * (1.0 - 2.0**-51)
+    return -step * start, step
+
+
+def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
+    """Points of all cells of one axis: as evaluation's coordinate and as positions in [-1, 1] on
+    the axis of nodes.
+
+    Along s, points below the block are never visited; cells that lie wholly below it repeat its
+    edge.
+    """
+    start, stop = axis.span
+    edge = np.arange(cells)[:, None]
+    x = (start + (stop - start) * (0.5 * (2.0 * edge + 1.0 + LOCAL[None, :]) / cells)).ravel()
+    at = axis.to_file(x)
+    if axis.name == "s":
+        dead = axis.to_file(atlas.SQRT2 * (np.arange(cells) + 1.0) / cells) <= axis.low
+        at.reshape(cells, WIDTH)[dead] = axis.low
+    return x, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
+
+
+def cells_1d(piece: int, values: Array, cells: int) -> Array:
+    """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node
+    ``values`` (n,)."""
+    x, at = cell_positions(atlas.BORDER_PIECES[piece][1], cells)
+    local = (
+        interpolation_matrix(values.size, at)
+        @ chebyshev_coefficients(values)
+        * cell_scale(piece, x)
+    )
+    return _to_powers(local.reshape(cells, WIDTH))
+
+
+def cell_scale(piece: int, x: Array) -> Array:
+    """What a piece of v~crit is multiplied by from nodes to cells, at its coordinate ``x`` (n,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):  # both are infinite at y~ = infinity
+        of_nodes, of_cells = kernels[-1].border_scales(
+            piece, atlas.BORDER_PIECES[piece][1].amplitude(x)
+        )
+        return np.where(of_nodes == of_cells, 1.0, of_nodes / of_cells)
+
+
+def _to_powers(local: Array) -> Array:
+    """Power-basis coefficients, highest power first, of values (cells, WIDTH) at the points of each
+    cell."""
+    # the mean apart: the change of basis multiplies rounding errors by a hundred
+    mean = local.mean(axis=1)
+    out: Array = np.ascontiguousarray((local - mean[:, None]) @ _TO_POWERS.T)
+    out[:, -1] += mean
+    return out
+
+
+def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
+    """Power-basis coefficients (cells along a * cells along b, WIDTH, WIDTH) of node ``values``
+    (n_a, n_b).
+
+    Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from 7 down to
+    0.
+    """
+    left = interpolation_matrix(values.shape[0], cell_positions(a, cells[0])[1])
+    right = interpolation_matrix(values.shape[1], cell_positions(b, cells[1])[1])
+    local = (left @ chebyshev_coefficients(values) @ right.T).reshape(
+        cells[0], WIDTH, cells[1], WIDTH
+    )
+    mean = local.mean(axis=(1, 3))
+    power = np.einsum(
+        "pi,aibj,qj->abqp", _TO_POWERS, local - mean[:, None, :, None], _TO_POWERS, optimize=True
+    )
+    power[:, :, -1, -1] += mean
+    return np.asarray(power, dtype=np.float64).reshape(-1, WIDTH, WIDTH)
+
+
+def _joined(patches: Sequence[Array]) -> Array:
+    """The patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line: a row
+    lies in one."""
+    shape = (sum(p.shape[0] for p in patches), WIDTH, WIDTH)
+    raw = np.empty(math.prod(shape) + WIDTH)
+    skip = (-raw.ctypes.data % 64) // 8
+    return np.concatenate(patches, out=raw[skip : skip + math.prod(shape)].reshape(shape))
+
+
+def border_cells(pieces: Sequence["BorderPiece"]) -> tuple[Array, Array]:
+    """The stored border for evaluation: coefficients (cells, WIDTH) and pieces (3,
+    PIECE_COLUMNS)."""
+    coefficients, rows, first = [], np.zeros((len(pieces), PIECE_COLUMNS)), 0
+    worst = max(piece.max_rel_error for piece in pieces)
+    for index, piece in enumerate(pieces):
+        coefficients.append(cells_1d(index, piece.values, piece.cells))
+        rows[index] = first, *_count(atlas.BORDER_PIECES[index][1], piece.cells), worst
+        first += piece.cells
+    return np.concatenate(coefficients), rows
+
+
+def block_rows(blocks: Sequence["Block"]) -> Array:
+    """The geometry of the blocks for evaluation, (sources + 1, BLOCK_COLUMNS)."""
+    rows, first = np.zeros((len(atlas.SOURCES) + 1, BLOCK_COLUMNS)), 0
+    for row, chart, block in zip(rows, atlas.CHARTS, blocks, strict=False):
+        na, nb = block.cells
+        row[:6] = first, nb, *_count(chart.a, na), *_count(chart.b, nb)
+        first += na * nb
+    return rows
+
+
+def quantity_cells(blocks: Sequence["Block"], quantity: int) -> tuple[Array, Array, Array]:
+    """What :meth:`mumacro.kernel.binding.Data.put` wants of a quantity: polynomials, errors, errors
+    in every cell."""
+    name, errors = atlas.QUANTITY_NAMES[quantity], np.zeros((len(atlas.SOURCES) + 1, 2))
+    patches, in_cells = [], []
+    for error, chart, block in zip(errors, atlas.CHARTS, blocks, strict=False):
+        cells = block.cells[0] * block.cells[1]
+        nodes = block.nodes.get(name)
+        patches.append(
+            np.zeros((cells, WIDTH, WIDTH))
+            if nodes is None
+            else cells_2d(chart.a, chart.b, nodes, block.cells)
+        )
+        error[0] = block.errors[name][0]
+        if quantity == atlas.MU:
+            error += chart.rounding, chart.floor
+        in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))  # none where it is zero
+    return _joined(patches), errors, np.concatenate(in_cells)
+
+
+@functools.cache
+def outer_cells() -> Array:
+    """Coefficients (cells, 2, WIDTH) of f and g + r f'/2 of the limit of large speed, in cells of
+    ln (1 + r^2)."""
+    kernel = kernels[-1]
+    cells, top = kernel.atlas.outer_cells, kernel.atlas.outer_log_max
+    r = np.sqrt(np.expm1((np.arange(cells)[:, None] + 0.5 + 0.5 * LOCAL) * top / cells))
+    f, g, slope, _, _ = kernel.outer_expansion(r.ravel()).T
+    return np.stack([_to_powers(x.reshape(cells, WIDTH)) for x in (f, g + 0.5 * slope)], axis=1)
+
+
+class Border:
+    """The border of continuous sliding, v~crit(y~): the stored curve inside, its limits at both
+    ends.
+
+    ``arrays`` are what the kernel reads, see :func:`border_cells`; ``max_rel_error`` bounds the
+    stored curve's error.
+    """
+
+    def __init__(self, pieces: Sequence["BorderPiece"]) -> None:
+        self.arrays: tuple[Array, Array] = border_cells(pieces)
+        self.max_rel_error = max(piece.max_rel_error for piece in pieces)
+        self._data = Data(
+            *self.arrays, np.zeros((len(atlas.SOURCES) + 1, BLOCK_COLUMNS)), outer_cells()
+        )
+
+    def __call__(self, y: Array) -> Array:
+        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN for what is no
+        amplitude."""
+        return kernels[-1].border(self._data, np.ascontiguousarray(y).reshape(-1)).reshape(y.shape)
