@@ -21,6 +21,9 @@ SCALARS = {
     "mu_ratio(v, y)": "s.mu_ratio(0.1, 0.5)",
     "evaluate, floats": "s.evaluate(**case)",
     "evaluate, gradient=True": "s.evaluate(**case, gradient=True)",
+    "evaluate, k from a tenth to ten times": "s.evaluate(**soft, k_range=near)",
+    "evaluate, k from 1e-300 to 1e300": "s.evaluate(**soft, k_range=(1e-300, 1e300))",
+    "the same, a ball": "s.evaluate(**soft, k_range=(1e-300, 1e300), contact='ball')",
 }
 ARRAYS = {
     "scipy.special.ellipk(m), for comparison": "ellipk(m)",
@@ -62,6 +65,8 @@ def calls(points: int, quick: bool) -> str:
         "y": y,
         "m": rng.uniform(0.0, 1.0, n),
         "case": CASE,
+        "soft": {name: x for name, x in CASE.items() if name != "k"},
+        "near": (0.1 * CASE["k"], 10.0 * CASE["k"]),
         "many": {**CASE, "v0": 0.4 * v, "y0": 3e-6 * y},
     }
     tables = []

@@ -24,7 +24,7 @@ from mumacro.inputs.fields import (
     picked,
     real,
 )
-from mumacro.inputs.k_range import ENDS, as_ends, extremes, middle
+from mumacro.inputs.k_range import ENDS, as_ends, middle
 from mumacro.inputs.kind import (
     AMPLITUDE,
     SPRING,
@@ -34,7 +34,7 @@ from mumacro.inputs.kind import (
     kind_of,
 )
 from mumacro.kernel import slices
-from mumacro.kernel.arrays import Array, Places
+from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Data, kernels
 from mumacro.kernel.threads import default_threads
 from mumacro.table import atlas
@@ -731,14 +731,9 @@ class Surrogate:
         groups: bool,
         kind: Kind = SPRING,
     ) -> Answer[Array]:
-        # a value that holds for all cases stays one value
-        flat = [
-            float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape)
-            for c in columns
-        ]
         found, source = slices.cases(
             self._data_of(kind),
-            flat,
+            [_flat_or_one(column, shape) for column in columns],
             math.prod(shape),
             self.threads,
             17 if gradient else 5 if groups else 3,
@@ -764,17 +759,13 @@ class Surrogate:
     ) -> IntervalAnswer[Array]:
         """``answer`` for the middle of an interval of k, and the extremes over it."""
         shape = answer.mu_macro.shape
-        flat = {name: _flat(column, shape) for name, column in columns.items()}
-
-        def evaluate(k: Array, places: Places) -> tuple[Array, Array, Array]:
-            six = [
-                _contiguous(k if name == "k" else column[places]) for name, column in flat.items()
-            ]
-            rows = slices.cases(self._data_of(kind), six, k.size, self.threads, 17, kind)[0]
-            return rows[0], rows[2], rows[5 + FIELDS.index("k")] * k
-
-        low, high, bound = extremes(
-            evaluate, *(np.array(np.broadcast_to(end, shape)).ravel() for end in ends)
+        first, last = ends
+        low, high, bound = slices.intervals(
+            self._data_of(kind),
+            [_flat_or_one(column, shape) for column in {**columns, "k": first}.values()],
+            _flat(last, shape),
+            self.threads,
+            kind,
         )
         out: IntervalAnswer[Array] = IntervalAnswer(
             answer.mu_macro,
@@ -938,6 +929,13 @@ def _common_shape(arrays: Sequence[Array]) -> tuple[int, ...]:
 def _contiguous(a: Array) -> Array:
     """``a`` as the kernel wants it: contiguous, aligned float64."""
     return a if a.flags.carray and a.dtype == np.float64 else np.require(a, np.float64, ["C", "A"])
+
+
+def _flat_or_one(a: Any, shape: tuple[int, ...]) -> Array | float:
+    """As :func:`_flat`; a value that holds for all cases stays one value."""
+    if type(a) is not np.ndarray:
+        return float(a)
+    return float(a.item()) if a.size == 1 else _flat(a, shape)
 
 
 def _flat(a: Array, shape: tuple[int, ...]) -> Array:
