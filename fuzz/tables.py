@@ -29,7 +29,8 @@ import numpy as np
 from benchmarks.measuring import ROOT, main, markdown, sections
 from mumacro import Surrogate, TableError
 from mumacro.table.atlas import BORDER_PIECES
-from mumacro.table.netcdf import Table, parse_table, read_table, write_table
+from mumacro.table.blocks import Table
+from mumacro.table.netcdf import parse_table, read_table, write_table
 from mumacro.table.polynomials import nodes
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"

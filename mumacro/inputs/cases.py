@@ -26,6 +26,7 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.k_range import BOUND, ENDS
 from mumacro.inputs.kind import AMPLITUDE, DIRECTIONS, LIFTS_OFF, SPRING, Kind
+from mumacro.inputs.units import unknown_name
 from mumacro.kernel.arrays import Array, common_shape, flat
 
 
@@ -230,6 +231,9 @@ def other_five(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> di
                 "both ends of it"
             )
             raise InputError(name, case[name], told)
+    for name in case.keys() - {*kind.columns, *_AMPLITUDES, "k_range", *ENDS}:
+        bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
+        raise InputError(name, case[name], bound)
     inputs = {
         name: value for name, value in case.items() if value is not None or name == "k" != unknown
     }
