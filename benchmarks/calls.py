@@ -107,7 +107,7 @@ def far_end(points: int, quick: bool) -> str:  # noqa: ARG001
     """`mu_ratio` of equal points, beside the median over places from 1e-3 to 1e3."""
     s, n = mumacro.open(1e-10, threads=1), 200 if quick else 2000
     rng = np.random.default_rng(0)
-    places = {str(i): 10.0 ** rng.uniform(-3.0, 3.0, 2) for i in range(20 if quick else 200)}
+    places = {str(i): tuple(10.0 ** rng.uniform(-3.0, 3.0, 2)) for i in range(20 if quick else 200)}
     work = {
         name: partial(s.mu_ratio, np.full(n, v), np.full(n, y))
         for name, (v, y) in {**places, **FAR}.items()

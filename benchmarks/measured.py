@@ -65,7 +65,7 @@ def fitted(contact: str, mu0: Any = None, unknowns: Any = None) -> Fit:
         return fit(columns, unknowns, contact=contact, surrogate=table(), **ALONG, **RIG)
 
 
-def force(contact: str, k: Any, mu0: Any, v0: Any) -> Array:
+def force(contact: Any, k: Any, mu0: Any, v0: Any) -> Array:
     """Friction of the model [N]."""
     mu = table().evaluate(mu0=mu0, k=k, v0=v0, contact=contact, **ALONG, **RIG).mu_macro
     return np.asarray(FZ * mu)

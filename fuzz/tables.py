@@ -127,12 +127,11 @@ def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
         if table.attributes["content_sha256"] != expected.checksum:
             ask(Surrogate(table, path))
             what = DIFFERS
-        elif table.attributes != expected.table.attributes:
-            names = [
-                n
-                for n, value in expected.table.attributes.items()
-                if table.attributes.get(n) != value
-            ]
+        elif names := [
+            name
+            for name, value in expected.table.attributes.items()
+            if not np.array_equal(np.asarray(table.attributes.get(name)), np.asarray(value))
+        ]:
             what, said = TEXTS, ", ".join(names)
     except TableError as error:
         what, said = REFUSED, error.reason

@@ -185,7 +185,7 @@ def test_every_committed_file_is_tested() -> None:
 
 
 def test_the_stated_shares_of_errors_end_at_the_largest(table: Surrogate) -> None:
-    told = table.attributes
+    told: Any = table.attributes
     largest = {name: part["1"] for name, part in table.error_distribution.items()}
     assert largest["mu_ratio"] == told["verified_max_abs_error"] <= table.tolerance
     assert largest["power"] == told["verified_max_rel_power_error"]

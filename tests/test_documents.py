@@ -174,7 +174,7 @@ def shown_distribution() -> dict[tuple[str, str, str], list[str]]:
 
 def test_the_distribution_of_errors_on_the_page_is_what_the_tables_state() -> None:
     shown = shown_distribution()
-    made = {tuple(row[:3]): row[3:] for row in error_distribution.spring_across()}
+    made = {(row[0], row[1], row[2]): row[3:] for row in error_distribution.spring_across()}
     assert len(made) == 24
     assert {place: shown[place] for place in made} == made
     assert {contact for contact, *_ in shown} == {

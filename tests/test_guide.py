@@ -75,6 +75,16 @@ ELSEWHERE = {
     "python benchmarks/hard_cases.py": ("tests/test_benchmarks.py", '"hard_cases")'),
     "python benchmarks/validation.py": ("tests/test_benchmarks.py", '("validation", '),
     "python benchmarks/validity.py": ("tests/test_benchmarks.py", '"validity", '),
+    "python benchmarks/measured.py": ("tests/test_measured.py", "measured.SECTIONS"),
+    "python benchmarks/error_distribution.py": (
+        "tests/test_benchmarks.py",
+        '"error_distribution --share',
+    ),
+    "python -m builder verify TABLE --write": (
+        "tests/test_builder_cli.py",
+        'here(*words, "--write")',
+    ),
+    "mumacro law --approximations": ("tests/test_command.py", '*words, "--approximations")'),
     "python benchmarks/tables_readme.py": ("tests/test_benchmarks.py", "tables_readme.tables("),
     "gcc -O2 -c mumacro.c mumacro_table.c && gfortran mumacro.f90 friction.f90 mumacro.o "
     "mumacro_table.o -lm": ("tests/test_c_languages.py", '"mumacro.f90"'),

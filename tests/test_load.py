@@ -168,7 +168,7 @@ def test_a_fold_has_its_three_roots_stretched(surrogate: Surrogate, m: float) ->
 @settings(max_examples=15, deadline=None)
 @given(log_v0=st.floats(-5.0, 0.0), share=st.floats(0.001, 0.999), m=st.floats(0.1, 0.8))
 def test_no_root_is_missed(
-    surrogate: Surrogate, contact: str, log_v0: float, share: float, m: float
+    surrogate: Surrogate, contact: Any, log_v0: float, share: float, m: float
 ) -> None:
     case = {**CASE, "v0": 10.0**log_v0}
     loads = CASE["Fz"] * np.geomspace(1e-9, 1e9, 20_001)
@@ -346,7 +346,7 @@ def posted(client: Any, path: str, code: int = 200, **asked: Any) -> Any:
     return response.json()
 
 
-SWEPT = {"along": "Fz", "start": 1.0, "stop": 100.0, "points": 3}
+SWEPT: dict[str, Any] = {"along": "Fz", "start": 1.0, "stop": 100.0, "points": 3}
 
 
 def test_the_service_takes_the_load_at_which_k_holds(client: Any) -> None:

@@ -18,9 +18,10 @@ pyplot = pytest.importorskip("matplotlib.pyplot")
 def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Each section's text, without a picture in docs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measured, "IMAGES", tmp_path_factory.mktemp("img"))
+        images = tmp_path_factory.mktemp("img")
+        patch.setattr(measured, "IMAGES", images)
         found = {name: section() for name, section in measured.SECTIONS.items()}
-        assert (measured.IMAGES / "measured.png").read_bytes().startswith(b"\x89PNG")
+        assert (images / "measured.png").read_bytes().startswith(b"\x89PNG")
     return {**found, "normal": validation.normal_oscillation()}
 
 

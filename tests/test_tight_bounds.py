@@ -331,7 +331,7 @@ CLOSEST = {
 
 @pytest.mark.parametrize("form", ["along", "normal"])
 def test_the_rounding_of_one_spring_along_and_normal_is_bounded_tightly(
-    table: Surrogate, form: str
+    table: Surrogate, form: Any
 ) -> None:
     six = CLOSEST[form]
     name = "Fz_amplitude" if form == "normal" else "y0"
