@@ -158,6 +158,7 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, double s
     const int most = m->drag > 0.0 ? MU_MOTION_PERIODS : MU_MOTION_REST_PERIODS;
     double last_moved[2] = {0.0, 0.0}, last_end[2] = {0.0, 0.0}, last = HUGE_VAL;
     mu_steady found;
+    int between;
     for (int period = 1;; ++period) {
         double end[2] = {f[0], f[1]}, moved[2], size, rate;
         found = mu_period(m, grid, share, end, 0.0, NULL);
@@ -169,24 +170,27 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, double s
         if (m->drag == 0.0 && found.decay == 0.0) found.error = 0.0; /* it sticks: each period is the same */
         if (m->drag == 0.0 && size < last) found.error = mu_min(found.error, 2.0 * size * last / (last - size));
         if (found.error <= goal || size <= 4e-16 * share || period >= most) return found;
-        if (m->drag == 0.0 || last == HUGE_VAL || size >= last || found.decay == 0.0) {
+        /* what the last change and this one say together: whether a step of the secant is worth it */
+        between = moved[0] * last_moved[0] + moved[1] * last_moved[1] < 0.0;
+        if (m->drag > 0.0 && last < HUGE_VAL && (size < last || between)) {
+            const double dx = moved[0] - last_moved[0], dy = moved[1] - last_moved[1], square = dx * dx + dy * dy;
+            const double back = square > 0.0 ? (dx * moved[0] + dy * moved[1]) / square : 0.0;
+            f[0] = end[0] - back * (end[0] - last_end[0]);
+            f[1] = end[1] - back * (end[1] - last_end[1]);
+            last = size;
+        } else {
             f[0] = end[0];
             f[1] = end[1];
-            if (m->drag > 0.0 && found.decay == 0.0 && size > 0.0) { /* the drag only stretches it: up to the limit */
+            last = size;
+            if (m->drag > 0.0 && found.decay == 0.0) { /* the drag only stretches it: up to the limit */
                 const double a = size * size, b = end[0] * moved[0] + end[1] * moved[1];
                 const double c = mu_min(end[0] * end[0] + end[1] * end[1] - limit * limit, 0.0);
                 const double times = mu_max((sqrt(mu_max(b * b - a * c, 0.0)) - b) / a, 0.0);
                 f[0] += times * moved[0];
                 f[1] += times * moved[1];
             }
-        } else {
-            const double dx = moved[0] - last_moved[0], dy = moved[1] - last_moved[1], square = dx * dx + dy * dy;
-            const double share_of = square > 0.0 ? (dx * moved[0] + dy * moved[1]) / square : 0.0;
-            f[0] = end[0] - share_of * (end[0] - last_end[0]);
-            f[1] = end[1] - share_of * (end[1] - last_end[1]);
         }
         mu_keep_below(limit, f);
-        last = m->drag > 0.0 && size >= last ? HUGE_VAL : size;
         memcpy(last_moved, moved, sizeof moved);
         memcpy(last_end, end, sizeof end);
     }
