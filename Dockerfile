@@ -4,6 +4,9 @@
 #   docker build -t mumacro .
 #   docker run --read-only --cap-drop=all -p 127.0.0.1:8000:8000 mumacro
 #
+# These two are not run by the checks as they stand: deploy/container.sh does the same by docker or
+# podman, under names and a port of its own.
+#
 # BASE may be any image with a `python3` of 3.11 or newer.  BUILD_BASE, if it is another image, must have the same
 # Python at the same path and the same C library: the environment made in it has the path of its interpreter.
 # BUILD_BASE must be able to make a virtual environment; BASE needs neither that nor a shell.
@@ -32,8 +35,8 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after linking.
     && if command -v strip >/dev/null; then \
         find venv -name '*.so' -not -path '*.libs/*' -exec strip --strip-unneeded {} +; fi \
-# WebSockets and restarts on changed files are switched off, and pip has no business in a running image.
-    && venv/bin/python -m pip uninstall --quiet --yes websockets watchfiles pip setuptools
+# pip has no business in a running image.
+    && venv/bin/python -m pip uninstall --quiet --yes pip setuptools
 COPY LICENSE ./
 COPY mumacro mumacro
 COPY service service

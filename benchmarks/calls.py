@@ -21,6 +21,9 @@ SCALARS = {
     "mu_ratio(v, y)": "s.mu_ratio(0.1, 0.5)",
     "evaluate, floats": "s.evaluate(**case)",
     "evaluate, gradient=True": "s.evaluate(**case, gradient=True)",
+    "evaluate, k from a tenth to ten times": "s.evaluate(**soft, k_range=near)",
+    "evaluate, k from 1e-300 to 1e300": "s.evaluate(**soft, k_range=(1e-300, 1e300))",
+    "the same, a ball": "s.evaluate(**soft, k_range=(1e-300, 1e300), contact='ball')",
 }
 ARRAYS = {
     "scipy.special.ellipk(m), for comparison": "ellipk(m)",
@@ -62,6 +65,8 @@ def calls(points: int, quick: bool) -> str:
         "y": y,
         "m": rng.uniform(0.0, 1.0, n),
         "case": CASE,
+        "soft": {name: x for name, x in CASE.items() if name != "k"},
+        "near": (0.1 * CASE["k"], 10.0 * CASE["k"]),
         "many": {**CASE, "v0": 0.4 * v, "y0": 3e-6 * y},
     }
     tables = []
@@ -84,5 +89,35 @@ def calls(points: int, quick: bool) -> str:
     return "\n\n".join([said, *tables, processes(quick)])
 
 
+#: places that cost more than most: v~, y~
+FAR = {
+    "y~ = 1e3, v~ = 0.1": (0.1, 1e3),
+    "y~ = 130,000, v~ = 0.1": (0.1, 1.3e5),
+    "y~ = 132,000, v~ = 0.1": (0.1, 1.32e5),
+    "y~ = 1e8, v~ = 1e3": (1e3, 1e8),
+    "y~ = 1, v~ = 1e-2": (1e-2, 1.0),
+    "y~ = 1, v~ = 1e-4": (1e-4, 1.0),
+    "y~ = 1, v~ = 1e-6": (1e-6, 1.0),
+    "y~ = 1, v~ = 1e-300": (1e-300, 1.0),
+    "y~ = 1.1, v~ = 1e-6": (1e-6, 1.1),
+}
+
+
+def far_end(points: int, quick: bool) -> str:  # noqa: ARG001
+    """`mu_ratio` of equal points, beside the median over places from 1e-3 to 1e3."""
+    s, n = mumacro.open(1e-10, threads=1), 200 if quick else 2000
+    rng = np.random.default_rng(0)
+    places = {str(i): tuple(10.0 ** rng.uniform(-3.0, 3.0, 2)) for i in range(20 if quick else 200)}
+    work = {
+        name: partial(s.mu_ratio, np.full(n, v), np.full(n, y))
+        for name, (v, y) in {**places, **FAR}.items()
+    }
+    best = best_of(2 if quick else 7, work)
+    usual = statistics.median(best[name] for name in places)
+    rows = [["median", quantity(1e9 * usual / n), "1"]]
+    rows += [[name, quantity(1e9 * best[name] / n), f"{best[name] / usual:.1f}"] for name in FAR]
+    return markdown(["place", "ns a point", "medians"], rows)
+
+
 if __name__ == "__main__":
-    main(__doc__, {"calls": calls}, points=1_000_000, quick=False)
+    main(__doc__, {"calls": calls, "far_end": far_end}, points=1_000_000, quick=False)

@@ -1,7 +1,7 @@
 """Screenshot of the page for the documents, with a separate service and a headless Chromium.
 
 ``python benchmarks/page.py`` replaces docs/img/page.png.  Needs Chromium with its ChromeDriver and
-the PyPI package selenium.
+the PyPI package selenium: ``.ci/peers -- python benchmarks/page.py``.
 """
 
 import base64

@@ -311,6 +311,45 @@ def summary() -> str:
     return f"Stick-slip from {slowest:g} v~crit up:\n\n{markdown(header, rows, 2)}"
 
 
+def normal_oscillation() -> str:
+    """M. Popov, Front. Mech. Eng. 6 (2020) 69, eqs. (33) to (38): mu_macro = mu0 (1 - alpha
+    Psi(beta)) where the normal force oscillates, with the fit Psi = (3/4)(1 - b)^2 + (1/4)(1 -
+    b)^4."""
+
+    def under(difference: float) -> str:
+        """A difference, without digits of rounding."""
+        return "< 1e-14" if difference < 1e-14 else quantity(difference)
+
+    b = np.linspace(0.0, 1.0, 2001)
+    fit = (1.0 - b) ** 2 * (0.75 + 0.25 * (1.0 - b) ** 2)
+    limit = 1.0 - closed_forms.master_curve_limit(b)
+    rows = []
+    for alpha in (0.01, 0.1, 0.5, 0.9, 0.999):
+        mu = table().quantity("mu_ratio", alpha * b, alpha + 0.0 * b, direction="normal")[0]
+        off = 1.0 - alpha * fit - mu
+        at = int(np.argmin(off))
+        psi = (1.0 - mu) / alpha
+        rows.append(
+            [
+                f"{alpha:g}",
+                quantity(float(-off[at] / alpha), 3),
+                f"{b[at]:.2f}",
+                quantity(float(max(off.max() / alpha, 0.0))),
+                under(float(np.abs(psi - limit).max())),
+                under(float(max(abs(mu[0] - (1.0 - alpha)), abs(mu[-1] - 1.0)))),
+            ]
+        )
+    header = [
+        "alpha",
+        "the fit too low by alpha times",
+        "at b",
+        "too high by",
+        "Psi less 1 - N_0",
+        "both ends off by",
+    ]
+    return markdown(header, rows)
+
+
 SECTIONS = sections(
     model,
     static,
@@ -321,6 +360,7 @@ SECTIONS = sections(
     continuous,
     large_amplitudes,
     summary,
+    normal_oscillation,
 )
 
 if __name__ == "__main__":

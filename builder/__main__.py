@@ -11,7 +11,7 @@ from typing import Any
 
 from mumacro import InputError, Surrogate
 from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
-from mumacro.extras import missing
+from mumacro.errors import missing
 from mumacro.kernel.threads import processors
 from mumacro.table.atomic import alone_in
 
@@ -88,6 +88,7 @@ def _solve(chosen: Namespace) -> int:
 
 def _verify(chosen: Namespace) -> int:
     from .solver.sweep import Sweep
+    from .tables.build import write_verified
     from .tables.verify import holds, verify
 
     surrogate = Surrogate.open(chosen.table)
@@ -99,6 +100,8 @@ def _verify(chosen: Namespace) -> int:
         raise ImpossibleError(
             f"{chosen.table} misses its tolerance of {surrogate.tolerance:g} or a bound"
         )
+    if chosen.write:
+        write_verified(chosen.table, report)
     return 0
 
 
@@ -190,6 +193,8 @@ def _parser(prog: str) -> OneLineParser:
     one.add_argument(
         "--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s"
     )
+    text = "store the errors in the table's attributes, as a build does with --seed 2018"
+    one.add_argument("--write", action="store_true", help=text)
     one.add_argument("--workers", **workers)
     one = command(_export, "Write a table for other tools; print what was written as JSON.")
     one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import MumacroError, Surrogate, closed_forms
-from mumacro.analysis.law import approximations, border_speeds, friction_law
+from mumacro.analysis.approximations import approximations, border_speeds
+from mumacro.analysis.law import law as friction_law
 from mumacro.kernel.arrays import Array
 
 from .solver.steady import border
@@ -287,14 +288,14 @@ def _dimensional_law(s: Surrogate) -> list[Panel]:
     """Fig. 11: mu_macro over v0 of one contact at two amplitudes, with the paper's laws."""
     v0, curves = np.linspace(0.0, 1.0, 601) ** 2 * 0.25, []
     for y0, look in ((0.6e-6, "C0-"), (4e-6, "C2-")):
-        case: dict[str, float | None] = {
+        case: dict[str, Any] = {
             "mu0": 0.5,
             "Fz": 10.0,
             "k": 5e6,
             "omega": 2.0 * np.pi * 20e3,
             "y0": y0,
         }
-        law = friction_law(s, "v0", v0, case)
+        law = friction_law(s, values=v0, **case)
         paper = approximations(s, law)
         curves.append(Curve(v0, law.answer.mu_macro, look, f"exact, $y_0$ = {y0 * 1e6:g} $l_0$"))
         if y0 > 1e-6:

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import extended
 from benchmarks.measuring import main, markdown, quantity, sections
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
 from mumacro.kernel.binding import kernels
-from tests import extended
 from tests.test_driven_bounds import answered, hard, ordinary
 
 Array = NDArray[np.float64]

@@ -3,15 +3,20 @@ stick-slip model."""
 
 import sys as _sys
 
+from mumacro.errors import InputError, MumacroError, TableError
+from mumacro.errors import missing as _missing
+
 try:
-    from mumacro import closed_forms
+    from mumacro import closed_forms, plotting
+    from mumacro import moved as _moved
     from mumacro.analysis import validity
-    from mumacro.analysis.fit import fit
-    from mumacro.analysis.fit_result import Fit
+    from mumacro.analysis.fit import Fit, fit
+    from mumacro.analysis.law import law
+    from mumacro.analysis.settling import settling
+    from mumacro.analysis.solve_for import solve_for
     from mumacro.answer import Answer
     from mumacro.contacts import stiffness
     from mumacro.contacts.element import Element
-    from mumacro.errors import InputError, MumacroError, TableError
     from mumacro.surrogate import Surrogate
     from mumacro.table.atlas import REGIMES, SOURCES
     from mumacro.version import __version__
@@ -20,8 +25,6 @@ except ImportError as _error:
     # is "-m" meanwhile.
     if _sys.argv[:1] != ["-m"]:
         raise
-    from mumacro.extras import missing as _missing
-
     raise SystemExit(_missing("", _error)) from None
 
 open = Surrogate.open  # noqa: A001 (mumacro.open(), as users of other data libraries expect)
@@ -39,7 +42,20 @@ __all__ = [
     "__version__",
     "closed_forms",
     "fit",
+    "law",
     "open",
+    "plotting",
+    "settling",
+    "solve_for",
     "stiffness",
     "validity",
 ]
+
+# the modules of the face can be imported by its names, wherever they stand
+_sys.modules |= {f"{__name__}.stiffness": stiffness, f"{__name__}.validity": validity}
+_sys.meta_path.append(_moved.Signposts)
+
+
+def __dir__() -> list[str]:
+    """What users need; the folders and modules behind it are no part of the face."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

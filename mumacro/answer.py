@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
+from mumacro import closed_forms, plotting
 from mumacro.errors import MumacroError
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
@@ -148,10 +149,13 @@ class Answer(Generic[Number]):
         return self._by_source("source", _SOURCE_NAMES)
 
     def plot(self, axes: Any = None) -> Any:
-        """The cases over (v~, y~), see ``mumacro.plotting.plot_answer``; needs matplotlib."""
-        from mumacro.plotting import plot_answer
-
-        return plot_answer(self, axes)
+        """The cases over (v~, y~), see ``mumacro.plotting.plot_cases``; needs matplotlib."""
+        v, y, code = (
+            np.ravel(np.asarray(x)) for x in (self.v_tilde, self.y_tilde, self.regime_code)
+        )
+        regimes = {name: code == i for i, name in enumerate(REGIMES)}
+        # an answer has no table
+        return plotting.plot_cases(v, y, regimes, closed_forms.border_blend, axes)
 
     def columns(self) -> dict[str, Any]:
         """What is known of each case, by name: mu_macro first, then what was requested beside

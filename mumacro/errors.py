@@ -1,7 +1,10 @@
-"""The exceptions of the project.  They are independent of HTTP."""
+"""The exceptions of the project, independent of HTTP; and what to install where a package is
+missing."""
 
 from pathlib import Path
 from typing import Any
+
+_OURS = ("mumacro", "builder", "service")
 
 
 class MumacroError(Exception):
@@ -43,3 +46,26 @@ def _shown(value: object) -> str:
     """The value as text of bounded length."""
     text = repr(value)
     return text if len(text) <= 200 else text[:197] + "..."
+
+
+def missing(extra: str, error: ImportError) -> str:
+    """What to install, in one line, where an import raised ``error``; ``extra`` is empty for the
+    library itself.
+
+    Raises ``error`` itself when one of the project's own modules is missing: a fault that must not
+    be hidden.
+
+    >>> missing("files", ModuleNotFoundError("No module named 'pyarrow'", name="pyarrow"))
+    "pyarrow is not installed: pip install 'mumacro[files]' (in a checkout: pip install -e
+    '.[files]')"
+    """
+    if error.name is None:  # a sentence of our own: the compiled kernel is missing
+        return str(error)
+    package = error.name.partition(".")[0]
+    if package in _OURS:
+        raise error
+    brackets = f"[{extra}]" if extra else ""
+    return (
+        f"{package} is not installed: pip install 'mumacro{brackets}' (in a checkout: pip "
+        f"install -e '.{brackets}')"
+    )

@@ -14,7 +14,6 @@ from mumacro.answer import BAND, GROUPS, Answer, IntervalAnswer
 from mumacro.errors import InputError
 from mumacro.inputs.fields import PER_UNIT
 from mumacro.inputs.kind import AMPLITUDE, Kind
-from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIMES
 
 #: name -> units and long_name, as xarray and CF write them
@@ -47,11 +46,14 @@ _KINDS = {
     "source": object,
     "regime": object,
 }
+Evaluate = Callable[..., Any]
 Apply = Callable[[Callable[..., Any], Mapping[str, Any], Sequence[str]], list[Any]]
 
 
 def evaluate_labelled(
-    surrogate: Surrogate,
+    evaluate: Evaluate,
+    evaluate_on_one_thread: Evaluate,
+    certain: Callable[[Any, Any], Any],
     cases: Any,
     inputs: Mapping[str, Any],
     kind: Kind,
@@ -59,6 +61,9 @@ def evaluate_labelled(
     options: dict[str, Any],
 ) -> Any:
     """:meth:`mumacro.Surrogate.evaluate` for labelled inputs, ``options`` are its other keywords.
+
+    ``evaluate`` evaluates arrays, ``evaluate_on_one_thread`` the parts that Dask and xarray hand
+    out, and ``certain`` tells whether the regime at (v~, y~) is.
 
     An answer whose attributes are Series, DataArrays or Dask arrays, by their names, for xarray
     with ``units`` and ``long_name``; for a DataFrame or Dataset of cases one of these, with the
@@ -77,11 +82,11 @@ def evaluate_labelled(
             "inputs", sorted(libraries), "objects of one library: pandas, or xarray and Dask"
         )
     library = next(name for name in _APPLY if name in libraries)
-    # Dask has its own threads
-    table = surrogate if library == "pandas" else surrogate.on_one_thread()
+    if library != "pandas":  # Dask has its own threads
+        evaluate = evaluate_on_one_thread
     if kinds[""] == "dask":
         beside = {name: value for name, value in inputs.items() if name not in cases.columns}
-        return _parts(table, cases, {**options, **beside})
+        return _parts(evaluate, cases, {**options, **beside})
     for name, value in given.items():
         if hasattr(value, "to_dask_array"):
             raise InputError(
@@ -97,7 +102,7 @@ def evaluate_labelled(
     names += [*(GROUPS if groups else ()), *slopes]
 
     def chunk(*values: Any) -> list[Any]:
-        found = table.evaluate(dict(zip(given, values, strict=True)), **options)
+        found = evaluate(dict(zip(given, values, strict=True)), **options)
         rows = [*found.gradient.values(), *found.gradient_bound.values()] if gradient else []
         return [getattr(found, name) for name in names if name not in slopes] + rows
 
@@ -109,9 +114,9 @@ def evaluate_labelled(
             return _categories(entries, code, name)
         return apply(lambda codes: [entries[codes]], {"source_code": code}, [name])[0]
 
-    def certain(v: Any, y: Any) -> Any:
+    def labelled_certain(v: Any, y: Any) -> Any:
         both = {"v_tilde": v, "y_tilde": y}
-        return apply(lambda v, y: [table._certain(v, y, kind)], both, ["regime_certain"])[0]
+        return apply(lambda v, y: [certain(v, y)], both, ["regime_certain"])[0]
 
     mu_macro, mu_ratio, bound, code = (found[name] for name in names[:4])
     answer: Any = (IntervalAnswer if interval else Answer)(
@@ -122,7 +127,7 @@ def evaluate_labelled(
     if groups:
         answer._groups, answer._certain = (
             (found["v_tilde"], found["y_tilde"], found["length_scale"]),
-            certain,
+            labelled_certain,
         )
     if gradient:
         answer.gradient = {name: found[f"d_mu_macro_d_{name}"] for name in kind.fields}
@@ -135,13 +140,13 @@ def evaluate_labelled(
     return whole.DataFrame(columns) if library == "pandas" else whole.Dataset(columns)
 
 
-def _parts(table: Surrogate, cases: Any, options: dict[str, Any]) -> Any:
+def _parts(evaluate: Evaluate, cases: Any, options: dict[str, Any]) -> Any:
     """A DataFrame of Dask, part by part; one without rows is evaluated now, so that faults of its
     columns show."""
     import pandas as pd
 
     empty = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in cases.dtypes.items()})
-    return cases.map_partitions(table.evaluate, meta=table.evaluate(empty, **options), **options)
+    return cases.map_partitions(evaluate, meta=evaluate(empty, **options), **options)
 
 
 # --- a function of arrays, applied to labelled objects: one result for each name ------------------

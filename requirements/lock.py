@@ -3,12 +3,14 @@
     python requirements/lock.py [ARGS]     write them (ARGS, e.g. --upgrade, go to uv)
     python requirements/lock.py --check    exit code 1 if pyproject.toml has changed since
 
-test.txt is made first and constrains the others.  No index is named in the result: the installing
-machine chooses it.
+test.txt is made first and constrains the others.  peers.txt has only what test.txt and tools.txt
+lack: it is installed beside them.  No index is named in the result: the installing machine chooses
+it.
 """
 
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -22,6 +24,7 @@ EXTRAS = ("arrow", "builder", "dask", "figures", "files", "service")  # that tes
 UV = "uv==0.13.8"  # pins the resolver too: two people who lock on the same day get the same file
 PROJECT = tomllib.loads((FOLDER.parent / "pyproject.toml").read_text("utf-8"))
 BUILD, ZIG = PROJECT["build-system"]["requires"], PROJECT["tool"]["mumacro"]["zig"]
+UNUSED = PROJECT["tool"]["mumacro"]["unused"]
 
 
 def inputs_digest() -> str:
@@ -30,6 +33,7 @@ def inputs_digest() -> str:
     inputs = [
         BUILD,
         ZIG,
+        UNUSED,
         PROJECT["dependency-groups"],
         *(PROJECT["project"][name] for name in names),
     ]
@@ -37,6 +41,14 @@ def inputs_digest() -> str:
 
 
 HEADER = f"# Pinned by: python3 dev.py lock\n# inputs: {inputs_digest()}\n"
+
+
+def without(pins: str, *names: str) -> str:
+    """The pins of packages that none of these files has."""
+    held = "".join((FOLDER / f"{name}.txt").read_text("utf-8") for name in names)
+    there = {*re.findall(r"^([\w.-]+)==", held, re.MULTILINE)}
+    each = re.findall(r"^([\w.-]+)(==.*\n(?: .*\n)*)", pins, re.MULTILINE)
+    return "".join(package + rest for package, rest in each if package not in there)
 
 
 def stale() -> list[str]:
@@ -54,6 +66,8 @@ def lock(folder: Path, arguments: list[str]) -> None:
     build, zig = folder / "build.in", folder / "zig.in"
     build.write_text("\n".join([*BUILD, "editables"]))  # hatchling needs it to install in place
     zig.write_text(ZIG)
+    unused = folder / "unused.txt"
+    unused.write_text("\n".join(UNUSED))
     test: list[str | Path] = [
         "pyproject.toml",
         "--group=test",
@@ -67,6 +81,7 @@ def lock(folder: Path, arguments: list[str]) -> None:
         "service": ["pyproject.toml", "--extra=service", *within],
         "build": [build, *within],
         "zig": [zig],
+        "peers": ["--group=peers", *within, "--constraint", FOLDER / "tools.txt"],
     }
     for name, source in sources.items():
         out = folder / f"{name}.txt"
@@ -77,6 +92,7 @@ def lock(folder: Path, arguments: list[str]) -> None:
             "--generate-hashes",
             "--no-annotate",
             "--no-header",
+            f"--excludes={unused}",
             "-q",
         ]
         places: list[str | Path] = [
@@ -100,6 +116,8 @@ def lock(folder: Path, arguments: list[str]) -> None:
         )
         if "://" in pins or "file:" in pins or " @ " in pins:
             raise SystemExit(f"the lock for {name} names a place to download from; it must not")
+        if name == "peers":
+            pins = without(pins, "test", "tools")
         (FOLDER / out.name).write_text(HEADER + pins, encoding="utf-8", newline="\n")
         print(f"requirements/{name}.txt: {pins.count('==')} pins")
 

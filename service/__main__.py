@@ -25,7 +25,7 @@ from contextlib import nullcontext
 try:
     from .settings import PREFIX, Settings, SettingsError, load_settings
 except ModuleNotFoundError as error:
-    # Without mumacro.extras: perhaps no package is installed here.
+    # Without mumacro.errors.missing: perhaps no package is installed here.
     raise SystemExit(
         f"python -m service: {error.name} is not installed: pip install 'mumacro[service]' "
         "(in a checkout: pip install -e '.[service]')"

@@ -161,6 +161,11 @@ TableAnswer = model(
     size_bytes=int,
     max_abs_error=told(float | None, "Largest verified absolute error of mu_macro/mu0 [-]"),
     max_rel_error=told(float | None, "Largest verified relative error of mu_macro [-]"),
+    error_distribution=told(
+        dict[str, dict[str, float]],
+        "By quantity: the error that a share of the verified points does not exceed; bound over "
+        "error",
+    ),
     attributes=told(dict[str, Any], "Root attributes of the file"),
     blocks=list[dict[str, Any]],
     loaded=told(many(TableLabel), "All loaded tables, tightest first"),

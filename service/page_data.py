@@ -4,7 +4,7 @@ over (v~, y~).
 The service serves it; the page itself is in ``service/static/page``.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -49,14 +49,9 @@ _V_DECADES, _Y_DECADES = (-4, 3), (-2, 3)
 _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
 
 
-def names(knows: Iterable[str] = ()) -> dict[str, Any]:
-    """``names.json``: inputs, choices, geometries with arguments, and what the page's host
-    ``knows``.
-
-    The page shows what needs them only if they are there: ``service`` (what is computed by the
-    service only), ``guide``, ``stiffness`` and ``fit``; ``contact``, ``direction`` and ``k_range``,
-    fields of a case.
-    """
+def names(guide: bool) -> dict[str, Any]:
+    """``names.json``: inputs, choices, geometries with arguments, and whether a ``guide`` is
+    served."""
     inputs: dict[str, dict[str, Any]] = {
         name: {
             "label": label,
@@ -82,13 +77,13 @@ def names(knows: Iterable[str] = ()) -> dict[str, Any]:
     arguments = {
         name: {**one._asdict(), "units": _scales(one.units)} for name, one in ARGUMENTS.items()
     }
-    known = list(knows)
-    choices = {
-        name: words if name in known else dict([*words.items()][:1])
-        for name, words in _CHOICES.items()
+    return {
+        "inputs": inputs,
+        "choices": _CHOICES,
+        "geometries": geometries,
+        "arguments": arguments,
+        "guide": guide,
     }
-    told = {"geometries": geometries, "arguments": arguments, "knows": known}
-    return {"inputs": inputs, "choices": choices, **told}
 
 
 def map_of(surrogate: Surrogate) -> dict[str, Any]:

@@ -107,7 +107,7 @@ def serving() -> Callable[..., AbstractContextManager[Server]]:
 @pytest.fixture(scope="session")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of the example server for UM-Bridge."""
-    pytest.importorskip("umbridge", reason="the PyPI package umbridge is not installed")
+    pytest.importorskip("umbridge", reason="umbridge of requirements/peers.txt is not installed")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -167,6 +167,20 @@ def run_builder(repository: Path) -> Callable[..., subprocess.CompletedProcess[s
         )
 
     return run
+
+
+# --- tests of programs that this one works with ---------------------------------------------------
+
+#: fixtures that need a package of requirements/peers.txt
+PEERS = {"bridge", "fmpy", "open_page"}
+
+
+@pytest.hookimpl(tryfirst=True)  # before the expression of -m is applied
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A test with such a fixture is marked peer."""
+    for item in items:
+        if PEERS & {*getattr(item, "fixturenames", ())}:
+            item.add_marker("peer")
 
 
 # --- nothing is skipped silently ------------------------------------------------------------------

@@ -7,8 +7,9 @@ import numpy as np
 from mumacro.kernel.binding import Data, Kernel, kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import CHARTS
+from mumacro.table.blocks import Block
 from mumacro.table.bundled import bundled_tables
-from mumacro.table.netcdf import Block, read_table
+from mumacro.table.netcdf import read_table
 from mumacro.table.polynomials import Border, block_rows, outer_cells
 from tests.cases import Array
 

@@ -92,8 +92,12 @@ def test_a_section_is_a_table_of_finite_numbers(section: Any) -> None:
     check(tables(section()))
 
 
+SCRIPTS = ["calls --quick", "c_header --quick", "solver --quick"]
+SCRIPTS += ["error_distribution --share 0.002"]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("script", ["calls --quick", "c_header --quick", "solver --quick"])
+@pytest.mark.parametrize("script", SCRIPTS)
 def test_a_script_prints_tables_of_finite_numbers(script: str) -> None:
     check(run(*script.split()))
 

@@ -71,6 +71,32 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     assert {"holds": True, "not_covered": 0}.items() <= json.loads(verified.stdout).items()
 
 
+def test_verify_stores_what_it_finds_only_when_asked(
+    here: Run, tables_dir: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(tables_dir / "mumacro-1e-4.nc", tmp_path / "copy.nc"))
+    before, image = Surrogate.open(path), path.read_bytes()
+    words = ("verify", path, "--points", 300, "--seed", 5)
+    assert here(*words).returncode == 0
+    assert path.read_bytes() == image
+    report = json.loads(here(*words, "--write").stdout)
+    after = Surrogate.open(path)
+    assert after.checksum == before.checksum
+    assert after.attributes["verified_points"] == report["points"]
+    assert after.max_abs_error == report["max_abs_error"] < before.max_abs_error
+    for name, part in report["distribution"].items():
+        told = [*part["error_quantiles"], *part["bound_over_error"]]
+        assert [*after.error_distribution[name].values()] == told
+        assert told != [*before.error_distribution[name].values()]
+    # a table that misses its bounds is left as it is
+    table = read_table(path)
+    table.attributes["tolerance"] = 1e-9
+    write_table(table, path)
+    image = path.read_bytes()
+    refused(here(*words, "--write"), "misses its tolerance")
+    assert path.read_bytes() == image
+
+
 def test_solve_answers_at_the_ends_of_its_range(run_builder: Run, here: Run) -> None:
     done = run_builder("solve", "--v", 0.1, "--y", 0.5)
     assert json.loads(done.stdout)["mu_ratio"] == close(0.9420042895137095, abs=1e-15)

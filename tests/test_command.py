@@ -568,11 +568,10 @@ def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path)
 
 def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
-    from mumacro.analysis.law import friction_law
-    from mumacro.plotting import plot_answer, plot_map
+    from mumacro import law as friction_law
 
     known = {name: value for name, value in VALUES.items() if name != "v0"}
-    law = friction_law(surrogate, "v0", np.geomspace(1e-3, 1.0, 20), known)
+    law = friction_law(surrogate, start=1e-3, stop=1.0, points=20, **known)
     axes = law.plot(figure.add_subplot())
     np.testing.assert_array_equal(
         axes.lines[0].get_xydata(), np.column_stack((law.values, law.answer.mu_macro))
@@ -580,18 +579,16 @@ def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     assert [line.get_xdata()[0] for line in axes.lines[2:]] == [
         crossing.value for crossing in law.border
     ]
-    axes = plot_map(surrogate, figure.add_subplot(), point=(0.1, 0.5))
+    axes = surrogate.plot(figure.add_subplot(), point=(0.1, 0.5))
     v, y = axes.lines[0].get_data()
     np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y))
     assert axes.lines[1].get_xydata().tolist() == [[0.1, 0.5]]
     many = surrogate.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
-    axes = plot_answer(many, figure.add_subplot())
+    axes = many.plot(figure.add_subplot())
     shown = {line.get_label(): len(line.get_xdata()) for line in axes.lines[:-1]}
     assert shown == {"continuous": 2, "stick_slip": 1}  # v~ = 0 has no place on a logarithmic axis
     with pytest.raises(AttributeError, match="groups=True"):
-        plot_answer(
-            surrogate.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}), figure.add_subplot()
-        )
+        surrogate.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}).plot(figure.add_subplot())
 
 
 BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3")
@@ -681,7 +678,10 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
     found = json.loads(said(capsys, 0, "table", "--json"))
     expected = (str(surrogate.path), surrogate.checksum, surrogate.max_abs_error)
     assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
-    assert said(capsys, 0, "table").count(".nc") > len(found["bundled"])
+    assert found["error_distribution"] == surrogate.error_distribution
+    text = said(capsys, 0, "table")
+    assert text.count(".nc") > len(found["bundled"])
+    assert f"{surrogate.error_distribution['border']['0.95']:.2g}" in text
 
 
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:

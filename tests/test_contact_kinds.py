@@ -205,21 +205,30 @@ def test_the_extremes_are_those_of_a_dense_sampling(table: Surrogate, pair: Any)
 
 
 @pytest.mark.parametrize("pair", PAIRS[:2], ids=" ".join)
-def test_extremes_inside(table: Surrogate, pair: Any) -> None:
+@pytest.mark.parametrize("ratio", [10.5, 11.9, 12.1, 20.0, 300.0, 3e4])
+def test_extremes_inside(table: Surrogate, pair: Any, ratio: Any) -> None:
     """mu~ rises with k between a smallest and a largest value, so both ends of the interval lie
     between them."""
-    kind, k = {"contact": pair[0]}, np.geomspace(1e-2, 1e4, 6001)
-    slope = table.evaluate(k=k, **RAY, **kind, gradient=True).gradient["k"]
+    ray = {**RAY, "y0": ratio}
+    kind, k = {"contact": pair[0]}, np.geomspace(1.0, 10.0 * ratio**2, 6001) / ratio
+    slope = table.evaluate(k=k, **ray, **kind, gradient=True).gradient["k"]
     turns = k[1:][slope[1:] * slope[:-1] < 0.0]
     assert turns.size == 2
     ends = turns[0] / 1.5, turns[1] * 1.5
-    found = table.evaluate(k_range=ends, **RAY, **kind)
-    least, most, *both = (table.evaluate(k=x, **RAY, **kind).mu_macro for x in (*turns, *ends))
-    only = table.evaluate(k_range=(turns[0] / 1.1, turns[0] * 1.1), **RAY, **kind)
+    found = table.evaluate(k_range=ends, **ray, **kind)
+    least, most, *both = (table.evaluate(k=x, **ray, **kind).mu_macro for x in (*turns, *ends))
+    only = table.evaluate(k_range=(turns[0] / 1.1, turns[0] * 1.1), **ray, **kind)
     assert only.mu_macro_low == close(least, abs=1e-6)
     assert only.mu_macro_low < min(both[0], only.mu_macro_high)
     assert found.mu_macro_low <= min(least, *both) + 1e-9
     assert found.mu_macro_high >= max(most, *both) - 1e-9
+    # however far away the other end is
+    until = table.evaluate(k_range=(1e-300, turns[1] / 1.1), **ray, **kind)
+    since = table.evaluate(k_range=(turns[0] * 1.1, 1e300), **ray, **kind)
+    assert until.mu_macro_low <= least + 1e-9
+    assert until.mu_macro_low == close(least, rel=1e-4)
+    assert since.mu_macro_high >= most - 1e-9
+    assert since.mu_macro_high == close(most, rel=1e-4)
 
 
 @pytest.mark.parametrize("ratio", [9.725, 9.735, 9.75, 9.8])

@@ -12,10 +12,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mumacro import InputError, Surrogate, fit
-from mumacro.analysis.law import friction_law
-from mumacro.analysis.settling import settling
-from mumacro.analysis.solve_for import solve_for
+from mumacro import InputError, Surrogate, fit, law, settling, solve_for
 from mumacro.inputs.fields import BOUNDS, FIELDS, POSITIVE, STIFFNESS
 from tests.cases import CASE, Case, log_uniform, tables, without
 from tests.comparing import close
@@ -294,8 +291,8 @@ def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap:
         lambda: table.evaluate(**{**CASE, "k": gap}),
         lambda: table.evaluate({**CASE, "k": gap}),
         lambda: settling(table, **{**CASE, "k": gap}),
-        lambda: friction_law(table, "v0", np.array([1e-3, 1e-2]), {**rest, "k": gap}),
-        lambda: solve_for(table, "v0", 0.2, {**rest, "k": gap}),
+        lambda: law(table, start=1e-3, stop=1e-2, **{**rest, "k": gap}),
+        lambda: solve_for(table, "v0", 0.2, **{**rest, "k": gap}),
         lambda: fit(
             {"v0": [0.01, 0.02], "mu_macro": [0.2, 0.2]}, "mu0", k=gap, **without(rest, "mu0")
         ),

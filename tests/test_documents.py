@@ -10,22 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import validation, validity
+from benchmarks import error_distribution, extended, validation, validity
 from mumacro import Surrogate, __version__
-from mumacro.analysis.law import APPROXIMATIONS, BORDERS, borders
+from mumacro.analysis.approximations import APPROXIMATIONS, BORDERS, borders
 from tests.comparing import close
+from tests.documents import PAGES, ROOT
 from tests.test_benchmarks import tables
 
-ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-PAGES = sorted(
-    [
-        *ROOT.glob("*.md"),
-        *DOCS.rglob("*.md"),
-        *(ROOT / "tables").glob("*.md"),
-        *ROOT.glob("examples/*.md"),
-    ]
-)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(
     r"^```.*?^```$|^(?:    .*\n)+|<!-- begin .*?<!-- end|`[^`\n]+`|<!--.*?-->",
@@ -80,7 +72,7 @@ def test_the_readme_has_the_figures_of_the_page_on_accuracy() -> None:
 
 
 def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Surrogate) -> None:
-    page = (DOCS / "http.md").read_text("utf-8")
+    page = (DOCS / "python.md").read_text("utf-8")
     seen = set()
     for column, given, errors in re.findall(
         r"^\| `(\w+)` \| .+ \| (.+) \| (.+ %.*) \|$", page, re.MULTILINE
@@ -172,6 +164,50 @@ def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(
         assert largest == close(float(bound), rel=0.05)
 
 
+def shown_distribution() -> dict[tuple[str, str, str], list[str]]:
+    """The figures of the page on accuracy by contact, quantity and table."""
+    page = (DOCS / "accuracy.md").read_text("utf-8")
+    (found,) = (table for table in tables(page) if "bound/error, median" in table[0])
+    rows = (list(row.values()) for row in found)
+    return {(contact, name, table): figures for contact, name, table, *figures in rows}
+
+
+def test_the_distribution_of_errors_on_the_page_is_what_the_tables_state() -> None:
+    shown = shown_distribution()
+    made = {(row[0], row[1], row[2]): row[3:] for row in error_distribution.spring_across()}
+    assert len(made) == 24
+    assert {place: shown[place] for place in made} == made
+    assert {contact for contact, *_ in shown} == {
+        "spring across",
+        "ball across",
+        "spring along",
+        "ball along",
+        "spring normal",
+    }
+    for place, (half, most, nearly, largest, least, *_) in shown.items():
+        assert float(half) <= float(most) <= float(nearly) <= float(largest), place
+        assert float(least.replace(",", "")) >= 1.0, place
+
+
+@pytest.mark.skipif(not extended.HAS_EXTENDED, reason="longdouble has the digits of a double here")
+@pytest.mark.parametrize("direction", ["along", "normal"])
+def test_the_distribution_of_a_springs_errors_is_that_on_the_page(direction: str) -> None:
+    shown = shown_distribution()
+    for contact, name, table, *figures in error_distribution.driven("spring", direction, 0.2):
+        compared = zip(figures[:2], shown[contact, name, table][:2], strict=True)
+        for one, other in compared:
+            assert float(one) == close(float(other), rel=0.3), name
+
+
+@pytest.mark.slow
+def test_the_distribution_of_a_balls_errors_is_that_on_the_page() -> None:
+    shown = shown_distribution()
+    for contact, name, table, *figures in error_distribution.ball_across(0.2):
+        there = shown[contact, name, table]
+        assert float(figures[3]) <= 10.0 * float(there[3]), (name, table)
+        assert float(figures[3]) > float(there[0]), (name, table)
+
+
 def test_every_test_that_the_threats_name_exists_and_every_line_names_one() -> None:
     text = (DOCS / "operations.md").read_text("utf-8").partition("## Threats")[2]
     named = re.findall(r"`(tests/\w+\.py)::(\w+)`", text)
@@ -224,5 +260,5 @@ def test_metadata_agrees_with_the_package() -> None:
 
 
 def test_the_columns_of_a_law_are_all_described() -> None:
-    page = (DOCS / "http.md").read_text("utf-8")
+    page = (DOCS / "python.md").read_text("utf-8")
     assert [column for column in (*APPROXIMATIONS, *BORDERS) if f"`{column}`" not in page] == []

@@ -1,7 +1,8 @@
 """Oscillation along and of the normal force: every bound covers its error, and none is much wider
 than that.
 
-The reference is evaluated with more digits, and for a ball with more springs (``extended.py``).
+The reference is evaluated with more digits, and for a ball with more springs
+(``benchmarks/extended.py``).
 """
 
 from typing import Any
@@ -9,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks import extended
 from benchmarks.contacts import hard_points
 from mumacro import Surrogate
-from tests import extended
 from tests.cases import UNIT, Array, opened, tables
 
 table = tables(1e-7)

@@ -155,7 +155,6 @@ def test_the_umbridge_server_answers_as_the_library_and_outlives_an_error(
 
 
 def test_uncertainty(repository: Path, bridge: Any, surrogate: Surrogate) -> None:
-    need(None, "umbridge", "scipy")
     text = run(repository, sys.executable, "examples/uncertainty.py", bridge)
     sampled = number(r"points: mean [\d.]+, standard deviation ([\d.]+)", text)
     first_order = number(r"first order: standard deviation ([\d.]+)", text)
@@ -169,8 +168,9 @@ def test_uncertainty(repository: Path, bridge: Any, surrogate: Surrogate) -> Non
     assert sampled == close(first_order, rel=0.02)
 
 
+@pytest.mark.peer
 def test_least_power(repository: Path, tables_dir: Path) -> None:
-    need(None, "openmdao", "scipy")
+    need(None, "openmdao")
     table = tables_dir / "mumacro-1e-10.nc"
     text = run(repository, sys.executable, "examples/least_power.py", table)
     assert number(r"mu_macro = ([\d.]+)", text) == close(0.15, abs=1e-6)

@@ -15,7 +15,8 @@ from builder.__main__ import main
 from builder.export.c import ExportError
 from builder.export.grid import FORMATS, GONE, export_table
 from mumacro.errors import TableError
-from mumacro.table.netcdf import Table, read_table
+from mumacro.table.blocks import Table
+from mumacro.table.netcdf import read_table
 from tests.cases import Capture
 
 pytestmark = pytest.mark.slow

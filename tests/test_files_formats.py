@@ -383,7 +383,7 @@ def test_damaged_and_missing_files_are_reported_in_one_line(
         ("*.none", "o.csv", "no such file"),
         ("text.parquet", "o.csv", "Is this a 'parquet' file?"),
         ("cut.csv.gz", "o.csv", "is damaged"),
-        ("latin.csv", "o.parquet", "rows 1 to 1: no text in UTF-8"),
+        ("latin.csv", "o.parquet", "row 1 is not in UTF-8; save the file as UTF-8"),
         ("flipped.parquet", "o.csv", ""),
         ("good.parquet", "o.xlsx", "ends in"),
         ("good.parquet", "none/o.csv", "No such file or directory"),
@@ -392,6 +392,20 @@ def test_damaged_and_missing_files_are_reported_in_one_line(
         assert said in ran(capsys, 1, tmp_path / name, "-o", tmp_path / out, "--force")
     assert "several formats" in ran(
         capsys, 1, good, tmp_path / "latin.csv", "-o", tmp_path / "o.csv"
+    )
+
+
+@pytest.mark.parametrize("bad", [1, 2, 5])
+def test_a_row_in_another_encoding_is_named_with_the_remedy(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, bad: int
+) -> None:
+    monkeypatch.setattr(reading, "ROWS", 2)  # several blocks
+    rows = [f"{GOOD},{'µ' if i == bad else 'u'}" for i in range(1, bad + 2)]
+    text = "\n".join([f"{HEADER},name", *rows])
+    (tmp_path / "german.csv").write_bytes(text.encode("cp1252"))
+    assert (
+        f"german.csv: row {bad} is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
+        in ran(capsys, 1, tmp_path / "german.csv", "-o", tmp_path / "out.parquet")
     )
 
 

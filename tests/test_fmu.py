@@ -36,7 +36,7 @@ def unit(
 def fmpy() -> Any:
     """FMPy, and a compiler that has built the unit's binary."""
     compilers.compiler("gcc")
-    pytest.importorskip("fmpy.validation", reason="fmpy is not installed")
+    pytest.importorskip("fmpy.validation", reason="fmpy of requirements/peers.txt is not installed")
     import fmpy
 
     return fmpy

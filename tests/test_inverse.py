@@ -11,8 +11,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mumacro import InputError, Surrogate
-from mumacro.analysis.rootfinding import TINY, Curve, Sweep, last_double
-from mumacro.analysis.solve_for import border_crossings, solve_for
+from mumacro.analysis.borders import border_crossings
+from mumacro.analysis.rootfinding import TINY, Curve, last_double
+from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.sweep import Sweep
 from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.comparing import close
 
@@ -47,7 +49,7 @@ def test_the_forward_answer_is_inverted(
     said, fields, case = as_kind(case, pair, share)
     unknown = fields[place]
     forward: Any = surrogate.evaluate(**case, **said)
-    solution = solve_for(surrogate, unknown, forward.mu_macro, without(case, unknown), **said)
+    solution = solve_for(surrogate, unknown, forward.mu_macro, **without(case, unknown), **said)
     if solution.constant or not solution.roots[0]:
         # within the surrogate's error the input has no influence here, or its end equals the limit
         edge = min(
@@ -70,18 +72,18 @@ def test_an_enclosure_on_a_plateau_spans_it(surrogate: Surrogate) -> None:
     # this one on
     case: Case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
     root = only_root(
-        solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, without(case, "k"))
+        solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, **without(case, "k"))
     )
     assert root.low < 10.0 < 1e9 < root.high
 
 
 def test_targets_are_solved_together_as_alone(surrogate: Surrogate) -> None:
     targets = np.linspace(0.23, 0.299, 57)
-    together = solve_for(surrogate, "v0", targets, without(CASE, "v0"))
+    together = solve_for(surrogate, "v0", targets, **without(CASE, "v0"))
     values = [roots[0].value for roots in together.roots]
     assert values == sorted(values)
     for target, value in zip(targets, values, strict=True):
-        assert only_root(solve_for(surrogate, "v0", target, without(CASE, "v0"))).value == close(
+        assert only_root(solve_for(surrogate, "v0", target, **without(CASE, "v0"))).value == close(
             value, rel=1e-9
         )
 
@@ -98,7 +100,7 @@ def test_a_monotone_unknown_reports_its_reach(
     surrogate: Surrogate, unknown: Any, low: Any, high: Any
 ) -> None:
     targets = [0.999 * low, low + 0.5 * (high - low), 1.001 * high]
-    solution = solve_for(surrogate, unknown, targets, without(CASE, unknown))
+    solution = solve_for(surrogate, unknown, targets, **without(CASE, unknown))
     assert [len(roots) for roots in solution.roots] == [0, 1, 0]
     assert solution.reach.mu_min == close(low, abs=1e-10)
     assert solution.reach.mu_max == high
@@ -109,12 +111,12 @@ def test_an_end_that_is_attained_is_a_root_and_one_that_is_only_approached_none(
 ) -> None:
     static = surrogate.evaluate(**{**CASE, "v0": 0.0}).mu_macro
     for unknown, end in (("v0", static), ("y0", 0.3), ("omega", 0.3)):
-        assert only_root(solve_for(surrogate, unknown, end, without(CASE, unknown))).value == 0.0
+        assert only_root(solve_for(surrogate, unknown, end, **without(CASE, unknown))).value == 0.0
     # at rest friction vanishes from y0 = l0 on
-    root = only_root(solve_for(surrogate, "y0", 0.0, {**without(CASE, "y0"), "v0": 0.0}))
+    root = only_root(solve_for(surrogate, "y0", 0.0, **{**without(CASE, "y0"), "v0": 0.0}))
     assert root.value == close(3e-6, rel=1e-12)
     for unknown, end in (("v0", 0.3), ("y0", 0.0)):
-        solution = solve_for(surrogate, unknown, end, without(CASE, unknown))
+        solution = solve_for(surrogate, unknown, end, **without(CASE, unknown))
         assert solution.roots == ((),)
         assert not solution.reach.holds(end)
 
@@ -131,12 +133,12 @@ def test_a_fold_has_three_roots(surrogate: Surrogate, unknown: Any) -> None:
     last = ratio[-1]
     for share, expected in ((-0.01, 2), (0.5, 3), (1.01, 1)):
         target = 0.3 * (last + share * (high - last))
-        roots = solve_for(surrogate, unknown, target, without(case, unknown)).roots[0]
+        roots = solve_for(surrogate, unknown, target, **without(case, unknown)).roots[0]
         assert len(roots) == expected
         assert [root.value for root in roots] == sorted(root.value for root in roots)
         for root in roots:
             assert root.mu_macro == close(target, rel=1e-12)
-    below = solve_for(surrogate, unknown, 0.3 * 0.99 * low, without(case, unknown))
+    below = solve_for(surrogate, unknown, 0.3 * 0.99 * low, **without(case, unknown))
     assert below.roots == ((),)
     assert below.reach.mu_min == close(0.3 * low, rel=1e-6)
 
@@ -144,14 +146,18 @@ def test_a_fold_has_three_roots(surrogate: Surrogate, unknown: Any) -> None:
 def test_a_range_keeps_its_roots_only(surrogate: Surrogate) -> None:
     case = without({**CASE, "v0": 1e-4}, "k")
     target = 0.3 * 0.0023
-    every = solve_for(surrogate, "k", target, case)
+    every = solve_for(surrogate, "k", target, **case)
     assert len(every.roots[0]) == 3
     first, second, third = (root.value for root in every.roots[0])
     middle = solve_for(
-        surrogate, "k", target, case, within=(math.sqrt(first * second), math.sqrt(second * third))
+        surrogate,
+        "k",
+        target,
+        **case,
+        within=(math.sqrt(first * second), math.sqrt(second * third)),
     )
     assert only_root(middle).value == close(second, rel=1e-9)
-    half = solve_for(surrogate, "v0", 0.25, without(CASE, "v0"), within=(0.0, 1e-3))
+    half = solve_for(surrogate, "v0", 0.25, **without(CASE, "v0"), within=(0.0, 1e-3))
     assert half.roots == ((),)
     assert half.reach.max_included
     assert half.reach.mu_max == surrogate.evaluate(**{**CASE, "v0": 1e-3}).mu_macro
@@ -174,7 +180,7 @@ def test_an_input_without_influence_is_reported(
 ) -> None:
     case = {**CASE, **changed}
     value = surrogate.evaluate(**case).mu_macro
-    solution = solve_for(surrogate, unknown, [value, 0.9 * value], without(case, unknown))
+    solution = solve_for(surrogate, unknown, [value, 0.9 * value], **without(case, unknown))
     assert solution.constant
     assert solution.roots == ((), ())
     assert solution.reach.mu_min == solution.reach.mu_max == value
@@ -182,10 +188,10 @@ def test_an_input_without_influence_is_reported(
 
 def test_at_rest_the_frequency_only_matters_by_being_there(surrogate: Surrogate) -> None:
     case = without({**CASE, "v0": 0.0}, "omega")
-    solution = solve_for(surrogate, "omega", [0.3, 0.25], case)
+    solution = solve_for(surrogate, "omega", [0.3, 0.25], **case)
     assert [[root.value for root in roots] for roots in solution.roots] == [[0.0], []]
     static = surrogate.evaluate(**CASE | {"v0": 0.0}).mu_macro
-    root = only_root(solve_for(surrogate, "omega", static, case))
+    root = only_root(solve_for(surrogate, "omega", static, **case))
     assert (root.low, root.high) == (5e-324, 1.7976931348623157e308)
 
 
@@ -195,10 +201,10 @@ def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(
     for unknown in ("v0", "y0", "omega", "mu0"):
         case = {**CASE, "k": "rigid"}
         target = surrogate.evaluate(**case).mu_macro
-        root = only_root(solve_for(surrogate, unknown, target, without(case, unknown)))
+        root = only_root(solve_for(surrogate, unknown, target, **without(case, unknown)))
         assert root.value == close(CASE[unknown], rel=1e-9)
     for target in (1e-9, 0.1, 1e7):
-        root = only_root(solve_for(surrogate, "mu0", target, without(CASE, "mu0")))
+        root = only_root(solve_for(surrogate, "mu0", target, **without(CASE, "mu0")))
         assert root.mu_macro == close(target, rel=1e-12)
 
 
@@ -216,7 +222,12 @@ def test_no_root_is_missed_on_a_ray(
     assume(mu.min() * (1.0 + 1e-9) < target < mu.max() * (1.0 - 1e-9))
     above = mu > target * (1.0 + 1e-12)
     found = solve_for(
-        surrogate, unknown, target, without(case, unknown), (ray[0], ray[-1]), contact=contact
+        surrogate,
+        unknown,
+        target,
+        **without(case, unknown),
+        within=(ray[0], ray[-1]),
+        contact=contact,
     ).roots[0]
     assert len(found) >= np.count_nonzero(above[1:] != above[:-1])
     assert all(root.mu_macro == close(target, rel=1e-11) for root in found)
@@ -230,7 +241,7 @@ def test_along_and_normal_the_whole_friction_is_reached(
     surrogate: Surrogate, pair: Any, k: Any
 ) -> None:
     said, _, case = as_kind({**CASE, "k": k}, pair)
-    solution = solve_for(surrogate, "v0", 0.3, without(case, "v0"), **said)
+    solution = solve_for(surrogate, "v0", 0.3, **without(case, "v0"), **said)
     root = only_root(solution)
     # where the springs begin to slide all the time; the last digits before it are mu0, too
     z = case.get("Fz_amplitude", 0.0) / case["Fz"]
@@ -251,8 +262,8 @@ def test_the_amplitude_of_the_force_stays_below_the_force(surrogate: Surrogate) 
     said, _, case = as_kind(CASE, ("spring", "normal"))
     for unknown, within in (("Fz_amplitude", (0.1, 10.0)), ("Fz", (4.0, 100.0))):
         with pytest.raises(InputError, match=r"range must be two ascending.*Fz_amplitude below Fz"):
-            solve_for(surrogate, unknown, 0.2, without(case, unknown), within, **said)
-        reach = solve_for(surrogate, unknown, 0.2, without(case, unknown), **said).reach
+            solve_for(surrogate, unknown, 0.2, **without(case, unknown), within=within, **said)
+        reach = solve_for(surrogate, unknown, 0.2, **without(case, unknown), **said).reach
         assert reach.high < 10.0 if unknown == "Fz_amplitude" else reach.low > 4.0
 
 
@@ -268,6 +279,9 @@ REFUSED: list[tuple[str, Any, Case, str]] = [
     ("across", ("v0", ANY, (1.0, 1.0)), {}, "range must"),
     ("across", ("k", ANY, (0.0, 1.0)), {}, "range must"),
     ("across", ("v0", ANY, (0.0, math.inf)), {}, "range must"),
+    ("across", ("v0", ANY, 1.0), {}, "range must"),
+    ("across", ("v0", "fast"), {}, "target must be a real number"),
+    ("across", ("v0", ANY), {"fz": 1.0}, "fz must be one of .*did you mean Fz"),
     ("across", ("omega", ANY), {"f": 1e3}, "f must"),
     ("across", ("v0", ANY), {"omega": None, "f": 1e308}, "f must"),
     ("across", ("v0", ANY), {"k": [1e6, 2e6]}, "k must"),
@@ -288,10 +302,18 @@ def test_a_bad_question_is_refused(
     surrogate: Surrogate, direction: str, asked: Any, changed: Case, said: str
 ) -> None:
     keywords, _, case = as_kind(CASE, ("spring", direction))
-    given = {**without(case, asked[0]), **changed}
+    unknown, target, *within = asked
+    given = {**without(case, unknown), **changed}
     gone = [name for name, value in changed.items() if value is None and name != "k"]
     with pytest.raises(InputError, match=f"^{said}"):
-        solve_for(surrogate, asked[0], asked[1], without(given, *gone), *asked[2:], **keywords)
+        solve_for(
+            surrogate,
+            unknown,
+            target,
+            within=within[0] if within else None,
+            **without(given, *gone),
+            **keywords,
+        )
 
 
 # --- border ---------------------------------------------------------------------------------------
@@ -334,13 +356,13 @@ def test_a_ray_at_the_border_crosses_it_twice_or_never(
 
 
 def test_a_fold_just_above_its_first_ratio_is_found(surrogate: Surrogate) -> None:
-    case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
+    case: Case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
     # between minimum and maximum, which differ by a thousandth
     target = float(surrogate.mu_ratio(0.6626, 6.626))
-    roots = solve_for(surrogate, "k", target, case).roots[0]
+    roots = solve_for(surrogate, "k", target, **case).roots[0]
     assert len(roots) == 3
     assert roots[1].low <= 6.626 <= roots[1].high
-    below = solve_for(surrogate, "k", target, {**case, "omega": 9.7})
+    below = solve_for(surrogate, "k", target, **{**case, "omega": 9.7})
     assert len(below.roots[0]) == 1
 
 
@@ -475,12 +497,12 @@ def test_the_cusp_of_the_static_limit_is_met(surrogate: Surrogate) -> None:
 def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> None:
     rest = without(CASE, "k", "y0")
     for ends in ({"k_range": (8e5, 1.25e6)}, {"k_low": 8e5, "k_high": 1.25e6}):
-        found = solve_for(surrogate, "y0", [0.15, 0.4], {**rest, **ends})
+        found = solve_for(surrogate, "y0", [0.15, 0.4], **{**rest, **ends})
         assert found.ends == tuple(
-            solve_for(surrogate, "y0", [0.15, 0.4], {**rest, "k": k}) for k in (8e5, 1.25e6)
+            solve_for(surrogate, "y0", [0.15, 0.4], **{**rest, "k": k}) for k in (8e5, 1.25e6)
         )
         assert found.roots[0][0].value == close(
-            solve_for(surrogate, "y0", 0.15, {**rest, "k": 1e6}).roots[0][0].value, rel=1e-9
+            solve_for(surrogate, "y0", 0.15, **{**rest, "k": 1e6}).roots[0][0].value, rel=1e-9
         )
     with pytest.raises(InputError, match="k_range must be left out where k is the swept input"):
-        solve_for(surrogate, "k", 0.15, {**without(CASE, "k"), "k_range": (8e5, 1.25e6)})
+        solve_for(surrogate, "k", 0.15, **{**without(CASE, "k"), "k_range": (8e5, 1.25e6)})

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, closed_forms
-from mumacro.analysis.law import (
+from mumacro.analysis.approximations import (
     APPROXIMATIONS,
     BORDERS,
     approximations,
     border_speeds,
-    friction_law,
-    sweep_values,
 )
+from mumacro.analysis.law import law as friction_law
+from mumacro.analysis.law import sweep_values
 from mumacro.inputs.fields import FIELDS
 from mumacro.inputs.kind import kind_of
 from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
@@ -32,7 +32,7 @@ def law_of(
     """A law over v0, the keywords of its kind, and its other inputs."""
     said, _, case = as_kind(LINE, pair, 0.7)
     case = {**without(case, *("k" for name in change if name.startswith("k_"))), **dict(change)}
-    return friction_law(surrogate, "v0", values, case, **said, **options), said, case
+    return friction_law(surrogate, values=values, **case, **said, **options), said, case
 
 
 # --- the range ------------------------------------------------------------------------------------
@@ -62,6 +62,38 @@ def test_a_bad_range_names_its_field(field: str, arguments: Any) -> None:
     assert caught.value.field == field
 
 
+@pytest.mark.parametrize(
+    ("field", "options"),
+    [
+        ("start", {"stop": 1.0}),
+        ("stop", {"start": 1.0}),
+        ("start", {"start": "slow", "stop": 1.0}),
+        ("stop", {"start": 1.0, "stop": [2.0, 3.0]}),
+        ("points", {"start": 1.0, "stop": 2.0, "points": 2.5}),
+        ("values", {"values": [1.0, 2.0], "start": 1.0}),
+        ("values", {"values": [2.0, 1.0]}),
+        ("values", {"values": 1.0}),
+        ("values", {"values": []}),
+        ("values", {"values": ["slow"]}),
+    ],
+)
+def test_a_range_that_is_no_range_names_its_field(
+    surrogate: Surrogate, field: str, options: Any
+) -> None:
+    with pytest.raises(InputError) as caught:
+        friction_law(surrogate, **options, **LINE)
+    assert caught.value.field == field
+
+
+def test_a_law_goes_from_start_to_stop(surrogate: Surrogate) -> None:
+    for scale in ("log", "linear"):
+        values = sweep_values("v0", 1e-3, 1.0, 7, scale)
+        law = friction_law(surrogate, start=1e-3, stop=1.0, points=7, scale=scale, **LINE)
+        assert law.values.tolist() == values.tolist()
+        expected = friction_law(surrogate, values=values, **LINE).answer.mu_macro
+        assert law.answer.mu_macro.tolist() == expected.tolist()
+
+
 # --- any contact and direction --------------------------------------------------------------------
 
 
@@ -71,7 +103,7 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, pl
     said, fields, case = as_kind(CASE, pair, 0.009)
     along = fields[place]
     values = sweep_values(along, 0.01 * case[along], 100.0 * case[along], 41, "log")
-    law = friction_law(surrogate, along, values, without(case, along), **said)
+    law = friction_law(surrogate, along, values=values, **without(case, along), **said)
     assert law.kind.names == said
     moving, still = (
         surrogate.evaluate(**{**case, along: values, **v0}, **said)
@@ -157,6 +189,7 @@ def test_the_articles_formulas_are_refused_for_another_contact(
         ("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
         ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
         ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high must be given"),
+        ("v0", {**LINE, "step": 9}, "across", "step must be one of mu0, Fz, k"),
         ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude must be left out"),
         (
             "k",
@@ -176,7 +209,7 @@ def test_a_bad_interval_is_named(
     surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any
 ) -> None:
     with pytest.raises(InputError, match=said):
-        friction_law(surrogate, along, np.array([1.0, 10.0]), case, direction=direction)
+        friction_law(surrogate, along, values=[1.0, 10.0], **case, direction=direction)
 
 
 @every_pair
@@ -194,7 +227,7 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
     assert len(told) == len(set(told)) == 3 + len(law.border)
     amplitudes = np.array([1.0, 9.0])
     other = friction_law(
-        surrogate, "Fz_amplitude", amplitudes, without(CASE, "y0"), direction="normal"
+        surrogate, "Fz_amplitude", values=amplitudes, **without(CASE, "y0"), direction="normal"
     )
     assert other.plot().get_xlabel().endswith("[N]")
 
@@ -207,7 +240,9 @@ LENGTH = 0.0625
 
 def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
     """Law, approximations over mu0 and borders as v~ at the amplitude y~ over v~ = ``v``."""
-    law = friction_law(surrogate, "v0", np.asarray(v) * LENGTH * 3.0, {**CONTACT, "y0": y * LENGTH})
+    law = friction_law(
+        surrogate, values=np.asarray(v) * LENGTH * 3.0, **{**CONTACT, "y0": y * LENGTH}
+    )
     borders = border_speeds(surrogate, law)
     found = {name: x / 0.25 for name, x in approximations(surrogate, law).items()}
     assert (list(found), list(borders)) == (list(APPROXIMATIONS), list(BORDERS))
@@ -303,7 +338,7 @@ def test_the_border_of_every_case_is_where_the_law_crosses_it(
     surrogate: Surrogate, along: Any
 ) -> None:
     values = sweep_values(along, 0.1 * CASE[along], 10.0 * CASE[along], 31, "log")
-    law = friction_law(surrogate, along, values, without(CASE, along))
+    law = friction_law(surrogate, along, values=values, **without(CASE, along))
     speeds = border_speeds(surrogate, law)
     v0 = values if along == "v0" else CASE["v0"]
     assert ((v0 >= speeds["exact"]) == (law.answer.regime == "continuous")).all()
@@ -317,11 +352,11 @@ def test_the_border_of_every_case_is_where_the_law_crosses_it(
 def test_extreme_inputs_give_numbers_or_nan_and_no_warning(
     surrogate: Surrogate, along: Any
 ) -> None:
-    case = {"mu0": 0.3, "Fz": 1e-200, "k": 1e200, "y0": 1e-300, "omega": 1e150, "v0": 1e-150}
+    case: Case = {"mu0": 0.3, "Fz": 1e-200, "k": 1e200, "y0": 1e-300, "omega": 1e150, "v0": 1e-150}
     values = sweep_values(
         along, 1e-300 if along != "v0" else 0.0, 1e300, 41, "log" if along != "v0" else "linear"
     )
-    law = friction_law(surrogate, along, values, without(case, along))
+    law = friction_law(surrogate, along, values=values, **without(case, along))
     for column in (
         *approximations(surrogate, law).values(),
         *border_speeds(surrogate, law).values(),
@@ -335,7 +370,7 @@ def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(
 ) -> None:
     values = sweep_values("v0", 1e-3, 10.0, 5, "log")
     for changed in ({"k": "rigid"}, {"k": math.inf}, {"y0": 0.0}, {"omega": 0.0}):
-        law = friction_law(surrogate, "v0", values, {**without(CASE, "v0"), **changed})
+        law = friction_law(surrogate, values=values, **{**without(CASE, "v0"), **changed})
         assert all((column == 0.0).all() for column in border_speeds(surrogate, law).values())
         found = approximations(surrogate, law)
         if "k" in changed:

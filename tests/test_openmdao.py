@@ -12,7 +12,10 @@ from mumacro import InputError, Surrogate
 from mumacro.inputs.fields import FIELDS
 from tests.serving import CASE
 
-om = pytest.importorskip("openmdao.api")
+om = pytest.importorskip(
+    "openmdao.api", reason="openmdao of requirements/peers.txt is not installed"
+)
+pytestmark = pytest.mark.peer
 
 # stick-slip, continuous sliding, creep below y~ = 1, large amplitude
 POINTS = np.array([[0.1, 0.5], [2.0, 1.0], [1e-3, 0.7], [0.3, 30.0]])

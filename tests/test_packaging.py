@@ -15,7 +15,7 @@ import pytest
 
 import mumacro
 import service
-from mumacro.extras import missing
+from mumacro.errors import missing
 from mumacro.table import bundled
 from service.settings import load_settings
 

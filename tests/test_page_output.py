@@ -33,8 +33,8 @@ def test_it_loads_and_shows_the_known_value(
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
     assert page.text("#regime") == "stick slip"
     assert page.text("#model") == (
-        "Model: one spring of stiffness k, oscillation across the sliding direction; not compared "
-        "with measured points."
+        "Model: one spring of stiffness k, oscillation across the sliding direction; compared "
+        "with one published set of measured points, along."
     )
     assert "k is known: k known to 10 % leaves mu_macro uncertain by" in page.text("#rows")
     stick = surrogate.stick_fraction(answer.v_tilde, answer.y_tilde)
@@ -365,4 +365,28 @@ def test_the_panels_ask_and_fill_the_form(
         page.choose("#points", "1 2 3 4", "input")
         assert page.is_old("#fit")  # the result is that of other points
         page.click("#fit-form button")
-        page.wait_for("#fit-status", "^needs two or three columns: v0, mu_macro, std. Grey")
+        page.wait_for("#fit-status", "^needs two or three columns: v0, mu_macro, std; .*Grey")
+
+
+def test_the_fit_takes_decimal_commas_and_a_column_mu0(
+    open_page: Any, surrogate: Surrogate
+) -> None:
+    v0, mu0 = np.geomspace(1e-3, 1.0, 9), np.linspace(0.28, 0.32, 9)
+    mu = surrogate.evaluate(**{**START, "k": 1.3e6, "v0": v0, "mu0": mu0}).mu_macro
+    rows = [
+        ";".join(f"{value!r}" for value in row).replace(".", ",")
+        for row in zip((1e3 * v0).tolist(), mu.tolist(), mu0.tolist(), strict=True)
+    ]
+    with open_page.faked(RECORDED) as page:
+        page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
+        page.choose("#points", "\n".join(["v0 [mm/s];mu_macro;mu0", *rows]), "input")
+        page.click("#fit-form button")
+        asked = page.asked("v1/fit")
+        assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
+        assert (asked["mu0"], asked["unknowns"]) == (mu0.tolist(), ["k"])
+        (line,) = page.texts("#fit-found li")
+        assert re.fullmatch("k = 1.3 N/µm ± .*Use", line)
+        assert page.text("#fit-status") == ""
+        page.choose("#unknowns", "mu0", "input")
+        page.click("#fit-form button")
+        page.wait_for("#fit-status", "^µ₀ is a column of the points: choose k as the unknown")

@@ -13,6 +13,7 @@ from tests.comparing import close
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 PAGE = (Path(__file__).parent.parent / "docs" / "how-to" / "scale.md").read_text("utf-8")
+RUN = {"Lazy designs, streaming reductions", "Files over a cluster"}
 CASES: dict[str, Any] = {
     "mu0": 0.3,
     "Fz": 10.0,
@@ -24,6 +25,7 @@ CASES: dict[str, Any] = {
 
 
 def run(heading: str, *needs: str) -> dict[str, Any]:
+    assert heading in RUN
     for package in needs:
         pytest.importorskip(package)
     section = PAGE.split(f"# {heading}\n")[1].split("\n##")[0]
@@ -31,6 +33,11 @@ def run(heading: str, *needs: str) -> dict[str, Any]:
     for block in re.findall(r"^```python\n(.*?)^```$", section, re.MULTILINE | re.DOTALL):
         exec(compile(block, heading, "exec"), names)  # noqa: S102 (our own page)
     return names
+
+
+def test_every_program_of_the_page_is_in_a_section_that_runs_here() -> None:
+    sections = re.findall(r"^#+ ([^\n]+)\n(.*?)(?=^##|\Z)", PAGE, re.MULTILINE | re.DOTALL)
+    assert {heading for heading, text in sections if "```python" in text} == RUN
 
 
 @pytest.fixture(scope="module")

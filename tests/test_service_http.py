@@ -269,9 +269,6 @@ def test_the_page_loads_nothing_from_elsewhere(client: Any) -> None:
             assert {
                 f"/static/page/{name}" for name in re.findall(r'from "\./([^"]+)"', asset.text)
             } <= FILES.keys()
-    assert {"contact", "direction", "k_range"} <= set(
-        client.get("/static/page/names.json").json()["knows"]
-    )
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/v1/table.nc", *FILES])

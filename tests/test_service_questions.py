@@ -11,7 +11,6 @@ import pytest
 
 import mumacro
 from mumacro import Surrogate
-from mumacro.analysis.law import APPROXIMATIONS, BORDERS
 from mumacro.contacts.geometries import contact_of
 from tests.cases import Case
 from tests.comparing import close
@@ -134,7 +133,7 @@ def test_a_law_is_single_answers_in_a_row(client: Any) -> None:
 
 
 @pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega", "f"])
-def test_a_law_goes_along_any_input_and_has_approximations(client: Any, along: Any) -> None:
+def test_a_law_goes_along_any_input(client: Any, along: Any) -> None:
     name, per = ("omega", 2 * math.pi) if along == "f" else (along, 1.0)
     middle = CASE[name] / per
     asked = {
@@ -144,11 +143,8 @@ def test_a_law_goes_along_any_input_and_has_approximations(client: Any, along: A
         "scale": "linear",
         name: None,
     }
-    law = answered(client, "law", {**CASE, **asked}, include=["approximations"])
+    law = answered(client, "law", {**CASE, **asked})
     assert len(law["values"]) == 201
-    assert law["approximations"].keys() == set(APPROXIMATIONS)
-    assert law["border_speeds"].keys() == set(BORDERS)
-    assert all(len(column) == 201 for column in law["approximations"].values())
     there = answered(client, "mu-macro", CASE, **{name: law["values"][77] * per})
     assert law["mu_macro"][77] == close(there["mu_macro"], rel=1e-14)
     for mark in law["border"]:
@@ -157,11 +153,8 @@ def test_a_law_goes_along_any_input_and_has_approximations(client: Any, along: A
 
 
 def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
-    law = answered(client, "law", LAW, y0=1e-5, include=["approximations", "power"])
-    assert set(law["approximations"]["small_amplitude"]) == {None}  # outside its range
-    response = client.get(
-        "/v1/law.csv", params={**LAW, "y0": 1e-5, "include": "approximations,power"}
-    )
+    law = answered(client, "law", LAW, y0=1e-5, include=["power"])
+    response = client.get("/v1/law.csv", params={**LAW, "y0": 1e-5, "include": "power"})
     assert response.headers["content-type"].startswith("text/csv")
     assert 'filename="friction-law-v0.csv"' in response.headers["content-disposition"]
     columns = {
@@ -173,8 +166,6 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
             for part in law[name]
         },
         "mu_static [-]": law["mu_static"],
-        **{f"{name} [-]": law["approximations"][name] for name in APPROXIMATIONS},
-        **{f"border_{name} [m/s]": law["border_speeds"][name] for name in BORDERS},
         "regime": law["regime"],
         "source": law["source"],
     }

@@ -214,9 +214,10 @@ REFUSED = [
         ("POST law", {"points": value}, "#/points", "a whole number")
         for value in (5.5, True, "5", 1e30)
     ),
-    ("POST law", {"include": ["curvature"]}, "#/include/0", "settling, approximations"),
-    ("POST law", {"include": ["approximations"], "contact": "ball"}, "#/include", "one spring"),
-    ("GET law.csv", {"include": "curvature"}, "?include", "approximations"),
+    ("POST law", {"include": ["curvature"]}, "#/include/0", "settling"),
+    ("POST law", {"include": ["approximations"]}, "#/include", "mumacro law --approximations"),
+    ("GET law.csv", {"include": "curvature"}, "?include", "settling"),
+    ("GET law.csv", {"include": "power,approximations"}, "?include", "--approximations"),
     ("GET law.csv?mu0=0.4", {}, "?mu0", "is given more than once"),
     ("GET law.csv", {"omega": ...}, "?omega", "is required"),
     *(

@@ -24,7 +24,8 @@ def test_the_table_describes_itself(client: Any, surrogate: Surrogate) -> None:
     answer = client.get("/v1/table").json()
     label = {name: getattr(surrogate, name) for name in ("id", "tolerance")}
     expected = {
-        name: getattr(surrogate, name) for name in ("checksum", "max_abs_error", "max_rel_error")
+        name: getattr(surrogate, name)
+        for name in ("checksum", "max_abs_error", "max_rel_error", "error_distribution")
     }
     expected |= {
         **label,

@@ -19,7 +19,8 @@ from mumacro import InputError, Surrogate, TableError
 from mumacro.table import atlas
 from mumacro.table.atlas import BORDER_PIECES, CHARTS, NAMES
 from mumacro.table.atomic import BusyError, alone_in, write_whole
-from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, Table, _digest, read_table, write_table
+from mumacro.table.blocks import Table
+from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, _digest, read_table, write_table
 from mumacro.table.polynomials import nodes
 from tests.cases import Array
 
@@ -129,6 +130,19 @@ EDITS: dict[str, tuple[Edit, str]] = {
         )
         for version in (np.int32(0), np.int32(2), np.int32(99), "one", np.array([1, 2]))
     },
+    **{
+        f"{name} = {value}": (put(name, value, ""), f"'{name}'.* (has a negative number|is not)")
+        for name in ("verified_error_quantiles", "verified_bound_over_error")
+        for value in ("many", [1.0, 2.0], np.full(64, -1.0))
+    },
+    "a negative error among the shares": (
+        put("verified_error_quantiles", np.full(24, -1.0), ""),
+        "'verified_error_quantiles' has a negative number",
+    ),
+    "shares of errors without the shares": (
+        lambda root: root.delncattr("verified_quantiles"),
+        "'verified_quantiles' of / is missing",
+    ),
     "no version": (lambda root: root.delncattr("format_version"), "not a mumacro table"),
     "a changed value": (lambda root: root[f"{BLOCK}/value"].__setitem__((0, 0), 0.5), "checksum"),
     "a smaller tolerance": (put("tolerance", 1e-15, ""), "checksum"),
@@ -320,6 +334,18 @@ def test_one_checksum_covers_every_number_that_takes_part(sound: Table) -> None:
     assert len(seen) > 150
 
 
+def test_an_older_table_that_states_no_distribution_of_its_errors_opens(
+    tmp_path: Path, sound: Table
+) -> None:
+    assert Surrogate(sound, TABLE).error_distribution.keys() >= {"mu_ratio", "border"}
+    for name in ("quantiles", "quantities", "error_quantiles", "bound_over_error"):
+        del sound.attributes[f"verified_{name}"]
+    write_table(sound, tmp_path / "older.nc")
+    older = Surrogate.open(tmp_path / "older.nc")
+    assert older.error_distribution == {}
+    assert older.checksum == Surrogate.open(TABLE).checksum
+
+
 def test_tables_with_fewer_quantities_open(tmp_path: Path, sound: Table) -> None:
     fewer = deepcopy(sound)
     fewer.attributes["quantities"] = "mu_ratio stick_fraction"
@@ -354,7 +380,7 @@ def test_every_number_comes_back_and_the_same_numbers_give_the_same_bytes(
     assert write_table(read_table(TABLE), two) == before
     assert one.read_bytes() == two.read_bytes()
     # with the checksum, which covers every number, see above
-    assert read_table(one).attributes == sound.attributes
+    np.testing.assert_equal(read_table(one).attributes, sound.attributes)
     assert one.stat().st_mode & 0o777 == 0o644
 
 

@@ -14,6 +14,8 @@ from builder.tables.measure import SEAMS, block_errors, cell_errors, fast_from, 
 from builder.tables.quantities import SOLVED, solver_noise
 from builder.tables.verify import (
     CASES,
+    bound_over_error,
+    distribution,
     draw,
     monotony,
     seam_jumps,
@@ -95,8 +97,47 @@ def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(
         assert part[error] > 0.0
         assert part[error] == max(source[error] for source in part["sources"].values())
         assert len(part["sources"]) > 8
-    names = {*QUANTITY_NAMES, *(f"slopes of {name}" for name in QUANTITY_NAMES)}
+    names = {*QUANTITY_NAMES, "border", *(f"slopes of {name}" for name in QUANTITY_NAMES)}
     assert uncovered(report) == dict.fromkeys(names, 0)
+
+
+def test_the_distribution_of_errors_is_that_of_its_points(sound: Surrogate, sweep: Sweep) -> None:
+    report = verify(sound, sweep, 1000, seed=3)
+    spread = report["distribution"]
+    largest = {
+        "mu_ratio": report["max_abs_error"],
+        "power": report["power"]["max_rel_error"],
+        "stick_fraction": report["stick_fraction"]["max_abs_error"],
+        "border": report["border"]["max_rel_error"],
+    }
+    assert spread.keys() == {*largest, "slope_along_v", "slope_along_y"}
+    for name, part in spread.items():
+        assert part["error_quantiles"] == sorted(part["error_quantiles"]), name
+        assert part["error_quantiles"][0] < 0.2 * part["error_quantiles"][-1], name
+        least, median, most = part["bound_over_error"]
+        assert 1.0 <= least < median < most < math.inf, name
+    assert {name: spread[name]["error_quantiles"][-1] for name in largest} == largest
+    slopes = (spread[name]["error_quantiles"][-1] for name in ("slope_along_v", "slope_along_y"))
+    assert max(slopes) == report["slopes"]["mu_ratio"]["max_abs_error"]
+
+
+def test_shares_of_errors_and_ratios_are_counted() -> None:
+    error = np.arange(1.0, 102.0)
+    found = distribution(error, bound_over_error(np.full(101, 201.0), np.full(101, 1.5), error))
+    assert found["error_quantiles"] == [51.0, 96.0, 100.0, 101.0]
+    # the first error is within the solver's own
+    least, median, most = found["bound_over_error"]
+    assert (least, most) == close((202.5 / 101.0, 202.5 / 2.0), rel=1e-15)
+    assert median == close(202.5 / 51.5, rel=1e-3)
+    assert distribution(error, np.full(101, np.nan))["bound_over_error"] == [0.0, 0.0, 0.0]
+
+
+def test_a_border_that_is_off_is_found(sweep: Sweep) -> None:
+    table = read_table(TABLE)
+    for piece in table.border:
+        piece.values *= 1.0 + 1e-9
+    found = uncovered(verify(Surrogate(table, TABLE), sweep, 200, seed=3))
+    assert found["border"] > 1000
 
 
 @pytest.mark.parametrize(

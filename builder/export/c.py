@@ -5,11 +5,7 @@ The functions are those of ``mumacro/kernel``, joined into one text; nothing is 
 other packages this module needs only what the library itself needs.
 """
 
-import importlib.util
 import re
-import subprocess
-import sys
-import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -19,7 +15,7 @@ from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas
 from mumacro.table.atomic import write_whole
-from mumacro.table.netcdf import Table
+from mumacro.table.blocks import Table
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.version import __version__
 
@@ -46,26 +42,6 @@ _PRIVATE = re.compile(r"\b(mu|MU)_(?!macro\b|ratio\b)(?=\w)")
 class ExportError(MumacroError):
     """What cannot be exported, or not there; the message states why, a compiler's in its own
     words."""
-
-
-def zig(target: str) -> list[str] | None:
-    """The command that compiles for a target of zig's; None where the package ziglang is not
-    installed."""
-    found = importlib.util.find_spec("ziglang")
-    return [sys.executable, "-m", "ziglang", "cc", "-target", target] if found else None
-
-
-def compiled(texts: dict[str, str], command: list[str]) -> bytes:
-    """What ``command`` makes in a folder that holds ``texts`` by name."""
-    with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
-        for name, text in texts.items():
-            Path(folder, name).write_text(text, "ascii")
-        # the folder by its whole name: zig's cache would take two files "./mumacro.h" for one
-        words = [*command, f"-I{folder}", "-o", "made"]
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
-        if done.returncode != 0:
-            raise ExportError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
-        return Path(folder, "made").read_bytes()
 
 
 def header_text(table: Table) -> str:

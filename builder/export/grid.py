@@ -16,7 +16,8 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array
 from mumacro.table.atomic import write_whole
-from mumacro.table.netcdf import Table, read_table
+from mumacro.table.blocks import Table
+from mumacro.table.netcdf import read_table
 
 from .c import ExportError, write_c
 from .fmu.model import fmu2, fmu3

@@ -9,7 +9,7 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
-from mumacro.table.netcdf import Block, BorderPiece
+from mumacro.table.blocks import Block, BorderPiece
 from mumacro.table.polynomials import (
     LOCAL,
     WIDTH,

@@ -14,15 +14,16 @@ import numpy as np
 from mumacro import MumacroError, Surrogate
 from mumacro.kernel.arrays import Array
 from mumacro.table.atlas import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
-from mumacro.table.netcdf import Block, Table, write_table
+from mumacro.table.blocks import Block, Table
+from mumacro.table.netcdf import read_table, write_table
 from mumacro.table.polynomials import Border
 from mumacro.version import __version__
 
 from ..solver.sweep import Sweep
 from .blocks import build_block, build_border
-from .measure import block_errors
+from .measure import block_errors, border_errors
 from .quantities import ABS_TO_REL, SOLVED
-from .verify import holds, uncovered, verify
+from .verify import QUANTILES, holds, uncovered, verify
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
 SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
@@ -132,10 +133,9 @@ def build_table(
         When the verified error does not come below the tolerance.
     """
     border = Border(pieces := build_border(sweep, tolerance))
-    y = 10.0 ** np.random.default_rng(23).uniform(-4.0, 6.0, 600)
-    exact = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    largest = float(border_errors(border, sweep, np.random.default_rng(23), 600).max())
     for piece in pieces:
-        piece.max_rel_error = SAFETY * float(np.abs(border(y) / exact - 1.0).max())
+        piece.max_rel_error = SAFETY * largest
     progress("border", True)
     targets = [tolerance] * len(CHARTS)
 
@@ -189,6 +189,39 @@ def _verified(quantity: Quantity, found: dict[str, Any]) -> tuple[str, float]:
     return f"verified_max_{quantity.variable}_error", found["max_abs_error"]
 
 
+def verified_attributes(report: dict[str, Any], quantities: list[str]) -> dict[str, Any]:
+    """The attributes that state what a report of :func:`.verify.verify` found."""
+    spread = report["distribution"]
+    return {
+        "verified_max_abs_error": report["max_abs_error"],
+        "verified_max_rel_error": report["max_rel_error"],
+        **dict(
+            _verified(quantity, report[quantity.name])
+            for quantity in QUANTITIES[1:]
+            if quantity.name in quantities
+        ),
+        "verified_max_slope_error": report["slopes"]["mu_ratio"]["max_abs_error"],
+        "verified_points": np.int32(report["points"]),
+        # few and flat: each attribute costs about a hundred bytes
+        "verified_quantiles": np.array(QUANTILES),
+        "verified_quantities": " ".join(spread),
+        "verified_error_quantiles": np.concatenate(
+            [part["error_quantiles"] for part in spread.values()]
+        ),
+        "verified_bound_over_error": np.concatenate(
+            [part["bound_over_error"] for part in spread.values()]
+        ),
+    }
+
+
+def write_verified(path: Path, report: dict[str, Any]) -> None:
+    """Put what a report of :func:`.verify.verify` found into the attributes of a table file; no
+    other number of it changes."""
+    table = read_table(path)
+    table.attributes |= verified_attributes(report, table.quantities)
+    write_table(table, path)
+
+
 def _finish(
     table: Table,
     out: Path,
@@ -221,11 +254,7 @@ def _finish(
         "Conventions": "CF-1.11",
         "tolerance": tolerance,
         "quantities": " ".join(table.quantities),
-        "verified_max_abs_error": report["max_abs_error"],
-        "verified_max_rel_error": report["max_rel_error"],
-        **dict(_verified(quantity, report[quantity.name]) for quantity in QUANTITIES[1:]),
-        "verified_max_slope_error": report["slopes"]["mu_ratio"]["max_abs_error"],
-        "verified_points": np.int32(report["points"]),
+        **verified_attributes(report, table.quantities),
         "n_solves": np.int32(sweep.n_solves),
         "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),
     }

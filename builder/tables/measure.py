@@ -21,9 +21,10 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import CHARTS, CONTINUOUS, QUANTITIES, SQRT2, Axis, Chart
-from mumacro.table.netcdf import Block
+from mumacro.table.blocks import Block
 from mumacro.table.polynomials import (
     WIDTH,
+    Border,
     cells_2d,
     chebyshev_coefficients,
     coefficient_matrix,
@@ -39,7 +40,7 @@ class BlockErrors(NamedTuple):
     """Largest errors of a block.
 
     By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in
-    :class:`mumacro.table.netcdf.Block`. ``absolute``, ``relative``: of mu~.
+    :class:`mumacro.table.blocks.Block`. ``absolute``, ``relative``: of mu~.
     """
 
     values: dict[str, float]
@@ -49,6 +50,7 @@ class BlockErrors(NamedTuple):
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
+    """``n`` random numbers from ``low`` to ``high``, uniform in their logarithm, (n,)."""
     return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
 
 
@@ -73,6 +75,13 @@ def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, A
     y[fast] = log_uniform(rng, atlas.Y_CONT, 1e6, int(fast.sum()))
     v[fast] = fast_from(s, y[fast]) * off[fast]
     return v, y
+
+
+def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int) -> Array:
+    """Relative errors of v~crit on ``n`` fresh solves, (n,)."""
+    y = 10.0 ** rng.uniform(-4.0, 6.0, n)
+    exact = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    return np.asarray(np.abs(border(y) / exact - 1.0))
 
 
 def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:

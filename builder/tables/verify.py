@@ -13,9 +13,9 @@ from mumacro.table import atlas
 from mumacro.table.atlas import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
 
 from ..solver.sweep import Sweep
-from .measure import SEAMS, fast_from, near_seams
+from .measure import SEAMS, border_errors, fast_from, near_seams
 from .measure import log_uniform as _log
-from .quantities import ABS_TO_REL, solver_noise
+from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE, solver_noise
 
 # of v~crit: nearer, slopes of what is not smooth at the border are not compared
 BESIDE_BORDER = 1e-3
@@ -27,6 +27,10 @@ _FOURTH_ORDER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
 _STEP = 0.003
 # one point in so many is also compared with differences, which take twelve solves each
 SLOPE_SHARE = 20
+BORDER_POINTS = 2000  # fresh solves of v~crit
+#: shares of the points; the error below which such a share lies is published, the last is the
+#: largest error
+QUANTILES = (0.5, 0.95, 0.99, 1.0)
 
 
 def _corner(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
@@ -150,13 +154,24 @@ class Neighbours:
 
 class _Compared(NamedTuple):
     """Errors, which are beyond the solver's own for all but mu~, the same relative to the value,
-    bounds, sources."""
+    bounds, bounds over errors, sources.
+
+    ``over``: bound and solver's own error together, over the difference to the fresh solve; NaN
+    where that difference is no larger than the solver's own error.
+    """
 
     error: Array
     relative: Array
     bound: Array
+    over: Array
     missed: NDArray[np.bool_]
     source: NDArray[np.int8]
+
+
+def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
+    """What :class:`_Compared` has as ``over``."""
+    with np.errstate(all="ignore"):
+        return np.where(difference > noise, (bound + noise) / difference, np.nan)
 
 
 def _values(
@@ -166,11 +181,11 @@ def _values(
     truth = solved[name]
     noise = solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
     error = np.abs(value - truth)
-    missed = error > bound + noise
+    missed, over = error > bound + noise, bound_over_error(bound, noise, error)
     if name != "mu_ratio":
         error = np.maximum(error - noise, 0.0)
     scale = np.where(truth == 0.0, 1.0, truth)
-    return _Compared(error, error / scale, bound, missed, source)
+    return _Compared(error, error / scale, bound, over, missed, source)
 
 
 def _slopes(surrogate: Surrogate, around: Neighbours, name: str) -> _Compared:
@@ -178,16 +193,14 @@ def _slopes(surrogate: Surrogate, around: Neighbours, name: str) -> _Compared:
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
     source = surrogate.ratio_with_bound(v, y)[2]
     _, along_v, along_y, *bounds = surrogate.slopes(v, y, name, bounds=True)
-    off, bound = (
-        np.maximum(np.abs(np.stack((along_v, along_y)) - truth) - noise, 0.0),
-        np.stack(bounds),
-    )
+    difference, bound = np.abs(np.stack((along_v, along_y)) - truth), np.stack(bounds)
+    off, over = np.maximum(difference - noise, 0.0), bound_over_error(bound, noise, difference)
     # at the border of one that is not smooth there, the last digits of v~crit decide
     keep = np.full(v.shape, True)
     if not QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border:
         keep = np.abs(v / around.crit - 1.0) > BESIDE_BORDER
-    off, bound = off[:, keep].ravel(), bound[:, keep].ravel()
-    return _Compared(off, off, bound, off > bound, np.tile(source[keep], 2))
+    off, bound, over = (x[:, keep].ravel() for x in (off, bound, over))
+    return _Compared(off, off, bound, over, off > bound, np.tile(source[keep], 2))
 
 
 def _said(found: _Compared, at: Any = slice(None)) -> dict[str, Any]:
@@ -210,10 +223,59 @@ def _report(parts: list[_Compared]) -> dict[str, Any]:
     }
 
 
+def distribution(error: Array, over: Array) -> dict[str, list[float]]:
+    """Errors at :data:`QUANTILES`; least, median and largest bound over error, 0 where no error is
+    beyond the solver's own."""
+    known = over[~np.isnan(over)]
+    return {
+        "error_quantiles": np.quantile(error, QUANTILES).tolist(),
+        "bound_over_error": np.quantile(known, (0.0, 0.5, 1.0)).tolist()
+        if known.size
+        else [0.0, 0.0, 0.0],
+    }
+
+
+def _distributions(
+    values: dict[str, list[_Compared]], slopes: list[_Compared], border: _Compared
+) -> dict[str, dict[str, list[float]]]:
+    """By quantity, then of the slopes of mu~ along ln v~ and ln y~, and of v~crit, relative."""
+    found = {}
+    for name, parts in values.items():
+        error = [part.relative if SOLVED[name].relative else part.error for part in parts]
+        found[name] = np.concatenate(error), np.concatenate([part.over for part in parts])
+    for row, name in enumerate(("slope_along_v", "slope_along_y")):
+        error, over = (
+            [x.reshape(2, -1)[row] for x in column]
+            for column in ([part.error for part in slopes], [part.over for part in slopes])
+        )
+        found[name] = np.concatenate(error), np.concatenate(over)
+    found["border"] = border.relative, border.over
+    return {name: distribution(*both) for name, both in found.items()}
+
+
+def _border_found(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Compared:
+    """Errors of v~crit, all relative."""
+    error = border_errors(surrogate.border, sweep, rng, BORDER_POINTS)
+    bound, noise = (
+        np.full_like(error, surrogate.border.max_rel_error),
+        np.full_like(error, SOLVER_NOISE),
+    )
+    off = np.maximum(error - noise, 0.0)
+    return _Compared(
+        off,
+        off,
+        bound,
+        bound_over_error(bound, noise, error),
+        off > bound,
+        np.zeros(error.size, np.int8),
+    )
+
+
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
-    """Of the report of :func:`verify`: how many values and slopes of each quantity miss their
-    bound."""
+    """Of the report of :func:`verify`: how many values and slopes of each quantity, and
+    speeds of the border, miss their bound."""
     found = {name: report.get(name, report)["not_covered"] for name in report["slopes"]}
+    found["border"] = report["border"]["not_covered"]
     return found | {
         f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()
     }
@@ -237,7 +299,8 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         (values whose error exceeds their bound), and the same by kind of case in ``cases`` and by
         block or closed form in ``sources``; ``seam_jump``, ``seam_slope_jump``, ``monotony``.  By
         name the same of each other quantity, beyond the solver's own error, and in ``slopes`` of
-        the slopes of each along ln v~ and ln y~, absolute, of one point in twenty.
+        the slopes of each along ln v~ and ln y~, absolute, of one point in twenty; in ``border`` of
+        v~crit, relative.  ``distribution``: errors at :data:`QUANTILES` and bounds over errors.
     """
     names = surrogate.table.quantities
     values: dict[str, list[_Compared]] = {name: [] for name in names}
@@ -250,11 +313,14 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         for name in names:
             values[name].append(_values(surrogate, name, v, y, solved))
             slopes[name].append(_slopes(surrogate, around, name))
+    border = _border_found(surrogate, sweep, np.random.default_rng([seed, len(CASES)]))
     return {
         **_report(values["mu_ratio"]),
         "cases": {case: _said(part) for case, part in zip(CASES, values["mu_ratio"], strict=True)},
         **{name: _report(values[name]) for name in names[1:]},
         "slopes": {name: _report(parts) for name, parts in slopes.items()},
+        "border": _said(border),
+        "distribution": _distributions(values, slopes["mu_ratio"], border),
         "seam_jump": seam_jumps(surrogate),
         "seam_slope_jump": seam_slope_jumps(surrogate),
         "monotony": monotony(surrogate),

@@ -11,19 +11,144 @@ import functools
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mumacro.analysis.fit_result import Fit, quantile
-from mumacro.analysis.measured_points import HARDLY, STD, Measured
-from mumacro.errors import InputError
-from mumacro.extras import missing
+from mumacro import plotting
+from mumacro.analysis.measured_points import HARDLY, STD, UNKNOWNS, Measured
+from mumacro.errors import InputError, missing
+from mumacro.inputs.fields import real
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
-_PER_DECADE, _MOST_NODES = 10, 600  # of the sweep
+CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
+_PER_DECADE, _MOST_NODES = 10, 600  # of the scan
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What measured points say about a contact.
+
+    Attributes
+    ----------
+    values : dict
+        k [N/m] and mu0 [-], those that were unknown; k is infinite where a rigid contact fits best.
+    std : dict
+        Their standard deviations; infinite where the points do not determine a value.
+    covariance : ndarray
+        (unknowns, unknowns), in the order of ``values``.  Without standard deviations of the points
+        it is scaled by the scatter about the fit.
+    interval : dict of tuple
+        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.  Of
+        several solutions they cover all, while ``std`` and ``covariance`` are those of the best
+        one.
+    residuals : ndarray
+        Measured mu_macro minus the fit's [-], (n,).
+    chi2, reduced_chi2 : float
+        Sum of squared residuals over their variances (1 if not given); the same over the degrees of
+        freedom, NaN if there is none.
+    solutions : tuple of dict
+        All minima that the points allow within 95 %, best first, each with values and ``chi2``.
+    warnings : tuple of str
+        What the points do not determine.
+    contact, direction : str
+        As given.
+    points : dict of ndarray
+        The inputs [SI] of each point, (n,), the unknown ones left out; ``mu_macro``, and ``std``
+        where given.
+    """
+
+    values: dict[str, float]
+    std: dict[str, float]
+    covariance: Array
+    interval: dict[str, tuple[float, float]]
+    residuals: Array
+    chi2: float
+    reduced_chi2: float
+    solutions: tuple[dict[str, float], ...]
+    warnings: tuple[str, ...]
+    contact: str
+    direction: str
+    points: dict[str, Array]
+    _problem: Measured = field(repr=False, compare=False)
+
+    def predict(self, **inputs: ArrayLike) -> tuple[Array, Array]:
+        """mu_macro of the fit [-] and its standard deviation, at inputs [SI] that replace those of
+        the points."""
+        given = {
+            **self._problem.columns,
+            **{name: real(name, value) for name, value in inputs.items()},
+        }
+        mu, slopes = self._problem.model(self.values, given)
+        # a rigid contact has no slope along k
+        used = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
+        rows = np.stack([slopes[name] for name in self.values], axis=-1)
+        return mu, np.sqrt(np.einsum("...i,ij,...j", rows, used, rows))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Points, fit and its 95 % band over the input that varies most; returns matplotlib's axes.
+
+        There is a curve for each set of the other inputs; more than 8 of them have no legend.
+        Where each point has its own, such as mu0, there is one line through the fit at the points.
+        """
+        given = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
+        along = max(given, key=lambda name: (np.unique(given[name]).size, name == "v0"))
+        x, names = given[along], [name for name in self._problem.columns if name != along]
+        sets, member = np.unique([self.points[name] for name in names], axis=1, return_inverse=True)
+        if sets.shape[1] == x.size > 1:
+            return self._plot_each(along, ax)
+        low = x[x > 0.0].min(initial=math.inf)
+        fine = np.geomspace(low, x.max(), 300) if low < math.inf else x
+        width = quantile(None if STD in self.points else x.size - len(self.values))
+        curves = []
+        for i, row in enumerate(sets.T):
+            mine = member.ravel() == i
+            varied = [
+                f"{name} = {x:.4g}"
+                for name, x, all_ in zip(names, row, sets, strict=True)
+                if np.ptp(all_) > 0.0
+            ]
+            places = np.unique(np.concatenate([fine, x[mine]]))
+            mu, off = self.predict(**{along: places}, **dict(zip(names, row, strict=True)))
+            bars = self.points[STD][mine] if STD in self.points else None
+            label, measured = ", ".join(varied) or "fit", self.points["mu_macro"][mine]
+            curves.append(plotting.Curve(label, x[mine], measured, bars, places, mu, width * off))
+        return plotting.plot_fit(along, curves, ", ".join(self._told()), ax)
+
+    def _plot_each(self, along: str, ax: Any) -> Any:
+        """The same where each point has its own other inputs, such as mu0: one line."""
+        order = np.argsort(self.points[along])
+        x, measured = self.points[along][order], self.points["mu_macro"][order]
+        mu, off = (column[order] for column in self.predict())
+        std = self.points.get(STD)
+        width = quantile(None if std is not None else x.size - len(self.values))
+        bars, label = None if std is None else std[order], "fit, at the inputs of each point"
+        curve = plotting.Curve(label, x, measured, bars, x, mu, width * off)
+        return plotting.plot_fit(along, [curve], ", ".join(self._told()), ax)
+
+    def _told(self) -> list[str]:
+        units = {"k": " N/m", "mu0": ""}
+        return [
+            f"{name} = {x:.4g} ± {self.std[name]:.2g}{units[name]}"
+            for name, x in self.values.items()
+        ]
+
+    def __repr__(self) -> str:
+        given = STD in self.points
+        scatter = (
+            f"reduced chi2 {self.reduced_chi2:.3g}"
+            if given
+            else f"scatter {math.sqrt(self.reduced_chi2):.2g}"
+        )
+        about = f"{self.residuals.size} points, {scatter}, {self.contact}"
+        lines = [
+            f"<Fit {', '.join(self._told())}; {about}>",
+            *(f"  warning: {text}" for text in self.warnings),
+        ]
+        return "\n".join(lines)
 
 
 def fit(
@@ -336,3 +461,12 @@ def _around(values: Mapping[str, float], apart: Array) -> dict[str, tuple[float,
             name: (float(x * np.exp(-o)) if x < math.inf else 0.0, float(x * np.exp(o)))
             for (name, x), o in zip(values.items(), apart, strict=True)
         }
+
+
+def quantile(dof: int | None) -> float:
+    """Half width of a 95 % interval in standard deviations: of Student's t, or of the normal
+    distribution."""
+    from scipy.special import ndtri, stdtrit
+
+    share = 0.5 + 0.5 * CONFIDENCE
+    return float(ndtri(share) if dof is None or dof < 1 else stdtrit(dof, share))

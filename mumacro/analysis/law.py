@@ -1,71 +1,26 @@
-"""The friction law: mu_macro over a range of v0, or of any one input, with its marks and the
-paper's approximations."""
+"""The friction law: mu_macro over a range of v0, or of any one input, with its marks."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mumacro import closed_forms
-from mumacro.analysis.rootfinding import Sweep
-from mumacro.analysis.roots import Crossing, checked_case
-from mumacro.analysis.solve_for import border_crossings
+from mumacro import plotting
+from mumacro.analysis.borders import Crossing, border_crossings
+from mumacro.analysis.load import Stiffening, stiffening_of
+from mumacro.analysis.sweep import Sweep, checked_case
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
-from mumacro.inputs.fields import FIELDS, POSITIVE
+from mumacro.inputs.fields import FIELDS, POSITIVE, real
 from mumacro.inputs.k_range import without_interval
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
 SCALES = ("log", "linear")
-
-#: column -> what it is and where it is given; NaN elsewhere.  Without an equation number it is this
-#: project's own.
-APPROXIMATIONS = {
-    "static": "eqs. (16), (38), the limit v0 -> 0: mu0 sqrt(1 - y~^2), 0 for y~ >= 1",
-    "creep": "slow sliding, first order: mu0 (sqrt(1 - y~^2) + pi v~ / (2 (1 - y~^2))), or mu0 "
-    "C(y~) v~ for y~ > 1, C from the table; given up to mu0",
-    "master_curve": "eq. (28), stick-slip at y~ << 1, between (38) at v0 = 0 and (40) at the "
-    "border (27); given for y~ <= 1 up to that border",
-    "master_curve_limit": "the limit of (28) for y~ -> 0, between (38) and the table's value at "
-    "the table's border; given for y~ <= 1 up to the border",
-    "critical": "eqs. (32), (40), the value at the border for y~ << 1: mu0 (1 - y~^2 / 4); given "
-    "for y~ <= 1",
-    "small_amplitude": "eq. (31), continuous sliding at y~ << 1: mu0 (1 - y~^2 / (4 (1 + v~^2))); "
-    "given for y~ <= 1 in continuous sliding",
-    "continuous": "mu0 (2/pi) K(i y~ / sqrt(1 + v~^2)), eqs. (31) and (35) in one; given in "
-    "continuous sliding",
-    "rigid": "eqs. (35), (37), fast sliding or rigid contact: mu0 (2/pi) K(i y~/v~)",
-    "corner": "slow sliding near y~ = 1, root of mu~^3 + 2 (y~ - 1) mu~ = pi v~; given for |y~ - "
-    "1| <= 0.5, mu~ <= 0.7",
-}
-#: v0 at which continuous sliding begins: column -> what it is and where it is given
-BORDERS = {
-    "exact": "the table's border",
-    "eq_23": "l0 omega v~, v~ the root of y~^2 = 2 v~ (1 + v~^2)(sqrt(1 + v~^2) + v~); given for "
-    "y~ <= 1",
-    "eq_24": "eqs. (24), (39): (omega / 2)(sqrt(l0^2 + 2 y0^2) - l0); given for y~ <= 1",
-    "eq_26": "l0 omega sqrt(y~ / 4.5); given for y~ >= 1",
-    "eq_27": "l0 omega 0.47 y~^(5/2) / (y~^2 + 0.94 y~^(1/2) / (1 + y~^2))",
-    "small_amplitude": "l0 omega (y~^2 / 2)(1 - 5 y~^2 / 12); given for y~ <= 1",
-    "large_amplitude": "l0 omega sqrt(y~ / 4.402914), eq. (26) with the exact constant; given for "
-    "y~ >= 1",
-    "blend": "one formula for every y~, within 0.6 percent",
-}
-_CORNER_REACH, _CORNER_TOP = 0.5, 0.7
-#: column of BORDERS -> formula, smallest and largest y~
-_FORMULAS = {
-    "eq_23": (closed_forms.border_23, 0.0, 1.0),
-    "eq_24": (closed_forms.border_24, 0.0, 1.0),
-    "eq_26": (closed_forms.border_26, 1.0, math.inf),
-    "eq_27": (closed_forms.border_27, 0.0, math.inf),
-    "small_amplitude": (closed_forms.border_small_amplitude, 0.0, 1.0),
-    "large_amplitude": (closed_forms.border_large_amplitude, 1.0, math.inf),
-    "blend": (closed_forms.border_blend, 0.0, math.inf),
-}
 
 
 @dataclass(frozen=True)
@@ -82,6 +37,15 @@ class Law:
     border: tuple[Crossing, ...]
     case: dict[str, float]  #: the other five inputs [SI], checked; an interval of k by its middle
     kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
+    #: how k grows along Fz; None where k is constant
+    stiffening: Stiffening | None = None
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """All six inputs [SI]: ``case``, and the swept one (n,); k (n,), too, where it grows with
+        Fz."""
+        six = {**self.case, self.along: self.values}
+        return six if self.stiffening is None else six | self.stiffening.scaled(six, self.values)
 
     @property
     def band(self) -> tuple[Array, Array] | None:
@@ -95,13 +59,24 @@ class Law:
         """The law as a table: column -> values (n,), the swept input first."""
         names = ["mu_macro", *(BAND if self.band else ()), "regime", "error_bound", "source"]
         found = {name: getattr(self.answer, name) for name in names}
-        return {self.along: self.values, **found, "mu_static": self.mu_static}
+        k = {} if self.stiffening is None else {"k": self.inputs["k"]}
+        return {self.along: self.values, **k, **found, "mu_static": self.mu_static}
 
-    def plot(self, axes: Any = None) -> Any:
+    def plot(
+        self, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None
+    ) -> Any:
         """A picture, see ``mumacro.plotting.plot_law``; needs matplotlib."""
-        from mumacro.plotting import plot_law
-
-        return plot_law(self, axes)
+        return plotting.plot_law(
+            self.along,
+            self.values,
+            self.answer.mu_macro,
+            self.mu_static,
+            axes,
+            band=self.band,
+            borders=[(crossing.value, crossing.name) for crossing in self.border],
+            roots=roots,
+            target=target,
+        )
 
 
 def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
@@ -115,12 +90,13 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
         raise InputError("along", along, f"one of {', '.join(FIELDS)}, {AMPLITUDE}")
     if scale not in SCALES:
         raise InputError("scale", scale, f"one of {', '.join(SCALES)}")
-    if points < 2:
-        raise InputError("points", points, ">= 2")
+    if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
+        raise InputError("points", points, "a whole number >= 2")
     positive = along in POSITIVE or scale == "log"
     if not (math.isfinite(start) and (start > 0.0 or (start == 0.0 and not positive))):
-        told = " on a logarithmic scale" if scale == "log" else ""
-        raise InputError("start", start, f"finite and > 0{told}" if positive else "finite and >= 0")
+        where = " on a logarithmic scale" if scale == "log" else ""
+        bound = f"finite and > 0{where}" if positive else "finite and >= 0"
+        raise InputError("start", start, bound)
     if not (math.isfinite(stop) and stop > start):
         raise InputError("stop", stop, "finite and > start")
     if scale == "linear":
@@ -131,15 +107,38 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
     return np.clip(values, start, stop)
 
 
-def friction_law(
+def _end(name: str, value: float | None) -> float:
+    """One end of the range as a float."""
+    if value is None:
+        raise InputError(name, None, "given [SI]: the range goes from start to stop")
+    end = real(name, value)
+    if end.ndim:
+        raise InputError(name, end.shape, "one number")
+    return float(end)
+
+
+def _ascending(values: ArrayLike) -> Array:
+    """Values of the swept input, (n,)."""
+    x = real("values", values)
+    if x.ndim != 1 or not x.size or not np.all(np.diff(x) >= 0.0):
+        raise InputError("values", values, "one-dimensional and ascending")
+    return x
+
+
+def law(
     surrogate: Surrogate,
-    along: str,
-    values: Array,
-    case: Mapping[str, Any],
+    along: str = "v0",
     *,
+    start: float | None = None,
+    stop: float | None = None,
+    points: int = 201,
+    scale: str = "log",
+    values: ArrayLike | None = None,
+    refine: bool = False,
     contact: str = "spring",
     direction: str = "across",
-    refine: bool = False,
+    stiffness_exponent: float | None = None,
+    **case: Any,
 ) -> Law:
     """The friction law: mu_macro over a range of one input.
 
@@ -149,131 +148,63 @@ def friction_law(
     along : str
         The swept input: mu0, Fz, k, y0, omega or v0; for direction normal Fz_amplitude in place of
         y0.
-    values : ndarray
-        Its values [SI], ascending, shape (n,), such as :func:`sweep_values` makes.
-    case : mapping
-        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
-        for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: the law has a band, see
-        :attr:`Law.band`.
-    contact, direction : str
-        As in :meth:`mumacro.Surrogate.evaluate`.
+    start, stop : float
+        Its first and its last value [SI], both included.
+    points, scale : int, str
+        How many values there are, evenly spaced on a scale "log" or "linear".
+    values : array_like
+        The values themselves [SI], ascending, shape (n,), in place of ``start`` and ``stop``.
     refine : bool
         Also values where mu_macro bends, for pictures: at the borders, and where a straight line
         between neighbours would be wrong by more than a thousandth of the law's height.
+    contact, direction : str
+        As in :meth:`mumacro.Surrogate.evaluate`.
+    stiffness_exponent : float, optional
+        Along Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1.  Fz_given, the load at which
+        ``k`` holds, is ``Fz`` of the case.  Left out: 1/3 for a ball whose case has ``Fz``, else 0,
+        a constant k, and the case has no ``Fz``.
+    **case : float
+        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
+        for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: the law has a band, see
+        :attr:`mumacro.analysis.law.Law.band`.
 
     Raises
     ------
     InputError
-        An input that is missing, out of bounds, or given twice; an interval of k where k is swept.
+        An input that is missing, out of bounds, or given twice; an interval of k where k is swept;
+        a range out of bounds; an exponent without the load at which k holds, or along another input
+        than Fz.
 
     Examples
     --------
     >>> import mumacro
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
-    >>> law = friction_law(mumacro.open(), "v0", sweep_values("v0", 1e-4, 1.0, 3, "log"), case)
-    >>> law.answer.mu_macro.round(4).tolist(), round(law.border[0].value, 5)
+    >>> found = mumacro.law(mumacro.open(), start=1e-4, stop=1.0, points=3, **case)
+    >>> found.answer.mu_macro.round(4).tolist(), round(found.border[0].value, 5)
     ([0.2238, 0.24, 0.2957], 0.07105)
     """
+    if values is None:
+        x = sweep_values(along, _end("start", start), _end("stop", stop), points, scale)
+    elif start is None and stop is None:
+        x = _ascending(values)
+    else:
+        raise InputError("values", "an array", "left out beside start and stop")
     kind = kind_of(contact, direction)
-    case, ends = without_interval(case, along)
-    known = checked_case(case, along, kind)
-    sweep = Sweep(surrogate, known, along, kind)
+    one_k, ends = without_interval(case, along)
+    one_k, stiffening = stiffening_of(one_k, along, kind, stiffness_exponent)
+    others = checked_case(one_k, along, kind)
+    sweep = Sweep(surrogate, others, along, kind, stiffening)
+    ends_of_range = float(x[0]), float(x[-1])
     border = border_crossings(
-        surrogate, along, known, float(values[0]), float(values[-1]), **kind.names
+        surrogate, along, others, *ends_of_range, **kind.names, stiffening=stiffening
     )
     if refine:
-        values = sweep.refined(np.union1d(values, [mark.value for mark in border]))
-    answer = sweep.answer(values, groups=True, illegal="raise")
+        x = sweep.refined(np.union1d(x, [mark.value for mark in border]))
+    answer = sweep.answer(x, groups=True, illegal="raise")
     if ends:
-        others = {name: value for name, value in known.items() if name != "k"}
-        answer = Sweep(surrogate, {**others, **ends}, along, kind).answer(
-            values, groups=True, illegal="raise"
-        )
-    at_rest = sweep.answer(values, v0=0.0) if along != "v0" else sweep.answer(0.0)
-    return Law(
-        along, values, answer, np.broadcast_to(at_rest.mu_macro, values.shape), border, known, kind
-    )
-
-
-def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
-    """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the stated
-    range.
-
-    InputError for a ball, and an oscillation along or normal: the article has one spring, across.
-    """
-    inputs = _of_one_spring(law)
-    mu0, v, y = inputs["mu0"], law.answer.v_tilde, law.answer.y_tilde
-    # rigid contact has no finite v~ and y~; eq. (37) is then the result
-    elastic = np.isfinite(v) & np.isfinite(y)
-    low, slides = elastic & (y <= 1.0), elastic & (law.answer.regime == "continuous")
-    near = elastic & (np.abs(y - 1.0) <= _CORNER_REACH) & (v > 0.0) & (v < 1.0)
-    # the tangent of mu_macro(v0) at v0 = 0; not finite where it is vertical (y~ = 1, rigid contact)
-    at_rest = surrogate.evaluate({**inputs, "v0": np.zeros(law.values.shape)}, gradient=True)
-    with np.errstate(all="ignore"):
-        creep = law.mu_static + at_rest.gradient["v0"] * inputs["v0"]
-        border, fit_border = surrogate.v_tilde_crit(y), closed_forms.border_27(y)
-        # without oscillation there is no border, and every speed but 0 is infinitely far above it
-        share, fit_share = (np.where(v > 0.0, v / at, 0.0) for at in (border, fit_border))
-        static, critical, top = (
-            closed_forms.static_limit(y),
-            closed_forms.critical(y),
-            surrogate.mu_ratio(border, y),
-        )
-        rigid = np.where(
-            elastic, closed_forms.outer(np.where(v > 0.0, y / v, math.inf)), law.answer.mu_ratio
-        )
-        corner, limit = closed_forms.corner_root(v, y - 1.0), closed_forms.master_curve_limit(share)
-        found = {
-            "static": (law.mu_static, True),
-            "creep": (creep, creep <= mu0),
-            "master_curve": (
-                mu0 * (static + (critical - static) * closed_forms.master_curve(fit_share)),
-                low,
-            ),
-            "master_curve_limit": (mu0 * (static + (top - static) * limit), low & (v <= border)),
-            "critical": (mu0 * critical, low),
-            "small_amplitude": (mu0 * closed_forms.small_amplitude(v, y), low & slides),
-            "continuous": (mu0 * closed_forms.continuous(v, y), slides),
-            "rigid": (mu0 * rigid, True),
-            "corner": (mu0 * corner, near & (corner <= _CORNER_TOP)),
-        }
-    return {name: np.where(given, column, np.nan) for name, (column, given) in found.items()}
-
-
-def borders(y: Array) -> dict[str, Array]:
-    """v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN outside the
-    stated range.
-
-    >>> found = borders(np.array([0.5, 2.0]))
-    >>> found["eq_24"].round(4).tolist(), found["eq_26"].round(4).tolist()
-    ([0.1124, nan], [nan, 0.6667])
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        return {
-            name: np.where((y >= least) & (y <= most), formula(y), np.nan)
-            for name, (formula, least, most) in _FORMULAS.items()
-        }
-
-
-def _of_one_spring(law: Law) -> dict[str, Any]:
-    """The inputs of a law of one spring across."""
-    if law.kind != SPRING:
-        told = " ".join(law.kind.names.values())
-        raise InputError("approximations", told, "left out: they are those of one spring, across")
-    return {**law.case, law.along: law.values}
-
-
-def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:
-    """v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in
-    :data:`BORDERS`; (n,).
-
-    NaN where an approximation does not apply and where y~ is beyond double range; 0 for rigid
-    contact and without oscillation, which never stick.  InputError as in :func:`approximations`.
-    """
-    inputs = _of_one_spring(law)
-    y, omega = law.answer.y_tilde, inputs["omega"]
-    never = (inputs["y0"] == 0.0) | (omega == 0.0) | np.isinf(inputs["k"])
-    with np.errstate(all="ignore"):
-        unit = np.where(np.isfinite(y), law.answer.length_scale * omega, np.nan)
-        found = {"exact": surrogate.v_tilde_crit(y), **borders(y)}
-        return {name: np.where(never, 0.0, unit * column) for name, column in found.items()}
+        interval = {**{name: one for name, one in others.items() if name != "k"}, **ends}
+        over = Sweep(surrogate, interval, along, kind, stiffening)
+        answer = over.answer(x, groups=True, illegal="raise")
+    at_rest = sweep.answer(x, v0=0.0) if along != "v0" else sweep.answer(0.0)
+    mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
+    return Law(along, x, answer, mu_static, border, others, kind, sweep.stiffening)

@@ -9,65 +9,18 @@ bracket: by its geometric mean, so that any scale is reached.
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro.answer import Answer
-from mumacro.inputs.kind import SPRING, Kind
+from mumacro.analysis.sweep import Sweep
 from mumacro.kernel.arrays import Array, Bools, Places
-from mumacro.surrogate import Surrogate
 
 TINY = 5e-324
 _ROUNDING = 2.0**-52
 _PER_CALL = 512
-_CHORD, _HALVINGS = 1e-3, 8  # of a refined sweep: error of a straight line over the height, rounds
 _MAX_SAMPLES = 20_001
-
-
-class Sweep:
-    """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
-    ``k`` is rigid."""
-
-    def __init__(
-        self, surrogate: Surrogate, case: Mapping[str, Any], unknown: str, kind: Kind = SPRING
-    ) -> None:
-        self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
-
-    def answer(self, x: Any, **more: Any) -> Answer[Any]:
-        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in
-        ``evaluate``."""
-        answer: Answer[Any] = self.surrogate.evaluate(
-            **{**self.case, self.unknown: x, **self.kind.names, **more}
-        )
-        return answer
-
-    def mu(self, x: Array) -> Array:
-        """mu_macro [-] at ``x`` (n,)."""
-        return np.asarray(self.answer(x).mu_macro)
-
-    def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
-        """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN
-        at an edge."""
-        answer = self.answer(x, gradient=True)
-        with np.errstate(over="ignore", invalid="ignore"):
-            return answer, x * answer.gradient[self.unknown]  # type: ignore[index]
-
-    def refined(self, values: Array) -> Array:
-        """``values`` and more between them, where chords of mu_macro differ from it."""
-        mu = self.mu(values)
-        for _ in range(_HALVINGS):
-            low, high = values[:-1], values[1:]
-            middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
-            inside = self.mu(middle)
-            bent = np.abs(inside - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
-            at = np.flatnonzero(bent & (middle > low) & (middle < high))
-            if not at.size:
-                break
-            values, mu = np.insert(values, at + 1, middle[at]), np.insert(mu, at + 1, inside[at])
-        return values
 
 
 class Curve:

@@ -1,5 +1,4 @@
-"""The inverse problem: which value of one input gives a wanted mu_macro; and where a sweep of it
-crosses the border.
+"""The inverse problem: which values of one input give a mu_macro.
 
 What is known of mu_macro as a function of one input, the others constant, for an oscillation
 across:
@@ -24,28 +23,32 @@ and less. Along and normal every input has one root, and mu0 is reached: where t
 moves backwards, or the springs slide all the time.  There mu_macro falls with k and rises with Fz
 (along), and rises with both (normal).
 
+Where k grows with the load as Fz^m, m < 1, v~ and y~ go like Fz^(m-1) (across and along): mu_macro
+runs through the same values in the same order, its turning points and its border are as many, and
+stand in ln Fz 1/(1 - m) times as far apart.  For m = 1 it is constant.  For normal it rises with Fz
+at constant k and rises with k, so it rises with Fz for every m, up to mu0 where that is reached.
+
 How a level is found on a monotone piece: :mod:`mumacro.analysis.rootfinding`.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mumacro.analysis.rootfinding import TINY, Curve, Sweep, curves_between, last_double, samples
-from mumacro.analysis.roots import Crossing, Reach, Root, Solution, checked_case
+from mumacro.analysis.load import Stiffening, stiffening_of
+from mumacro.analysis.rootfinding import TINY, Curve, curves_between, last_double, samples
+from mumacro.analysis.sweep import EVERYWHERE, Sweep, checked_case
 from mumacro.answer import Answer
 from mumacro.errors import InputError
-from mumacro.inputs.fields import POSITIVE
+from mumacro.inputs.fields import POSITIVE, real
 from mumacro.inputs.k_range import without_interval
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.surrogate import Surrogate
 
-EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # searched over all their values
 HUGE = 1.7976931348623157e308
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.
@@ -57,41 +60,89 @@ _PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
 # 1 - O(y~^2), along 1 - O(y~); reverse slip may begin at y~ = 3/c^3, where the angle c =
 # arccos(v~/y~) is 1e-8 or more.
 _ENDS = {"across": (1e-6, 1e8), "along": (1e-17, 1e30), "normal": (1e-17, 10.0)}
-# y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls
-# strictly from 2 to 1/2 (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on
-# either side.
-_Y_CLOSEST = 1.290791
+
+
+class Root(NamedTuple):
+    """One value of the unknown."""
+
+    value: float  #: the unknown [SI]
+    #: between them, and on the root's side of the next turning point, mu_macro is within the
+    #: surrogate's error bound of the target: the true root cannot be distinguished from any of
+    #: these values [SI]
+    low: float
+    high: float
+    mu_macro: float  #: the surrogate's value there [-]
+    regime: str  #: one of :data:`mumacro.REGIMES`
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Which mu_macro is reachable in a range of the unknown."""
+
+    low: float  #: the range of the unknown [SI]
+    high: float
+    mu_min: float  #: smallest and largest mu_macro in it [-]
+    mu_max: float
+    min_included: bool  #: False where that value is approached and never reached
+    max_included: bool
+
+    def holds(self, target: float) -> bool:
+        """Whether ``target`` is reachable."""
+        above = target > self.mu_min or (self.min_included and target == self.mu_min)
+        return above and (target < self.mu_max or (self.max_included and target == self.mu_max))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """All roots of every target."""
+
+    unknown: str  #: the input that was solved for
+    targets: tuple[float, ...]  #: the wanted mu_macro [-]
+    #: of each target, ascending; empty where it is not reachable
+    roots: tuple[tuple[Root, ...], ...]
+    reach: Reach  #: what is reachable in the range that was searched
+    #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
+    constant: bool
+    #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
+    #: its highest value
+    ends: tuple["Solution", "Solution"] | None = None
+    #: how k grows with Fz, where that is solved for; None where k is constant
+    stiffening: Stiffening | None = None
 
 
 def solve_for(
     surrogate: Surrogate,
     unknown: str,
-    targets: ArrayLike,
-    case: Mapping[str, Any],
-    within: tuple[float, float] | None = None,
+    target: ArrayLike,
     *,
+    within: tuple[float, float] | None = None,
     contact: str = "spring",
     direction: str = "across",
+    stiffness_exponent: float | None = None,
+    **case: Any,
 ) -> Solution:
-    """Every value of one input at which mu_macro has the wanted value.
+    """Every value of one input at which mu_macro is ``target``.
 
     Parameters
     ----------
     surrogate : Surrogate
     unknown : str
         One of mu0, Fz, k, y0, omega, v0; for direction normal Fz_amplitude in place of y0.
-    targets : array_like
-        Wanted mu_macro [-], >= 0, shape (n,) or a scalar.
-    case : mapping
-        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
-        for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: see
-        :attr:`Solution.ends`.
+    target : array_like
+        mu_macro [-], >= 0, shape (n,) or a scalar.
     within : (float, float), optional
         Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for
         k, Fz and mu0 from where the contact is so soft that it does not matter to where it is as
         good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
+    stiffness_exponent : float, optional
+        For Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1, where ``Fz`` of the case is
+        Fz_given: see :func:`mumacro.law`.
+    **case : float
+        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
+        for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: see
+        ``Solution.ends``.
 
     Raises
     ------
@@ -102,37 +153,39 @@ def solve_for(
     --------
     >>> import mumacro
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
-    >>> found = solve_for(mumacro.open(), "y0", [0.15, 0.4], case)
-    >>> [[f"{root.value:.4e} m" for root in roots] for roots in found.roots]  # 0.4 is above mu0
+    >>> solution = mumacro.solve_for(mumacro.open(), "y0", target=[0.15, 0.4], **case)
+    >>> [[f"{root.value:.4e} m" for root in roots] for roots in solution.roots]  # 0.4: above mu0
     [['2.8570e-06 m'], []]
     """
     kind = kind_of(contact, direction)
-    case, interval = without_interval(case, unknown)
+    others, interval = without_interval(case, unknown)
     if interval:
         softest, middle, stiffest = (
             solve_for(
                 surrogate,
                 unknown,
-                targets,
-                {**case, "k": k},
-                within,
+                target,
+                within=within,
                 contact=contact,
                 direction=direction,
+                stiffness_exponent=stiffness_exponent,
+                **{**others, "k": k},
             )
-            for k in (interval["k_low"], case["k"], interval["k_high"])
+            for k in (interval["k_low"], others["k"], interval["k_high"])
         )
         return replace(middle, ends=(softest, stiffest))
-    sweep = Sweep(surrogate, checked_case(case, unknown, kind), unknown, kind)
-    wanted = np.asarray(targets, dtype=np.float64).ravel()
-    bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
+    others, stiffening = stiffening_of(others, unknown, kind, stiffness_exponent)
+    sweep = Sweep(surrogate, checked_case(others, unknown, kind), unknown, kind, stiffening)
+    levels = real("target", target).ravel()
+    bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:
         raise InputError(
             "target",
-            float(wanted[bad[0]]),
+            float(levels[bad[0]]),
             "finite and >= 0",
-            int(bad[0]) if np.ndim(targets) else None,
+            int(bad[0]) if np.ndim(target) else None,
         )
-    low, high = _default_range(sweep, wanted) if within is None else _checked_range(sweep, within)
+    low, high = _default_range(sweep, levels) if within is None else _checked_range(sweep, within)
     folds = unknown in ("k", "Fz") and direction == "across"
     x = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
     answer = sweep.answer(x)
@@ -151,52 +204,13 @@ def solve_for(
     constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
     if within is None and unknown in EVERYWHERE and not constant:
         reach = _without_limit(sweep, reach)
-    levels = tuple(wanted.tolist())
-    found = _roots(sweep, [] if constant else curves, wanted)
+    found = _roots(sweep, [] if constant else curves, levels)
     roots = (
-        tuple(some) if reach.holds(level) else () for level, some in zip(levels, found, strict=True)
+        tuple(some) if reach.holds(level) else ()
+        for level, some in zip(levels.tolist(), found, strict=True)
     )
-    return Solution(unknown, levels, tuple(roots), reach, constant)
-
-
-def border_crossings(
-    surrogate: Surrogate,
-    along: str,
-    case: Mapping[str, Any],
-    low: float,
-    high: float,
-    *,
-    contact: str = "spring",
-    direction: str = "across",
-) -> tuple[Crossing, ...]:
-    """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends,
-    ascending.
-
-    ``case`` holds the other five inputs.  Of continuous sliding none, one, or (across, over mu0, Fz
-    or k) two places; none for rigid contact (never any stick) and without oscillation.
-    """
-    kind = kind_of(contact, direction)
-    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind)
-    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values():
-        return ()
-    low = max(low, TINY)  # at 0 nothing oscillates or slides
-    middle = low if along in EVERYWHERE or direction != "across" else _where(sweep, _Y_CLOSEST)
-    edges = np.array([low, middle, high] if low < middle < high else [low, high])
-    found = []
-    for regime in ("continuous", "reverse_slip"):
-        state = sweep.answer(edges).regime == regime
-        i = np.flatnonzero(state[1:] != state[:-1])
-
-        def before(x: Array, regime: str = regime, states: Bools = state[i, None]) -> Bools:
-            same: Bools = (sweep.answer(x).regime == regime) == states
-            return same
-
-        cuts = last_double(before, edges[i], edges[i + 1])
-        found += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
-    below, first = np.array(sorted(set(found))).reshape(-1, 2).T
-    after = sweep.answer(first)
-    regimes = zip(sweep.answer(below).regime.tolist(), after.regime.tolist(), strict=True)
-    return tuple(map(Crossing, first.tolist(), after.mu_macro.tolist(), regimes))
+    targets = tuple(levels.tolist())
+    return Solution(unknown, targets, tuple(roots), reach, constant, stiffening=sweep.stiffening)
 
 
 def _legal(sweep: Sweep) -> tuple[float, float]:
@@ -208,7 +222,10 @@ def _legal(sweep: Sweep) -> tuple[float, float]:
 
 
 def _checked_range(sweep: Sweep, within: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(end) for end in within)
+    try:
+        low, high = (float(end) for end in within)
+    except (TypeError, ValueError) as error:
+        raise InputError("range", within, "two ascending, finite numbers") from error
     least, most = _legal(sweep)
     if not least <= low < high <= most:
         bound = "two ascending, finite numbers " + ("> 0" if sweep.unknown in POSITIVE else ">= 0")
@@ -223,8 +240,19 @@ def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
     case, unknown, (least, most) = sweep.case, sweep.unknown, _legal(sweep)
     if unknown in EVERYWHERE:
         return least, most
+    low, high = _soft_to_rigid(sweep, targets, least)
+    if sweep.stiffening is not None:
+        lightest, heaviest = sweep.stiffening.range(case["k"])
+        inner = max(low, lightest), min(high, heaviest)
+        low, high = inner if inner[0] < inner[1] else (max(least, lightest), heaviest)
+    return low, high
+
+
+def _soft_to_rigid(sweep: Sweep, targets: Array, least: float) -> tuple[float, float]:
+    """The same for k, Fz and mu0, whose smallest legal value is ``least``."""
+    case, unknown = sweep.case, sweep.unknown
     amplitude = case[AMPLITUDE if sweep.kind.normal else "y0"]
-    if 0.0 in (amplitude, case["omega"]):
+    if 0.0 in (amplitude, case["omega"]) or sweep.proportional:
         return max(least, 1e-300), 1e300
     if unknown == "Fz" and sweep.kind.normal:
         return least, min(1e17 * amplitude, 1e300)
@@ -238,7 +266,7 @@ def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
         )
         r = math.exp(min(log_r, 230.0))
         stiff = max(stiff, stiff * r, 1e3 * r * r)
-    low, high = sorted((_where(sweep, soft), _where(sweep, stiff)))
+    low, high = sorted((sweep.where(soft), sweep.where(stiff)))
     if unknown == "mu0":  # mu_macro grows with it without limit
         wanted = targets[targets > 0.0]
         low, high = (
@@ -246,15 +274,6 @@ def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
             2.0 * float(wanted.max(initial=0.5 * high)),
         )
     return max(low, 1e-300), min(high, 1e300)
-
-
-def _where(sweep: Sweep, place: float) -> float:
-    """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``place``, within double range; of a
-    rigid contact any."""
-    one = sweep.answer(1.0)
-    at_one = float(one.v_tilde / one.y_tilde if sweep.kind.normal else one.y_tilde)
-    scale = 1.0 if sweep.case.get("k") == math.inf else min(max(at_one, 1e-300), 1e300)
-    return place / scale if sweep.unknown == "k" else scale / place
 
 
 def _without_limit(sweep: Sweep, reach: Reach) -> Reach:

@@ -12,10 +12,11 @@ from typing import Any, TypedDict
 
 import numpy as np
 
+from mumacro.analysis.load import EXPONENTS, ROUGH, Stiffening
 from mumacro.analysis.measured_points import HARDLY
 from mumacro.analysis.settling import settling
 from mumacro.errors import InputError
-from mumacro.inputs.fields import RAD_PER_CYCLE, as_columns, length_scale
+from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID, as_columns, length_scale
 from mumacro.inputs.k_range import without_interval
 from mumacro.inputs.kind import kind_of
 from mumacro.surrogate import Surrogate
@@ -85,6 +86,39 @@ def model_rows(
         *(_cycle(surrogate, six) if direction == "across" else ()),
     ]
     return sorted((row for row in rows if row is not None), key=lambda row: ROWS.index(row["row"]))
+
+
+def load_rows(
+    unknown: str,
+    case: Mapping[str, Any],
+    contact: str = "spring",
+    stiffening: Stiffening | None = None,
+) -> list[Row]:
+    """What is to be said of k where Fz is swept or solved for, at most one row.
+
+    ``case`` has the other five inputs, ``stiffening`` says how k grows, as in the result.
+
+    Examples
+    --------
+    >>> case = {"mu0": 0.3, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
+    >>> [found] = load_rows("Fz", case, "ball", Stiffening(1 / 3, 10.0))
+    >>> found["text"]
+    'k grows as Fz^0.333 from its value at Fz = 10 N'
+    """
+    if unknown != "Fz" or case.get("k") in (math.inf, RIGID):
+        return []
+    if stiffening is not None:
+        text = (
+            f"k grows as Fz^{stiffening.exponent:.3g} from its value at Fz = {stiffening.load:g} N"
+        )
+    else:
+        advice = "" if EXPONENTS[contact] else ", and a stiffness exponent"
+        text = (
+            "constant over Fz here; with the load k grows, as Fz^(1/3) for a ball, as "
+            f"Fz^{ROUGH[0]:g} to Fz^{ROUGH[1]:g} for rough surfaces: give Fz at which k "
+            f"holds{advice}"
+        )
+    return [{"row": "k is known", "text": text, "effect": None}]
 
 
 def k_effect(

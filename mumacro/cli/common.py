@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.validity import digits, k_effect
+from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.fields import (
     LIKE,
@@ -46,6 +46,9 @@ inputs, each as name=value, in SI units or with a unit as in y0=2um:
 """
 
 
+CURVE = 400  # points of a curve in a picture
+
+
 class UsageError(Exception):
     """The command is written wrongly; one line, with the remedy."""
 
@@ -61,6 +64,7 @@ class OneLineParser(argparse.ArgumentParser):
         super().__init__(formatter_class=RawDescriptionHelpFormatter, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
+        """End the program with code 2 and the fault, with the choice that may have been meant."""
         if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
             known = [word.strip(" '") for word in wrong[3].split(",")]
             near = difflib.get_close_matches(wrong[2].lower(), known, n=1)
@@ -136,6 +140,15 @@ def add_format(parser: OneLineParser) -> None:
     )
 
 
+def add_exponent(parser: OneLineParser) -> None:
+    """The option for a stiffness that grows with the load."""
+    text = (
+        "where Fz is swept or the unknown: k grows as Fz^M, 0 to 1, and Fz= in the case is the "
+        "load at which k holds; default with Fz=: 1/3 for a ball"
+    )
+    parser.add_argument("--stiffness-exponent", type=float, metavar="M", help=text)
+
+
 def add_form(parser: argparse.ArgumentParser) -> None:
     """The options for the form of a result."""
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
@@ -179,13 +192,15 @@ def read_case(
     *,
     one_k: str = "",
     whole: bool = True,
+    optional: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
     ``Surrogate.evaluate``.
 
     ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
     not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
-    other inputs must be there.  UsageError tells everything that is wrong, in one line.
+    other inputs must be there, but for those that are ``optional``.  UsageError tells everything
+    that is wrong, in one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20.69kHz v0=0.01"])["k"]
     1000000.0
@@ -208,7 +223,8 @@ def read_case(
             case[name] = _read(name, text, kind, one_k)
         except ValueError as error:
             faults.append(str(error))
-    faults += _faults_of_names(case, kind, without, whole)
+    absent = {*optional} - case.keys()
+    faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
         raise UsageError("; ".join(faults))
     return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}
@@ -273,6 +289,12 @@ def _faults_of_names(
         hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in given
     ]
     return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
+
+
+def without_or_load(unknown: str) -> dict[str, Any]:
+    """Keywords of ``read_case``: the unknown must not be there; Fz may be, as the load at which k
+    holds."""
+    return {"optional": ["Fz"]} if unknown == "Fz" else {"without": [unknown]}
 
 
 def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
@@ -345,6 +367,11 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
         for column, width in zip(columns, widths, strict=True)
     )
     return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
+
+
+def model_lines(rows: Sequence[Row]) -> list[str]:
+    """What is said about the model, below a result."""
+    return [in_columns([("model", f"{row['row']}: {row['text']}")]) for row in rows]
 
 
 def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:

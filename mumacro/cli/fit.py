@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.analysis.fit import fit
-from mumacro.analysis.fit_result import Fit
+from mumacro.analysis.fit import Fit, fit
 from mumacro.analysis.measured_points import STD, UNKNOWNS, unknowns_beside
 from mumacro.analysis.validity import digits
 from mumacro.cli import common
@@ -29,7 +28,7 @@ from mumacro.inputs.text_tables import (
     read_text,
 )
 
-FIT = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
+EXAMPLE = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\
 columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:
   v0 and mu_macro, of each point; what varies of Fz, y0 (or {AMPLITUDE}), omega or f;
@@ -39,14 +38,14 @@ columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:
 what is neither a column nor unknown is given as name=value
 
 examples:
-  {FIT}
+  {EXAMPLE}
   mumacro fit measured.csv Fz=10N y0=2um f=20kHz mu0=0.3 --unknown k --contact ball
 """
 _READ = (*SI, AMPLITUDE, "mu_macro", STD)  # columns
 _SHOWN = 5  # faults of a file
 
 
-def fit_points(words: Sequence[str]) -> str:
+def run(words: Sequence[str]) -> str:
     """``mumacro fit``."""
     first = "points", {"help": "a file of CSV; - is standard input"}
     told = "k and mu0 of a contact from measured friction."

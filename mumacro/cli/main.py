@@ -8,49 +8,33 @@ import difflib
 import importlib
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from itertools import zip_longest
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from mumacro.analysis.validity import model_rows
-from mumacro.answer import BAND
-from mumacro.cli import common
-from mumacro.cli.common import (
-    ImpossibleError,
-    OneLineParser,
-    UsageError,
-    as_json,
-    in_columns,
-    open_table,
-    read_case,
-)
-from mumacro.cli.fit import FIT, fit_points
-from mumacro.cli.questions import LAW, SOLVE_FOR, STIFFNESS, law, map_, solve, stiffness_of
-from mumacro.extras import missing
-from mumacro.inputs.fields import LIKE, NAMES, PER_UNIT
-from mumacro.inputs.kind import SPRING, Kind
-from mumacro.surrogate import Surrogate
+from mumacro.cli import common, fit, law, one_case, solve_for, stiffness, table
+from mumacro.cli import map as map_
+from mumacro.cli.common import ImpossibleError, UsageError
+from mumacro.errors import missing
+from mumacro.inputs.fields import NAMES
 from mumacro.table.bundled import bundled_tables
-from mumacro.version import __version__
 
-CASE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s"
 FIRST = f"""\
-friction of one case:      mumacro '{CASE}'
-friction along the speed:  {LAW}
-which amplitude halves it: {SOLVE_FOR}
+friction of one case:      mumacro '{one_case.EXAMPLE}'
+friction along the speed:  {law.EXAMPLE}
+which amplitude halves it: {solve_for.EXAMPLE}
 everything else:           mumacro --help"""
 OVERVIEW = f"""\
 Macroscopic friction of a contact that oscillates across or along its sliding direction,
 or normally.
 
-  mumacro '{CASE}'          one case
+  mumacro '{one_case.EXAMPLE}'          one case
   mumacro eval cases.parquet -o out.parquet                      files: csv, ndjson, parquet
   mumacro law 'mu0=0.3 ...' --along v0 1mm/s 1m/s -o law.png     mu_macro along one input
   mumacro solve-for y0 'mu0=0.3 ...' --target 0.15               which input gives a wanted mu_macro
   mumacro map -o map.png                                         mu_macro/mu0, speed and amplitude
-  {FIT}    k and mu0 from measured points
-  {STIFFNESS}    k from materials
+  {fit.EXAMPLE}    k and mu0 from measured points
+  {stiffness.EXAMPLE}    k from materials
   mumacro table                                                  the table in use and its errors
   mumacro export --format csv                                    the table for other tools
   mumacro serve                                                  the same over HTTP
@@ -58,116 +42,6 @@ or normally.
 Each command has its own help: mumacro eval --help.
 
 """
-REGIME_WORDS = {
-    "continuous": "slips all the time",
-    "stick_slip": "sticks during a part of each period",
-    "static": "at rest: the limit v0 -> 0",
-    "partial_slip": "the rim of the contact slips all the time, its middle sticks during a part of "
-    "each period",
-    "reverse_slip": "slips forwards and backwards in each period",
-}
-ROW_OF_K = ("k is known", True)  # the answer for an interval tells that already
-
-
-def _one_case(words: Sequence[str]) -> str:
-    parser = OneLineParser(prog="mumacro", description=OVERVIEW + common.INPUTS)
-    common.add_case(parser, "the six inputs, quoted together or apart")
-    parser.add_argument("--gradient", action="store_true", help="also d mu_macro / d input")
-    parser.add_argument(
-        "--model", action="store_true", help="in JSON, too: what the model leaves out in this case"
-    )
-    parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
-    chosen = parser.parse_intermixed_args(words)
-    kind = common.kind_in(chosen)
-    case = read_case(chosen.words, kind)
-    surrogate = open_table(chosen.table)
-    answer = surrogate.evaluate(**{**case, **kind.names, "gradient": chosen.gradient})
-    middle = common.middle_of(case)
-    rows = model_rows(surrogate, middle, **kind.names) if chosen.model or not chosen.json else []
-    if chosen.json:
-        names = ["mu_macro", "mu_ratio", "regime", "error_bound", "source", "v_tilde", "y_tilde"]
-        found = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
-        ends = {name: getattr(answer, name) for name in BAND if "k_range" in case}
-        found |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
-        found |= {"model": rows} if chosen.model else {}
-        found |= dict(kind.names.items() - SPRING.names.items())
-        return as_json({**found, "table": common.about(surrogate)})
-    lines = [
-        ("model", f"{row['row']}: {common.in_words(row['text'], middle)}")
-        for row in rows
-        if (row["row"], "k_range" in case) != ROW_OF_K
-    ]
-    text = in_columns(
-        _rows_of(answer, surrogate, case, kind, common.format_for(chosen, surrogate, case, kind))
-    )
-    error = f"numerical error  {answer.error_bound:.2g}"
-    return "\n".join([text, *([in_columns(lines)] if lines else []), error])
-
-
-def _rows_of(
-    answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind, form: str
-) -> list[Sequence[str]]:
-    """An answer as rows of name, value, unit, meaning."""
-    groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
-    rows = [
-        ("mu_macro", f"{answer.mu_macro:#{form}}", "[-]", ""),
-        ("mu_ratio", f"{answer.mu_ratio:#{form}}", "[-]", "mu_macro / mu0"),
-        ("regime", answer.regime, "", REGIME_WORDS[answer.regime]),
-        ("v_tilde", f"{answer.v_tilde:{form}}", "[-]", "v0 k / (mu0 Fz omega)"),
-        ("y_tilde", f"{answer.y_tilde:{form}}", "[-]", groups),
-        ("source", answer.source, "", f"of {surrogate.id}, tolerance {surrogate.tolerance:g}"),
-    ]
-    if "k_range" in case:
-        low, high = (f"{end:.6g}" for end in case["k_range"])
-        middle = f"at k = {common.middle_of(case)['k']:.6g} N/m, the geometric middle"
-        rows[:1] = [
-            (*rows[0][:3], middle),
-            (
-                "from",
-                f"{answer.mu_macro_low:#{form}}",
-                "[-]",
-                f"the least for k from {low} to {high} N/m",
-            ),
-            ("to", f"{answer.mu_macro_high:#{form}}", "[-]", "the most"),
-        ]
-    for name, slope in (answer.gradient or {}).items():
-        unit = PER_UNIT[LIKE.get(name, name)]
-        rows.append((f"slope {name}", f"{slope:{form}}", f"[{unit}]", f"d mu_macro / d {name}"))
-    return list(rows)
-
-
-def _table(words: Sequence[str]) -> str:
-    parser = OneLineParser(
-        prog="mumacro table",
-        description="Name, path, tolerance, verified errors and checksum of the table in use.",
-        epilog="example:\n  mumacro table --table 1e-7",
-    )
-    common.add_table(parser)
-    chosen = parser.parse_args(words)
-    surrogate = open_table(chosen.table)
-    names = (
-        "verified_max_abs_error",
-        "verified_max_rel_error",
-        "content_sha256",
-        "format_version",
-        "product_version",
-    )
-    told = {name: surrogate.attributes.get(name) for name in names}
-    told["checksum"] = told.pop("content_sha256")
-    found = {
-        **common.about(surrogate),
-        "path": str(surrogate.path),
-        **told,
-        "bytes": surrogate.path.stat().st_size,
-    }
-    bundled = [str(path) for path in bundled_tables()]
-    if chosen.json:
-        return as_json({**found, "bundled": bundled})
-    rows = [
-        (name, f"{value:.3g}" if isinstance(value, float) else str(value))
-        for name, value in found.items()
-    ]
-    return in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
 
 
 def _part(name: str) -> Any:
@@ -204,12 +78,12 @@ def _serve(words: Sequence[str]) -> int:
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
     "eval": _eval,
-    "law": law,
-    "solve-for": solve,
-    "map": map_,
-    "fit": fit_points,
-    "stiffness": stiffness_of,
-    "table": _table,
+    "law": law.run,
+    "solve-for": solve_for.run,
+    "map": map_.run,
+    "fit": fit.run,
+    "stiffness": stiffness.run,
+    "table": table.run,
     "export": _export,
     "serve": _serve,
 }
@@ -222,7 +96,7 @@ def _no_command(words: Sequence[str]) -> str:
     meant = difflib.get_close_matches(words[0], COMMANDS, n=1)
     if meant and words[0] not in NAMES:
         raise UsageError(f"unknown command {words[0]!r}: did you mean {meant[0]}?")
-    return _one_case(words)
+    return one_case.run(words, OVERVIEW)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

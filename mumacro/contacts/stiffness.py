@@ -1,7 +1,7 @@
 """Tangential contact stiffness from materials and geometry: the input k that every evaluation
 needs.
 
-Half-space elasticity, two smooth elastic bodies, small strains:
+Half-space elasticity, two smooth elastic bodies, small strains::
 
     1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
     1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,   G = E / (2 (1 + nu))

@@ -164,8 +164,11 @@ class TextSource:
                 batch = pa.RecordBatch.from_arrays(
                     [pa.array(columns[x], pa.string()) for x in names], [*names]
                 )
-            except UnicodeEncodeError as error:
-                raise FilesError(f"{where}: no text in UTF-8 ({error.reason})") from None
+            except UnicodeEncodeError:
+                row = (
+                    skip - len(texts) + 1 + next(i for i, x in enumerate(texts) if not _is_utf8(x))
+                )
+                raise FilesError(f"{lines.path}: row {row} {NO_UTF8}") from None
             wrong = [(i, self._shown(texts[i]), why) for i, why in enumerate(faults) if why]
             yield Block(batch, lines.share, texts, wrong)
 
@@ -226,6 +229,11 @@ def _head(path: Path, sep: str, decimal: str) -> list[str]:
     except ValueError as error:
         raise FilesError(f"{path}: line 1: {error}") from None
     return ["\ufeff" * (first[:3] == b"\xef\xbb\xbf") + cells[0], *cells[1:]]
+
+
+def _is_utf8(record: Sequence[str]) -> bool:
+    """Whether no cell has a byte that is kept as a half of a surrogate pair."""
+    return not any("\udc80" <= sign <= "\udcff" for cell in record for sign in cell)
 
 
 def _object(text: bytes) -> tuple[dict[str, Any], str | None]:

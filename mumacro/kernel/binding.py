@@ -43,6 +43,20 @@ def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
     return _new("int32_t[3]", [len(part) for part in orders]), _new("double[]", joined or [0.0])
 
 
+def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, Any, list[Any]]:
+    """Six columns, (n,) or one number, as pointers with their strides, and what these point to."""
+    constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
+    kept = [constants]
+    for i, column in enumerate(columns):
+        if isinstance(column, float):
+            constants[i] = column
+            pointers[i] = constants + i
+        else:
+            pointers[i], strides[i] = pointer, _ = _numbers(column), 1
+            kept.append(pointer)
+    return pointers, strides, kept
+
+
 class Data:
     """A table as the kernel reads it.
 
@@ -175,19 +189,29 @@ class Kernel:
         y~; slopes by input and their bounds.  ``kind``: another contact and direction, see
         :class:`mumacro.inputs.kind.Kind`.
         """
-        constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
-        kept = []
-        for i, column in enumerate(columns):
-            if isinstance(column, float):
-                constants[i] = column
-                pointers[i] = constants + i
-            else:
-                pointers[i], strides[i] = pointer, _ = _numbers(column), 1
-                kept.append(pointer)
+        pointers, strides, _kept = _columns_of(columns)
         out = _numbers(rows.reshape(-1)[start:] if start else rows)
         codes = _FFI.from_buffer(_CODES, source)
         self._cases(
             data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
+        )
+
+    def intervals(
+        self,
+        data: Data,
+        n: int,
+        columns: Sequence[Array | float],
+        high: Array,
+        rows: Array,
+        start: int = 0,
+        kind: tuple[int, int] = (0, 0),
+    ) -> None:
+        """As :meth:`cases`, with k from its column to ``high`` (n,): smallest and largest mu_macro
+        and the largest bound met there, ``rows`` (3, N)."""
+        pointers, strides, _kept = _columns_of(columns)
+        out = _numbers(rows.reshape(-1)[start:])
+        self._found.intervals(
+            data.pointer, *kind, n, pointers, strides, _numbers(high), out, rows.shape[1]
         )
 
     def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:

@@ -271,22 +271,27 @@ static double mu_turn_rounding(const mu_turning *at, double y) {
     return MU_LINE_ROUNDING * (2.0 / y + 2.0 * at->sine + 2.0 * at->x * at->c);
 }
 
+/* The bounds of springs that slip backwards, one in each lane. */
+typedef struct {
+    mu_lanes mu, along_v, along_y, stick;
+} mu_bounds;
+
 /* With reverse slip.  m is the root of F(m) = 2/y~: its error is that of F over its slope, or a root where the slope
  * vanishes.  mu~ is stationary in m; its slopes and the duration of stick are not. */
-static void mu_bound_reverse(const mu_turning *at, double v, double y, const mu_reverse *found, mu_driven *out) {
-    const mu_line *line = &out->line;
-    const double m = found->m, p = found->p, ill = at->x * y / (y - v);
-    const double off = MU_LINE_ROUNDING * (2.0 / y + 2.0 * p * at->x) * (1.0 + ill);
-    const double flat = 4.0 * sqrt(off / at->travel);
-    const double of_m = found->slope > 0.0 ? mu_min(2.0 * off / found->slope, flat) : flat;
-    const double of_p = mu_min(found->of_p, 1.0) * of_m + MU_LINE_ROUNDING * p * (1.0 + ill);
-    const double inputs = fabs(line->along_v) + fabs(line->along_y);
-    out->stick_bound = of_m / MU_PI + MU_LINE_ROUNDING * line->stick;
-    out->bound = MU_LINE_ROUNDING * (line->terms + inputs);
-    out->bound_v = v * (m * of_m + p * of_p) / MU_PI + MU_LINE_ROUNDING * line->along_v;
-    out->bound_y = 2.0 / MU_PI * of_p + out->bound_v + MU_LINE_ROUNDING * (line->terms + inputs);
-    out->power_bound = v * (out->bound + MU_LINE_ROUNDING) +
-                       MU_LINE_ROUNDING * (y * at->travel + 2.0 + 2.0 * at->c * v + 2.0 * y * at->sine) / MU_PI;
+MU_INLINE mu_bounds mu_bound_reverse(const mu_turning *at, mu_lanes v, mu_lanes y, const mu_reverse *found,
+                                     const mu_lines *line) {
+    const mu_lanes m = found->m, p = found->p, ill = at->x * y / (y - v);
+    const mu_lanes off = MU_LINE_ROUNDING * (2.0 / y + 2.0 * p * at->x) * (1.0 + ill);
+    const mu_lanes flat = 4.0 * mu_sqrt(off / at->travel), steep = 2.0 * off / found->slope;
+    const mu_lanes of_m = mu_select(MU_WHERE(found->slope > 0.0), mu_lower(steep, flat), flat);
+    const mu_lanes of_p = mu_lower(found->of_p, mu_all(1.0)) * of_m + MU_LINE_ROUNDING * p * (1.0 + ill);
+    const mu_lanes inputs = mu_size(line->along_v) + mu_size(line->along_y);
+    mu_bounds out;
+    out.stick = of_m / MU_PI + MU_LINE_ROUNDING * line->stick;
+    out.mu = MU_LINE_ROUNDING * (line->terms + inputs);
+    out.along_v = v * (m * of_m + p * of_p) / MU_PI + MU_LINE_ROUNDING * line->along_v;
+    out.along_y = 2.0 / MU_PI * of_p + out.along_v + MU_LINE_ROUNDING * (line->terms + inputs);
+    return out;
 }
 
 /* A spring with v~ < y~, of which y~ - v~ has digits. */
@@ -295,9 +300,17 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
     const mu_turning at = mu_turning_of(v, y);
     const double turn = at.travel - 2.0 / y, nearest = mu_turn_rounding(&at, y);
     if (mu_is_reversing(direction, &at, y)) {
-        const mu_reverse found = mu_reverse_of(&at, y, mu_reverse_start(y));
-        out.line = mu_line_of_reverse(&at, v, y, &found);
-        mu_bound_reverse(&at, v, y, &found, &out);
+        const mu_lanes slow = mu_all(v), wide = mu_all(y);
+        const mu_reverse found = mu_reverse_of(&at, wide);
+        const mu_lines line = mu_lines_of_reverse(&at, slow, wide, &found);
+        const mu_bounds bounds = mu_bound_reverse(&at, slow, wide, &found, &line);
+        out.line = mu_line_of_reverse(&at, v, y, &line);
+        out.bound = mu_first(bounds.mu);
+        out.bound_v = mu_first(bounds.along_v);
+        out.bound_y = mu_first(bounds.along_y);
+        out.stick_bound = mu_first(bounds.stick);
+        out.power_bound = v * (out.bound + MU_LINE_ROUNDING) +
+                          MU_LINE_ROUNDING * (y * at.travel + 2.0 + 2.0 * at.c * v + 2.0 * y * at.sine) / MU_PI;
     } else {
         const mu_stuck stuck = mu_half_stick(&at);
         out.line = mu_line_of_stick(v, y, stuck.h, direction == MU_NORMAL ? MU_NORMAL_STICKS : MU_ALONG_STICKS);
@@ -320,6 +333,41 @@ enum { MU_SUM_MU, MU_SUM_V, MU_SUM_Y, MU_SUM_STICK, MU_SUMS };
  * apart, of degree n - 3 to n - 1, carry more: the largest of them, times this, is the bound. */
 #define MU_NULL_SAFETY 16.0
 
+/* What a ball's springs are driven by. */
+enum { MU_NODE_V, MU_NODE_Y, MU_NODE_SHARE, MU_NODE_ROWS };
+
+/* v~, y~ and share of the load of springs from node i of the rule on.  A spring that the rounding of the edge puts
+ * among those without reverse slip, and a lane behind the last node, has no share. */
+MU_INLINE void mu_springs_in_lanes(const mu_turning *at, const mumacro_driven_rule *rule, int64_t i, double v, double y,
+                                   double reversed, double out[MU_NODE_ROWS][MU_LANES]) {
+    const double least = mu_max(y, 1.0) / 1e300;
+    for (int lane = 0; lane < MU_LANES; ++lane) {
+        const double *point = rule->points + MU_DRIVEN_COLUMNS * (i + lane < rule->nodes ? i + lane : i);
+        const double rest = reversed * point[0], s = mu_max(rest * (2.0 - rest), least), load = MU_MIDDLE * s;
+        const int counts = y / load * at->travel > 2.0 && i + lane < rule->nodes;
+        out[MU_NODE_V][lane] = counts ? v / load : at->x * 4.0 / at->travel;
+        out[MU_NODE_Y][lane] = counts ? y / load : 4.0 / at->travel;
+        out[MU_NODE_SHARE][lane] = counts ? load * reversed * point[1] : 0.0;
+    }
+}
+
+/* Their shares of mu~, of its slopes and of the stick fraction, then of the bounds of these. */
+MU_INLINE void mu_drive_lanes(const mu_turning *at, double nodes[MU_NODE_ROWS][MU_LANES],
+                              double out[2 * MU_SUMS][MU_LANES]) {
+    const mu_lanes v = mu_load(nodes[MU_NODE_V]), y = mu_load(nodes[MU_NODE_Y]), share = mu_load(nodes[MU_NODE_SHARE]);
+    const mu_reverse found = mu_reverse_of(at, y);
+    const mu_lines line = mu_lines_of_reverse(at, v, y, &found);
+    const mu_bounds bounds = mu_bound_reverse(at, v, y, &found, &line);
+    mu_store(out[MU_SUM_MU], share * line.mu);
+    mu_store(out[MU_SUM_V], share * line.along_v);
+    mu_store(out[MU_SUM_Y], share * line.along_y);
+    mu_store(out[MU_SUM_STICK], share * line.stick);
+    mu_store(out[MU_SUMS + MU_SUM_MU], share * bounds.mu);
+    mu_store(out[MU_SUMS + MU_SUM_V], share * bounds.along_v);
+    mu_store(out[MU_SUMS + MU_SUM_Y], share * bounds.along_y);
+    mu_store(out[MU_SUMS + MU_SUM_STICK], share * bounds.stick);
+}
+
 /* A ball with v~ < y~.  Its springs all turn at the same phase: those further out than 1 - xi = `reversed` slip
  * backwards, too. */
 static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
@@ -328,8 +376,8 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     const double last = 0.5 * at.travel * y / MU_MIDDLE, reversed = mu_outside(last);
     const double still = 1.0 - reversed; /* xi of the last spring without reverse slip; next the load of these */
     const double load = MU_MIDDLE * still * (1.0 - still * still / 3.0);
-    const double least = mu_max(y, 1.0) / 1e300, ill = 1.0 + 2.0 * at.x * y / (y - v);
-    double nulls[MU_SUMS][3] = {{0.0}}, over_start[3] = {1.0, 1.0, 1.0};
+    const double ill = 1.0 + 2.0 * at.x * y / (y - v);
+    double nulls[MU_SUMS][3] = {{0.0}}, sums[2 * MU_SUMS] = {0.0};
     const mu_stuck stuck = mu_half_stick(&at);
     mu_driven out = {mu_line_of_stick(v, y, stuck.h, MU_ALONG_REVERSES), 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_line *sum = &out.line;
@@ -346,38 +394,26 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     out.bound_v *= still;
     out.bound_y *= still;
     out.stick_bound = (out.stick_bound + MU_LINE_ROUNDING) * load;
-    for (int64_t i = rule->nodes - 1; i >= 0; --i) { /* from outside, where m is that of rigid contact, to the middle */
-        const double *point = rule->points + MU_DRIVEN_COLUMNS * i;
-        const double rest = reversed * point[0], s = mu_max(rest * (2.0 - rest), least);
-        const double share = MU_MIDDLE * s * reversed * point[1], a = y / (MU_MIDDLE * s), slow = v / (MU_MIDDLE * s);
-        const double start = mu_reverse_start(a);
-        /* m over its start changes slowly: a parabola through the last three springs */
-        const double guess = start * mu_max(3.0 * (over_start[0] - over_start[1]) + over_start[2], 0.5);
-        mu_reverse found;
-        mu_driven one;
-        double values[MU_SUMS];
-        if (!(a * at.travel > 2.0)) continue;
-        found = mu_reverse_of(&at, a, guess);
-        one.line = mu_line_of_reverse(&at, slow, a, &found);
-        mu_bound_reverse(&at, slow, a, &found, &one);
-        over_start[2] = i == rule->nodes - 1 ? found.m / start : over_start[1];
-        over_start[1] = i == rule->nodes - 1 ? found.m / start : over_start[0];
-        over_start[0] = found.m / start;
-        values[MU_SUM_MU] = share * one.line.mu;
-        values[MU_SUM_V] = share * one.line.along_v;
-        values[MU_SUM_Y] = share * one.line.along_y;
-        values[MU_SUM_STICK] = share * one.line.stick;
-        for (int row = 0; row < MU_SUMS; ++row)
-            for (int j = 0; j < 3; ++j) nulls[row][j] += point[2 + j] * values[row];
-        sum->mu += values[MU_SUM_MU];
-        sum->along_v += values[MU_SUM_V];
-        sum->along_y += values[MU_SUM_Y];
-        sum->stick += values[MU_SUM_STICK];
-        out.bound += share * one.bound;
-        out.bound_v += share * one.bound_v;
-        out.bound_y += share * one.bound_y;
-        out.stick_bound += share * one.stick_bound;
+    for (int64_t i = 0; i < rule->nodes; i += MU_LANES) {
+        double nodes[MU_NODE_ROWS][MU_LANES], rows[2 * MU_SUMS][MU_LANES];
+        const int few = rule->nodes - i < MU_LANES ? (int)(rule->nodes - i) : MU_LANES;
+        mu_springs_in_lanes(&at, rule, i, v, y, reversed, nodes);
+        mu_drive_lanes(&at, nodes, rows);
+        for (int lane = 0; lane < few; ++lane) {
+            const double *point = rule->points + MU_DRIVEN_COLUMNS * (i + lane);
+            for (int row = 0; row < 2 * MU_SUMS; ++row) sums[row] += rows[row][lane];
+            for (int row = 0; row < MU_SUMS; ++row)
+                for (int j = 0; j < 3; ++j) nulls[row][j] += point[2 + j] * rows[row][lane];
+        }
     }
+    sum->mu += sums[MU_SUM_MU];
+    sum->along_v += sums[MU_SUM_V];
+    sum->along_y += sums[MU_SUM_Y];
+    sum->stick += sums[MU_SUM_STICK];
+    out.bound += sums[MU_SUMS + MU_SUM_MU];
+    out.bound_v += sums[MU_SUMS + MU_SUM_V];
+    out.bound_y += sums[MU_SUMS + MU_SUM_Y];
+    out.stick_bound += sums[MU_SUMS + MU_SUM_STICK];
     {
         double missed[MU_SUMS];
         for (int row = 0; row < MU_SUMS; ++row) {
@@ -456,12 +492,16 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
     return mu_ball_answer(data, quantity, v, y);
 }
 
+static mu_slopes mu_slopes_of_driven(const mu_driven *found) {
+    const mu_line *line = &found->line;
+    const mu_slopes out = {line->mu, line->along_v, line->along_y, found->bound_v, found->bound_y, found->bound};
+    return out;
+}
+
 static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int direction, double v, double y) {
     if (direction != MU_ACROSS) {
         const mu_driven found = mu_drive(data, contact, direction, v, y);
-        const mu_slopes out = {found.line.mu,  found.line.along_v, found.line.along_y,
-                               found.bound_v, found.bound_y,      found.bound};
-        return out;
+        return mu_slopes_of_driven(&found);
     }
     return contact == MU_BALL ? mu_ball_slopes(data, v, y) : mu_slopes_at(data, MU_MU_RATIO, v, y);
 }

@@ -45,9 +45,10 @@ static double mu_rigid_slope(int direction, double r) {
     return r > 1.0 ? -MU_TWO_OVER_PI / sqrt((r - 1.0) * (r + 1.0)) : 0.0;
 }
 
-/* mu~ of any case of any contact, and the groups: zero inputs, rigid contact, groups beyond double precision. */
+/* mu~ of any case of any contact, and the groups: zero inputs, rigid contact, groups beyond double precision.  `at`,
+ * unless NULL, gets the slopes of a case along or normal with finite groups, which cost nothing more. */
 static mu_answer mu_any_case(const mumacro_data *data, int contact, int direction, const mu_inputs *in, double *v,
-                             double *y) {
+                             double *y, mu_slopes *at) {
     double r, mu;
     *v = *y = NAN;
     if (mu_first_bad(direction, in)) return mu_limit(NAN, NAN, -1);
@@ -56,7 +57,14 @@ static mu_answer mu_any_case(const mumacro_data *data, int contact, int directio
     if (in->v0 == 0.0 && *y == HUGE_VAL) return mu_limit(0.0, 0.0, MU_STATIC_LIMIT);
     if (*y == 0.0 && in->v0 > 0.0) return mu_limit(1.0, MU_ROUNDING, MU_NO_OSCILLATION);
     if ((*v < HUGE_VAL && *y < HUGE_VAL) || direction == MU_NORMAL) {
-        mu_answer found = mu_answer_as(data, contact, direction, MU_MU_RATIO, *v, *y);
+        mu_answer found;
+        if (at && direction != MU_ACROSS) {
+            const mu_driven driven = mu_drive(data, contact, direction, *v, *y);
+            *at = mu_slopes_of_driven(&driven);
+            found = mu_limit(at->value, at->bound, driven.line.source);
+        } else {
+            found = mu_answer_as(data, contact, direction, MU_MU_RATIO, *v, *y);
+        }
         /* v~ below 5e-324: the static limit holds to rounding, mu~ itself underflows for y~ > 1 */
         if (*v == 0.0 && in->v0 > 0.0) found.bound += MU_DENORMAL;
         return found;
@@ -104,16 +112,16 @@ static void mu_know(mu_answer found, mu_slopes at, double known[MU_KNOWN][MU_CHU
     known[MU_OF_BOUND_Y][i] = at.bound_y;
 }
 
-/* The same of any case.  One-sided at the edges: d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0,
+/* The same of any case; `slopes` is NULL where they are still to be found.  One-sided at the edges: d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0,
  * d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, infinite on y~ = 1 and for rigid contact.  Relative to k the slope is 0 for
  * rigid contact. */
 static void mu_gradient(const mumacro_data *data, int contact, int direction, const mu_inputs *in,
-                        mu_answer found, double v, double y, double *out, int64_t stride) {
+                        mu_answer found, const mu_slopes *slopes, double v, double y, double *out, int64_t stride) {
     const double mu0 = in->mu0, six[6] = {in->mu0, in->Fz, in->k, in->y0, in->omega, in->v0};
     double *error = out + 6 * stride;
     if (found.source != -1 && found.source != MU_RIGID && found.source != MU_NO_OSCILLATION &&
         !(found.source == MU_STATIC_LIMIT && y == HUGE_VAL)) {
-        const mu_slopes at = mu_slopes_as(data, contact, direction, v, y);
+        const mu_slopes at = slopes ? *slopes : mu_slopes_as(data, contact, direction, v, y);
         double inputs[6][MU_CHUNK], known[MU_KNOWN][MU_CHUNK];
         for (int i = 0; i < 6; ++i) inputs[i][0] = six[i];
         mu_know(found, at, known, 0);
@@ -192,11 +200,11 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
         const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
         mu_answer found = {mu[i], bound[i], source[i]};
         if (!mu_is_left(c.block[i])) continue;
-        if (v[i] == -1.0) found = mu_any_case(data, MU_SPRING, MU_ACROSS, &six, v + i, y + i);
+        if (v[i] == -1.0) found = mu_any_case(data, MU_SPRING, MU_ACROSS, &six, v + i, y + i, NULL);
         mu[i] = found.value;
         bound[i] = found.bound;
         source[i] = (int8_t)found.source;
-        if (slopes) mu_gradient(data, MU_SPRING, MU_ACROSS, &six, found, v[i], y[i], slopes + i, stride);
+        if (slopes) mu_gradient(data, MU_SPRING, MU_ACROSS, &six, found, NULL, v[i], y[i], slopes + i, stride);
     }
     for (int i = 0; i < n; ++i) {
         out[i] = mu[i] * in[0][i];
@@ -233,9 +241,10 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
         double in[6], v, y;
         mu_inputs six;
         mu_answer found;
+        mu_slopes at, *slopes = rows == MU_ROWS && direction != MU_ACROSS ? &at : NULL;
         for (int j = 0; j < 6; ++j) in[j] = columns[j][strides[j] ? i : 0];
         memcpy(&six, in, sizeof six);
-        found = mu_any_case(data, contact, direction, &six, &v, &y);
+        found = mu_any_case(data, contact, direction, &six, &v, &y, slopes);
         out[MU_ROW_MACRO * stride + i] = found.value * six.mu0;
         out[MU_ROW_RATIO * stride + i] = found.value;
         out[MU_ROW_BOUND * stride + i] = found.bound * six.mu0;
@@ -245,7 +254,7 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
             out[MU_ROW_Y * stride + i] = y;
         }
         if (rows == MU_ROWS)
-            mu_gradient(data, contact, direction, &six, found, v, y, out + MU_ROW_SLOPES * stride + i, stride);
+            mu_gradient(data, contact, direction, &six, found, slopes, v, y, out + MU_ROW_SLOPES * stride + i, stride);
     }
 }
 

@@ -133,6 +133,17 @@ MU_INLINE mu_lanes mu_load(const double *at) {
     return x;
 }
 MU_INLINE void mu_store(double *at, mu_lanes x) { memcpy(at, &x, sizeof x); }
+/* The lower of two numbers, the higher, the one without its sign. */
+MU_INLINE mu_lanes mu_lower(mu_lanes a, mu_lanes b) { return mu_select(MU_WHERE(b < a), b, a); }
+MU_INLINE mu_lanes mu_higher(mu_lanes a, mu_lanes b) { return mu_select(MU_WHERE(b > a), b, a); }
+MU_INLINE mu_lanes mu_size(mu_lanes x) { return mu_higher(x, -x); }
+/* Whether a condition holds in every lane. */
+MU_INLINE int mu_is_everywhere(mu_mask where) {
+    int64_t lanes[MU_LANES], all = -1;
+    memcpy(lanes, &where, sizeof lanes);
+    for (int i = 0; i < MU_LANES; ++i) all &= lanes[i];
+    return all != 0;
+}
 MU_INLINE void mu_store_whole(int64_t *at, mu_mask x) { memcpy(at, &x, sizeof x); }
 
 #endif

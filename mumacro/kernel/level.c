@@ -2,6 +2,7 @@
 #include "kernel.c"
 #include "motion.c"
 #include "library.h"
+#include "interval.c"
 
 static void mu_values_as(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
                          const double *y, double *value, double *bound, int8_t *source) {
@@ -27,6 +28,18 @@ static double mu_border_as(const mumacro_data *data, int contact, int direction,
 static void mu_borders_as(const mumacro_data *data, int contact, int direction, int64_t n, const double *y,
                           double *crit) {
     for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_as(data, contact, direction, y[i]);
+}
+
+static void mu_intervals(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
+                         const int64_t *strides, const double *high, double *out, int64_t stride) {
+    for (int64_t i = 0; i < n; ++i) {
+        double six[6], found[3];
+        mu_inputs low;
+        for (int j = 0; j < 6; ++j) six[j] = columns[j][strides[j] ? i : 0];
+        memcpy(&low, six, sizeof low);
+        mu_extremes_of(data, contact, direction, &low, high[i], found);
+        for (int j = 0; j < 3; ++j) out[j * stride + i] = found[j];
+    }
 }
 
 static void mu_places_of(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block,
@@ -92,7 +105,7 @@ static const mumacro_atlas MU_ATLAS = {
 
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
-    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points, mu_cases_as, mu_ratio_alone,
-    mu_one, mu_borders_as, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares, mu_roots,
-    mu_outers, mu_element_steps, mu_motions, mu_motion_cycle,
+    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points, mu_cases_as,
+    mu_intervals, mu_ratio_alone, mu_one, mu_borders_as, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares,
+    mu_roots, mu_outers, mu_element_steps, mu_motions, mu_motion_cycle,
 };

@@ -36,6 +36,10 @@ typedef struct {
      * d mu_macro / d input, bounds */
     void (*cases)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
                   const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source);
+    /* cases whose k, the third column, reaches to high: the smallest and the largest mu_macro, and the largest bound met
+     * there, 3 rows of out, stride apart */
+    void (*intervals)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
+                      const int64_t *strides, const double *high, double *out, int64_t stride);
     /* of a spring, across, alone, in a fraction of the time: mu~; and one case, whose 7 numbers are mu_macro, mu_ratio, bound, v~,
      * y~, l0 = mu0 Fz / k, source; of 19 also the slopes and their bounds */
     double (*ratio)(const mumacro_data *data, double v, double y);

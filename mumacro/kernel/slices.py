@@ -15,6 +15,7 @@ from mumacro.kernel.binding import Data, kernels
 SLICE = 16_384  # points of a slice: its arrays stay in the second cache
 FEW = 65_536  # points that one thread evaluates before a second one has started
 COST = 64  # of a ball, about, in springs
+INTERVAL = 64  # of an interval of k, about, in cases
 _KERNEL = kernels[-1]
 
 
@@ -33,6 +34,10 @@ def share_out(n: int, threads: int, work: Callable[[slice], None], cost: int = 1
     with ThreadPoolExecutor(min(threads, len(parts)), thread_name_prefix="mumacro") as pool:
         for _ in pool.map(work, parts):
             pass
+
+
+def _slice(columns: Sequence[Array | float], part: slice) -> list[Array | float]:
+    return [column if isinstance(column, float) else column[part] for column in columns]
 
 
 def values(
@@ -85,12 +90,27 @@ def cases(
     out, source = np.empty((rows, n)), np.empty(n, np.int8)
 
     def work(part: slice) -> None:
-        six = (
-            columns
-            if part.stop - part.start == n
-            else [c if isinstance(c, float) else c[part] for c in columns]
-        )
+        six = columns if part.stop - part.start == n else _slice(columns, part)
         _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start, kind)
 
     share_out(n, threads, work, COST if any(kind) else 1)
     return out, source
+
+
+def intervals(
+    data: Data,
+    columns: Sequence[Array | float],
+    high: Array,
+    threads: int,
+    kind: tuple[int, int] = (0, 0),
+) -> Array:
+    """Extremes of cases whose k reaches from its column to ``high``, see
+    :meth:`mumacro.library.Kernel.intervals`: rows (3, n)."""
+    out = np.empty((3, high.size))
+
+    def work(part: slice) -> None:
+        six = _slice(columns, part)
+        _KERNEL.intervals(data, part.stop - part.start, six, high[part], out, part.start, kind)
+
+    share_out(high.size, threads, work, INTERVAL * (COST if any(kind) else 1))
+    return out

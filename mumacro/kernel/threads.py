@@ -2,7 +2,6 @@
 default."""
 
 import functools
-import multiprocessing
 import os
 import threading
 from contextlib import suppress
@@ -28,6 +27,8 @@ def default_threads() -> int:
     All processors in the main thread of a program.  One in any other thread and in a child process:
     what started them (Dask, joblib, multiprocessing, a pool of threads) already divides the work.
     """
+    import multiprocessing  # only arrays ask: one case starts sooner without
+
     if (
         threading.current_thread() is not threading.main_thread()
         or multiprocessing.parent_process() is not None

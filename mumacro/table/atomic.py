@@ -1,7 +1,6 @@
 """Files that are either complete or absent, and folders that one process has locked."""
 
 import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -42,6 +41,8 @@ def write_whole(path: Path, content: bytes, mode: int = 0o644) -> None:
 
     OSError leaves nothing behind, and an older file stays.
     """
+    import tempfile  # only writing needs it: reading a table starts sooner without
+
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".growing")
     try:
         with os.fdopen(handle, "wb") as stream:

@@ -8,9 +8,7 @@ For reading see ``mumacro.table.hdf5``.
 
 import hashlib
 import json
-import tempfile
 import threading
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +18,7 @@ from mumacro.errors import TableError
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas, hdf5
 from mumacro.table.atomic import write_whole
+from mumacro.table.blocks import BY_NAME, Block, BorderPiece, Table, names_in
 from mumacro.table.polynomials import nodes
 
 FORMAT_VERSION = 3
@@ -49,70 +48,10 @@ _PLAIN = {
         ("y_tilde",),
     ),
 }
+#: what is told of bound over error in the attribute ``verified_bound_over_error``
+RATIOS = ("least", "median", "largest")
 CELL_AXES = ("quantity", "cell", "derivative")
-_NAMED = {quantity.name: quantity for quantity in atlas.QUANTITIES}
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
-
-
-@dataclass
-class BorderPiece:
-    """One piece of v~crit: Chebyshev ``nodes`` (n,) of its coordinate, ``values`` (n,), cells for
-    evaluation."""
-
-    nodes: Array
-    values: Array
-    cells: int
-    max_rel_error: float = 0.0
-
-
-@dataclass
-class Block:
-    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), cells for evaluation, and what is
-    tabulated."""
-
-    a: Array
-    b: Array
-    cells: tuple[int, int]
-    #: node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity
-    #: is zero
-    nodes: dict[str, Array] = field(default_factory=dict)
-    #: by quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a
-    #: and b, in all cells
-    errors: dict[str, Array] = field(
-        default_factory=lambda: {name: np.zeros(3) for name in atlas.QUANTITY_NAMES}
-    )
-    #: the same for every cell (cells, 3), in the order of the cells, for slopes
-    cell_errors: dict[str, Array] = field(default_factory=dict)
-    max_abs_error: float = 0.0  #: the largest errors of mu~ found
-    max_rel_error: float = 0.0
-
-
-@dataclass
-class Table:
-    """Everything that a table file holds."""
-
-    border: list[BorderPiece]
-    blocks: list[Block]
-    v_tilde: Array
-    y_tilde: Array
-    mu_ratio: Array
-    stick_fraction: Array
-    error_estimate: Array
-    v_tilde_crit: Array
-    attributes: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def quantities(self) -> list[str]:
-        """The names of the tabulated quantities, mu_ratio first."""
-        return _names(self.attributes)
-
-    def held(self, chart: atlas.Chart) -> list[atlas.Quantity]:
-        """Those that the block of ``chart`` tabulates."""
-        return [_NAMED[name] for name in self.quantities if chart.holds(_NAMED[name])]
-
-
-def _names(attributes: dict[str, Any]) -> list[str]:
-    return str(attributes.get("quantities")).split()
 
 
 def _digest(table: Table) -> str:
@@ -253,6 +192,8 @@ def write_table(table: Table, path: str | Path) -> str:
     TableError where the folder does not exist or cannot be written, or the disk is full; nothing is
     left behind.
     """
+    import tempfile  # only writing needs it: reading a table starts sooner without
+
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
@@ -279,6 +220,8 @@ def _image(table: Table) -> bytes:
     A temporary file: where the disk is full the netCDF library reports little and keeps the file
     open.  What it makes in memory holds the time of day.
     """
+    import tempfile  # only writing needs it: reading a table starts sooner without
+
     import netCDF4  # installed only to build tables
 
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
@@ -331,6 +274,16 @@ def _check_same(group: hdf5.Group, name: str, wanted: Any) -> None:
         raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {told!r}")
 
 
+def _check_distribution(root: hdf5.Group, found: dict[str, Any]) -> None:
+    """Refuse a distribution of errors that is not one; an older table has none."""
+    if "verified_quantities" not in found:
+        return
+    shares, names = root.attribute("verified_quantiles"), str(found["verified_quantities"]).split()
+    for name, each in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
+        if np.any(root.numbers(f"verified_{name}", each * len(names)) < 0.0):
+            raise root.refuse(f"attribute 'verified_{name}' has a negative number")
+
+
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
     """Those of the root: what the program uses of them is of the right kind."""
     if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
@@ -344,16 +297,17 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
     for name in ("tolerance", *(key for key in found if key.startswith("verified_max_"))):
         if not root.numbers(name, 1)[0] > 0.0:
             raise root.refuse(f"attribute {name!r} must be > 0, got {found[name]!r}")
+    _check_distribution(root, found)
     if not isinstance(found["content_sha256"], str):
         raise root.refuse("attribute 'content_sha256' is no text")
     try:
         json.loads(found.get("builder_options", "{}"))
     except (ValueError, TypeError, RecursionError) as error:
         raise root.refuse(f"attribute 'builder_options' is no JSON ({error})") from None
-    names = _names(found)
-    if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= _NAMED.keys():
+    names = names_in(found)
+    if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= BY_NAME.keys():
         raise root.refuse(
-            f"attribute 'quantities' is {names}, this program knows {', '.join(_NAMED)}"
+            f"attribute 'quantities' is {names}, this program knows {', '.join(BY_NAME)}"
         )
     return found
 
@@ -371,7 +325,7 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
     for name, wanted in _geometry(chart).items():
         _check_same(group, name, wanted)
     a, b = _nodes(group, chart.a), _nodes(group, chart.b)
-    quantities = [_NAMED[name] for name in names if chart.holds(_NAMED[name])]
+    quantities = [BY_NAME[name] for name in names if chart.holds(BY_NAME[name])]
     found = {
         one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities
     }
@@ -396,7 +350,7 @@ def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: list[str]) -
 
 def _read(root: hdf5.Group) -> Table:
     attributes = _attributes(root)
-    names = _names(attributes)
+    names = names_in(attributes)
     below_border = root.group("border")
     below_blocks = below_border.group("blocks")
     border = [
@@ -460,10 +414,26 @@ def read_image(path: str | Path) -> bytes:
         raise TableError(path, f"cannot be read: {error.strerror or error}") from error
 
 
+def error_distribution(table: Table) -> dict[str, dict[str, float]]:
+    """By quantity: the error that a share of the verified points does not exceed ("0.5" to "1"),
+    and the :data:`RATIOS` of bound over error; empty for a table that does not state them."""
+    told = table.attributes
+    names = str(told.get("verified_quantities", "")).split()
+    if not names:
+        return {}
+    heads = [f"{share:g}" for share in told["verified_quantiles"]]
+    errors = np.reshape(told["verified_error_quantiles"], (len(names), -1)).tolist()
+    over = np.reshape(told["verified_bound_over_error"], (len(names), -1)).tolist()
+    return {
+        name: dict(zip(heads, error, strict=True)) | dict(zip(RATIOS, ratio, strict=True))
+        for name, error, ratio in zip(names, errors, over, strict=True)
+    }
+
+
 def json_attributes(table: Table) -> dict[str, object]:
-    """Root attributes as plain Python scalars and strings; ``builder_options`` parsed."""
+    """Root attributes as plain Python numbers, lists and strings; ``builder_options`` parsed."""
     out = {
-        key: value.item() if isinstance(value, np.generic) else value
+        key: value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
         for key, value in table.attributes.items()
     }
     if "builder_options" in out:

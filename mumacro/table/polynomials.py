@@ -9,7 +9,6 @@ local coordinates u, w in [-1, 1] as power-basis coefficients.
 import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -18,9 +17,7 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import BLOCK_COLUMNS, PIECE_COLUMNS, Data, kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import Axis
-
-if TYPE_CHECKING:
-    from mumacro.table.netcdf import Block, BorderPiece
+from mumacro.table.blocks import Block, BorderPiece
 
 WIDTH = 8  # coefficients of a cell along each coordinate: one vector
 
@@ -149,7 +146,7 @@ def _joined(patches: Sequence[Array]) -> Array:
     return np.concatenate(patches, out=raw[skip : skip + math.prod(shape)].reshape(shape))
 
 
-def border_cells(pieces: Sequence["BorderPiece"]) -> tuple[Array, Array]:
+def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
     """The stored border for evaluation: coefficients (cells, WIDTH) and pieces (3,
     PIECE_COLUMNS)."""
     coefficients, rows, first = [], np.zeros((len(pieces), PIECE_COLUMNS)), 0
@@ -161,7 +158,7 @@ def border_cells(pieces: Sequence["BorderPiece"]) -> tuple[Array, Array]:
     return np.concatenate(coefficients), rows
 
 
-def block_rows(blocks: Sequence["Block"]) -> Array:
+def block_rows(blocks: Sequence[Block]) -> Array:
     """The geometry of the blocks for evaluation, (sources + 1, BLOCK_COLUMNS)."""
     rows, first = np.zeros((len(atlas.SOURCES) + 1, BLOCK_COLUMNS)), 0
     for row, chart, block in zip(rows, atlas.CHARTS, blocks, strict=False):
@@ -171,7 +168,7 @@ def block_rows(blocks: Sequence["Block"]) -> Array:
     return rows
 
 
-def quantity_cells(blocks: Sequence["Block"], quantity: int) -> tuple[Array, Array, Array]:
+def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
     """What :meth:`mumacro.kernel.binding.Data.put` wants of a quantity: polynomials, errors, errors
     in every cell."""
     name, errors = atlas.QUANTITY_NAMES[quantity], np.zeros((len(atlas.SOURCES) + 1, 2))
@@ -210,7 +207,7 @@ class Border:
     stored curve's error.
     """
 
-    def __init__(self, pieces: Sequence["BorderPiece"]) -> None:
+    def __init__(self, pieces: Sequence[BorderPiece]) -> None:
         self.arrays: tuple[Array, Array] = border_cells(pieces)
         self.max_rel_error = max(piece.max_rel_error for piece in pieces)
         self._data = Data(

@@ -163,7 +163,10 @@ class Asking(NamedTuple):
             else given_in_query(request)
         )
         name = wanted and given.get(wanted, model.model_fields[wanted].default)
-        return cls.made(request.app.tables, model, given, [name] if name in NAMES else [], one=one)
+        left_out = [name] if name in NAMES else []
+        if name == "Fz" and given.get(name) is not None:  # the load at which k holds
+            left_out = []
+        return cls.made(request.app.tables, model, given, left_out, one=one)
 
     @classmethod
     def made(
@@ -278,6 +281,7 @@ class Reply(Response):
         ]
 
     async def __call__(self, _scope: Scope, _receive: Receive, send: Send) -> None:
+        """Send head and body."""
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
         await send({"type": "http.response.body", "body": self.body})
 

@@ -13,10 +13,10 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 import mumacro
-from mumacro.analysis.fit_result import Fit, quantile
+from mumacro.analysis.fit import Fit, quantile
 from mumacro.analysis.measured_points import STD, UNKNOWNS
 from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES, contact_of
-from mumacro.extras import missing
+from mumacro.errors import missing
 from mumacro.inputs.fields import NAMES as INPUTS
 from mumacro.inputs.fields import RIGID, is_rigid
 from mumacro.inputs.kind import AMPLITUDE, ContactName, DirectionName

@@ -9,10 +9,8 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.page_data import POLICY, map_of, names
-
 from .. import __version__
-from ..options import CaseRequest
+from ..page_data import POLICY, map_of, names
 from ..wire.json import dump
 from . import Endpoint, Reply, file_answer, in_thread
 
@@ -43,12 +41,8 @@ def _file(path: Path, url: str = "", policy: str = "") -> Endpoint:
 
 
 async def _names(request: Request) -> Response:
-    """The library's inputs, units and bounds, the geometries of a contact, and what this service
-    can do."""
-    guide = ["guide"] if request.app.settings.guide is not None else []
-    return Reply(
-        dump(names(["service", *CaseRequest.model_fields, "stiffness", "fit", *guide])), _FRESH
-    )
+    """The library's inputs, units and bounds, and the geometries of a contact."""
+    return Reply(dump(names(guide=request.app.settings.guide is not None)), _FRESH)
 
 
 async def _map(request: Request) -> Response:

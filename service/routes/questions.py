@@ -10,24 +10,18 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from starlette.responses import Response
 
-from mumacro.analysis.law import (
-    APPROXIMATIONS,
-    BORDERS,
-    Law,
-    approximations,
-    border_speeds,
-    friction_law,
-    sweep_values,
-)
-from mumacro.analysis.roots import Solution
-from mumacro.analysis.solve_for import solve_for
+import mumacro
+from mumacro.analysis.law import Law, sweep_values
+from mumacro.analysis.load import Stiffening
+from mumacro.analysis.solve_for import Solution, solve_for
+from mumacro.analysis.validity import load_rows
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
-from mumacro.inputs.kind import SPRING
+from mumacro.kernel.arrays import Array
 
 from ..answers import REGIME_NAMES, Part, answer_columns, nested
-from ..models import Answered, default, grouped, included, many, model, optional, told
-from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes
+from ..models import Answered, ModelRow, default, included, many, model, optional, told
+from ..options import MODEL, NAMES, Five, Name, NotNegative, Options, Positive, bounded, example
 from ..wire.json import dump
 from . import Asking, Endpoint, Reply, question
 
@@ -39,27 +33,20 @@ _whole = BeforeValidator(
     lambda value: int(value) if isinstance(value, float) and value.is_integer() else value
 )
 _Points = Annotated[int, Field(ge=2, le=MAX_POINTS), _whole]
-_APPROXIMATIONS, _SPEEDS = "approximations", "border_speeds"
-#: the columns that belong to a law beside those of its cases
+#: the column that belongs to a law beside those of its cases
 _STATIC = Part("mu_static", "-", "Static limit (v0 -> 0) of each case")
-_MORE = (
-    *(
-        Part(f"{_APPROXIMATIONS}.{name}", "-", f"{text}; null: outside that")
-        for name, text in APPROXIMATIONS.items()
-    ),
-    *(
-        Part(f"{_SPEEDS}.{name}", "m/s", f"{text}; null: outside that")
-        for name, text in BORDERS.items()
-    ),
-)
-_more: Any = model(
-    "_LawInclude",
-    "",
-    include=includes(_APPROXIMATIONS, "those of the paper beside the exact values"),
+_K = Part("k", "N/m", "Stiffness at each value, where it grows along Fz")
+_MODEL = "Along Fz, or solved for it: what is said of k"
+_Exponent = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+_exponent = bounded(
+    "a number from 0 to 1",
+    "For Fz only: k grows as Fz to this power, and Fz of the case is the load at which k holds; "
+    "left out: 1/3 for a ball with Fz, else k is constant",
+    None,
 )
 
 
-class LawOptions(_more, Options):  # type: ignore[misc]
+class LawOptions(Options):
     """What is asked beside the five other inputs."""
 
     along: Name = bounded(f"one of {', '.join(NAMES)}", "The swept input", "v0")
@@ -69,16 +56,20 @@ class LawOptions(_more, Options):  # type: ignore[misc]
     stop: Positive = bounded("finite and > 0", "Last value [SI], > start", examples=[10.0])
     points: _Points = bounded(f"a whole number from 2 to {MAX_POINTS}", "Number of values", 201)
     scale: Literal["log", "linear"] = bounded("log or linear", "Spacing of the values", "log")
+    stiffness_exponent: _Exponent | None = _exponent
 
-    @model_validator(mode="after")
-    def _sensible(self) -> Self:
-        if _APPROXIMATIONS in (self.include or ()) and self.kind != SPRING:
+    @model_validator(mode="before")
+    @classmethod
+    def _without_approximations(cls, form: dict[str, Any]) -> dict[str, Any]:
+        names = form.get("include")
+        if isinstance(names, list) and "approximations" in names:
             raise InputError(
                 "include",
-                _APPROXIMATIONS,
-                "without approximations: they are those of one spring, across",
+                "approximations",
+                "left out: the formulas of the paper are gone here; mumacro law --approximations "
+                "prints them",
             )
-        return self
+        return form
 
 
 def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
@@ -86,17 +77,36 @@ def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     (table, form, case, wanted), (along, per) = found, field_of(found.form.along)
     asked = wanted.asked
     values = sweep_values(along, form.start * per, form.stop * per, form.points, form.scale)
-    law = friction_law(table.surrogate, along, values, case, **asked.kind.names)
-    six = [values if name == along else np.array([case[name]]) for name in asked.fields]
+    law = mumacro.law(
+        table.surrogate,
+        along,
+        values=values,
+        stiffness_exponent=form.stiffness_exponent,
+        **asked.kind.names,
+        **case,
+    )
+    six = _columns(found, along, values, law.stiffening)
     answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
     answer[_STATIC.path], parts = law.mu_static, [*wanted.parts, _STATIC]
-    if _APPROXIMATIONS in (form.include or ()):
-        for group, made in ((_APPROXIMATIONS, approximations), (_SPEEDS, border_speeds)):
-            answer |= {
-                f"{group}.{name}": column for name, column in made(table.surrogate, law).items()
-            }
-        parts += _MORE
+    if law.stiffening is not None:
+        answer[_K.path], parts = law.inputs["k"], [*parts, _K]
     return law, {part: part.values(answer[part.path]) for part in parts}
+
+
+def _columns(
+    found: Asking, unknown: str, values: Array, stiffening: Stiffening | None
+) -> list[Array]:
+    """The inputs of the cases at values of one of them, by column."""
+    case = {**found.case, unknown: values}
+    if stiffening is not None:
+        case |= stiffening.scaled(found.case, values)
+    return [np.atleast_1d(case[name]) for name in found.wanted.asked.fields]
+
+
+def _said(found: Asking, unknown: str, stiffening: Stiffening | None) -> dict[str, Any]:
+    """What is said of the model, if anything."""
+    rows = load_rows(unknown, found.case, found.form.contact, stiffening)
+    return {MODEL: rows} if rows else {}
 
 
 @question(LawOptions, "along")
@@ -107,7 +117,8 @@ def post_law(found: Asking) -> Response:
     swept = {"along": along, "unit": unit_of(along), "values": law.values / per}
     border = [{"value": mark.value / per, "mu_macro": mark.mu_macro} for mark in law.border]
     answer = nested({part.path: column for part, column in columns.items()})
-    return Reply(dump({**swept, **answer, "border": border, **found.table.signature}))
+    said = _said(found, found.form.along, law.stiffening)
+    return Reply(dump({**swept, **answer, "border": border, **said, **found.table.signature}))
 
 
 @question(LawOptions, "along")
@@ -118,7 +129,7 @@ def get_law_csv(found: Asking) -> Response:
     along, per = found.form.along, field_of(found.form.along)[1]
     heads = {f"{along} [{unit_of(along)}]": (law.values / per).tolist()}
     for part in sorted(columns, key=lambda part: bool(part.names)):  # texts last
-        name = part.path.removeprefix(f"{_APPROXIMATIONS}.").replace(f"{_SPEEDS}.", "border_")
+        name = part.path
         shown = ["" if value != value else value for value in columns[part]]
         heads[name if part.names else f"{name} [{part.unit}]"] = shown
     text = io.StringIO()
@@ -158,6 +169,7 @@ class SolveForOptions(Options):
         "Where to search [SI]; left out: wherever it changes mu_macro",
         None,
     )
+    stiffness_exponent: _Exponent | None = _exponent
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:
@@ -177,9 +189,10 @@ def post_solve_for(found: Asking) -> Response:
         table.surrogate,
         name,
         [x * unit for x in form.target],
-        case,
-        within,
+        within=within,
+        stiffness_exponent=form.stiffness_exponent,
         **wanted.asked.kind.names,
+        **case,
     )
     answer = {"unknown": form.unknown, "unit": unit_of(form.unknown), "quantity": form.quantity}
     answer |= _results(form, solution, _included(found, name, solution), unit, per)
@@ -189,6 +202,7 @@ def post_solve_for(found: Asking) -> Response:
             {"k": k, **_results(form, end, None, unit, per)}
             for k, end in zip(ks, solution.ends, strict=True)
         ]
+    answer |= _said(found, name, solution.stiffening)
     return Reply(dump({**answer, **table.signature}))
 
 
@@ -224,11 +238,11 @@ def _results(
 
 def _included(found: Asking, unknown: str, solution: Solution) -> list[dict[str, Any]]:
     """The included quantities of every root, in order."""
-    table, _, case, wanted = found
+    table, _, _, wanted = found
     values = np.array([root.value for roots in solution.roots for root in roots])
     if not wanted.include or not values.size:
         return [{}] * values.size
-    six = [values if name == unknown else np.array([case[name]]) for name in wanted.asked.fields]
+    six = _columns(found, unknown, values, solution.stiffening)
     answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
     rows = zip(*(answer[path].tolist() for path in wanted.more), strict=True)
     return [nested(dict(zip(wanted.more, row, strict=True))) for row in rows]
@@ -268,8 +282,9 @@ LawAnswer = model(
     values=told(list[float], "The swept input [SI]"),
     **default(True),
     **included(True),
-    **grouped(_MORE, True, "Beside the exact values"),
     mu_static=told(list[float], _STATIC.described),
+    k=optional(list[float], _K.described),
+    model=optional(many(ModelRow), _MODEL),
     border=told(many(BorderMark), "Up to two points inside the range"),
 )
 _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
@@ -330,6 +345,7 @@ SolveForAnswer = model(
     ends=optional(
         many(SolveForEnd), "Only with k_range: for k_low and k_high; the rest is for the middle"
     ),
+    model=optional(many(ModelRow), _MODEL),
 )
 ENDPOINTS = [
     Endpoint(

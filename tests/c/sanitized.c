@@ -84,7 +84,7 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
 static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, double *const *columns,
                       int single) {
     const size_t size = (size_t)n;
-    double *rows[3] = {numbers(3 * size), numbers(5 * size), numbers(17 * size)};
+    double *rows[3] = {numbers(3 * size), numbers(5 * size), numbers(17 * size)}, *high = numbers(size);
     int8_t *source = (int8_t *)malloc(size);
     int64_t strides[6];
     for (int i = 0; i < 6; ++i) strides[i] = i == single ? 0 : 1;
@@ -94,13 +94,17 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
     for (int kind = 1; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
         kernel->cases(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW,
                          (const double *const *)columns, strides, 17, rows[2], n, source);
+    for (int64_t i = 0; i < n; ++i) high[i] = columns[2][i * strides[2]] * scaled(-0.1, drawn() < 0.5 ? 4.0 : 600.0);
+    for (int kind = 0; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
+        kernel->intervals(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, kind ? n < 2 ? n : 2 : n < FEW ? n : FEW,
+                          (const double *const *)columns, strides, high, rows[0], n);
     for (int64_t i = 0; i < n; ++i) {
         double x[6], *found = numbers(i % 2 ? 19 : 7);
         for (int j = 0; j < 6; ++j) x[j] = columns[j][i * strides[j]];
         kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2 ? 19 : 7, found);
         free(found);
     }
-    free(rows[0]), free(rows[1]), free(rows[2]), free(source);
+    free(rows[0]), free(rows[1]), free(rows[2]), free(high), free(source);
 }
 
 /* Steps of n contacts of a few springs, whose forces are what x holds. */

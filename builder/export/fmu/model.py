@@ -13,10 +13,13 @@ The unit holds its sources, the binary of the machine it is made on, and where z
 those of Linux and Windows for 64-bit Intel and AMD; without any compiler the sources alone.
 """
 
+import importlib.util
 import io
 import platform
 import shutil
+import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,10 +28,10 @@ from xml.sax.saxutils import quoteattr
 from mumacro.inputs.fields import UNITS
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS
 from mumacro.table import atlas
-from mumacro.table.netcdf import Table
+from mumacro.table.blocks import Table
 from mumacro.version import __version__
 
-from ..c import compiled, header_text, zig
+from ..c import ExportError, header_text
 
 _HERE = Path(__file__).parent
 STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01, AMPLITUDE: 0.0}
@@ -97,7 +100,7 @@ def _unit(table: Table, version: int) -> bytes:
     for place, command in _targets(version):
         if f"binaries/{place}" not in binaries:
             library = [] if place.endswith(".dll") else ["-lm"]
-            binaries[f"binaries/{place}"] = compiled(
+            binaries[f"binaries/{place}"] = _compiled(
                 sources, [*command, *OPTIONS, f"fmu{version}.c", *library]
             )
     if not binaries:
@@ -131,12 +134,32 @@ def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
         ("x86_64-linux", "x86_64-linux-gnu.2.17"),
         ("x86_64-windows", "x86_64-windows-gnu"),
     ):
-        if command := zig(target):
+        if command := _zig(target):
             yield place(three), [*command, "-s"]
     processor = {"arm64": "aarch64"}.get(platform.machine(), platform.machine())
     found = next((path for path in map(shutil.which, ("gcc", "clang", "cc")) if path), None)
     if found and platform.system() in ("Linux", "Darwin") and processor in ("x86_64", "aarch64"):
         yield place(f"{processor}-{platform.system().lower()}"), [found]
+
+
+def _zig(target: str) -> list[str] | None:
+    """The command that compiles for a target of zig's; None where the package ziglang is not
+    installed."""
+    found = importlib.util.find_spec("ziglang")
+    return [sys.executable, "-m", "ziglang", "cc", "-target", target] if found else None
+
+
+def _compiled(texts: dict[str, str], command: list[str]) -> bytes:
+    """What ``command`` makes in a folder that holds ``texts`` by name."""
+    with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
+        for name, text in texts.items():
+            Path(folder, name).write_text(text, "ascii")
+        # the folder by its whole name: zig's cache would take two files "./mumacro.h" for one
+        words = [*command, f"-I{folder}", "-o", "made"]
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        if done.returncode != 0:
+            raise ExportError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
+        return Path(folder, "made").read_bytes()
 
 
 def _description(version: int, token: str) -> str:

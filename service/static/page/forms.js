@@ -2,7 +2,7 @@
 import { Status } from "./ask.js";
 import {
   RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
-  readValue, show, symbolOf, valueOf, within,
+  readValue, refuse, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
@@ -148,7 +148,7 @@ export function stiffness(use) {
     const model = contact === "ball" ? "ball (Hertz)" : "one spring";
     const said = (warnings ?? []).map((text) => `. Warning: ${text}`).join("");
     const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}${said}`;
-    list("stiffness-result", [[told, { k }, 6, about.knows.includes("contact") ? { contact } : {}]], use);
+    list("stiffness-result", [[told, { k }, 6, { contact }]], use);
   });
 }
 
@@ -159,8 +159,10 @@ export function fit(use) {
   const plot = new Plot($("fit-plot"), (...size) => paint(...size));
   $("fit-image").addEventListener("click", () => plot.save(told, "friction-fit.svg"));
   return panel("fit", "v1/fit", (state) => {
-    const unknowns = $("unknowns").value.split(" ");
-    return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...readPoints($("points").value) };
+    const points = readPoints($("points").value);
+    const unknowns = $("unknowns").value.split(" ").filter((name) => !(name in points)); // a column mu0 is known
+    if (!unknowns.length) refuse("µ₀ is a column of the points: choose k as the unknown");
+    return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...points };
   }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, curve }, asked, state) => {
     /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
     const text = (name, value, digits = 4) =>

@@ -2,8 +2,8 @@
 // Nothing here needs a browser; tests/page tests it with node.
 
 /** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
- *  slider's decimal exponents (SI), start value; beside them the choices with their words, what the host `knows`,
- *  geometries and their arguments. */
+ *  slider's decimal exponents (SI), start value; beside them the choices with their words, geometries
+ *  and their arguments, and whether there is a guide. */
 export const about = {};
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
@@ -54,7 +54,7 @@ export function friction(value, uncertainty = 0, usual = 4) {
 }
 
 class Fault extends Error {}
-const refuse = (why) => { throw new Fault(why); };
+export const refuse = (why) => { throw new Fault(why); };
 
 /** { found } of what reads a text, or { fault }: why it cannot be used. */
 export function attempt(read) {
@@ -114,10 +114,7 @@ export function readQuantity(name, text, unit) {
 /** A typed value of an input: a number, or for k "rigid" or "low..high". */
 export function readValue(name, text, unit = about.inputs[name].offered[0]) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return RIGID;
-  if (name === "k" && text.includes("..")) {
-    return about.knows.includes("k_range") ? readInterval(name, text, unit)
-      : refuse("must be one number: this service knows no interval");
-  }
+  if (name === "k" && text.includes("..")) return readInterval(name, text, unit);
   const read = readQuantity(name, text, unit);
   const { positive, bound } = about.inputs[name];
   if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0)) refuse(`must be ${bound}`);
@@ -142,22 +139,45 @@ const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval
 export const rounded = (name, value, unit, digits) =>
   readValue(name, String(value === "rigid" ? value : Number(fromSI(name, value, unit).toPrecision(digits))), unit);
 
-const COLUMNS = [["v0", /^(v|speed)/i], ["mu_macro", /^(mu|µ|μ|friction)/i], ["std", /^(std|±|sigma|s$|u$)/i]];
+const COLUMNS = [
+  ["v0", /^(v|speed)/i], ["mu_macro", /^(mu|µ|μ|friction)(?!_?[0₀])/i], ["std", /^(std|±|sigma|s$|u$)/i],
+  ["mu0", /^(mu|µ|μ)_?[0₀]/i],
+];
+const WITH_COMMA = /^[+−-]?\d*,\d+(?:e[+-]?\d+)?(?![\d.,])/i;
 
-/** { v0 [m/s], mu_macro, std } of points, one a line.  A first line of words names the columns. */
+/** What stands between the columns: a comma may also be the decimal sign of columns between spaces. */
+function separatorOf(text, lines) {
+  const sign = ["\t", ";", ","].find((one) => text.includes(one));
+  if (sign !== ",") return sign ?? /\s+/;
+  const cells = lines.filter((line) => /^[\d,+−-]/.test(line)).map((line) => line.split(/\s+/));
+  const decimal = cells.every((row) => row.length > 1 && row.every((cell) => /^[^,]+$/.test(cell) || WITH_COMMA.test(cell)));
+  return cells.length && decimal ? /\s+/ : sign;
+}
+
+/** Cells with a decimal point; the decimal sign is a comma where a cell has one, and then it is so in every cell. */
+function withPoints(rows) {
+  const comma = rows.flat().find((cell) => WITH_COMMA.test(cell));
+  if (comma === undefined) return rows;
+  const point = rows.flat().find((cell) => /^[+−-]?\d*\./.test(cell));
+  if (point !== undefined) refuse(`“${comma}” has a decimal comma, “${point}” a decimal point: use one of them`);
+  return rows.map((row) => row.map((cell) => cell.replace(",", ".")));
+}
+
+/** { v0 [m/s], mu_macro, std, mu0 } of points, one a line.  A first line of words names the columns. */
 export function readPoints(text) {
-  const between = ["\t", ";", ","].find((sign) => text.includes(sign)) ?? /\s+/;
   const lines = text.split("\n").map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
-  const rows = lines.map((line) => line.split(between).map((cell) => cell.trim()));
+  const between = separatorOf(text, lines);
+  let rows = lines.map((line) => line.split(between).map((cell) => cell.trim()));
   if (!rows.length) refuse("paste points: v₀ and µ, one point a line");
-  const headed = /^[^\d.+−-]/.test(rows[0][0]);
-  const head = headed ? rows.shift() : COLUMNS.map(([name]) => name).slice(0, rows[0].length);
+  const headed = /^[^\d.,+−-]/.test(rows[0][0]);
+  const head = headed ? rows.shift() : COLUMNS.map(([name]) => name).slice(0, Math.min(3, rows[0].length));
   const names = head.map((cell) => COLUMNS.find(([, sign]) => sign.test(cell))?.[0]);
   const strange = names.findIndex((name, i) => name === undefined || names.indexOf(name) < i);
-  if (strange >= 0) refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, each once`);
+  if (strange >= 0) refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, mu0, each once`);
   const complete = names.includes("v0") && names.includes("mu_macro") && (headed || rows[0].length <= 3);
-  if (!complete) refuse("needs two or three columns: v0, mu_macro, std");
+  if (!complete) refuse("needs two or three columns: v0, mu_macro, std; with mu0 also their names");
   if (!rows.length) refuse("paste points below the names of the columns");
+  rows = withPoints(rows);
   const unit = readUnit("v0", /[[(](.*)[\])]/.exec(head[names.indexOf("v0")])?.[1] ?? "m/s");
   return Object.fromEntries(names.map((name, j) => [name, rows.map((row, i) => {
     const line = `line ${i + 1 + headed}`;
@@ -214,8 +234,7 @@ export const powerOf = ({ direction }) => (direction === "normal" ? [] : ["power
 
 /** The question for the readout. */
 export function question(state) {
-  const model = about.knows.includes("contact") ? ["model"] : []; // of a service that has several
-  const include = ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), ...model];
+  const include = ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), "model"];
   return { ...caseOf(state, [], true), include };
 }
 

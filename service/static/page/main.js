@@ -84,7 +84,7 @@ function showAnswer({ asked, ...found }) {
   $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
-  $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; not compared with measured points.`;
+  $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; compared with one published set of measured points, along.`;
   const rows = found.model ?? [];
   const units = rows.find(({ row }) => row === "units"); // beside the number: it is probably wrong
   $("units").textContent = units ? `Check the units: ${units.text}` : "";
@@ -126,10 +126,9 @@ function showBars({ gradient, mu_macro: mu }, asked) {
 
 function start(names) {
   Object.assign(about, names);
-  for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.includes(part.dataset.needs);
-  const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.includes(name));
+  for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
   parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge),
-    ...panels.map(([, panel]) => panel(setSI))];
+    solver(setSI), stiffness(setSI), fit(setSI)];
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
   addEventListener("change", take);

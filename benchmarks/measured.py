@@ -1,0 +1,266 @@
+"""Published measured friction beside the model: five speeds of one pair of steel, shaken along.
+
+python benchmarks/measured.py [--only SECTION]     # also draws docs/img/measured.png
+
+The points are the printed numbers of one open article, with their source in
+tests/data/luo-2024.csv.  k is fitted by `mumacro.fit`; mu0 at each speed is the force without
+shaking over the weight.  Forces do not depend on the weight: mu0 Fz and k count alone.
+"""
+
+from benchmarks.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
+
+import csv
+import warnings
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro import Fit, Surrogate, fit, solve_for
+
+Array = NDArray[np.float64]
+POINTS = ROOT / "tests" / "data" / "luo-2024.csv"
+FZ = 1.1 * 9.80665  # N, of the slider's weight; the article does not state the force
+RIG: dict[str, Any] = {"Fz": FZ, "y0": 0.35e-6, "f": 26e3}
+ALONG: dict[str, Any] = {"direction": "along"}
+CONTACTS = ("spring", "ball")
+INK, GREY, BLUE, RED = "#222222", "#8c959f", "#1f6fb4", "#c1272d"
+
+
+class Points(NamedTuple):
+    """Measured forces: of each speed, and the largest before sliding."""
+
+    v0: Array  #: m/s, (5,)
+    without: Array  #: N, (5,)
+    shaken: Array  #: N, (5,)
+    static_without: float  #: N
+    static_shaken: float  #: N
+
+
+@cache
+def table() -> Surrogate:
+    return Surrogate.open()
+
+
+@cache
+def points() -> Points:
+    with POINTS.open(encoding="utf-8") as lines:
+        rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    v0, without, shaken = (
+        np.array([float(row[name]) for row in rows])
+        for name in ("v0 [mm/s]", "force_without [N]", "force_with [N]")
+    )
+    return Points(1e-3 * v0[1:], without[1:], shaken[1:], float(without[0]), float(shaken[0]))
+
+
+def fitted(contact: str, mu0: Any = None, unknowns: Any = None) -> Fit:
+    """k, with mu0 of each speed unless something else is given; ``unknowns`` as in ``fit``."""
+    p = points()
+    columns = {"v0": p.v0, "mu_macro": p.shaken / FZ}
+    if unknowns is None:
+        columns["mu0"] = p.without / FZ if mu0 is None else mu0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they are in the result
+        return fit(columns, unknowns, contact=contact, surrogate=table(), **ALONG, **RIG)
+
+
+def force(contact: Any, k: Any, mu0: Any, v0: Any) -> Array:
+    """Friction of the model [N]."""
+    mu = table().evaluate(mu0=mu0, k=k, v0=v0, contact=contact, **ALONG, **RIG).mu_macro
+    return np.asarray(FZ * mu)
+
+
+def forces() -> str:
+    """Each point beside the model: with the fitted k of a spring and a ball, and rigid."""
+    p = points()
+    mu0 = p.without / FZ
+    spring, ball = (force(c, fitted(c).values["k"], mu0, p.v0) for c in CONTACTS)
+    rigid = force("spring", "rigid", mu0, p.v0)
+    rows = [
+        [
+            f"{1e3 * v0:g}",
+            f"{without:.2f}",
+            f"{shaken:.3f}",
+            f"{a:.3f}",
+            f"{b:.3f}",
+            f"{c:.4f}",
+            f"{shaken / c:.0f}",
+        ]
+        for v0, without, shaken, a, b, c in zip(
+            p.v0, p.without, p.shaken, spring, ball, rigid, strict=True
+        )
+    ]
+    header = (
+        "v0 [mm/s]",
+        "not shaken [N]",
+        "shaken [N]",
+        "spring [N]",
+        "ball [N]",
+        "rigid [N]",
+        "shaken/rigid",
+    )
+    _draw()
+    return markdown(header, rows, 0)
+
+
+def stiffness() -> str:
+    """The fitted k, what single points give, and where the points are."""
+    p, rows = points(), []
+    mu0 = p.without / FZ
+    for contact in CONTACTS:
+        found = fitted(contact)
+        k, (low, high) = found.values["k"], found.interval["k"]
+        case = {**RIG, "mu0": 0.0, "v0": 0.0}
+        each = np.array(
+            [
+                solve_for(
+                    table(),
+                    "k",
+                    p.shaken[i] / FZ,
+                    contact=contact,
+                    **ALONG,
+                    **{**case, "mu0": mu0[i], "v0": p.v0[i]},
+                )
+                .roots[0][0]
+                .value
+                for i in range(p.v0.size)
+            ]
+        )
+        y = k * RIG["y0"] / p.without
+        rows.append(
+            [
+                contact,
+                f"{k / 1e6:.2f} ± {found.std['k'] / 1e6:.2f}",
+                f"{low / 1e6:.2f} to {high / 1e6:.2f}",
+                f"{np.sqrt(found.reduced_chi2):.4f}",
+                f"{each.min() / 1e6:.2f} to {each.max() / 1e6:.2f}",
+                f"{100.0 * np.abs(each / k - 1.0).max():.1f}",
+                f"{y.min():.2f} to {y.max():.2f}",
+            ]
+        )
+    header = (
+        "contact",
+        "k [N/µm]",
+        "95 %",
+        "scatter of mu",
+        "each point alone",
+        "off by at most [%]",
+        "y0/l0",
+    )
+    return markdown(header, rows)
+
+
+def trends() -> str:
+    """What speaks against the model: friction at the slowest over that at the fastest speed, and
+    the largest force before sliding."""
+    p = points()
+    mu0 = p.without / FZ
+    slope, start = np.polyfit(np.log(p.v0), mu0, 1)
+    rows = [
+        [
+            "measured",
+            *[f"{p.shaken[0] / p.shaken[-1]:.2f}"] * 2,
+            *[f"{p.static_shaken:.2f}"] * 2,
+        ]
+    ]
+
+    def ratio(contact: str, k: float, at: Any) -> str:
+        mu = force(contact, k, at, p.v0)
+        return f"{mu[0] / mu[-1]:.2f}"
+
+    cells = [ratio(c, fitted(c).values["k"], mu0) for c in CONTACTS]
+    static = [
+        f"{float(force(c, fitted(c).values['k'], p.static_without / FZ, 0.0)):.2f}"
+        for c in CONTACTS
+    ]
+    rows.append(["mu0 of each speed", *cells, *static])
+    # a spring here never slips backwards: its path of slip is v0 times a period
+    case = {**RIG, "mu0": mu0, "k": fitted("spring").values["k"], "v0": p.v0}
+    answer = table().evaluate(case, groups=True, **ALONG)
+    stick = table().quantity("stick_fraction", answer.v_tilde, answer.y_tilde, **ALONG)[0]
+    at = start + slope * np.log(p.v0 / (1.0 - stick))
+    cell = ratio("spring", fitted("spring", at).values["k"], at)
+    rows.append(["mu0 at the mean speed of slip", cell, "-", "-", "-"])
+    one = np.full(p.v0.size, mu0.mean())
+    cells = [ratio(c, fitted(c, one).values["k"], one) for c in CONTACTS]
+    rows.append(["one mu0", *cells, "-", "-"])
+    header = (
+        "mu0",
+        "slowest/fastest, spring",
+        "ball",
+        "before sliding [N], spring",
+        "ball",
+    )
+    text = markdown(header, rows)
+    asked = [
+        solve_for(
+            table(),
+            "k",
+            p.static_shaken / FZ,
+            contact=c,
+            **ALONG,
+            **{**RIG, "mu0": p.static_without / FZ, "v0": 0.0},
+        )
+        .roots[0][0]
+        .value
+        for c in CONTACTS
+    ]
+    more = [
+        f"{100.0 * (a / fitted(c).values['k'] - 1.0):.0f}"
+        for a, c in zip(asked, CONTACTS, strict=True)
+    ]
+    off = p.without - p.shaken
+    free = [fitted(c, unknowns=("k", "mu0")) for c in CONTACTS]
+    return " ".join(
+        [
+            f"{text}\n\nNot shaken less shaken is {off.min():.2f} to {off.max():.2f} N while it",
+            f"slides, {p.static_without - p.static_shaken:.2f} N before. The force before sliding",
+            f"asks for k = {asked[0] / 1e6:.2f} N/µm (spring), {asked[1] / 1e6:.2f} N/µm (ball):",
+            f"{more[0]} % and {more[1]} % more. With k and mu0 both unknown the fit says:",
+            f"{free[0].warnings[0]} (spring); {free[1].warnings[0]} (ball).",
+        ]
+    )
+
+
+def _draw() -> None:
+    """docs/img/measured.png: all forces on logarithmic axes, and the shaken ones alone."""
+    from matplotlib.figure import Figure
+
+    p = points()
+    v0 = np.geomspace(p.v0[0], p.v0[-1], 201)
+    mu0 = np.interp(np.log(v0), np.log(p.v0), p.without / FZ)
+    spring, ball = (force(c, fitted(c).values["k"], mu0, v0) for c in CONTACTS)
+    mean = np.full(p.v0.size, p.without.mean() / FZ)
+    one = force("spring", fitted("spring", mean).values["k"], mean[0], v0)
+    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for axes in (left, right):
+        axes.plot(1e3 * v0, spring, color=BLUE, lw=2.0, label="one spring, $k$ fitted")
+        axes.plot(1e3 * v0, ball, color=BLUE, lw=2.0, ls="--", label="ball, $k$ fitted")
+        axes.set_xscale("log")
+        axes.set_xticks(1e3 * p.v0, [f"{1e3 * x:g}" for x in p.v0], minor=False)
+        axes.set_xticks([], minor=True)
+        axes.set_xlabel(r"$v_0$ [mm/s]")
+        axes.spines[["top", "right"]].set_visible(False)
+    rigid = force("spring", "rigid", mu0, v0)
+    left.plot(1e3 * v0, rigid, color=GREY, lw=2.0, label="rigid contact")
+    left.plot(1e3 * p.v0, p.without, "o", mfc="white", color=INK, label="measured, not shaken")
+    left.plot(1e3 * p.v0, p.shaken, "o", color=INK, label="measured, shaken")
+    left.set(yscale="log", ylabel="friction [N]", ylim=(1e-3, 6.0), title="not shaken, and shaken")
+    left.set_yticks([0.001, 0.01, 0.1, 1.0], ["0.001", "0.01", "0.1", "1"])
+    right.plot(1e3 * v0, one, color=RED, lw=1.6, ls=":", label=r"one spring, one $\mu_0$")
+    right.plot(1e3 * p.v0, p.shaken, "o", color=INK)
+    right.set(ylabel="friction [N]", ylim=(0.0, 0.65), title="shaken alone")
+    handles = dict(zip(*reversed(left.get_legend_handles_labels()), strict=True))
+    handles |= dict(zip(*reversed(right.get_legend_handles_labels()), strict=True))
+    figure.legend(
+        list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False
+    )
+    figure.savefig(IMAGES / "measured.png", dpi=100, metadata={"Software": None})
+
+
+SECTIONS = sections(forces, stiffness, trends)
+
+if __name__ == "__main__":
+    main(__doc__, SECTIONS)

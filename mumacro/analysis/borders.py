@@ -1,0 +1,84 @@
+"""The borders that a sweep crosses: where continuous sliding, or along reverse slip, begins or
+ends."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mumacro.analysis.load import Stiffening
+from mumacro.analysis.rootfinding import TINY, last_double
+from mumacro.analysis.sweep import EVERYWHERE, Sweep, checked_case
+from mumacro.inputs.kind import kind_of
+from mumacro.kernel.arrays import Array, Bools
+from mumacro.surrogate import Surrogate
+
+#: regime -> the border at which it begins or ends
+BORDER_NAMES = {
+    "reverse_slip": "border of reverse slip",
+    "continuous": "border of continuous sliding",
+}
+# y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls
+# strictly from 2 to 1/2 (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on
+# either side.
+_Y_CLOSEST = 1.290791
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A value of the swept input at which the regime changes, mu_macro there, and the regimes below
+    and above."""
+
+    value: float
+    mu_macro: float
+    regimes: tuple[str, str]
+
+    @property
+    def name(self) -> str:
+        """Which border it is."""
+        regime = next(one for one in ("continuous", "reverse_slip") if one in self.regimes)
+        return BORDER_NAMES[regime]
+
+
+def border_crossings(
+    surrogate: Surrogate,
+    along: str,
+    case: Mapping[str, Any],
+    low: float,
+    high: float,
+    *,
+    contact: str = "spring",
+    direction: str = "across",
+    stiffening: Stiffening | None = None,
+) -> tuple[Crossing, ...]:
+    """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends,
+    ascending.
+
+    ``case`` holds the other five inputs, of which k grows with Fz where there is a ``stiffening``.
+    Of continuous sliding none, one, or (across, over mu0, Fz or k) two places; none for rigid
+    contact (never any stick) and without oscillation.
+    """
+    kind = kind_of(contact, direction)
+    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind, stiffening)
+    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values() or sweep.proportional:
+        return ()
+    low = max(low, TINY)  # at 0 nothing oscillates or slides
+    middle = low if along in EVERYWHERE or direction != "across" else sweep.where(_Y_CLOSEST)
+    edges = np.array([low, middle, high] if low < middle < high else [low, high])
+    found = []
+    for regime in ("continuous", "reverse_slip"):
+        state = sweep.answer(edges).regime == regime
+        i = np.flatnonzero(state[1:] != state[:-1])
+
+        def before(x: Array, regime: str = regime, states: Bools = state[i, None]) -> Bools:
+            same: Bools = (sweep.answer(x).regime == regime) == states
+            return same
+
+        cuts = last_double(before, edges[i], edges[i + 1])
+        found += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
+    below, first = np.array(sorted(set(found))).reshape(-1, 2).T
+    after = sweep.answer(first)
+    regimes = zip(sweep.answer(below).regime.tolist(), after.regime.tolist(), strict=True)
+    return tuple(map(Crossing, first.tolist(), after.mu_macro.tolist(), regimes))

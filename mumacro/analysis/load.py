@@ -1,0 +1,102 @@
+"""The stiffness of a contact under a load that changes: k = k_given (Fz/Fz_given)^m.
+
+The area of a contact grows with its load, and k with it: m = 1/3 for a ball (Hertz), 0.5 to 1 for
+rough surfaces, 0 for a flat punch.  It matters where Fz is swept or solved for.  Across and along
+only k/Fz counts, which goes like Fz^(m-1): the friction law over Fz keeps its course, stretched
+over ln Fz by 1/(1 - m), and for m = 1 it does not depend on Fz at all.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mumacro.errors import InputError
+from mumacro.inputs.fields import check_inputs, real
+from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.kind import CONTACTS, Kind
+from mumacro.kernel.arrays import Array
+
+EXPONENT = "stiffness_exponent"
+EXPONENTS = {"spring": 0.0, "ball": 1.0 / 3.0}  # by contact, where none is given
+ROUGH = 0.5, 1.0  # of rough surfaces (docs/validity.md)
+_BOUND = "one number from 0 to 1: 1/3 for a ball, 0.5 to 1 for rough surfaces, 0 for constant k"
+_FAR = 1e300  # stiffnesses and loads beyond it, or below its inverse, are not searched
+
+
+class Stiffening(NamedTuple):
+    """k = k_given (Fz/load)^exponent."""
+
+    exponent: float  #: m, > 0 and <= 1
+    load: float  #: Fz_given [N], at which k_given holds
+
+    def stiffness(self, k: float, load: ArrayLike) -> Array:
+        """k [N/m] at loads [N], (n,), of a contact that has ``k`` at :attr:`load`; InputError where
+        it is no double > 0."""
+        loads = np.asarray(load, dtype=np.float64)
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            out = np.asarray(k * (loads**self.exponent / self.load**self.exponent))
+        # a load that is out of bounds itself is refused by its own bound
+        bad = (loads > 0.0) & (loads < math.inf) & ~((out > 0.0) & (out < math.inf))
+        if bad.any() and k < math.inf:
+            i = int(np.flatnonzero(bad.ravel())[0])
+            bound = f"such that k = {k:g} N/m (Fz/{self.load:g} N)^{self.exponent:.3g} is a number"
+            raise InputError("Fz", float(loads.flat[i]), bound, i if loads.ndim else None)
+        return out
+
+    def scaled(self, case: Mapping[str, Any], load: ArrayLike) -> dict[str, Array]:
+        """The stiffnesses of a case, k or the ends of its interval, at loads [N], (n,)."""
+        return {
+            name: self.stiffness(float(case[name]), load) for name in ("k", *ENDS) if name in case
+        }
+
+    def place(self, ratio: float) -> float:
+        """The load [N] at which k/Fz is ``ratio`` times what it is at :attr:`load`; for m < 1."""
+        power = math.log(self.load) - math.log(ratio) / (1.0 - self.exponent)
+        return math.exp(min(max(power, -690.0), 690.0))
+
+    def range(self, k: float) -> tuple[float, float]:
+        """Between which loads [N] both the load and k are far within double range."""
+        log_k, log_far = math.log(k), math.log(_FAR)
+        low, high = (
+            math.log(self.load) + (side * log_far - log_k) / self.exponent for side in (-1.0, 1.0)
+        )
+        return math.exp(max(low, -log_far)), math.exp(min(high, log_far))
+
+
+def stiffening_of(
+    case: Mapping[str, Any], unknown: str, kind: Kind, exponent: float | None
+) -> tuple[Mapping[str, Any], Stiffening | None]:
+    """How k grows where Fz is swept or solved for, and the case without the load at which k holds.
+
+    That load is the ``Fz`` of the case.  Without it k is constant, and an exponent > 0 is refused;
+    beside a spring without an exponent it is refused, too.  None where k is constant.
+    """
+    if exponent is not None:
+        value = np.asarray(exponent)
+        if value.ndim or value.dtype.kind not in "iuf" or not 0.0 <= float(value) <= 1.0:
+            raise InputError(EXPONENT, exponent, _BOUND)
+        if unknown != "Fz":
+            bound = f"left out where {unknown} is the unknown or swept: k is that of the one load"
+            raise InputError(EXPONENT, exponent, bound)
+    load = case.get("Fz")
+    if unknown != "Fz" or (load is None and not exponent):
+        return case, None
+    if load is None:
+        bound = "given [N] beside a stiffness exponent: the load at which k holds"
+        raise InputError("Fz", None, bound)
+    power = EXPONENTS[CONTACTS[kind.contact]] if exponent is None else float(exponent)
+    if exponent is None and not power:
+        bound = (
+            "left out, because Fz is the unknown; beside a stiffness exponent it is the load at "
+            "which k holds"
+        )
+        raise InputError("Fz", load, bound)
+    loads = real("Fz", load)
+    if loads.size != 1:
+        raise InputError("Fz", load, "one number: the load at which k holds")
+    check_inputs({"Fz": loads})
+    rest = {name: value for name, value in case.items() if name != "Fz"}
+    return rest, Stiffening(power, float(loads.item())) if power else None

@@ -1,0 +1,96 @@
+"""``mumacro law``: mu_macro over a range of one input."""
+
+import math
+from collections.abc import Sequence
+
+from mumacro.analysis.approximations import approximations
+from mumacro.analysis.law import law as friction_law
+from mumacro.analysis.validity import load_rows
+from mumacro.cli import common
+from mumacro.cli.common import CURVE, UsageError, as_json, in_columns, open_table, read_case
+from mumacro.inputs.fields import field_of, unit_of
+
+EXAMPLE = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1mm/s 1m/s"
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro law``."""
+    told = (
+        "mu_macro over a range of one input, with the static value and the border of "
+        "continuous sliding."
+    )
+    epilog = f"{common.INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} -o law.png"
+    parser = common.question("law", told, epilog, "a case without the swept input", "*")
+    text = "the swept input, its first and its last value, in its SI unit or with a unit"
+    parser.add_argument(
+        "--along", nargs=3, metavar=("NAME", "LOW", "HIGH"), required=True, help=text
+    )
+    parser.add_argument("--points", type=int, help="number of values; default: 25, in pictures 400")
+    parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
+    parser.add_argument(
+        "--approximations", action="store_true", help="also the approximations of the article"
+    )
+    common.add_exponent(parser)
+    chosen = parser.parse_intermixed_args(words)
+    (along, *ends), kind = chosen.along, common.kind_in(chosen)
+    if along not in kind.columns:
+        raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
+    (inner, scale), unit = field_of(along), unit_of(along)
+    case = read_case(chosen.words, kind, **common.without_or_load(along))
+    start, stop = (scale * end for end in common.read_values((along, end) for end in ends))
+    drawn = chosen.out is not None and chosen.out.suffix != ".csv"
+    surrogate = open_table(chosen.table)
+    found = friction_law(
+        surrogate,
+        inner,
+        start=start,
+        stop=stop,
+        points=(CURVE if drawn else 25) if chosen.points is None else chosen.points,
+        scale=chosen.scale,
+        refine=drawn,
+        stiffness_exponent=chosen.stiffness_exponent,
+        **kind.names,
+        **case,
+    )
+    model = load_rows(inner, found.case, chosen.contact, found.stiffening)
+    columns = found.columns | (approximations(surrogate, found) if chosen.approximations else {})
+    columns = {along: columns.pop(inner) / scale, **columns}
+    by_unit = {along: unit, "k": unit_of("k")}
+    border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
+    if chosen.json:
+        return as_json(
+            {
+                "along": along,
+                "unit": unit,
+                **columns,
+                "border": border,
+                **({"model": model} if model else {}),
+                "table": common.about(surrogate),
+            }
+        )
+    headed = {
+        f"{name} [{by_unit[name]}]" if name in by_unit else name: column
+        for name, column in columns.items()
+    }
+    middle = found.values[found.values.size // 2]
+    form = common.format_for(chosen, surrogate, {**case, inner: middle}, kind)
+    of_k = ", for the geometric middle of k" if found.band else ""
+    marks = [f"{c.name} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border]
+    marks += common.model_lines(model)
+    if chosen.out is not None:
+        return "\n".join(
+            [
+                common.write_result(chosen.out, headed, found.plot),
+                *marks,
+            ]
+        )
+    del headed["source"]
+    shown = [
+        [cell if isinstance(cell, str) else _shown(cell, form) for cell in x]
+        for x in headed.values()
+    ]
+    return "\n".join([in_columns([[*headed], *zip(*shown, strict=True)]), *marks])
+
+
+def _shown(value: float, form: str) -> str:
+    return "-" if math.isnan(value) else f"{value:{form}}"

@@ -1,0 +1,45 @@
+"""``mumacro map``: the map of mu~, with a case on it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mumacro import plotting
+from mumacro.cli import common
+from mumacro.cli.common import UsageError, open_table, read_case
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro map``."""
+    told = (
+        "The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case "
+        "on it."
+    )
+    epilog = f"{common.INPUTS}\nexample:\n  mumacro map -o map.png"
+    parser = common.question("map", told, epilog, "a case to mark, if any", "*")
+    chosen = parser.parse_intermixed_args(words)
+    if chosen.out is None:
+        raise UsageError("a map is written to a file: give -o map.png")
+    kind, surrogate = common.kind_in(chosen), open_table(chosen.table)
+    one_k = "one k is needed: the map marks one point"
+    point = None
+    if chosen.words:
+        case = surrogate.evaluate(**{**read_case(chosen.words, kind, one_k=one_k), **kind.names})
+        point = (case.v_tilde, case.y_tilde)
+    ranges = (plotting.V_RANGE, plotting.y_range(kind.normal))
+    v, y = (
+        x.ravel() for x in np.meshgrid(np.geomspace(*ranges[0], 141), np.geomspace(*ranges[1], 101))
+    )
+    columns = {
+        "v_tilde": v,
+        "y_tilde": y,
+        "mu_ratio": surrogate.quantity("mu_ratio", v, y, **kind.names)[0],
+    }
+    text = common.write_result(
+        chosen.out,
+        columns,
+        lambda axes: surrogate.plot(axes, point=point, **kind.names),
+    )
+    if point and not all(low <= x <= high for x, (low, high) in zip(point, ranges, strict=True)):
+        text += f"\nthe case lies outside the map: v~ = {point[0]:.6g}, y~ = {point[1]:.6g}"
+    return text

@@ -1,0 +1,144 @@
+"""``mumacro solve-for``: the values of one input that give a mu_macro."""
+
+from collections.abc import Sequence
+
+from mumacro.analysis.law import law as friction_law
+from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.validity import load_rows
+from mumacro.cli import common
+from mumacro.cli.common import (
+    CURVE,
+    ImpossibleError,
+    UsageError,
+    as_json,
+    in_columns,
+    open_table,
+    read_case,
+)
+from mumacro.inputs.fields import NAMES, field_of, unit_of
+from mumacro.inputs.kind import AMPLITUDE
+
+EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --target 0.15"
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro solve-for``."""
+    told = "Every value of one input at which mu_macro is the target."
+    epilog = f"{common.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {EXAMPLE}"
+    first = "unknown", {"choices": (*NAMES, AMPLITUDE), "help": "the unknown input"}
+    parser = common.question("solve-for", told, epilog, "the other five inputs", first=first)
+    parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
+    parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
+    text = "range to search, in the SI unit of the unknown or with a unit"
+    parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
+    common.add_exponent(parser)
+    chosen = parser.parse_intermixed_args(words)
+    unknown, (inner, scale), unit = (
+        chosen.unknown,
+        field_of(chosen.unknown),
+        unit_of(chosen.unknown),
+    )
+    kind = common.kind_in(chosen)
+    if unknown not in kind.columns:
+        raise UsageError(
+            f"{unknown} does not belong to --direction {chosen.direction}: "
+            f"{', '.join(kind.columns)} do"
+        )
+    case = read_case(chosen.words, kind, **common.without_or_load(unknown))
+    if chosen.ratio and unknown == "mu0":
+        raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
+    target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
+    ends = [
+        scale * end for end in common.read_values((unknown, text) for text in chosen.between or ())
+    ]
+    surrogate = open_table(chosen.table)
+    found = solve_for(
+        surrogate,
+        inner,
+        target,
+        within=(ends[0], ends[1]) if ends else None,
+        stiffness_exponent=chosen.stiffness_exponent,
+        **kind.names,
+        **case,
+    )
+    model = load_rows(inner, common.middle_of(case), chosen.contact, found.stiffening)
+    reach, two = found.reach, found.ends
+    if not found.roots[0] and not (two and any(end.roots[0] for end in two)):
+        where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
+        if found.constant:
+            raise ImpossibleError(
+                f"{unknown} has no influence here: mu_macro is {reach.mu_min:.12g} for {where}"
+            )
+        raise ImpossibleError(
+            f"mu_macro = {target:.12g} is out of reach: {where} gives {reach.mu_min:.12g} to "
+            f"{reach.mu_max:.12g}"
+        )
+    places = {common.middle_of(case).get("k"): found}
+    if two:
+        places = dict(sorted({**places, **dict(zip(case["k_range"], two, strict=True))}.items()))
+    roots = [
+        (
+            *((k,) if two else ()),
+            r.value / scale,
+            r.low / scale,
+            r.high / scale,
+            r.mu_macro,
+            r.regime,
+        )
+        for k, one in places.items()
+        for r in one.roots[0]
+    ]
+    names = (*(("k",) if two else ()), unknown, "low", "high", "mu_macro", "regime")
+    if chosen.json:
+        listed = [dict(zip(names, root, strict=True)) for root in roots]
+        return as_json(
+            {
+                "unknown": unknown,
+                "unit": unit,
+                "target": target,
+                "roots": listed,
+                **({"model": model} if model else {}),
+                "table": common.about(surrogate),
+            }
+        )
+    heads = [
+        *(["k [N/m]"] if two else []),
+        f"{unknown} [{unit}]",
+        "between",
+        "and",
+        "mu_macro [-]",
+        "regime",
+    ]
+    if chosen.out is not None:
+        at = [root.value for one in places.values() for root in one.roots[0]]
+        # a decade around the roots; what is at 0 is shown up to 1
+        low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
+        curve = friction_law(
+            surrogate,
+            inner,
+            start=low,
+            stop=high,
+            points=CURVE,
+            scale="log" if low > 0.0 else "linear",
+            refine=True,
+            stiffness_exponent=chosen.stiffness_exponent,
+            **kind.names,
+            **case,
+        )
+        columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
+        return common.write_result(
+            chosen.out,
+            columns,
+            lambda axes: curve.plot(axes, roots=at, target=target),
+        )
+    at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
+    form = common.format_for(chosen, surrogate, {**case, inner: at_one}, kind)
+    text = in_columns(
+        [heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)]
+    )
+    none = [
+        f"no {unknown} gives that for k = {k:.6g} N/m"
+        for k, one in places.items()
+        if not one.roots[0]
+    ]
+    return "\n".join([text, *none, *common.model_lines(model)])

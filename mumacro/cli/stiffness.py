@@ -1,0 +1,46 @@
+"""``mumacro stiffness``: k of a contact from materials and geometry."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from mumacro.cli import common
+from mumacro.cli.common import OneLineParser, as_json, in_columns
+from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
+
+EXAMPLE = "mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3"
+_UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro stiffness``."""
+    parser = OneLineParser(
+        prog="mumacro stiffness",
+        description="The tangential stiffness k of a contact from materials and geometry, and the "
+        "kind of the contact.",
+        epilog=f"example:\n  {EXAMPLE}\n\nThe arguments of each: mumacro stiffness ball --help.",
+    )
+    parts = parser.add_subparsers(dest="geometry", required=True, metavar="GEOMETRY")
+    for name, geometry in GEOMETRIES.items():
+        part = parts.add_parser(
+            name, help=geometry.meaning, description=f"k of {geometry.meaning}."
+        )
+        for argument in (*geometry.arguments, *BODIES):
+            about, needed = ARGUMENTS[argument], argument in (*geometry.arguments, *BODIES[:2])
+            unit, choices = f" [{about.unit}]" if about.unit else "", about.choices or None
+            part.add_argument(
+                f"--{argument}", required=needed, choices=choices, help=f"{about.meaning}{unit}"
+            )
+        common.add_form(part)
+    chosen = parser.parse_args(words)
+    names = (*GEOMETRIES[chosen.geometry].arguments, *BODIES)
+    texts = {name: text for name in names if (text := getattr(chosen, name)) is not None}
+    given = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
+    contact = contact_of(chosen.geometry, **given)
+    found = asdict(contact)
+    if chosen.json:
+        return as_json({**found, "geometry": chosen.geometry, **given})
+    form = f".{chosen.digits or 4}g"  # what materials and geometry give at best
+    rows = [(name, f"{found[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
+    option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
+    rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
+    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in contact.warnings)])
