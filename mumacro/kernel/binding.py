@@ -37,12 +37,6 @@ def _numbers(array: Array | None) -> Any:
     return _NOTHING if array is None else _FFI.from_buffer(_NUMBERS, array)
 
 
-def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
-    """How many harmonics x, y and the normal force have, and all of them."""
-    joined = [float(order) for part in orders for order in part]
-    return _new("int32_t[3]", [len(part) for part in orders]), _new("double[]", joined or [0.0])
-
-
 def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, Any, list[Any]]:
     """Six columns, (n,) or one number, as pointers with their strides, and what these point to."""
     constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
@@ -251,52 +245,6 @@ class Kernel:
         ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
         given = map(_numbers, (before, after, k, dx, dy, forces, sums))
         self._found.element_steps(before.size, forces.shape[1], *given)
-
-    def motions(
-        self,
-        contact: int,
-        orders: Sequence[Sequence[int]],
-        cases: Array,
-        tolerance: float,
-        room: int,
-        out: Array,
-    ) -> None:
-        """Steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 2 + terms), see
-        ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force."""
-        self._found.motions(
-            contact,
-            cases.shape[0],
-            *_harmonics(orders),
-            _numbers(cases),
-            tolerance,
-            room,
-            _numbers(np.empty(4 * room + 1)),
-            _numbers(out),
-        )
-
-    def motion_cycle(
-        self,
-        orders: Sequence[Sequence[int]],
-        case: Array,
-        level: int,
-        shares: Array,
-        weights: Array,
-        goal: float,
-        room: int,
-    ) -> tuple[Array, Array, Array]:
-        """One cycle of a case, summed over springs: tau and the limit (n,), forces (n, 2)."""
-        tau, limit, forces = np.empty(room + 1), np.empty(room + 1), np.empty((room + 1, 2))
-        n = self._found.motion_cycle(
-            *_harmonics(orders),
-            _numbers(case),
-            level,
-            shares.size,
-            *map(_numbers, (shares, weights)),
-            goal,
-            room,
-            *map(_numbers, (np.empty(4 * room + 1), tau, limit, forces)),
-        )
-        return tau[: n + 1].copy(), limit[: n + 1].copy(), forces[: n + 1].copy()
 
     # --- for the builder --------------------------------------------------------------------------
 

@@ -66,17 +66,6 @@ typedef struct {
      * (n, springs, 2) are the state, sums (n, 2) the result */
     void (*element_steps)(int64_t n, int springs, const double *before, const double *after, const double *k,
                           const double *dx, const double *dy, double *forces, double *sums);
-    /* steady cycles of n periodic motions.  Units: mu0 Fz, a length, tau = omega t.  counts: harmonics of x, y and the
-     * normal force, whose orders follow each other; a case: stiffness, drag per tau, amplitude and phase of each.  work:
-     * 4 room + 1 numbers for room steps.  A row of out: mean forces along and across, share of stick, path of the foot
-     * per period, work of the shaker per period, decay of a disturbance per period, error of the mean force */
-    void (*motions)(int contact, int64_t n, const int32_t *counts, const double *orders, const double *cases,
-                    double tolerance, int64_t room, double *work, double *out);
-    /* one cycle of a case, summed over springs by weight, each with its share of the limit; returns how many steps it
-     * has, and one more row is filled: tau, limit, forces (n, 2) */
-    int64_t (*motion_cycle)(const int32_t *counts, const double *orders, const double *one, int level, int springs,
-                            const double *shares, const double *weights, double goal, int64_t room, double *work,
-                            double *tau, double *limit, double *forces);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this build has none of that number. */
