@@ -95,8 +95,8 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
     Examples
     --------
     >>> tau, u, sticks = steady_cycle(0.1, 0.8)
-    >>> round(float(u[:, 0].mean()), 4), round(float(sticks.mean()), 2)        # mu~ and stick
-    fraction (0.8064, 0.57)
+    >>> round(float(u[:, 0].mean()), 4), round(float(sticks.mean()), 2)  # mu~, stick fraction
+    (0.8064, 0.57)
     """
     tau = np.linspace(0.0, 2.0 * math.pi, steps + 1)
     moves = (v * tau[1] + 1j * np.diff(y * np.sin(tau))).tolist()

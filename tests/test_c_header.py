@@ -18,6 +18,7 @@ from builder.tables.verify import CASES, draw
 from mumacro import Surrogate
 from mumacro.inputs.fields import BOUNDS, FIELDS
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS, kind_of
+from mumacro.kernel import binding
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.netcdf import read_table
@@ -27,7 +28,7 @@ from tests.cases import PAIRS, every_pair, tables
 pytestmark = pytest.mark.slow
 
 DRIVER = Path(__file__).parent / "c" / "driver.c"
-KERNEL = Path(atlas.__file__).parent / "kernel"
+KERNEL = Path(binding.__file__).parent
 CASE = (0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01)
 MAIN = """\
 #include <stdio.h>

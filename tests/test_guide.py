@@ -84,6 +84,10 @@ ELSEWHERE = {
         "tests/test_builder_cli.py",
         'here(*words, "--write")',
     ),
+    "python -m builder verify my-table.nc --seed 2 --write": (
+        "tests/test_builder_cli.py",
+        'here(*words, "--write")',
+    ),
     "mumacro law --approximations": ("tests/test_command.py", '*words, "--approximations")'),
     "python benchmarks/tables_readme.py": ("tests/test_benchmarks.py", "tables_readme.tables("),
     "gcc -O2 -c mumacro.c mumacro_table.c && gfortran mumacro.f90 friction.f90 mumacro.o "

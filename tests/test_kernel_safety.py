@@ -14,7 +14,7 @@ from tests import compilers
 
 pytestmark = pytest.mark.slow
 
-KERNEL = Path(binding.__file__).parent / "kernel"
+KERNEL = Path(binding.__file__).parent
 DRIVER = Path(__file__).parent / "c" / "sanitized.c"
 CHECKS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 #: instructions that the compiler may use, and by how many doubles at a time the kernel then

@@ -1,18 +1,18 @@
 """The contact in the time domain: for programs with dynamics, soft drives, any motion of the upper
 point.
 
-A spring follows the motion of its upper point by f <- P(f + k dw), and P brings a force beyond mu0
-Fz back to that limit along its own direction: eqs. (9) to (12), one implicit step (Moreau's
-catching-up).  A ball is many independent springs by the method of dimensionality reduction, with
-the limit 3/2 (1 - xi^2) of the mean one at xi = 0 (middle) to 1 (rim).  The steps are those of the
-kernel, ``mumacro/kernel/element.c``; in C they are ``mumacro_element_step``.
+A step is straight, and the normal force changes along it in proportion to the way; then the force
+after it has a closed form, eqs. (9) to (12): the spring sticks up to the limit mu0 Fz, and from
+there the angle psi between force and motion falls by tan(psi/2) -> tan(psi/2) exp(-k s/(mu0 Fz))
+over the path s.  So only a curved motion needs small steps.  A ball is many independent springs by
+the method of dimensionality reduction, with the limit 3/2 (1 - xi^2) of the mean one at xi = 0
+(middle) to 1 (rim).  The steps are those of the kernel, ``mumacro/kernel/element.c``; in C they are
+``mumacro_element_step``.
 
 References
 ----------
 V. L. Popov, M. Hess, "Method of Dimensionality Reduction in Contact Mechanics and Friction",
 Springer (2015).
-J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert space",
-J. Differ. Equ. 26 (1977) 347.
 """
 
 import math
@@ -57,8 +57,8 @@ class Element:
 
     Notes
     -----
-    The error of a motion is proportional to its steps: 1000 steps a period give mean forces to
-    about 1e-3 mu0 Fz. Halving the steps and extrapolating, 2 F(h/2) - F(h), gains two digits.
+    Straight steps are exact.  The error of a curved motion falls with the square of its steps: 400
+    steps a period give mean forces to 3e-5 mu0 Fz, 800 to 1e-5, mostly much better.
 
     Examples
     --------
@@ -110,8 +110,8 @@ class Element:
             The motion during this step [m], finite, of the contacts' shape or broadcast to it.
         Fz : array_like, optional
             The normal force at the end of this step and until it is given again [N], finite and >=
-            0; at 0 the contact is open and its force zero.  For one spring only: the radius of a
-            ball would change with it.
+            0, reached in proportion to the way; at 0 the contact is open and its force zero.  For
+            one spring only: the radius of a ball would change with it.
 
         Returns
         -------
@@ -123,12 +123,12 @@ class Element:
         --------
         The mean over a period is mu_macro Fz; the table has 2.7246 N for this case:
 
-        >>> contact, omega, n = Element(mu0=0.3, Fz=10.0, k=1e6), 1.3e5, 1000
+        >>> contact, omega, n = Element(mu0=0.3, Fz=10.0, k=1e6), 1.3e5, 200
         >>> dt = 2 * np.pi / omega / n
         >>> dy = 2e-6 * np.diff(np.sin(omega * dt * np.arange(n + 1)))
         >>> periods = [[contact.step(0.1 * dt, float(way))[0] for way in dy] for _ in range(5)]
-        >>> f"{np.mean(periods[-1]):.3f}"
-        '2.725'
+        >>> f"{np.mean(periods[-1]):.4f}"
+        '2.7246'
         """
         limit = self._limit
         if Fz is not None:
@@ -138,8 +138,8 @@ class Element:
                 )
             limit = self._limits(self._like(Fz, "Fz"))
         along, across = self._like(dx, "dx"), self._like(dy, "dy")
-        self._limit, sums = limit, np.empty((self._k.size, 2))
-        _KERNEL.element_steps(limit, self._k, along, across, self._forces, sums)
+        before, self._limit, sums = self._limit, limit, np.empty((self._k.size, 2))
+        _KERNEL.element_steps(before, limit, self._k, along, across, self._forces, sums)
         return self._pair(sums)
 
     @property

@@ -232,12 +232,19 @@ class Kernel:
         return block, a, b
 
     def element_steps(
-        self, limit: Array, k: Array, dx: Array, dy: Array, forces: Array, sums: Array
+        self,
+        before: Array,
+        after: Array,
+        k: Array,
+        dx: Array,
+        dy: Array,
+        forces: Array,
+        sums: Array,
     ) -> None:
-        """Move contacts (n,) by (dx, dy): ``forces`` (n, springs, 2) in place, ``sums`` (n, 2)
-        filled."""
-        given = map(_numbers, (limit, k, dx, dy, forces, sums))
-        self._found.element_steps(limit.size, forces.shape[1], *given)
+        """Move contacts (n,) by (dx, dy), while their limits go from ``before`` to ``after``:
+        ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
+        given = map(_numbers, (before, after, k, dx, dy, forces, sums))
+        self._found.element_steps(before.size, forces.shape[1], *given)
 
     # --- for the builder --------------------------------------------------------------------------
 

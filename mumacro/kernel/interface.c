@@ -182,7 +182,7 @@ MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double 
     limit = mu0 * Fz;
     if (!(Fz >= 0.0 && limit < HUGE_VAL)) return 2;
     if (!(k > 0.0 && k < HUGE_VAL)) return 3;
-    mu_element_steps(1, springs, &limit, &k, &dx, &dy, state, force);
+    mu_element_steps(1, springs, &limit, &limit, &k, &dx, &dy, state, force);
     return 0;
 }
 

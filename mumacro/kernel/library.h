@@ -62,10 +62,10 @@ typedef struct {
     void (*normal_form_root)(int64_t n, const double *v, const double *eta, double *root);
     /* the two terms of large speed and their slopes, 5 rows of out */
     void (*outer_expansion)(int64_t n, const double *r, double *out);
-    /* one step of n contacts in the time domain: limits mu0 Fz, stiffnesses, motions; forces (n, springs, 2) are the
-     * state, sums (n, 2) the result */
-    void (*element_steps)(int64_t n, int springs, const double *limit, const double *k, const double *dx,
-                          const double *dy, double *forces, double *sums);
+    /* one step of n contacts in the time domain: limits mu0 Fz before and after it, stiffnesses, motions; forces
+     * (n, springs, 2) are the state, sums (n, 2) the result */
+    void (*element_steps)(int64_t n, int springs, const double *before, const double *after, const double *k,
+                          const double *dx, const double *dy, double *forces, double *sums);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this build has none of that number. */

@@ -111,7 +111,7 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
 static void ask_elements(const mumacro_kernel *kernel, int64_t n, double *const *x) {
     const int springs = 1 + (int)(drawn() * 5.0);
     double *held = nonsense(2 * (size_t)(n * springs)), *sums = numbers(2 * (size_t)n);
-    for (int step = 0; step < 3; ++step) kernel->element_steps(n, springs, x[0], x[2], x[3], x[5], held, sums);
+    for (int step = 0; step < 3; ++step) kernel->element_steps(n, springs, x[0], x[1], x[2], x[3], x[5], held, sums);
     free(held), free(sums);
 }
 
