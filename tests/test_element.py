@@ -91,6 +91,24 @@ def test_a_straight_step_is_exact_while_the_normal_force_changes() -> None:
     assert np.hypot(*expected) == close(np.minimum(np.hypot(*expected), last), rel=1e-14)
 
 
+def test_a_contact_that_closes_within_a_step_is_exact() -> None:
+    """The limit starts at 0: it sticks where k times the way is below the last limit, else slips at
+    once."""
+    rng = np.random.default_rng(13)
+    last, way, n = *10.0 ** rng.uniform((-1.0, -3.0), (1.0, 2.0), (400, 2)).T, 512
+    angle = rng.uniform(-math.pi, math.pi, 400)
+    one, many = (Element(1.0, np.ones(400), 1.0) for _ in range(2))
+    for element in (one, many):
+        element.step(1.0, 0.0)
+        assert not np.any(element.step(0.5, 0.5, Fz=0.0))
+    dx, dy = way * np.cos(angle), way * np.sin(angle)
+    expected = np.minimum(way, last) * [np.cos(angle), np.sin(angle)]
+    assert np.array(one.step(dx, dy, Fz=last)) == close(expected, rel=1e-14, abs=1e-15)
+    for i in range(n):
+        found = many.step(dx / n, dy / n, Fz=last * ((i + 1) / n))
+    assert np.abs(np.array(found) - expected).max() < 1e-11
+
+
 def test_a_force_against_the_motion_stays_on_its_line() -> None:
     """psi = pi: the spring unloads, and only then slips."""
     contact = Element(1.0, 1.0, 1.0)
