@@ -7,12 +7,20 @@
  *
  * over the way s.  Slip does not end within a step: as psi falls, the speed of the foot rises.
  * A ball is many independent springs (method of dimensionality reduction, Hertz's pressure): with the middle of the
- * contact at xi = 0 and its rim at 1, the limit of a spring is 3/2 (1 - xi^2) of the mean one.
- *
- * exp and log1p are those of the C library. */
+ * contact at xi = 0 and its rim at 1, the limit of a spring is 3/2 (1 - xi^2) of the mean one. */
 
-/* ln(1 + x) / x. */
-static double mu_log_ratio(double x) { return x == 0.0 ? 1.0 : log1p(x) / x; }
+/* The mean of 1/x over x from a > 0 to b > 0: ln(b/a) / (b - a), off by at most 1e-15 of itself. */
+static double mu_mean_inverse(double a, double b) {
+    const double z = (b - a) / (b + a), square = z * z, ratio = b / a;
+    double sum = 1.0 / 19.0;
+    if (fabs(z) > 0.15) { /* of numbers that are many decades apart the ratio may overflow */
+        const int ordinary = ratio > 1e-300 && ratio < 1e300;
+        return (ordinary ? mu_log1(ratio) : mu_log1(b) - mu_log1(a)) / (b - a);
+    }
+    /* ln(b/a) = 2 (z + z^3/3 + z^5/5 + ...); what is left out is below 1e-17 of it */
+    for (int i = 17; i > 0; i -= 2) sum = sum * square + 1.0 / i;
+    return 2.0 * sum / (b + a);
+}
 
 /* A step in which one spring slips, if only in its last part.  All forces are in one unit and at most about 1: limits
  * before and after, the drive k ds >= 0 along the direction (ex, ey); f is the spring's force, which is moved. */
@@ -26,7 +34,7 @@ static void mu_slip_in_step(double before, double after, double drive, double ex
     const double share = b >= 0.0 ? (c < 0.0 ? -c / (b + root) : 0.0) : a > 0.0 ? (root - b) / a : 1.0;
     const double stuck = mu_min(mu_max(share, 0.0), 1.0), rest = 1.0 - stuck;
     const double x = x0 + drive * stuck * ex, y = y0 + drive * stuck * ey, reach = sqrt(x * x + y * y);
-    const double start = before + change * stuck, fall = after - start;
+    const double start = before + change * stuck;
     /* psi at the start of slip; a spring without force follows the motion at once */
     const double cosine = reach > 0.0 ? (x * ex + y * ey) / reach : 1.0;
     const double sine = reach > 0.0 ? (y * ex - x * ey) / reach : 0.0;
@@ -34,8 +42,8 @@ static void mu_slip_in_step(double before, double after, double drive, double ex
     const double minus = cosine < 0.0 ? 1.0 - cosine : sine * sine / (1.0 + cosine);
     const double ahead = drive * rest;
     const int open = mu_min(start, after) <= 0.0;
-    const double q = ahead == 0.0 ? 0.0 : open ? HUGE_VAL : ahead * mu_log_ratio(fall / start) / start;
-    const double left = exp(-q), sum = plus + minus * left * left;
+    const double q = ahead == 0.0 ? 0.0 : open ? HUGE_VAL : ahead * mu_mean_inverse(start, after);
+    const double left = mu_decay(q), sum = plus + minus * left * left;
     /* sum is 0 for a force against the motion only, where the limit falls faster than the spring unloads */
     const double cosine1 = sum > 0.0 ? (plus - minus * left * left) / sum : cosine;
     const double sine1 = sum > 0.0 ? 2.0 * left * sine / sum : 0.0;
