@@ -86,7 +86,8 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
             (0.33516779066085 * near * beside(-9, -0.5), near),
             (decades(-3, 0.2), 1.5 * decades(0.0, 0.25)),
         ]
-    return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))  # type: ignore[return-value]
+    v, y = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    return v, y
 
 
 def asked(

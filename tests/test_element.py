@@ -4,6 +4,7 @@ import math
 from copy import deepcopy
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -73,6 +74,29 @@ def test_a_straight_step_is_exact(contact: str) -> None:
     assert np.abs(np.array(found) - expected).max(axis=0) / limit == close(0.0, abs=2e-11)
 
 
+def test_slip_turns_the_force_as_its_closed_form_in_30_digits() -> None:
+    """Limits that stay, fall by up to 300 decades, or rise nearly as fast as the drive; drives from
+    1e-6 to 300 limits."""
+    rng, n = np.random.default_rng(14), 600
+    first, angle = 10.0 ** rng.uniform(-3.0, 3.0, n), rng.uniform(-1.4, 1.4, n)
+    way = first * 10.0 ** rng.uniform(-6.0, 2.5, n)
+    last = first + 0.9 * way * np.cos(angle)
+    last[::3] = first[::3]
+    last[1::3] = first[1::3] * 10.0 ** -(10.0 ** rng.uniform(-9.0, 2.48, last[1::3].size))
+    contacts = Element(1.0, first, 1.0)
+    contacts.state = (first * [np.cos(angle), np.sin(angle)]).T[:, None]
+    forces = np.array(contacts.step(way, 0.0, Fz=last))
+    with mpmath.workdps(30):
+        for force, before, after, start, path in zip(
+            forces.T, first, last, angle, way, strict=True
+        ):
+            a, b = mpmath.mpf(float(before)), mpmath.mpf(float(after))
+            inverse = 1 / a if a == b else mpmath.log(b / a) / (b - a)
+            psi = 2 * mpmath.atan(mpmath.tan(start / 2) * mpmath.exp(-path * inverse))
+            expected = [float(b * mpmath.cos(psi)), float(b * mpmath.sin(psi))]
+            assert force == close(expected, rel=0.0, abs=2e-15 * after + 5e-324)
+
+
 def test_a_straight_step_is_exact_while_the_normal_force_changes() -> None:
     rng = np.random.default_rng(12)
     first, last = 10.0 ** rng.uniform(-1, 1, (2, 1000))
@@ -89,6 +113,24 @@ def test_a_straight_step_is_exact_while_the_normal_force_changes() -> None:
         found = many.step(dx / n, dy / n, Fz=first + (last - first) * ((i + 1) / n))
     assert np.abs(np.array(found) - expected).max() < 1e-11
     assert np.hypot(*expected) == close(np.minimum(np.hypot(*expected), last), rel=1e-14)
+
+
+def test_a_contact_that_closes_within_a_step_is_exact() -> None:
+    """The limit starts at 0: it sticks where k times the way is below the last limit, else slips at
+    once."""
+    rng = np.random.default_rng(13)
+    last, way, n = *10.0 ** rng.uniform((-1.0, -3.0), (1.0, 2.0), (400, 2)).T, 512
+    angle = rng.uniform(-math.pi, math.pi, 400)
+    one, many = (Element(1.0, np.ones(400), 1.0) for _ in range(2))
+    for element in (one, many):
+        element.step(1.0, 0.0)
+        assert not np.any(element.step(0.5, 0.5, Fz=0.0))
+    dx, dy = way * np.cos(angle), way * np.sin(angle)
+    expected = np.minimum(way, last) * [np.cos(angle), np.sin(angle)]
+    assert np.array(one.step(dx, dy, Fz=last)) == close(expected, rel=1e-14, abs=1e-15)
+    for i in range(n):
+        found = many.step(dx / n, dy / n, Fz=last * ((i + 1) / n))
+    assert np.abs(np.array(found) - expected).max() < 1e-11
 
 
 def test_a_force_against_the_motion_stays_on_its_line() -> None:

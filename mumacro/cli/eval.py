@@ -121,18 +121,18 @@ def main(words: Sequence[str]) -> int:
                     say=lambda text: console.print(f"mumacro eval: {text}"),
                     **options,
                 )
-            told = f"{done.answered:,} of {done.rows:,} rows evaluated with {surrogate.id}"
+            counts = f"{done.answered:,} of {done.rows:,} rows evaluated with {surrogate.id}"
             if chosen.out == "-":
                 with done.out.open("rb") as stream:
                     shutil.copyfileobj(stream, sys.stdout.buffer)
                 sys.stderr.write(
                     (done.rejects.read_text("utf-8", "replace") if done.rejects else "")
-                    + f"{told}\n"
+                    + f"{counts}\n"
                 )
             else:
                 rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
                 resumed = f"; {done.resumed:,} were done already" if done.resumed else ""
-                print(f"{told}: {done.out}{rejects}{resumed}")
+                print(f"{counts}: {done.out}{rejects}{resumed}")
     except KeyboardInterrupt:
         print("mumacro eval: stopped; the same command goes on", file=sys.stderr)
         return 130

@@ -48,8 +48,8 @@ _SHOWN = 5  # faults of a file
 def run(words: Sequence[str]) -> str:
     """``mumacro fit``."""
     first = "points", {"help": "a file of CSV; - is standard input"}
-    told = "k and mu0 of a contact from measured friction."
-    parser = common.question("fit", told, _COLUMNS, "the other inputs", "*", first)
+    description = "k and mu0 of a contact from measured friction."
+    parser = common.question("fit", description, _COLUMNS, "the other inputs", "*", first)
     parser.add_argument(
         "--unknown",
         nargs="+",
@@ -59,7 +59,7 @@ def run(words: Sequence[str]) -> str:
     common.add_format(parser)
     chosen = parser.parse_intermixed_args(words)
     unknown, more = (
-        [x for x in chosen.unknown or () if ("=" in x) == given] for given in (False, True)
+        [x for x in chosen.unknown or () if ("=" in x) == has_value] for has_value in (False, True)
     )
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
@@ -75,7 +75,7 @@ def run(words: Sequence[str]) -> str:
     points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
     unknown = unknown or unknowns_beside(points)
     there = [*unknown, *(name for name in points if name in kind.columns)]
-    given = common.read_case(
+    case = common.read_case(
         [*chosen.words, *more],
         kind,
         there,
@@ -85,7 +85,7 @@ def run(words: Sequence[str]) -> str:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # they are in the result
-            found = fit(points, unknown, **kind.names, surrogate=surrogate, **given)
+            result = fit(points, unknown, **kind.names, surrogate=surrogate, **case)
     except InputError as error:
         raise ImpossibleError(f"{chosen.points}: {error}") from None
     except ModuleNotFoundError as error:  # says what to install
@@ -93,48 +93,48 @@ def run(words: Sequence[str]) -> str:
     if chosen.out is not None:
         heads = [
             name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]"
-            for name in found.points
+            for name in result.points
         ]
-        columns = dict(zip(heads, found.points.values(), strict=True))
-        columns |= {"mu_macro fitted": found.points["mu_macro"] - found.residuals}
+        columns = dict(zip(heads, result.points.values(), strict=True))
+        columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
         return (
-            common.write_result(chosen.out, columns, found.plot)
+            common.write_result(chosen.out, columns, result.plot)
             + "\n"
-            + _told(found, chosen.digits)
+            + _text(result, chosen.digits)
         )
     if chosen.json:
-        whole = {field.name: getattr(found, field.name) for field in fields(found) if field.repr}
+        whole = {field.name: getattr(result, field.name) for field in fields(result) if field.repr}
         return as_json({**whole, "table": common.about(surrogate)})
-    return _told(found, chosen.digits)
+    return _text(result, chosen.digits)
 
 
-def _told(found: Fit, shown: int | None) -> str:
+def _text(result: Fit, shown: int | None) -> str:
     """Values with standard deviations and intervals, the scatter, other solutions, warnings."""
     rows: list[Sequence[str]] = []
-    for name, value in found.values.items():
-        off, (low, high) = found.std[name], found.interval[name]
+    for name, value in result.values.items():
+        off, (low, high) = result.std[name], result.interval[name]
         form = f".{shown or digits(off / value if 0.0 < value < math.inf else 0.0)}g"
-        told = "rigid" if math.isinf(value) else f"{value:{form}}"
+        number = "rigid" if math.isinf(value) else f"{value:{form}}"
         rows.append(
             (
                 name,
-                told,
+                number,
                 f"[{unit_of(name)}]",
                 f"+- {off:.2g}",
                 f"95 %: {low:{form}} to {high:{form}}",
             )
         )
-    if STD in found.points:
-        rows.append(("chi2", f"{found.reduced_chi2:.3g}", "[-]", "over the degrees of freedom"))
+    if STD in result.points:
+        rows.append(("chi2", f"{result.reduced_chi2:.3g}", "[-]", "over the degrees of freedom"))
     else:
         rows.append(
-            ("scatter", f"{math.sqrt(found.reduced_chi2):.2g}", "[-]", "of mu_macro about the fit")
+            ("scatter", f"{math.sqrt(result.reduced_chi2):.2g}", "[-]", "of mu_macro about the fit")
         )
-    rows.append(("points", str(found.residuals.size), "", f"{found.contact}, {found.direction}"))
-    for i, one in enumerate(found.solutions[1:], 2):
-        told = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in found.values)
-        rows.append((f"solution {i}", told))
-    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in found.warnings)])
+    rows.append(("points", str(result.residuals.size), "", f"{result.contact}, {result.direction}"))
+    for i, one in enumerate(result.solutions[1:], 2):
+        values = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in result.values)
+        rows.append((f"solution {i}", values))
+    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in result.warnings)])
 
 
 def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> dict[str, Any]:

@@ -15,12 +15,12 @@ EXAMPLE = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1
 
 def run(words: Sequence[str]) -> str:
     """``mumacro law``."""
-    told = (
+    description = (
         "mu_macro over a range of one input, with the static value and the border of "
         "continuous sliding."
     )
     epilog = f"{common.INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} -o law.png"
-    parser = common.question("law", told, epilog, "a case without the swept input", "*")
+    parser = common.question("law", description, epilog, "a case without the swept input", "*")
     text = "the swept input, its first and its last value, in its SI unit or with a unit"
     parser.add_argument(
         "--along", nargs=3, metavar=("NAME", "LOW", "HIGH"), required=True, help=text
@@ -40,7 +40,7 @@ def run(words: Sequence[str]) -> str:
     start, stop = (scale * end for end in common.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     surrogate = open_table(chosen.table)
-    found = friction_law(
+    law = friction_law(
         surrogate,
         inner,
         start=start,
@@ -52,11 +52,11 @@ def run(words: Sequence[str]) -> str:
         **kind.names,
         **case,
     )
-    model = load_rows(inner, found.case, chosen.contact, found.stiffening)
-    columns = found.columns | (approximations(surrogate, found) if chosen.approximations else {})
+    model = load_rows(inner, law.case, chosen.contact, law.stiffening)
+    columns = law.columns | (approximations(surrogate, law) if chosen.approximations else {})
     columns = {along: columns.pop(inner) / scale, **columns}
     by_unit = {along: unit, "k": unit_of("k")}
-    border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
+    border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in law.border]
     if chosen.json:
         return as_json(
             {
@@ -72,15 +72,15 @@ def run(words: Sequence[str]) -> str:
         f"{name} [{by_unit[name]}]" if name in by_unit else name: column
         for name, column in columns.items()
     }
-    middle = found.values[found.values.size // 2]
+    middle = law.values[law.values.size // 2]
     form = common.format_for(chosen, surrogate, {**case, inner: middle}, kind)
-    of_k = ", for the geometric middle of k" if found.band else ""
-    marks = [f"{c.name} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border]
+    of_k = ", for the geometric middle of k" if law.band else ""
+    marks = [f"{c.name} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in law.border]
     marks += common.model_lines(model)
     if chosen.out is not None:
         return "\n".join(
             [
-                common.write_result(chosen.out, headed, found.plot),
+                common.write_result(chosen.out, headed, law.plot),
                 *marks,
             ]
         )

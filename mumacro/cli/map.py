@@ -11,12 +11,12 @@ from mumacro.cli.common import UsageError, open_table, read_case
 
 def run(words: Sequence[str]) -> str:
     """``mumacro map``."""
-    told = (
+    description = (
         "The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case "
         "on it."
     )
     epilog = f"{common.INPUTS}\nexample:\n  mumacro map -o map.png"
-    parser = common.question("map", told, epilog, "a case to mark, if any", "*")
+    parser = common.question("map", description, epilog, "a case to mark, if any", "*")
     chosen = parser.parse_intermixed_args(words)
     if chosen.out is None:
         raise UsageError("a map is written to a file: give -o map.png")

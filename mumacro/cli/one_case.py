@@ -42,12 +42,12 @@ def run(words: Sequence[str], description: str) -> str:
     rows = model_rows(surrogate, middle, **kind.names) if chosen.model or not chosen.json else []
     if chosen.json:
         names = ["mu_macro", "mu_ratio", "regime", "error_bound", "source", "v_tilde", "y_tilde"]
-        found = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
+        result = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
         ends = {name: getattr(answer, name) for name in BAND if "k_range" in case}
-        found |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
-        found |= {"model": rows} if chosen.model else {}
-        found |= dict(kind.names.items() - SPRING.names.items())
-        return as_json({**found, "table": common.about(surrogate)})
+        result |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
+        result |= {"model": rows} if chosen.model else {}
+        result |= dict(kind.names.items() - SPRING.names.items())
+        return as_json({**result, "table": common.about(surrogate)})
     lines = [
         ("model", f"{row['row']}: {common.in_words(row['text'], middle)}")
         for row in rows

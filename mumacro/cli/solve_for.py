@@ -23,10 +23,10 @@ EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --t
 
 def run(words: Sequence[str]) -> str:
     """``mumacro solve-for``."""
-    told = "Every value of one input at which mu_macro is the target."
+    description = "Every value of one input at which mu_macro is the target."
     epilog = f"{common.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {EXAMPLE}"
     first = "unknown", {"choices": (*NAMES, AMPLITUDE), "help": "the unknown input"}
-    parser = common.question("solve-for", told, epilog, "the other five inputs", first=first)
+    parser = common.question("solve-for", description, epilog, "the other five inputs", first=first)
     parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
@@ -52,7 +52,7 @@ def run(words: Sequence[str]) -> str:
         scale * end for end in common.read_values((unknown, text) for text in chosen.between or ())
     ]
     surrogate = open_table(chosen.table)
-    found = solve_for(
+    solution = solve_for(
         surrogate,
         inner,
         target,
@@ -61,11 +61,11 @@ def run(words: Sequence[str]) -> str:
         **kind.names,
         **case,
     )
-    model = load_rows(inner, common.middle_of(case), chosen.contact, found.stiffening)
-    reach, two = found.reach, found.ends
-    if not found.roots[0] and not (two and any(end.roots[0] for end in two)):
+    model = load_rows(inner, common.middle_of(case), chosen.contact, solution.stiffening)
+    reach, two = solution.reach, solution.ends
+    if not solution.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
-        if found.constant:
+        if solution.constant:
             raise ImpossibleError(
                 f"{unknown} has no influence here: mu_macro is {reach.mu_min:.12g} for {where}"
             )
@@ -73,7 +73,7 @@ def run(words: Sequence[str]) -> str:
             f"mu_macro = {target:.12g} is out of reach: {where} gives {reach.mu_min:.12g} to "
             f"{reach.mu_max:.12g}"
         )
-    places = {common.middle_of(case).get("k"): found}
+    places = {common.middle_of(case).get("k"): solution}
     if two:
         places = dict(sorted({**places, **dict(zip(case["k_range"], two, strict=True))}.items()))
     roots = [

@@ -34,13 +34,13 @@ def run(words: Sequence[str]) -> str:
     chosen = parser.parse_args(words)
     names = (*GEOMETRIES[chosen.geometry].arguments, *BODIES)
     texts = {name: text for name in names if (text := getattr(chosen, name)) is not None}
-    given = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
-    contact = contact_of(chosen.geometry, **given)
-    found = asdict(contact)
+    arguments = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
+    contact = contact_of(chosen.geometry, **arguments)
+    stiffnesses = asdict(contact)
     if chosen.json:
-        return as_json({**found, "geometry": chosen.geometry, **given})
+        return as_json({**stiffnesses, "geometry": chosen.geometry, **arguments})
     form = f".{chosen.digits or 4}g"  # what materials and geometry give at best
-    rows = [(name, f"{found[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
+    rows = [(name, f"{stiffnesses[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
     rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
     return "\n".join([in_columns(rows), *(f"warning: {text}" for text in contact.warnings)])

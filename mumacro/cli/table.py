@@ -26,21 +26,21 @@ def run(words: Sequence[str]) -> str:
         "format_version",
         "product_version",
     )
-    told = {name: surrogate.attributes.get(name) for name in names}
-    told["checksum"] = told.pop("content_sha256")
-    found = {
+    stated = {name: surrogate.attributes.get(name) for name in names}
+    stated["checksum"] = stated.pop("content_sha256")
+    about = {
         **common.about(surrogate),
         "path": str(surrogate.path),
-        **told,
+        **stated,
         "bytes": surrogate.path.stat().st_size,
     }
     bundled = [str(path) for path in bundled_tables()]
     if chosen.json:
         errors = surrogate.error_distribution
-        return as_json({**found, "error_distribution": errors, "bundled": bundled})
+        return as_json({**about, "error_distribution": errors, "bundled": bundled})
     rows = [
         (name, f"{value:.3g}" if isinstance(value, float) else str(value))
-        for name, value in found.items()
+        for name, value in about.items()
     ]
     text = in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
     return "\n\n".join([text, *_errors(surrogate)])

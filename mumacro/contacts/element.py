@@ -58,7 +58,7 @@ class Element:
     Notes
     -----
     Straight steps are exact.  The error of a curved motion falls with the square of its steps: 400
-    steps a period give mean forces to 3e-5 mu0 Fz, 800 to 1e-5, mostly much better.
+    steps a period give mean forces to 3e-5 mu0 Fz, 800 to 1e-5.
 
     Examples
     --------

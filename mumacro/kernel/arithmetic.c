@@ -92,6 +92,17 @@ static double mu_scale(double x, int64_t e) {
     return x * mu_number((e + 1023) << 52);
 }
 
+/* exp(-x) of x >= 0, off by at most 4e-16 of itself while x < 700; 0 of an infinite x. */
+static double mu_decay(double x) {
+    /* x = n ln 2 + r with |r| <= ln(2)/2; n ln 2 in two parts, of which the first is exact */
+    const int32_t n = mu_whole_of(x / MU_LN2 + 0.5);
+    const double r = x - n * 0.693147180369123816490 - n * 1.90821492927058770002e-10;
+    double sum = 1.0;
+    if (!(x < 800.0)) return 0.0;
+    for (int i = 13; i > 0; --i) sum = 1.0 - sum * r / i; /* the terms that are left out: below 5e-18 */
+    return mu_scale(sum, -n);
+}
+
 /* a b / (c d e) of finite positive numbers whose partial products may overflow or underflow. */
 static double mu_quotient(double a, double b, double c, double d, double e) {
     int64_t i, j, k, l, m;

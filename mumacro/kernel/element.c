@@ -7,24 +7,24 @@
  *
  * over the way s.  Slip does not end within a step: as psi falls, the speed of the foot rises.
  * A ball is many independent springs (method of dimensionality reduction, Hertz's pressure): with the middle of the
- * contact at xi = 0 and its rim at 1, the limit of a spring is 3/2 (1 - xi^2) of the mean one.
- *
- * exp, log1p and atan2 are those of the C library. */
+ * contact at xi = 0 and its rim at 1, the limit of a spring is 3/2 (1 - xi^2) of the mean one. */
 
-/* What happened in one step: the mean force over it; the path of the foot; the integral of the rate at which two
- * motions approach, k times the foot's speed over the limit; the share of the step that sticks. */
-typedef struct {
-    double x, y, slip, decay, stuck;
-} mu_stretch;
-
-/* ln(1 + x) / x. */
-static double mu_log_ratio(double x) { return x == 0.0 ? 1.0 : log1p(x) / x; }
+/* The mean of 1/x over x from a > 0 to b > 0: ln(b/a) / (b - a), off by at most 1e-15 of itself. */
+static double mu_mean_inverse(double a, double b) {
+    const double z = (b - a) / (b + a), square = z * z, ratio = b / a;
+    double sum = 1.0 / 19.0;
+    if (fabs(z) > 0.15) { /* of numbers that are many decades apart the ratio may overflow */
+        const int ordinary = ratio > 1e-300 && ratio < 1e300;
+        return (ordinary ? mu_log1(ratio) : mu_log1(b) - mu_log1(a)) / (b - a);
+    }
+    /* ln(b/a) = 2 (z + z^3/3 + z^5/5 + ...); what is left out is below 1e-17 of it */
+    for (int i = 17; i > 0; i -= 2) sum = sum * square + 1.0 / i;
+    return 2.0 * sum / (b + a);
+}
 
 /* A step in which one spring slips, if only in its last part.  All forces are in one unit and at most about 1: limits
- * before and after, the drive k ds >= 0 along the direction (ex, ey); f is the spring's force, which is moved.  The
- * path of the foot is left as a share of the way, for a constant limit. */
-static void mu_slip_in_step(double before, double after, double drive, double ex, double ey, double *f,
-                            mu_stretch *out) {
+ * before and after, the drive k ds >= 0 along the direction (ex, ey); f is the spring's force, which is moved. */
+static void mu_slip_in_step(double before, double after, double drive, double ex, double ey, double *f) {
     const double size = sqrt(f[0] * f[0] + f[1] * f[1]), change = after - before;
     const double shrink = size > before ? before / size : 1.0; /* the end of the last step, rounded */
     const double x0 = f[0] * shrink, y0 = f[1] * shrink;
@@ -34,53 +34,30 @@ static void mu_slip_in_step(double before, double after, double drive, double ex
     const double share = b >= 0.0 ? (c < 0.0 ? -c / (b + root) : 0.0) : a > 0.0 ? (root - b) / a : 1.0;
     const double stuck = mu_min(mu_max(share, 0.0), 1.0), rest = 1.0 - stuck;
     const double x = x0 + drive * stuck * ex, y = y0 + drive * stuck * ey, reach = sqrt(x * x + y * y);
-    const double start = before + change * stuck, fall = after - start;
+    const double start = before + change * stuck;
     /* psi at the start of slip; a spring without force follows the motion at once */
     const double cosine = reach > 0.0 ? (x * ex + y * ey) / reach : 1.0;
     const double sine = reach > 0.0 ? (y * ex - x * ey) / reach : 0.0;
     const double plus = cosine > 0.0 ? 1.0 + cosine : sine * sine / (1.0 - cosine);
     const double minus = cosine < 0.0 ? 1.0 - cosine : sine * sine / (1.0 + cosine);
     const double ahead = drive * rest;
-    const double q = ahead == 0.0 ? 0.0 : mu_min(start, after) > 0.0 ? ahead * mu_log_ratio(fall / start) / start : HUGE_VAL;
-    const double left = exp(-q), sum = plus + minus * left * left;
+    const int open = mu_min(start, after) <= 0.0;
+    const double q = ahead == 0.0 ? 0.0 : open ? HUGE_VAL : ahead * mu_mean_inverse(start, after);
+    const double left = mu_decay(q), sum = plus + minus * left * left;
     /* sum is 0 for a force against the motion only, where the limit falls faster than the spring unloads */
     const double cosine1 = sum > 0.0 ? (plus - minus * left * left) / sum : cosine;
     const double sine1 = sum > 0.0 ? 2.0 * left * sine / sum : 0.0;
     const double unit = sqrt(cosine1 * cosine1 + sine1 * sine1);
     f[0] = after * ((cosine1 * ex - sine1 * ey) / unit);
     f[1] = after * ((cosine1 * ey + sine1 * ex) / unit);
-    if (out) {
-        /* means of cos psi and sin psi over the slip */
-        double along = cosine, across = sine;
-        if (q > 0.0) {
-            along = sum > 1.0 ? log1p(0.5 * minus * expm1(-2.0 * q)) / q : sum > 0.0 ? log(0.5 * sum) / q : -2.0;
-            along = mu_max(1.0 + along, -1.0);
-            across = 2.0 * atan2(-sine * expm1(-q), plus + minus * left) / q;
-        }
-        const double mean = 0.5 * (start + after);
-        const double fe = mean * along + fall * (cosine1 - cosine) / 12.0;
-        const double fs = mean * across + fall * (sine1 - sine) / 12.0;
-        out->x = stuck * 0.5 * (x0 + x) + rest * (fe * ex - fs * ey);
-        out->y = stuck * 0.5 * (y0 + y) + rest * (fe * ey + fs * ex);
-        out->slip = rest * along;
-        out->decay = mu_min(start, after) > 0.0 ? mu_max(q * along - log1p(fall / start), 0.0) : HUGE_VAL;
-        out->stuck = stuck;
-    }
 }
 
-/* Moves one spring of stiffness k by (dx, dy), while its limit goes from before to after; f is its force.  out may be
- * NULL. */
-static void mu_move_spring(double before, double after, double k, double dx, double dy, double *f, mu_stretch *out) {
+/* Moves one spring of stiffness k by (dx, dy), while its limit goes from before to after; f is its force. */
+static void mu_move_spring(double before, double after, double k, double dx, double dy, double *f) {
     const double larger = mu_max(fabs(dx), fabs(dy));
     const double x = larger > 0.0 ? f[0] + k * dx : f[0], y = larger > 0.0 ? f[1] + k * dy : f[1];
-    double ex = 1.0, ey = 0.0, way = 0.0, drive = 0.0, unit;
+    double ex = 1.0, ey = 0.0, drive = 0.0, unit;
     if (mu_max(fabs(x), fabs(y)) < HUGE_VAL && mu_hypot(x, y) <= after) {
-        if (out) {
-            out->x = 0.5 * (f[0] + x);
-            out->y = 0.5 * (f[1] + y);
-            out->slip = out->decay = 0.0;
-            out->stuck = 1.0;
-        }
         f[0] = x;
         f[1] = y;
         return;
@@ -91,32 +68,19 @@ static void mu_move_spring(double before, double after, double k, double dx, dou
         unit = sqrt(ex * ex + ey * ey);
         ex /= unit;
         ey /= unit;
-        way = larger * unit;
-        drive = k * way;
+        drive = k * (larger * unit);
     }
     if (!(drive < HUGE_VAL)) { /* so far that where it began does not count */
         f[0] = after * ex;
         f[1] = after * ey;
-        if (out) {
-            out->x = 0.5 * (before + after) * ex;
-            out->y = 0.5 * (before + after) * ey;
-            out->slip = way;
-            out->decay = HUGE_VAL;
-            out->stuck = 0.0;
-        }
         return;
     }
     unit = mu_max(mu_max(before, after), mu_max(drive, mu_max(fabs(f[0]), fabs(f[1]))));
     f[0] /= unit;
     f[1] /= unit;
-    mu_slip_in_step(before / unit, after / unit, drive / unit, ex, ey, f, out);
+    mu_slip_in_step(before / unit, after / unit, drive / unit, ex, ey, f);
     f[0] *= unit;
     f[1] *= unit;
-    if (out) {
-        out->x *= unit;
-        out->y *= unit;
-        out->slip = mu_max(way * out->slip - (after - before) * (1.0 - out->stuck) / k, 0.0);
-    }
 }
 
 /* The share of the limit mu0 Fz that spring i of n has: the integral of 3/2 (1 - xi^2) from i/n to (i + 1)/n.  All
@@ -134,7 +98,7 @@ static void mu_element_steps(int64_t n, int springs, const double *before, const
         sums[2 * i] = sums[2 * i + 1] = 0.0;
         for (int j = 0; j < springs; ++j, forces += 2) {
             const double share = mu_share_of_limit(j, springs);
-            mu_move_spring(before[i] * share, after[i] * share, k[i] / springs, dx[i], dy[i], forces, NULL);
+            mu_move_spring(before[i] * share, after[i] * share, k[i] / springs, dx[i], dy[i], forces);
             sums[2 * i] += forces[0];
             sums[2 * i + 1] += forces[1];
         }

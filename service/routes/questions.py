@@ -11,9 +11,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from starlette.responses import Response
 
 import mumacro
-from mumacro.analysis.law import Law, sweep_values
+from mumacro.analysis.law import Law
 from mumacro.analysis.load import Stiffening
-from mumacro.analysis.solve_for import Solution, solve_for
+from mumacro.analysis.solve_for import Solution
 from mumacro.analysis.validity import load_rows
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
@@ -76,17 +76,19 @@ def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     """The library's law and all columns beside the swept input."""
     (table, form, case, wanted), (along, per) = found, field_of(found.form.along)
     asked = wanted.asked
-    values = sweep_values(along, form.start * per, form.stop * per, form.points, form.scale)
     law = mumacro.law(
         table.surrogate,
         along,
-        values=values,
+        start=form.start * per,
+        stop=form.stop * per,
+        points=form.points,
+        scale=form.scale,
         stiffness_exponent=form.stiffness_exponent,
         **asked.kind.names,
         **case,
     )
-    six = _columns(found, along, values, law.stiffening)
-    answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
+    six = _columns(found, along, law.values, law.stiffening)
+    answer, _ = answer_columns(table.surrogate, six, law.values.size, wanted)
     answer[_STATIC.path], parts = law.mu_static, [*wanted.parts, _STATIC]
     if law.stiffening is not None:
         answer[_K.path], parts = law.inputs["k"], [*parts, _K]
@@ -185,7 +187,7 @@ def post_solve_for(found: Asking) -> Response:
     (table, form, case, wanted), (name, per) = found, field_of(found.form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
-    solution = solve_for(
+    solution = mumacro.solve_for(
         table.surrogate,
         name,
         [x * unit for x in form.target],
