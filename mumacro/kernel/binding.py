@@ -19,6 +19,8 @@ from mumacro.kernel.arrays import Array, Codes
 #: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
 BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 
+MOST_STEPS = 200_000  # of a period of a motion
+
 _HERE = Path(__file__).resolve().parent.parent
 _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
 _DECLARED = "".join(
@@ -35,6 +37,12 @@ _new, _unpack = _FFI.new, _FFI.unpack
 
 def _numbers(array: Array | None) -> Any:
     return _NOTHING if array is None else _FFI.from_buffer(_NUMBERS, array)
+
+
+def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
+    """How many harmonics x, y and the normal force have, and all of them."""
+    joined = [float(order) for part in orders for order in part]
+    return _new("int32_t[3]", [len(part) for part in orders]), _new("double[]", joined or [0.0])
 
 
 def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, Any, list[Any]]:
@@ -245,6 +253,54 @@ class Kernel:
         ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
         given = map(_numbers, (before, after, k, dx, dy, forces, sums))
         self._found.element_steps(before.size, forces.shape[1], *given)
+
+    def motions(
+        self,
+        contact: int,
+        orders: Sequence[Sequence[int]],
+        cases: Array,
+        tolerance: float,
+        out: Array,
+    ) -> None:
+        """Steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms), see
+        ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force."""
+        counts, joined = _harmonics(orders)
+        self._found.motions(
+            contact,
+            cases.shape[0],
+            counts,
+            joined,
+            _numbers(cases),
+            tolerance,
+            MOST_STEPS,
+            _numbers(np.empty(2 * MOST_STEPS)),
+            _numbers(out),
+        )
+
+    def motion_cycle(
+        self,
+        orders: Sequence[Sequence[int]],
+        case: Array,
+        shares: Array,
+        weights: Array,
+        tolerance: float,
+        n: int,
+    ) -> Array:
+        """Forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
+        forces, (counts, joined) = np.empty((n + 1, 2)), _harmonics(orders)
+        self._found.motion_cycle(
+            counts,
+            joined,
+            _numbers(case),
+            shares.size,
+            *map(_numbers, (shares, weights)),
+            tolerance,
+            MOST_STEPS,
+            _numbers(np.empty(2 * MOST_STEPS)),
+            n,
+            _numbers(forces),
+        )
+        return forces
 
     # --- for the builder --------------------------------------------------------------------------
 

@@ -1,5 +1,6 @@
 /* The shared object's functions for one instruction level; compiled once for each. */
 #include "kernel.c"
+#include "motion.c"
 #include "library.h"
 #include "interval.c"
 
@@ -106,5 +107,5 @@ extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points, mu_cases_as,
     mu_intervals, mu_ratio_alone, mu_one, mu_borders_as, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares,
-    mu_roots, mu_outers, mu_element_steps,
+    mu_roots, mu_outers, mu_element_steps, mu_motions, mu_motion_cycle,
 };

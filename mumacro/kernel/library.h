@@ -66,6 +66,18 @@ typedef struct {
      * (n, springs, 2) are the state, sums (n, 2) the result */
     void (*element_steps)(int64_t n, int springs, const double *before, const double *after, const double *k,
                           const double *dx, const double *dy, double *forces, double *sums);
+    /* steady cycles of n periodic motions.  Units: mu0 Fz, l0 = mu0 Fz / k, tau = omega t.  counts: harmonics of x, y
+     * and the normal force, whose orders follow each other; a case: drag per tau, amplitude and phase of each.  A row of
+     * out: mean forces along and across, share of stick, path of the foot per period, work of the shaker per period,
+     * decay of a disturbance per period as a logarithm, estimate of the error of the mean force.  work: 2 room numbers
+     * for room steps */
+    void (*motions)(int contact, int64_t n, const int32_t *counts, const double *orders, const double *cases,
+                    double tolerance, int64_t room, double *work, double *out);
+    /* one cycle of a case, summed over springs by weight, each with its share of the limit: forces (n + 1, 2) at equal
+     * times of the period */
+    void (*motion_cycle)(const int32_t *counts, const double *orders, const double *one, int springs,
+                         const double *shares, const double *weights, double tolerance, int64_t room, double *work, int64_t n,
+                         double *forces);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this build has none of that number. */
