@@ -14,7 +14,7 @@
  * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of the last two over
  * all marks, which cannot cancel.  A ball is many independent springs, see element.c. */
 
-enum { MU_MARKS = 256, MU_MOTION_PERIODS = 60, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
+enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_SQRT6 2.449489742783178
 
@@ -451,7 +451,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     mu_grid *steps = march->steps;
     int fresh, ends = 1;
     *march = none;
-    march->step = step > 0.0 ? step : 0.01;
+    march->step = step > 0.0 ? step : 0.1 * sqrt(sqrt(tolerance));
     march->turned = 1.0;
     march->steps = steps;
     steps->n = 0;
@@ -489,58 +489,103 @@ static void mu_keep_below(double limit, double *f) {
     }
 }
 
-/* The cycle whose distance to the steady one is below goal, or the last of many periods; f is its start. */
+/* A period as a map of the force at its start: how far it moves it, and by how much Newton's method would. */
+typedef struct {
+    double moved[2], step[2], size;
+} mu_residual;
+
+static mu_residual mu_residual_of(const mu_march *march, const double *f, double limit) {
+    mu_residual r = {{march->f[0] - f[0], march->f[1] - f[1]}, {0.0, 0.0}, 0.0};
+    r.size = mu_hypot(r.moved[0], r.moved[1]);
+    if (march->slipped) { /* the derivative of the map is left last first^T */
+        const double left = march->turned * mu_decay(march->decay), *first = march->first, *last = march->last;
+        const double stays = mu_max(1.0 - left * (first[0] * last[0] + first[1] * last[1]), 1e-16);
+        const double along = left * (first[0] * r.moved[0] + first[1] * r.moved[1]) / stays;
+        r.step[0] = r.moved[0] + along * last[0];
+        r.step[1] = r.moved[1] + along * last[1];
+    } else if (r.size > 0.0) { /* it is only stretched: up to the limit */
+        const double a = r.size * r.size, b = f[0] * r.moved[0] + f[1] * r.moved[1];
+        const double c = mu_min(f[0] * f[0] + f[1] * f[1] - limit * limit, 0.0);
+        const double times = mu_max((sqrt(mu_max(b * b - a * c, 0.0)) - b) / a, 1.0);
+        r.step[0] = times * r.moved[0];
+        r.step[1] = times * r.moved[1];
+    }
+    return r;
+}
+
+static mu_steady mu_cycle_of(const mu_march *march, double distance) {
+    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0};
+    memcpy(out.mean, march->mean, sizeof out.mean);
+    memcpy(out.marked, march->marked, sizeof out.marked);
+    if (march->slipped) out.decay = march->turned > 0.0 ? march->decay - mu_log1(mu_min(march->turned, 1.0)) : HUGE_VAL;
+    return out;
+}
+
+/* The cycle whose distance to the steady one is below goal, or the nearest of many periods; f is its start.
+ *
+ * No two forces move apart, so that a step of Newton's method is too long where the force then moves back against it;
+ * then the step is cut by the rule of the secant. */
 static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance, double goal,
                                double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
-    const int most = m->drag > 0.0 ? MU_MOTION_PERIODS : MU_MOTION_REST_PERIODS;
-    double before = HUGE_VAL;
+    double from[2] = {f[0], f[1]}, share = 1.0;
+    mu_residual r, base = {{0.0, 0.0}, {0.0, 0.0}, HUGE_VAL};
     mu_march march;
-    mu_steady found = {{0.0}, {0.0}, 0.0, 0.0, 0.0};
     march.step = 0.0;
     march.steps = steps;
     for (int period = 1;; ++period) {
-        double moved[2], along, left, size, next[2];
+        double distance, ahead, behind;
+        mu_take_period(m, grid, f, tolerance, &march, NULL);
+        r = mu_residual_of(&march, f, limit);
+        distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_hypot(r.step[0], r.step[1]));
+        if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
+        distance = mu_min(distance, 2.0 * limit);
+        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed) return mu_cycle_of(&march, distance);
+        ahead = base.step[0] * r.moved[0] + base.step[1] * r.moved[1];
+        behind = base.step[0] * base.moved[0] + base.step[1] * base.moved[1];
+        if (ahead < 0.0 && r.size > 0.5 * base.size && share > 1e-3) {
+            share *= mu_max(0.1, mu_min(behind / (behind - ahead), 0.7));
+        } else {
+            base = r;
+            share = 1.0;
+            from[0] = f[0];
+            from[1] = f[1];
+        }
+        f[0] = from[0] + share * base.step[0];
+        f[1] = from[1] + share * base.step[1];
+        mu_keep_below(limit, f);
+    }
+}
+
+/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only one; of those that stick
+ * there are many, and only its way decides between them. */
+static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance,
+                                       double goal, double *f) {
+    double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance;
+    mu_march march;
+    mu_steady out;
+    f[0] = f[1] = 0.0;
+    out = mu_find_cycle(m, grid, steps, tolerance, goal, f);
+    if (out.distance <= goal && out.mean[MU_MEAN_PATH] > 1e3 * goal) return out;
+    f[0] = f[1] = 0.0;
+    march.step = 0.0;
+    march.steps = steps;
+    for (int period = 1;; ++period) {
+        double moved[2], rate;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
         moved[0] = march.f[0] - f[0];
         moved[1] = march.f[1] - f[1];
-        size = mu_hypot(moved[0], moved[1]);
-        next[0] = march.f[0];
-        next[1] = march.f[1];
-        found.distance = size;
-        if (march.slipped) {
-            /* the map's derivative is left last first^T */
-            left = march.turned * mu_decay(march.decay);
-            along = (march.first[0] * moved[0] + march.first[1] * moved[1]) * left /
-                    mu_max(1.0 - left * (march.first[0] * march.last[0] + march.first[1] * march.last[1]), 1e-16);
-            next[0] += along * march.last[0];
-            next[1] += along * march.last[1];
-            found.distance = mu_max(size, mu_hypot(next[0] - f[0], next[1] - f[1]));
-        } else if (m->drag > 0.0) { /* it is only stretched: up to the limit */
-            const double a = size * size, b = next[0] * moved[0] + next[1] * moved[1];
-            const double c = mu_min(next[0] * next[0] + next[1] * next[1] - limit * limit, 0.0);
-            const double times = mu_max((sqrt(mu_max(b * b - a * c, 0.0)) - b) / a, 0.0);
-            next[0] += times * moved[0];
-            next[1] += times * moved[1];
-            found.distance = 2.0;
-        } else {
-            found.distance = 0.0;
-        }
-        found.distance = march.failed ? HUGE_VAL : mu_min(found.distance, 2.0 * limit);
-        if (found.distance <= goal || period >= most || march.failed) break;
-        if (!(size < before) && march.slipped && period % 3 == 0) { /* Newton's method may circle; the map does not */
-            next[0] = march.f[0];
-            next[1] = march.f[1];
-        }
-        before = size;
-        f[0] = next[0];
-        f[1] = next[1];
-        mu_keep_below(limit, f);
+        size[2] = size[1];
+        size[1] = size[0];
+        size[0] = mu_hypot(moved[0], moved[1]);
+        /* what is left to go, as a geometric series */
+        rate = mu_max(size[0] / size[1], size[1] / size[2]);
+        distance = march.mean[MU_MEAN_PATH] < 1e-13 ? 0.0 : period > 2 && rate < 1.0 ? mu_min(2.0 * size[0] / (1.0 - rate), 2.0) : 2.0;
+        if (march.failed) distance = 2.0;
+        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) return mu_cycle_of(&march, distance);
+        f[0] = march.f[0];
+        f[1] = march.f[1];
     }
-    memcpy(found.mean, march.mean, sizeof found.mean);
-    memcpy(found.marked, march.marked, sizeof found.marked);
-    found.decay = march.slipped ? march.decay - (march.turned > 0.0 ? mu_log1(mu_min(march.turned, 1.0)) : -HUGE_VAL) : 0.0;
-    return found;
 }
 
 static double mu_difference(const mu_steady *a, const mu_steady *b) {
@@ -573,13 +618,12 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, mu_grid 
     grid->n = m->marks;
     for (int i = 0; i < m->marks; ++i) grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)m->marks;
     for (int level = 0;; ++level) {
-        if (m->drag == 0.0) f[0] = f[1] = 0.0;
         mu_keep_below(limit, f);
-        out = mu_find_cycle(m, grid, steps, of_step, 0.05 * tolerance, f);
-        out.error = level > 0 ? mu_difference(&out, &last) + 2.0 * out.distance + 1e-13 : 2.0 * limit;
+        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.01 * tolerance, f);
+        out.error = level > 0 ? mu_difference(&out, &last) + 3.0 * out.distance + 1e-13 : 2.0 * limit;
         if (out.error <= tolerance || level == MU_MOTION_LEVELS || !mu_halve(steps, grid)) return out;
         last = out;
-        of_step *= 0.1;
+        of_step *= 0.06;
     }
 }
 
