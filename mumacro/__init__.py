@@ -12,6 +12,7 @@ try:
     from mumacro.analysis import validity
     from mumacro.analysis.fit import Fit, fit
     from mumacro.analysis.law import law
+    from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.settling import settling
     from mumacro.analysis.solve_for import solve_for
     from mumacro.answer import Answer
@@ -36,6 +37,7 @@ __all__ = [
     "Element",
     "Fit",
     "InputError",
+    "Motion",
     "MumacroError",
     "Surrogate",
     "TableError",
@@ -43,6 +45,7 @@ __all__ = [
     "closed_forms",
     "fit",
     "law",
+    "motion",
     "open",
     "plotting",
     "settling",

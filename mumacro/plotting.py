@@ -58,15 +58,17 @@ def own(axes: Any) -> Any:
     return _loaded("pyplot").subplots(layout="constrained")[1] if axes is None else axes
 
 
-def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
-    """Write a picture; ``draw`` gets its axes.  InputError where the name does not end in one of
-    ``ENDINGS``."""
+def save(path: str | Path, draw: Callable[[Any], Any], panels: int = 1) -> None:
+    """Write a picture; ``draw`` gets its axes, of several panels an array of them.  InputError
+    where the name does not end in one of ``ENDINGS``."""
     path = Path(path)
     if path.suffix not in ENDINGS:
         endings = f"a name that ends in {', '.join(ENDINGS)}, or for the command in .csv"
         raise InputError("file name", str(path), endings)
-    figure = _loaded("figure").Figure(figsize=(7.0, 4.5), layout="constrained")
-    draw(figure.subplots())
+    figure = _loaded("figure").Figure(
+        figsize=(7.0 if panels == 1 else 5.0 * panels, 4.5), layout="constrained"
+    )
+    draw(figure.subplots(1, panels))
     figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
@@ -187,4 +189,40 @@ def plot_fit(along: str, curves: Sequence[Curve], title: str, axes: Any = None) 
     axes.set(xlabel=f"{along} [{unit_of(along)}]", ylabel="mu_macro [-]", title=title)
     if len(curves) <= _MOST_LABELS:
         axes.legend()
+    return axes
+
+
+def plot_cycle(
+    t: Array, x: Array, y: Array, Fx: Array, Fy: Array, Fz: Array, mu0: float, axes: Any = None
+) -> Any:
+    """Forces of one period over time, with the limit mu0 Fz, and the path of the upper point with
+    the force's direction at 16 moments; all (n,), in SI.  ``axes`` are two, or new ones."""
+    if axes is None:
+        _, axes = _loaded("pyplot").subplots(1, 2, figsize=(10.0, 4.5), layout="constrained")
+    forces, path = axes
+    share = (t - t[0]) / (t[-1] - t[0])
+    forces.plot(share, Fx, label="$F_x$, along the drag")
+    forces.plot(share, Fy, label="$F_y$, across")
+    forces.plot(share, mu0 * Fz, ":", color="grey", label=r"$\pm\mu_0 F_z$")
+    forces.plot(share, -mu0 * Fz, ":", color="grey")
+    mean = float(np.sum((Fx[1:] + Fx[:-1]) * np.diff(share)) / 2.0)
+    forces.axhline(mean, lw=0.8, color="tab:blue", ls="--", label="mean of $F_x$")
+    forces.set(xlabel="share of the period [-]", ylabel="force [N]")
+    forces.legend(fontsize="small")
+    micro = 1e6
+    path.plot(micro * x, micro * y, label="upper point")
+    path.plot(micro * x[0], micro * y[0], "o", color="tab:blue", label="start of the period")
+    places = np.linspace(0, t.size - 1, 17).astype(int)[:-1]
+    path.quiver(
+        micro * x[places],
+        micro * y[places],
+        Fx[places],
+        Fy[places],
+        angles="xy",
+        width=0.004,
+        color="tab:red",
+        label="force",
+    )
+    path.set(xlabel=r"$x$ [µm]", ylabel=r"$y$ [µm]", aspect="equal", adjustable="datalim")
+    path.legend(fontsize="small")
     return axes

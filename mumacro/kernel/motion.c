@@ -16,6 +16,7 @@
 
 enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
+#define MU_MOTION_ROUNDING 1e-12
 #define MU_SQRT6 2.449489742783178
 
 /* A motion of one spring: harmonics of x, y and the normal force one after another, whose terms are amplitude and phase.
@@ -24,7 +25,7 @@ typedef struct {
     const int32_t *counts;
     const double *orders, *terms;
     double drag, scale, acceleration; /* the last is a bound */
-    int marks; /* of a period, of which the sums are kept */
+    int marks, nodes; /* parts of a period whose sums are kept; steps at least */
 } mu_shaken;
 
 /* The motion at tau: way, velocity, limit and its slope. */
@@ -517,7 +518,7 @@ static mu_steady mu_cycle_of(const mu_march *march, double distance) {
     mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
-    if (march->slipped) out.decay = march->turned > 0.0 ? march->decay - mu_log1(mu_min(march->turned, 1.0)) : HUGE_VAL;
+    if (march->slipped) out.decay = march->turned != 0.0 ? march->decay - mu_log1(mu_min(fabs(march->turned), 1.0)) : HUGE_VAL;
     return out;
 }
 
@@ -615,12 +616,12 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, mu_grid 
     double of_step = mu_cube_root_near(mu_min(0.3 * tolerance, 1e-3));
     mu_steady last, out;
     of_step *= of_step;
-    grid->n = m->marks;
-    for (int i = 0; i < m->marks; ++i) grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)m->marks;
+    grid->n = mu_min(m->nodes, (double)grid->room);
+    for (int i = 0; i < grid->n; ++i) grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
     for (int level = 0;; ++level) {
         mu_keep_below(limit, f);
         out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.01 * tolerance, f);
-        out.error = level > 0 ? mu_difference(&out, &last) + 3.0 * out.distance + 1e-13 : 2.0 * limit;
+        out.error = level > 0 ? mu_difference(&out, &last) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
         if (out.error <= tolerance || level == MU_MOTION_LEVELS || !mu_halve(steps, grid)) return out;
         last = out;
         of_step *= 0.06;
@@ -703,7 +704,7 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, doubl
         const mu_steady spring = mu_spring_motion(&one, tolerance / share, grid, steps, f);
         for (int j = 0; j < MU_MEANS; ++j) {
             /* forces and works are in units of its limit, paths in those of its l0 */
-            const double unit = 2.0 * t * (j == MU_MEAN_STUCK ? 1.0 : j == MU_MEAN_WORK ? share * share : share);
+            const double unit = 2.0 * t * (j == MU_MEAN_WORK ? share * share : share);
             out.sum.mean[j] += half * weight * unit * spring.mean[j];
             if (j <= MU_MEAN_Y) values[i][j] = unit * spring.mean[j];
         }
@@ -748,13 +749,14 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
 }
 
 static mu_shaken mu_shaken_as(const int32_t *counts, const double *orders, const double *one) {
-    mu_shaken m = {counts, orders, one + 1, one[0], 1.0, 0.0, 16};
+    mu_shaken m = {counts, orders, one + 1, one[0], 1.0, 0.0, 16, 16};
     double largest = 1.0;
     for (int i = 0; i < counts[0] + counts[1] + counts[2]; ++i) {
         if (i < counts[0] + counts[1]) m.acceleration += orders[i] * orders[i] * fabs(m.terms[2 * i]);
         largest = mu_max(largest, orders[i]);
     }
-    m.marks = (int)mu_min(16.0 * largest, MU_MARKS);
+    m.marks = 16 * (int)mu_min(largest, MU_MARKS / 16);
+    m.nodes = m.marks * (((int)largest + MU_MARKS / 16 - 1) / (MU_MARKS / 16));
     return m;
 }
 
