@@ -40,7 +40,7 @@ _WHOLE = (
     f"a whole number from 1 to {MOST_HARMONIC}: other ratios have no period 2 pi/omega; give the "
     "frequency of which all are multiples"
 )
-_LIFTS_OFF = "such that the normal force stays above 0: at 0 the contact lifts off"
+_LIFTS_OFF = "an oscillation that leaves a load > 0 at every moment: at 0 the contact lifts off"
 _STILL = "> 0, or x or y an oscillation: the friction of a contact that does not move is not fixed"
 _RIGID = "finite: a rigid contact is the limit of a large k; raise it until mu_macro stays the same"
 _OF_A_BALL = (
@@ -328,7 +328,8 @@ def _legal(scenes: Scenes, one: bool, frequency: str) -> Bools:
             require(f"{name}, amplitude", holds, size, "finite and >= 0")
             require(f"{name}, phase", np.isfinite(term.phase), term.phase, "finite, in degrees")
     lowest = _lowest_load(scenes, legal)
-    require("normal", lowest > 0.0, lowest, _LIFTS_OFF)
+    swing = sum((term.amplitude for term in scenes.terms[2]), np.zeros(legal.size))
+    require("normal", lowest > 0.0, swing, _LIFTS_OFF)
     swings = sum((term.amplitude for part in scenes.terms[:2] for term in part), np.zeros(legal.size))
     require("v0", (c["v0"] > 0.0) | (swings > 0.0), c["v0"], _STILL)
     with np.errstate(all="ignore"):

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from mumacro.cli import common, fit, law, one_case, solve_for, stiffness, table
+from mumacro.cli import common, fit, law, motion, one_case, solve_for, stiffness, table
 from mumacro.cli import map as map_
 from mumacro.cli.common import ImpossibleError, UsageError
 from mumacro.errors import missing
@@ -33,6 +33,7 @@ or normally.
   mumacro law 'mu0=0.3 ...' --along v0 1mm/s 1m/s -o law.png     mu_macro along one input
   mumacro solve-for y0 'mu0=0.3 ...' --target 0.15               which input gives a wanted mu_macro
   mumacro map -o map.png                                         mu_macro/mu0, speed and amplitude
+  mumacro motion 'mu0=0.3 ...' --x 1um@90deg --y 2um             any periodic motion
   {fit.EXAMPLE}    k and mu0 from measured points
   {stiffness.EXAMPLE}    k from materials
   mumacro table                                                  the table in use and its errors
@@ -81,6 +82,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
     "law": law.run,
     "solve-for": solve_for.run,
     "map": map_.run,
+    "motion": motion.run,
     "fit": fit.run,
     "stiffness": stiffness.run,
     "table": table.run,

@@ -90,6 +90,26 @@ static mu_moment mu_moment_at(const mu_shaken *m, double tau) {
     return at;
 }
 
+/* The mean way over a time that no harmonic turns by more than 0.4. */
+static void mu_mean_way(const mu_shaken *m, double tau, double length, double *way) {
+    const double *order = m->orders, *term = m->terms, middle = tau + 0.5 * length;
+    way[0] = m->drag * middle;
+    way[1] = 0.0;
+    for (int i = 0; i < m->counts[0] + m->counts[1]; ++i, ++order, term += 2) {
+        const double half = 0.5 * *order * length, z = half * half;
+        /* sin(half) / half, to 1e-17 */
+        const double damping = 1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0))));
+        double sine, cosine;
+        mu_sine_cosine(*order * middle + term[1], &sine, &cosine);
+        way[i >= m->counts[0]] += term[0] * sine * damping;
+    }
+    way[0] *= m->scale;
+    way[1] *= m->scale;
+}
+
+/* Of what may be squared. */
+static double mu_length(double x, double y) { return sqrt(x * x + y * y); }
+
 /* --- slip ------------------------------------------------------------------------------------------------------------ */
 
 static const double MU_RADAU_AT[3] = {(4.0 - MU_SQRT6) / 10.0, (4.0 + MU_SQRT6) / 10.0, 1.0};
@@ -254,8 +274,7 @@ static mu_moment mu_stuck_at(const mu_stick *stick, double share, double *f) {
 
 /* |f|^2 - L^2, and its slope over 2. */
 static double mu_excess(const mu_moment *at, const double *f) {
-    const double size = mu_hypot(f[0], f[1]);
-    return (size - at->limit) * (size + at->limit);
+    return f[0] * f[0] + f[1] * f[1] - at->limit * at->limit;
 }
 
 static double mu_excess_slope(const mu_moment *at, const double *f) {
@@ -303,21 +322,19 @@ static double mu_stick_end(const mu_stick *stick, int fresh) {
         at = mu_stuck_at(stick, share, f);
         value = mu_excess(&at, f);
         mu_narrow(&b, share, value);
-        if (fabs(value) <= 4e-16 * at.limit * at.limit) return share;
+        if (fabs(value) <= 1e-15 * at.limit * at.limit) return share;
     }
     return b.high;
 }
 
 /* --- a period ---------------------------------------------------------------------------------------------------------- */
 
-/* Sums over a step whose middle is there. */
-static void mu_add(mu_march *march, const mu_shaken *m, double middle, double time, const mu_moment *at, double fx,
-                   double fy, double speed) {
+/* Adds a force, which has done a work beside the drag. */
+static void mu_add(mu_march *march, const mu_shaken *m, double middle, double time, double fx, double fy, double work) {
     const int place = 2 * (int)(middle * (0.5 / MU_PI) * m->marks);
     march->mean[MU_MEAN_X] += time * fx;
     march->mean[MU_MEAN_Y] += time * fy;
-    march->mean[MU_MEAN_PATH] += time * speed;
-    march->mean[MU_MEAN_WORK] += time * (fx * (at->wx - m->scale * m->drag) + fy * at->wy);
+    march->mean[MU_MEAN_WORK] += work;
     march->marked[place] += time * fx;
     march->marked[place + 1] += time * fy;
 }
@@ -337,7 +354,7 @@ static void mu_draw(mu_drawing *drawing, double fx, double fy) {
 
 /* Slip begins with the force as it is: of a disturbance the part along t is left. */
 static void mu_begin_slip(mu_march *march) {
-    const double size = mu_hypot(march->f[0], march->f[1]);
+    const double size = mu_length(march->f[0], march->f[1]);
     const double tx = -march->f[1] / size, ty = march->f[0] / size;
     if (march->slipped) {
         march->turned *= march->last[0] * tx + march->last[1] * ty;
@@ -354,7 +371,7 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
                          mu_drawing *drawing) {
     static const double *weight = MU_RADAU[2];
     const mu_moment start = march->at;
-    const double size = mu_hypot(march->f[0], march->f[1]), ex = march->f[0] / size, ey = march->f[1] / size;
+    const double size = mu_length(march->f[0], march->f[1]), ex = march->f[0] / size, ey = march->f[1] / size;
     const double rest = end - start.tau;
     const double length = march->step >= rest ? rest : march->step > 0.5 * rest ? 0.5 * rest : march->step;
     double factor, nx, ny, time;
@@ -384,7 +401,9 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     for (int i = 0; i < 3; ++i) {
         const double share = slip.length * weight[i], limit = slip.stage[i].limit;
         mu_direction(&slip, slip.u[i], &nx, &ny);
-        mu_add(march, m, start.tau + 0.5 * slip.length, share, &slip.stage[i], limit * nx, limit * ny, slip.speed[i]);
+        mu_add(march, m, start.tau + 0.5 * slip.length, share, limit * nx, limit * ny,
+               share * limit * (nx * (slip.stage[i].wx - m->scale * m->drag) + ny * slip.stage[i].wy));
+        march->mean[MU_MEAN_PATH] += share * slip.speed[i];
         march->decay += share * slip.speed[i] / limit;
     }
     while (mu_is_drawn(drawing, slip.stage[2].tau, &time)) {
@@ -402,12 +421,10 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
 
 static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *fresh, int *ends,
                           mu_drawing *drawing) {
-    static const double gauss[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
-    static const double weight[3] = {5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0};
     mu_stick stick = {m, march->at, {march->f[0], march->f[1]}, end - march->at.tau};
-    const double speed = mu_hypot(stick.start.wx, stick.start.wy), way = 0.5 * stick.start.limit;
+    const double speed = mu_length(stick.start.wx, stick.start.wy), way = 0.5 * stick.start.limit;
     const double slowest = speed + sqrt(speed * speed + 2.0 * m->acceleration * way);
-    double share, f[2], time;
+    double share, time;
     int whole = 1;
     if (slowest * stick.length > 2.0 * way) {
         whole = 0;
@@ -415,17 +432,22 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
     }
     share = mu_stick_end(&stick, *fresh);
     if (share > 0.0) {
-        double fx, fy, size;
-        for (int i = 0; i < 3; ++i) {
-            const mu_moment at = mu_stuck_at(&stick, share * gauss[i], f);
-            mu_add(march, m, stick.start.tau + 0.5 * share * stick.length, share * stick.length * weight[i], &at, f[0], f[1], 0.0);
-        }
-        march->mean[MU_MEAN_STUCK] += share * stick.length;
-        time = stick.start.tau + share * stick.length;
+        const double taken = share * stick.length, drag = m->scale * m->drag;
+        double dx, dy, fx, fy, size, way[2];
+        time = stick.start.tau + taken;
         march->at = mu_moment_at(m, whole && share == 1.0 ? end : time);
-        fx = stick.f[0] + (march->at.x - stick.start.x);
-        fy = stick.f[1] + (march->at.y - stick.start.y);
-        size = mu_hypot(fx, fy);
+        dx = march->at.x - stick.start.x;
+        dy = march->at.y - stick.start.y;
+        fx = stick.f[0] + dx;
+        fy = stick.f[1] + dy;
+        mu_mean_way(m, stick.start.tau, taken, way);
+        way[0] -= stick.start.x;
+        way[1] -= stick.start.y;
+        /* the integral of f (w - drag), exactly */
+        mu_add(march, m, stick.start.tau + 0.5 * taken, taken, stick.f[0] + way[0], stick.f[1] + way[1],
+               stick.f[0] * (dx - drag * taken) + stick.f[1] * dy + 0.5 * (dx * dx + dy * dy) - drag * way[0] * taken);
+        march->mean[MU_MEAN_STUCK] += taken;
+        size = mu_length(fx, fy);
         if (share < 1.0 && size > 0.0) {
             fx *= march->at.limit / size;
             fy *= march->at.limit / size;
@@ -459,7 +481,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     march->at = mu_moment_at(m, 0.0);
     march->f[0] = f[0];
     march->f[1] = f[1];
-    fresh = mu_hypot(f[0], f[1]) >= march->at.limit * (1.0 - 1e-12);
+    fresh = mu_length(f[0], f[1]) >= march->at.limit * (1.0 - 1e-12);
     if (fresh && f[0] * march->at.wx + f[1] * march->at.wy - march->at.limit * march->at.slope > 0.0) mu_begin_slip(march);
     for (int64_t i = 0; i < grid->n; ++i) {
         const double end = grid->nodes[i];
@@ -477,13 +499,13 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     }
     for (int i = 0; i < MU_MEANS; ++i)
         if (i != MU_MEAN_PATH && i != MU_MEAN_WORK) march->mean[i] /= 2.0 * MU_PI;
-    for (int i = 0; i < 2 * MU_MARKS; ++i) march->marked[i] /= 2.0 * MU_PI;
+    for (int i = 0; i < 2 * m->marks; ++i) march->marked[i] /= 2.0 * MU_PI;
 }
 
 /* --- the steady cycle --------------------------------------------------------------------------------------------------- */
 
 static void mu_keep_below(double limit, double *f) {
-    const double size = mu_hypot(f[0], f[1]);
+    const double size = mu_length(f[0], f[1]);
     if (size > limit) {
         f[0] *= limit / size;
         f[1] *= limit / size;
@@ -497,7 +519,7 @@ typedef struct {
 
 static mu_residual mu_residual_of(const mu_march *march, const double *f, double limit) {
     mu_residual r = {{march->f[0] - f[0], march->f[1] - f[1]}, {0.0, 0.0}, 0.0};
-    r.size = mu_hypot(r.moved[0], r.moved[1]);
+    r.size = mu_length(r.moved[0], r.moved[1]);
     if (march->slipped) { /* the derivative of the map is left last first^T */
         const double left = march->turned * mu_decay(march->decay), *first = march->first, *last = march->last;
         const double stays = mu_max(1.0 - left * (first[0] * last[0] + first[1] * last[1]), 1e-16);
@@ -538,7 +560,7 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
         double distance, ahead, behind;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
         r = mu_residual_of(&march, f, limit);
-        distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_hypot(r.step[0], r.step[1]));
+        distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_length(r.step[0], r.step[1]));
         if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
         distance = mu_min(distance, 2.0 * limit);
         if (distance <= goal || period == MU_MOTION_PERIODS || march.failed) return mu_cycle_of(&march, distance);
@@ -578,7 +600,7 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
         moved[1] = march.f[1] - f[1];
         size[2] = size[1];
         size[1] = size[0];
-        size[0] = mu_hypot(moved[0], moved[1]);
+        size[0] = mu_length(moved[0], moved[1]);
         /* what is left to go, as a geometric series */
         rate = mu_max(size[0] / size[1], size[1] / size[2]);
         distance = march.mean[MU_MEAN_PATH] < 1e-13 ? 0.0 : period > 2 && rate < 1.0 ? mu_min(2.0 * size[0] / (1.0 - rate), 2.0) : 2.0;
@@ -589,10 +611,10 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
     }
 }
 
-static double mu_difference(const mu_steady *a, const mu_steady *b) {
+static double mu_difference(const mu_steady *a, const mu_steady *b, int marks) {
     double sum = 0.0;
-    for (int i = 0; i < 2 * MU_MARKS; i += 2)
-        sum += mu_hypot(a->marked[i] - b->marked[i], a->marked[i + 1] - b->marked[i + 1]);
+    for (int i = 0; i < 2 * marks; i += 2)
+        sum += mu_length(a->marked[i] - b->marked[i], a->marked[i + 1] - b->marked[i + 1]);
     return sum;
 }
 
@@ -621,7 +643,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, mu_grid 
     for (int level = 0;; ++level) {
         mu_keep_below(limit, f);
         out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.01 * tolerance, f);
-        out.error = level > 0 ? mu_difference(&out, &last) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
+        out.error = level > 0 ? mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
         if (out.error <= tolerance || level == MU_MOTION_LEVELS || !mu_halve(steps, grid)) return out;
         last = out;
         of_step *= 0.06;
@@ -640,11 +662,11 @@ static const double MU_KRONROD[8][2] = {
     {0.991455371120812639206854697526329, 0.022935322010529224963732008058970},
 };
 
-/* Place and weight of point i of 15, on -1 to 1. */
+/* Place and weight of point i of 15, from -1 to 1. */
 static double mu_kronrod(int i, double *weight) {
-    const double *point = MU_KRONROD[(i + 1) / 2];
+    const double *point = MU_KRONROD[i < 7 ? 7 - i : i - 7];
     *weight = point[1];
-    return i % 2 ? point[0] : -point[0];
+    return i < 7 ? -point[0] : point[0];
 }
 
 /* How rough two functions are at the points of the rule: the size of their four highest coefficients by polynomials that
@@ -711,7 +733,7 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, doubl
         out.sum.error += half * weight * 2.0 * t * share * spring.error;
         out.sum.decay = mu_min(out.sum.decay, spring.decay);
     }
-    out.error = half * mu_roughness(values);
+    out.error = 3.0 * half * mu_roughness(values);
     return out;
 }
 
