@@ -223,6 +223,7 @@ def plot_cycle(
         color="tab:red",
         label="force",
     )
+    path.margins(0.15)
     path.set(xlabel=r"$x$ [µm]", ylabel=r"$y$ [µm]", aspect="equal", adjustable="datalim")
     path.legend(fontsize="small")
     return axes

@@ -149,8 +149,8 @@ class Motion:
         return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load)
 
     def plot(self, axes: Any = None, *, index: int | None = None) -> Any:
-        """Forces over a period and the path of the upper point, see ``mumacro.plotting.plot_cycle``;
-        needs matplotlib."""
+        """Forces over a period and the path of the upper point, see
+        ``mumacro.plotting.plot_cycle``; needs matplotlib."""
         mu0 = float(self.scenes.columns["mu0"][self._place(index)])
         return plotting.plot_cycle(*self.cycle(index), mu0, axes)
 
@@ -238,7 +238,7 @@ def motion(
     )
     if kind.contact and any(np.any(term.amplitude != 0.0) for term in terms[2]):
         raise InputError("normal", normal, _OF_A_BALL)
-    if type(threads) is not int and threads is not None or threads is not None and threads < 1:
+    if threads is not None and (type(threads) is not int or threads < 1):
         raise InputError("threads", threads, "a whole number >= 1")
     least, most = TOLERANCES
     size = real("tolerance", tolerance)
@@ -330,7 +330,9 @@ def _legal(scenes: Scenes, one: bool, frequency: str) -> Bools:
     lowest = _lowest_load(scenes, legal)
     swing = sum((term.amplitude for term in scenes.terms[2]), np.zeros(legal.size))
     require("normal", lowest > 0.0, swing, _LIFTS_OFF)
-    swings = sum((term.amplitude for part in scenes.terms[:2] for term in part), np.zeros(legal.size))
+    swings = sum(
+        (term.amplitude for part in scenes.terms[:2] for term in part), np.zeros(legal.size)
+    )
     require("v0", (c["v0"] > 0.0) | (swings > 0.0), c["v0"], _STILL)
     with np.errstate(all="ignore"):
         length = scenes.length
@@ -338,7 +340,11 @@ def _legal(scenes: Scenes, one: bool, frequency: str) -> Bools:
         fastest = np.maximum(
             drag,
             sum(
-                (term.harmonic * (term.amplitude / length) for part in scenes.terms[:2] for term in part),
+                (
+                    term.harmonic * (term.amplitude / length)
+                    for part in scenes.terms[:2]
+                    for term in part
+                ),
                 np.zeros(legal.size),
             ),
         )
@@ -392,18 +398,20 @@ def _answer(scenes: Scenes, rows: Array, shape: tuple[int, ...]) -> Motion:
     c = scenes.columns
     along, across, stick, path, work, decay, error = rows.T
     with np.errstate(all="ignore"):
+        limit, length = c["mu0"] * c["Fz"], scenes.length
         mu = c["mu0"] * along
-        limit = c["mu0"] * c["Fz"]
-        columns = (
-            mu,
-            c["mu0"] * across,
-            stick,
-            path * scenes.length,
-            work / (2.0 * math.pi) * limit * scenes.length * c["omega"],
-            mu * c["Fz"] * c["v0"],
-            c["mu0"] * error,
-            math.log(1.0 / REMAINING) / decay,
-        )
-    if not shape:
-        return Motion(*(float(column[0]) for column in columns), scenes)
-    return Motion(*(column.reshape(shape) for column in columns), scenes)
+        columns = {
+            "mu_macro": mu,
+            "mu_lateral": c["mu0"] * across,
+            "stick_fraction": stick,
+            "slip_path": path * length,
+            "power": work / (2.0 * math.pi) * limit * length * c["omega"],
+            "power_drive": mu * c["Fz"] * c["v0"],
+            "error_estimate": c["mu0"] * error,
+            "periods": math.log(1.0 / REMAINING) / decay,
+        }
+    answers: dict[str, Any] = {
+        name: column.reshape(shape) if shape else float(column[0])
+        for name, column in columns.items()
+    }
+    return Motion(**answers, scenes=scenes)

@@ -84,9 +84,7 @@ def run(words: Sequence[str]) -> str:
     parser.add_argument("-o", "--out", type=Path, help=text)
     common.add_form(parser)
     chosen = parser.parse_intermixed_args(words)
-    case = read_case(
-        chosen.words, one_k="one motion has one k; ask for both ends", optional=["y0"]
-    )
+    case = read_case(chosen.words, one_k="one motion has one k; ask for both ends", optional=["y0"])
     if "y0" in case:
         raise UsageError("y0 is an option here: --y for across, --x for along the drag")
     texts = [(name, text) for name in PARTS if (text := getattr(chosen, name)) is not None]

@@ -17,6 +17,7 @@
 enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 1e-12
+#define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick is rounding */
 #define MU_SQRT6 2.449489742783178
 
 /* A motion of one spring: harmonics of x, y and the normal force one after another, whose terms are amplitude and phase.
@@ -461,7 +462,7 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
     }
     *fresh = 0;
     if (share < 1.0) {
-        *ends = share > 0.0; /* slip that only rounding ends goes on for a step */
+        *ends = march->at.tau - stick.start.tau > MU_MOTION_SHORT; /* slip that rounding ends goes on for a step */
         mu_begin_slip(march);
     }
 }
@@ -472,6 +473,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     static const mu_march none;
     const double step = march->step;
     mu_grid *steps = march->steps;
+    int64_t count = 0;
     int fresh, ends = 1;
     *march = none;
     march->step = step > 0.0 ? step : 0.1 * sqrt(sqrt(tolerance));
@@ -494,7 +496,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
                 mu_take_stick(march, m, end, &fresh, &ends, drawing);
             }
             if (march->at.tau > before && steps->n < steps->room) steps->nodes[steps->n++] = march->at.tau;
-            if (steps->n == steps->room || !(march->step > 1e-15)) march->failed = 1;
+            if (steps->n == steps->room || ++count > 4 * steps->room || !(march->step > 1e-15)) march->failed = 1;
         }
     }
     for (int i = 0; i < MU_MEANS; ++i)
