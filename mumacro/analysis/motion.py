@@ -95,11 +95,13 @@ class Scenes:
     @property
     def dimensionless(self) -> Array:
         """The cases as the kernel takes them, (n, 1 + 2 terms)."""
-        c, length = self.columns, self.length
-        rows = [c["v0"] / c["omega"] / length]
-        for part, unit in zip(self.terms, (length, length, c["Fz"]), strict=True):
-            for term in part:
-                rows += [term.amplitude / unit, term.phase]
+        c = self.columns
+        with np.errstate(all="ignore"):  # illegal cases are left out later
+            length = self.length
+            rows = [c["v0"] / c["omega"] / length]
+            for part, unit in zip(self.terms, (length, length, c["Fz"]), strict=True):
+                for term in part:
+                    rows += [term.amplitude / unit, term.phase]
         return np.ascontiguousarray(np.stack(rows, axis=1))
 
 
@@ -279,7 +281,7 @@ def _terms(name: str, part: Any) -> Iterable[Term]:
     """The harmonics of one part of a motion; none for an amplitude 0."""
     if isinstance(part, tuple) and len(part) == 2:
         triples: Sequence[Any] = [(1, *part)]
-    elif isinstance(part, (list, tuple)) and any(isinstance(one, (list, tuple)) for one in part):
+    elif isinstance(part, (list, tuple)) and all(isinstance(one, (list, tuple)) for one in part):
         triples = part
     else:
         triples = [(1, part, 0.0)]

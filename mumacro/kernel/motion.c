@@ -239,24 +239,80 @@ static void mu_narrow(mu_bracket *b, double x, double value) {
     }
 }
 
-/* At which share of a step its speed, which is below 0 at a stage, falls through 0. */
-static double mu_slip_end(const mu_shaken *m, const mu_moment *start, const mu_slip *slip) {
-    mu_bracket b = {0.0, 0.0, mu_max(mu_slip_speed(slip, start, 0.0), 0.0), 0.0, 0};
-    int i = 0;
-    for (; slip->speed[i] >= 0.0; ++i) {
-        b.low = MU_RADAU_AT[i];
-        b.at_low = slip->speed[i];
+static double mu_speed_at(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, double share) {
+    const mu_moment at = mu_moment_at(m, start->tau + share * slip->length);
+    return mu_slip_speed(slip, &at, mu_slip_at(slip, share));
+}
+
+/* Whether the speed of a step falls below 0, and between which shares first.  Where all stages are above, the least of
+ * the cubic through them is looked at. */
+static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, mu_bracket *b) {
+    const double x[4] = {0.0, MU_RADAU_AT[0], MU_RADAU_AT[1], 1.0};
+    const double speed[4] = {mu_max(mu_slip_speed(slip, start, 0.0), 0.0), slip->speed[0], slip->speed[1],
+                             slip->speed[2]};
+    double first, second, third, c, d, e, root, at[3], value[3];
+    int left = 0;
+    for (int i = 1; i < 4; ++i) {
+        if (speed[i] < 0.0) {
+            const mu_bracket found = {x[i - 1], x[i], speed[i - 1], speed[i], 0};
+            *b = found;
+            return 1;
+        }
     }
-    b.high = MU_RADAU_AT[i];
-    b.at_high = slip->speed[i];
-    for (int count = 0; count < 60 && b.high - b.low > 1e-15; ++count) {
-        const double share = mu_next_guess(&b);
-        const mu_moment at = mu_moment_at(m, start->tau + share * slip->length);
-        const double speed = mu_slip_speed(slip, &at, mu_slip_at(slip, share));
-        mu_narrow(&b, share, speed);
-        if (fabs(speed) <= 1e-13 * (fabs(at.wx) + fabs(at.wy) + fabs(at.slope))) return share;
+    /* divided differences, and the slope c x^2 + 2 d x + e of the cubic */
+    first = (speed[1] - speed[0]) / x[1];
+    second = ((speed[2] - speed[1]) / (x[2] - x[1]) - first) / x[2];
+    third = (((speed[3] - speed[2]) / (x[3] - x[2]) - (speed[2] - speed[1]) / (x[2] - x[1])) / (x[3] - x[1]) - second) / x[3];
+    c = 3.0 * third;
+    d = second - third * (x[1] + x[2]);
+    e = first - second * x[1] + third * x[1] * x[2];
+    if (!(d * d > c * e)) return 0;
+    root = sqrt(d * d - c * e);
+    /* of the two places of no slope that with c x + d > 0 */
+    at[1] = d > 0.0 ? -e / (d + root) : (root - d) / c;
+    if (!(at[1] > 0.0 && at[1] < 1.0)) return 0;
+    while (left < 2 && x[left + 1] < at[1]) ++left;
+    value[0] = speed[left];
+    value[2] = speed[left + 1];
+    at[0] = x[left];
+    at[2] = x[left + 1];
+    value[1] = speed[0] + at[1] * (first + (at[1] - x[1]) * (second + (at[1] - x[2]) * third));
+    if (value[1] > 0.3 * mu_max(mu_max(speed[0], speed[1]), mu_max(speed[2], speed[3]))) return 0;
+    for (int count = 0; count < 3; ++count) {
+        double p, q, next;
+        value[1] = mu_speed_at(m, start, slip, at[1]);
+        if (value[1] < 0.0) {
+            const mu_bracket found = {at[0], at[1], value[0], value[1], 0};
+            *b = found;
+            return 1;
+        }
+        /* the vertex of the parabola */
+        p = (value[1] - value[0]) / (at[1] - at[0]);
+        q = (value[2] - value[1]) / (at[2] - at[1]);
+        if (!(q > p)) return 0;
+        next = 0.5 * (at[0] + at[1]) - 0.5 * p * (at[2] - at[0]) / (q - p);
+        if (!(next > at[0] && next < at[2]) || next == at[1]) return 0;
+        if (next > at[1]) {
+            at[0] = at[1];
+            value[0] = value[1];
+        } else {
+            at[2] = at[1];
+            value[2] = value[1];
+        }
+        at[1] = next;
     }
-    return b.low;
+    return 0;
+}
+
+/* At which share of a step its speed falls through 0. */
+static double mu_slip_end(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, mu_bracket *b) {
+    const double fastest = mu_max(slip->speed[0], mu_max(slip->speed[1], slip->speed[2]));
+    for (int count = 0; count < 60 && b->high - b->low > 1e-15; ++count) {
+        const double share = mu_next_guess(b), speed = mu_speed_at(m, start, slip, share);
+        mu_narrow(b, share, speed);
+        if (fabs(speed) <= 1e-13 * fastest) return share;
+    }
+    return b->low;
 }
 
 /* A stick from a moment with a force, and how far that is inside the limit. */
@@ -376,6 +432,7 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     const double rest = end - start.tau;
     const double length = march->step >= rest ? rest : march->step > 0.5 * rest ? 0.5 * rest : march->step;
     double factor, nx, ny, time;
+    mu_bracket fall;
     mu_slip slip;
     if (!mu_slip_step(m, &start, ex, ey, length, length == rest ? end : start.tau + length, &slip)) {
         march->step = 0.25 * length;
@@ -388,9 +445,8 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
         return;
     }
     march->step = length < march->step ? mu_max(march->step, factor * length) : factor * length;
-    if (*ends && (slip.speed[0] < 0.0 || slip.speed[1] < 0.0 || slip.speed[2] < 0.0)) {
-        const double share = mu_slip_end(m, &start, &slip);
-        const double shorter = share * length;
+    if (*ends && mu_slip_falls(m, &start, &slip, &fall)) {
+        const double shorter = length * mu_slip_end(m, &start, &slip, &fall);
         march->slips = 0;
         if (!(start.tau + shorter > start.tau)) return;
         if (!mu_slip_step(m, &start, ex, ey, shorter, start.tau + shorter, &slip)) {
