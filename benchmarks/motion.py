@@ -26,7 +26,7 @@ L0 = 3e-6  # m, mu0 Fz / k
 SEARCHES = (
     ("spring", 1e-4, 10_000, 1e-8),
     ("spring", 1e-6, 20_000, 1e-9),
-    ("spring", 1e-8, 10_000, 1e-10),
+    ("spring", 1e-7, 10_000, 1e-9),
     ("ball", 1e-6, 300, 1e-8),
 )
 AGAINST_TABLES = (

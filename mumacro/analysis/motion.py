@@ -25,7 +25,7 @@ from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
 
 MOST_HARMONIC = 1000
-TOLERANCES = 1e-10, 1e-2
+TOLERANCES = 1e-9, 1e-2
 FURTHEST, SLOWEST = 1e9, 1e-12  # of ways per radian, in units of mu0 Fz / k
 REMAINING = 0.01  # of a disturbance, after ``periods``
 PARTS = ("x", "y", "normal")
@@ -210,7 +210,7 @@ def motion(
     contact : str
         "spring", or "ball" under a constant normal force.
     tolerance : float
-        Of the mean force over mu0 Fz, 1e-10 to 1e-2.
+        Of the mean force over mu0 Fz, 1e-9 to 1e-2.
     threads : int, optional
         Threads for arrays; all processors if left out.
 

@@ -16,8 +16,8 @@
 
 enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
-#define MU_MOTION_ROUNDING 1e-12
-#define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick is rounding */
+#define MU_MOTION_ROUNDING 1e-10 /* of the mean force: sticks too short to be found */
+#define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
 
 /* A motion of one spring: harmonics of x, y and the normal force one after another, whose terms are amplitude and phase.
@@ -45,7 +45,7 @@ typedef struct {
     mu_moment at;
     double f[2];
     int slips;
-    double step; /* that the next slip may take */
+    double step, began; /* what the next slip may take; of the last stick */
     double mean[MU_MEANS], marked[2 * MU_MARKS];
     /* of a small disturbance: the direction that survives first, the last one, what is left as a logarithm, as a factor */
     double first[2], last[2], decay, turned;
@@ -448,6 +448,7 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     if (*ends && mu_slip_falls(m, &start, &slip, &fall)) {
         const double shorter = length * mu_slip_end(m, &start, &slip, &fall);
         march->slips = 0;
+        march->began = start.tau + shorter;
         if (!(start.tau + shorter > start.tau)) return;
         if (!mu_slip_step(m, &start, ex, ey, shorter, start.tau + shorter, &slip)) {
             march->failed = 1;
@@ -487,7 +488,7 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
         whole = 0;
         stick.length = 2.0 * way / slowest;
     }
-    share = mu_stick_end(&stick, *fresh);
+    share = *fresh && stick.length < MU_MOTION_SHORT ? 1.0 : mu_stick_end(&stick, *fresh);
     if (share > 0.0) {
         const double taken = share * stick.length, drag = m->scale * m->drag;
         double dx, dy, fx, fy, size, way[2];
@@ -516,9 +517,9 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
         march->f[0] = fx;
         march->f[1] = fy;
     }
-    *fresh = 0;
+    *fresh = *fresh && share == 1.0 && stick.length < MU_MOTION_SHORT;
     if (share < 1.0) {
-        *ends = march->at.tau - stick.start.tau > MU_MOTION_SHORT; /* slip that rounding ends goes on for a step */
+        *ends = march->at.tau - march->began > MU_MOTION_SHORT; /* slip that rounding ends goes on for a step */
         mu_begin_slip(march);
     }
 }
@@ -534,6 +535,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     *march = none;
     march->step = step > 0.0 ? step : 0.1 * sqrt(sqrt(tolerance));
     march->turned = 1.0;
+    march->began = -1.0;
     march->steps = steps;
     steps->n = 0;
     march->at = mu_moment_at(m, 0.0);
@@ -543,6 +545,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     if (fresh && f[0] * march->at.wx + f[1] * march->at.wy - march->at.limit * march->at.slope > 0.0) mu_begin_slip(march);
     for (int64_t i = 0; i < grid->n; ++i) {
         const double end = grid->nodes[i];
+        if (end - march->at.tau < MU_MOTION_SHORT && i + 1 < grid->n) continue;
         while (march->at.tau < end && !march->failed) {
             const double before = march->at.tau;
             if (march->slips) {
