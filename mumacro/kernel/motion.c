@@ -730,36 +730,66 @@ static double mu_kronrod(int i, double *weight) {
     return i < 7 ? -point[0] : point[0];
 }
 
+/* Springs of a ball from t = low to high: the error of their sum, and their values at both ends by the polynomial through
+ * the points. */
+typedef struct {
+    double low, high, error, start[2], end[2];
+    double mean[MU_MEANS], decay, of_springs;
+} mu_panel;
+
 /* How rough two functions are at the points of the rule: the size of their four highest coefficients by polynomials that
  * are orthogonal there.  They stay large at kinks, wherever these lie between the points. */
-static double mu_roughness(const double values[15][2]) {
+static double mu_roughness(const double values[15][2], double *start, double *end) {
     double x[15], weight[15], last[15] = {0.0}, p[15], size = 0.0, square = 0.0;
+    double at_end = 0.7071067811865476, before = 0.0, sign = 1.0;
     for (int i = 0; i < 15; ++i) {
         x[i] = mu_kronrod(i, &weight[i]);
-        p[i] = 0.7071067811865476;
+        p[i] = at_end;
     }
-    for (int degree = 1; degree < 15; ++degree) {
-        double next[15], sum = 0.0, c[2] = {0.0, 0.0};
+    start[0] = start[1] = end[0] = end[1] = 0.0;
+    for (int degree = 0; degree < 15; ++degree) {
+        double next[15], sum = 0.0, c[2] = {0.0, 0.0}, beyond;
+        for (int i = 0; i < 15; ++i) {
+            c[0] += weight[i] * p[i] * values[i][0];
+            c[1] += weight[i] * p[i] * values[i][1];
+        }
+        for (int j = 0; j < 2; ++j) {
+            start[j] += sign * at_end * c[j];
+            end[j] += at_end * c[j];
+        }
+        if (degree > 10) square += c[0] * c[0] + c[1] * c[1];
         for (int i = 0; i < 15; ++i) {
             next[i] = x[i] * p[i] - size * last[i];
             sum += weight[i] * next[i] * next[i];
         }
+        beyond = at_end - size * before;
         size = sqrt(sum);
+        before = at_end;
+        at_end = beyond / size;
+        sign = -sign;
         for (int i = 0; i < 15; ++i) {
             last[i] = p[i];
             p[i] = next[i] / size;
-            c[0] += weight[i] * p[i] * values[i][0];
-            c[1] += weight[i] * p[i] * values[i][1];
         }
-        if (degree > 10) square += c[0] * c[0] + c[1] * c[1];
     }
     return sqrt(square);
 }
 
-typedef struct {
-    double low, high, error;
-    mu_steady sum;
-} mu_panel;
+/* The error of panel i: its own, and that of a kink between its end and its first point, which shows in the neighbour's
+ * other value there. */
+static double mu_panel_error(const mu_panel *panels, int n, int i) {
+    const mu_panel *one = &panels[i];
+    const double gap = 0.5 * (1.0 - MU_KRONROD[7][0]) * (one->high - one->low);
+    double error = one->error;
+    for (int j = 0; j < n; ++j) {
+        const mu_panel *other = &panels[j];
+        if (other->low == one->high)
+            error += gap * mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
+        if (other->high == one->low)
+            error += gap * mu_length(one->start[0] - other->end[0], one->start[1] - other->end[1]);
+    }
+    return error;
+}
 
 /* The motion of a spring with this share of the limit. */
 static mu_shaken mu_of_spring(const mu_shaken *m, double share) {
@@ -779,7 +809,7 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, doubl
     memset(&out, 0, sizeof out);
     out.low = low;
     out.high = high;
-    out.sum.decay = HUGE_VAL;
+    out.decay = HUGE_VAL;
     for (int i = 0; i < 15; ++i) {
         double weight;
         const double t = middle + half * mu_kronrod(i, &weight), share = 1.5 * t * t * (2.0 - t * t);
@@ -788,13 +818,13 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, doubl
         for (int j = 0; j < MU_MEANS; ++j) {
             /* forces and works are in units of its limit, paths in those of its l0 */
             const double unit = 2.0 * t * (j == MU_MEAN_WORK ? share * share : share);
-            out.sum.mean[j] += half * weight * unit * spring.mean[j];
+            out.mean[j] += half * weight * unit * spring.mean[j];
             if (j <= MU_MEAN_Y) values[i][j] = unit * spring.mean[j];
         }
-        out.sum.error += half * weight * 2.0 * t * share * spring.error;
-        out.sum.decay = mu_min(out.sum.decay, spring.decay);
+        out.of_springs += half * weight * 2.0 * t * share * spring.error;
+        out.decay = mu_min(out.decay, spring.decay);
     }
-    out.error = 3.0 * half * mu_roughness(values);
+    out.error = 3.0 * half * mu_roughness(values, out.start, out.end);
     return out;
 }
 
@@ -809,11 +839,16 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
     panels[0] = mu_ball_panel(m, 0.0, 0.5, 0.5 * tolerance, grid, steps, f);
     panels[1] = mu_ball_panel(m, 0.5, 1.0, 0.5 * tolerance, grid, steps, f);
     for (;; ++n) {
+        double most = -1.0;
         int worst = 0;
         error = 0.0;
         for (int i = 0; i < n; ++i) {
-            error += panels[i].error;
-            if (panels[i].error > panels[worst].error) worst = i;
+            const double own = mu_panel_error(panels, n, i);
+            error += own;
+            if (own > most) {
+                most = own;
+                worst = i;
+            }
         }
         if (error <= 0.5 * tolerance || n == MU_MOTION_PANELS) break;
         {
@@ -823,9 +858,9 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
         }
     }
     for (int i = 0; i < n; ++i) {
-        for (int j = 0; j < MU_MEANS; ++j) out.mean[j] += panels[i].sum.mean[j];
-        out.error += panels[i].sum.error;
-        out.decay = mu_min(out.decay, panels[i].sum.decay);
+        for (int j = 0; j < MU_MEANS; ++j) out.mean[j] += panels[i].mean[j];
+        out.error += panels[i].of_springs;
+        out.decay = mu_min(out.decay, panels[i].decay);
     }
     out.error += error;
     return out;
