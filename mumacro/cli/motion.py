@@ -42,8 +42,8 @@ _SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N"}
 def read_terms(name: str, text: str) -> list[tuple[float, float, float]]:
     """Harmonic, amplitude [SI] and phase [degrees] of each part of ``text``.
 
-    >>> read_terms("y", "2um, 3:0.4um@90deg")
-    [(1.0, 2e-06, 0.0), (3.0, 4e-07, 90.0)]
+    >>> read_terms("y", "2um, 3:0.5um@90deg")
+    [(1.0, 2e-06, 0.0), (3.0, 5e-07, 90.0)]
     """
     terms = []
     for part in text.split(","):
