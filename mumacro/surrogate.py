@@ -4,6 +4,7 @@ its bound."""
 import functools
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, NoReturn, Self, overload
 
@@ -15,18 +16,9 @@ from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.contacts.quadrature import put_rules
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.frames import evaluate_labelled
-from mumacro.inputs.fields import (
-    FIELDS,
-    RAD_PER_CYCLE,
-    as_columns,
-    check_inputs,
-    length_scale,
-    picked,
-    real,
-)
-from mumacro.inputs.k_range import ENDS, as_ends, middle
+from mumacro.inputs.cases import ABSENT, NUMBERS, NUMBERS_AND_ARRAYS, Cases, by_name, labelled, real
+from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import (
-    AMPLITUDE,
     SPRING,
     ContactName,
     DirectionName,
@@ -34,7 +26,7 @@ from mumacro.inputs.kind import (
     kind_of,
 )
 from mumacro.kernel import slices
-from mumacro.kernel.arrays import Array
+from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.binding import Data, kernels
 from mumacro.kernel.threads import default_threads
 from mumacro.table import atlas
@@ -47,11 +39,9 @@ _KERNEL = kernels[-1]
 _ONE = kernels[:2][-1]  # a single point does not fill the widest registers; the bits are the same
 _RATIO = _ONE.ratio
 _CODES = {name: code for code, name in enumerate(atlas.QUANTITY_NAMES)}
-#: types of one real number, which take the short way
-_NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
-)
-_NUMBERS_OR_ARRAY, _FLOAT = _NUMBERS | {np.ndarray}, np.dtype(np.float64)
+_FLOAT = np.dtype(np.float64)
+#: effects of an illegal value in an array
+ILLEGAL = ("nan", "raise")
 
 
 class Surrogate:
@@ -249,7 +239,7 @@ class Surrogate:
         0.94200429
         """
         if type(v_tilde) is float is type(y_tilde) or (
-            type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS
+            type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS
         ):
             try:
                 mu: float = _RATIO(self._pointer, v_tilde, y_tilde)
@@ -388,7 +378,7 @@ class Surrogate:
         (0.012142, True, 5)
         """
         data, kind = self._with(name), kind_of(contact, direction)
-        if kind == SPRING and type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
+        if kind == SPRING and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
             try:
                 one = _ONE.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
                 if one[2] >= 0:
@@ -415,55 +405,64 @@ class Surrogate:
     @overload
     def evaluate(
         self,
+        cases: None = ...,
+        /,
         *,
         mu0: float,
         Fz: float,
         k: float | Literal["rigid"],
-        y0: float,
-        v0: float,
+        y0: float = ...,
+        Fz_amplitude: float = ...,
         omega: float = ...,
         f: float = ...,
-        gradient: Literal[True],
-        groups: bool = ...,
-        illegal: str = ...,
+        v0: float,
         contact: ContactName = ...,
         direction: DirectionName = ...,
+        gradient: Literal[True],
+        groups: bool = ...,
+        illegal: Literal["nan", "raise"] = ...,
     ) -> AnswerWithGradient[float]: ...
 
     @overload
     def evaluate(
         self,
+        cases: None = ...,
+        /,
         *,
         mu0: float,
         Fz: float,
         k: float | Literal["rigid"],
-        y0: float,
-        v0: float,
+        y0: float = ...,
+        Fz_amplitude: float = ...,
         omega: float = ...,
         f: float = ...,
-        gradient: Literal[False] = ...,
-        groups: bool = ...,
-        illegal: str = ...,
+        v0: float,
         contact: ContactName = ...,
         direction: DirectionName = ...,
+        gradient: Literal[False] = ...,
+        groups: bool = ...,
+        illegal: Literal["nan", "raise"] = ...,
     ) -> Answer[float]: ...
 
     @overload
     def evaluate(
         self,
+        cases: None = ...,
+        /,
         *,
         mu0: float,
         Fz: float,
         k_range: tuple[float, float],
-        y0: float,
-        v0: float,
+        y0: float = ...,
+        Fz_amplitude: float = ...,
         omega: float = ...,
         f: float = ...,
-        gradient: bool = ...,
-        groups: bool = ...,
-        illegal: str = ...,
+        v0: float,
         contact: ContactName = ...,
         direction: DirectionName = ...,
+        gradient: bool = ...,
+        groups: bool = ...,
+        illegal: Literal["nan", "raise"] = ...,
     ) -> IntervalAnswer[float]: ...
 
     @overload
@@ -472,12 +471,22 @@ class Surrogate:
         cases: Mapping[str, Any] = ...,
         /,
         *,
-        gradient: Literal[True],
-        groups: bool = ...,
-        illegal: str = ...,
+        mu0: ArrayLike = ...,
+        Fz: ArrayLike = ...,
+        k: ArrayLike = ...,
+        k_range: ArrayLike = ...,
+        k_low: ArrayLike = ...,
+        k_high: ArrayLike = ...,
+        y0: ArrayLike = ...,
+        Fz_amplitude: ArrayLike = ...,
+        omega: ArrayLike | None = ...,
+        f: ArrayLike | None = ...,
+        v0: ArrayLike = ...,
         contact: ContactName = ...,
         direction: DirectionName = ...,
-        **inputs: ArrayLike | None,
+        gradient: Literal[True],
+        groups: bool = ...,
+        illegal: Literal["nan", "raise"] = ...,
     ) -> AnswerWithGradient[Array]: ...
 
     @overload
@@ -486,12 +495,22 @@ class Surrogate:
         cases: Mapping[str, Any] = ...,
         /,
         *,
-        gradient: Literal[False] = ...,
-        groups: bool = ...,
-        illegal: str = ...,
+        mu0: ArrayLike = ...,
+        Fz: ArrayLike = ...,
+        k: ArrayLike = ...,
+        k_range: ArrayLike = ...,
+        k_low: ArrayLike = ...,
+        k_high: ArrayLike = ...,
+        y0: ArrayLike = ...,
+        Fz_amplitude: ArrayLike = ...,
+        omega: ArrayLike | None = ...,
+        f: ArrayLike | None = ...,
+        v0: ArrayLike = ...,
         contact: ContactName = ...,
         direction: DirectionName = ...,
-        **inputs: ArrayLike | None,
+        gradient: Literal[False] = ...,
+        groups: bool = ...,
+        illegal: Literal["nan", "raise"] = ...,
     ) -> Answer[Array]: ...
 
     @overload
@@ -500,47 +519,81 @@ class Surrogate:
         cases: Any = ...,
         /,
         *,
+        mu0: Any = ...,
+        Fz: Any = ...,
+        k: Any = ...,
+        k_range: Any = ...,
+        k_low: Any = ...,
+        k_high: Any = ...,
+        y0: Any = ...,
+        Fz_amplitude: Any = ...,
+        omega: Any = ...,
+        f: Any = ...,
+        v0: Any = ...,
+        contact: str = ...,
+        direction: str = ...,
         gradient: bool = ...,
         groups: bool = ...,
         illegal: str = ...,
-        contact: ContactName = ...,
-        direction: DirectionName = ...,
-        **inputs: Any,
     ) -> Any: ...
 
-    def evaluate(  # type: ignore[misc]  # mypy does not match named inputs with **inputs
+    def evaluate(
         self,
         cases: Any = None,
         /,
         *,
+        mu0: Any = ABSENT,
+        Fz: Any = ABSENT,
+        k: Any = ABSENT,
+        k_range: Any = ABSENT,
+        k_low: Any = ABSENT,
+        k_high: Any = ABSENT,
+        y0: Any = ABSENT,
+        Fz_amplitude: Any = ABSENT,
+        omega: Any = ABSENT,
+        f: Any = ABSENT,
+        v0: Any = ABSENT,
+        contact: str = "spring",
+        direction: str = "across",
         gradient: bool = False,
         groups: bool = False,
         illegal: str = "nan",
-        contact: str = "spring",
-        direction: str = "across",
-        **inputs: Any,
+        **unknown: Any,
     ) -> Any:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
         Parameters
         ----------
         cases : mapping, DataFrame (pandas, Dask, Polars), pyarrow.Table or xarray.Dataset, optional
-            The inputs by name, in place of keywords; other columns are ignored.
+            The inputs by name, in place of keywords or beside them; other columns are ignored.
         mu0 : array_like
             Coulomb friction coefficient [-], > 0.
         Fz : array_like
             Normal force [N], > 0.
-        k : array_like
+        k : array_like or "rigid"
             Tangential stiffness [N/m], > 0; "rigid" or infinity is rigid contact, eq. (37).  It
-            must always be given.
+            must always be given, here or as an interval: None is refused.
+        k_range : pair of array_like
+            Lowest and highest stiffness [N/m] in place of k.
+        k_low, k_high : array_like
+            The same as two columns.
         y0 : array_like
-            Amplitude of the transverse oscillation [m], >= 0.
+            Amplitude of the oscillation [m], >= 0, across or along the sliding direction.
+        Fz_amplitude : array_like
+            Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction
+            is "normal".
         omega : array_like
             Angular frequency [rad/s], >= 0; or
         f : array_like
             frequency [Hz], >= 0, in its place.
         v0 : array_like
             Sliding speed [m/s], >= 0.
+        contact : str
+            "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip
+            is k = 8 a G*.
+        direction : str
+            "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the
+            force is Fz + Fz_amplitude cos(omega t), for a spring only.
         gradient : bool
             Also differentiate with respect to every input, with bounds.
         groups : bool
@@ -549,18 +602,8 @@ class Surrogate:
         illegal : str
             Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case,
             "raise" raises.
-        contact : str
-            "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip
-            is k = 8 a G*.
-        direction : str
-            "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the
-            force is Fz + Fz_amplitude cos(omega t), for a spring only.
-        Fz_amplitude : array_like
-            Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction
-            is "normal".
-        k_range : pair of array_like
-            Lowest and highest stiffness [N/m] in place of k; or two columns, ``k_low`` and
-            ``k_high``.
+        **unknown
+            Other names are refused.
 
         Returns
         -------
@@ -592,48 +635,122 @@ class Surrogate:
         >>> a.mu_macro_low < a.mu_macro < a.mu_macro_high
         True
         """
-        if contact != "spring" or direction != "across":
-            return self._evaluate(
-                cases, inputs, gradient, groups, illegal, kind_of(contact, direction)
+        if (
+            cases is None
+            and k_range is k_low is k_high is Fz_amplitude is ABSENT
+            and (f is ABSENT or omega is ABSENT)
+            and contact == "spring"
+            and direction == "across"
+            and illegal in ILLEGAL
+            and not unknown
+        ):
+            # the usual kind in plain numbers and arrays takes a short way, which saves most of the
+            # time of a call: its names are those of the columns; what is refused goes the long one
+            types = {*map(type, (mu0, Fz, k, y0, omega if f is ABSENT else f, v0))}
+            if types <= NUMBERS:
+                with suppress(OverflowError):  # a whole number beyond double range
+                    angular = omega if f is ABSENT else RAD_PER_CYCLE * float(f)
+                    one = self._one((mu0, Fz, k, y0, angular, v0), gradient)
+                    if one.source_code >= 0:
+                        return one
+            elif types <= NUMBERS_AND_ARRAYS:
+                columns = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "v0": v0}
+                columns |= {"omega": omega} if f is ABSENT else {"f": f}
+                return self.answer(Cases.of(columns, SPRING, illegal == "raise"), gradient, groups)
+        kind = kind_of(contact, direction)
+        if illegal not in ILLEGAL:
+            raise InputError("illegal", illegal, '"nan" or "raise"')
+        if unknown:
+            name = min(unknown)
+            raise InputError(name, unknown[name], f"one of {', '.join(kind.fields)} or f")
+        said = {
+            "mu0": mu0,
+            "Fz": Fz,
+            "k": k,
+            "k_range": k_range,
+            "k_low": k_low,
+            "k_high": k_high,
+            "y0": y0,
+            "Fz_amplitude": Fz_amplitude,
+            "omega": omega,
+            "f": f,
+            "v0": v0,
+        }
+        inputs = by_name(cases, {name: x for name, x in said.items() if x is not ABSENT}, kind)
+        if labelled(cases, inputs):
+            options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
+            return evaluate_labelled(
+                self.evaluate,
+                self.on_one_thread().evaluate,
+                functools.partial(self._certain, kind=kind),
+                cases,
+                inputs,
+                kind,
+                "k_low" in inputs,
+                options,
             )
-        six = _six(inputs) if cases is None and len(inputs) == 6 else None
-        if six is not None and illegal in ("nan", "raise"):
-            kinds = set(map(type, six))
-            if kinds <= _NUMBERS:
-                answer: Any = self._one(six, gradient)
-                if answer is not None:
-                    return answer
-            elif illegal == "nan" and kinds <= _NUMBERS_OR_ARRAY:
-                arrays = [x for x in six if type(x) is np.ndarray]
-                if (
-                    len({x.shape for x in arrays}) == 1
-                    and arrays[0].ndim
-                    and {x.dtype for x in arrays} == {_FLOAT}
-                ):
-                    return self._arrays(six, arrays[0].shape, gradient, gradient or groups)
-        return self._evaluate(cases, inputs, gradient, groups, illegal)
+        return self.answer(Cases.of(inputs, kind, illegal == "raise"), gradient, groups)
 
-    def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
-        """The answer to one case; None where it is illegal."""
-        try:
-            found = _ONE.one(self._pointer, six, 19 if gradient else 7)
-        except OverflowError:  # a whole number beyond double range
-            return None
-        if found[6] < 0.0:
-            return None
-        kind: type[Answer[float]] = AnswerWithGradient if gradient else Answer
-        answer = kind(
-            found[0],
-            found[1],
-            found[2],
-            int(found[6]),
-            (found[3], found[4], found[5]),
-            self._certain,
+    def answer(self, cases: Cases, gradient: bool = False, groups: bool = False) -> Answer[Any]:
+        """:meth:`evaluate` of cases in their one form."""
+        kind, columns, shape = cases.kind, cases.columns, cases.shape or (1,)
+        if not cases.shape and kind == SPRING and cases.ends is None:
+            return self._one([*columns.values()], gradient)
+        groups = groups or gradient or not cases.shape
+        found, source = slices.cases(
+            self._data_of(kind),
+            [*columns.values()],
+            math.prod(shape),
+            self.threads,
+            17 if gradient else 5 if groups else 3,
+            kind,
+        )
+        rows, codes = found.reshape(len(found), *shape), source.reshape(shape)
+        answer: Answer[Any] = (
+            IntervalAnswer if cases.ends else AnswerWithGradient if gradient else Answer
+        )(rows[0], rows[1], rows[2], codes)
+        if groups:
+            length = np.where(source == -1, np.nan, cases.length_scale()).reshape(shape)
+            answer._groups = rows[3], rows[4], length
+            answer._certain = (
+                self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
+            )
+        if gradient:
+            answer.gradient = dict(zip(kind.fields, rows[5:11], strict=True))
+            answer.gradient_bound = dict(zip(kind.fields, rows[11:], strict=True))
+        if isinstance(answer, IntervalAnswer):
+            self._add_extremes(answer, cases)
+        return answer if cases.shape else single(answer)
+
+    def _one(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
+        """The answer to one case of the usual kind; NaN where it is illegal."""
+        row = _ONE.one(self._pointer, six, 19 if gradient else 7)
+        answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
+            row[0], row[1], row[2], int(row[6]), (row[3], row[4], row[5]), self._certain
         )
         if gradient:
-            answer.gradient = dict(zip(FIELDS, found[7:13], strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, found[13:], strict=True))
+            answer.gradient = dict(zip(FIELDS, row[7:13], strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, row[13:], strict=True))
         return answer
+
+    def _add_extremes(self, answer: IntervalAnswer[Array], cases: Cases) -> None:
+        """Add to the answer for the middle of an interval of k the extremes over it."""
+        shape, legal = answer.mu_macro.shape, answer.source_code != -1
+        # NaN where they are no interval, so that the kernel has no answer either
+        first, last = (
+            np.where(np.isnan(cases.columns["k"]), np.nan, end) for end in cases.ends or ()
+        )
+        rows = slices.intervals(
+            self._data_of(cases.kind),
+            [*{**cases.columns, "k": first}.values()],
+            last,
+            self.threads,
+            cases.kind,
+        )
+        low, high, bound = (row.reshape(shape) for row in rows)
+        answer.error_bound = np.maximum(answer.error_bound, bound)
+        answer.mu_macro_low = np.where(legal, np.minimum(low, answer.mu_macro), np.nan)
+        answer.mu_macro_high = np.where(legal, np.maximum(high, answer.mu_macro), np.nan)
 
     def evaluate_case(
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
@@ -644,145 +761,6 @@ class Surrogate:
             self._pointer, (mu0, Fz, k, y0, omega, v0), 7
         )
         return mu_macro, mu_ratio, bound, int(source)
-
-    def _evaluate(
-        self,
-        cases: Any,
-        inputs: dict[str, Any],
-        gradient: bool,
-        groups: bool,
-        illegal: str,
-        kind: Kind = SPRING,
-    ) -> Any:
-        if illegal not in ("nan", "raise"):
-            raise InputError("illegal", illegal, '"nan" or "raise"')
-        unknown = inputs.keys() - {*FIELDS, "f", AMPLITUDE, "k_range", *ENDS}
-        if unknown:
-            raise InputError(
-                min(unknown), inputs[min(unknown)], f"one of {', '.join(kind.fields)} or f"
-            )
-        if cases is not None:
-            found = picked("cases", cases, (*kind.columns, *ENDS))
-            if twice := found.keys() & inputs.keys():
-                raise InputError(
-                    min(twice), inputs[min(twice)], "given once: in the cases or as a keyword"
-                )
-            inputs = {**found, **inputs}
-        inputs = kind.as_six({name: _from_arrow(x) for name, x in inputs.items()})
-        interval = not inputs.keys().isdisjoint(("k_range", *ENDS))
-        if interval:
-            inputs = as_ends(inputs)
-        if _labelled(inputs, cases):
-            options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
-            return evaluate_labelled(
-                self.evaluate,
-                self.on_one_thread().evaluate,
-                functools.partial(self._certain, kind=kind),
-                cases,
-                kind.as_given(inputs),
-                kind,
-                interval,
-                options,
-            )
-        try:
-            return self._plain(inputs, gradient, groups, illegal, kind, interval)
-        except InputError as error:
-            raise kind.refused(error) from error.__cause__
-
-    def _plain(
-        self,
-        inputs: dict[str, Any],
-        gradient: bool,
-        groups: bool,
-        illegal: str,
-        kind: Kind,
-        interval: bool,
-    ) -> Answer[Any]:
-        """The answer to inputs without labels, the amplitude by the name y0."""
-        ends = None
-        if interval:
-            *ends, between = middle(inputs, illegal)
-            inputs = {name: x for name, x in inputs.items() if name not in ENDS} | {"k": between}
-        columns = as_columns(inputs)
-        try:
-            shape = _common_shape([*columns.values()])
-        except ValueError as error:
-            shapes = {name: column.shape for name, column in columns.items()}
-            raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
-        if not shape or illegal == "raise":
-            check_inputs(columns, inputs.get("f"))
-            if kind.normal:
-                kind.check_lift_off(columns["y0"], columns["Fz"])
-        if not shape and kind == SPRING and ends is None:
-            one: Any = self._one(tuple(float(column) for column in columns.values()), gradient)
-            return one  # type: ignore[no-any-return]  # legal, so it is no None
-        answer = self._arrays(
-            [*columns.values()], shape or (1,), gradient, gradient or groups or not shape, kind
-        )
-        if ends is not None:
-            answer = self._with_extremes(answer, columns, ends, kind)
-        return answer if shape else single(answer)
-
-    def _arrays(
-        self,
-        columns: Sequence[Any],
-        shape: tuple[int, ...],
-        gradient: bool,
-        groups: bool,
-        kind: Kind = SPRING,
-    ) -> Answer[Array]:
-        found, source = slices.cases(
-            self._data_of(kind),
-            [_flat_or_one(column, shape) for column in columns],
-            math.prod(shape),
-            self.threads,
-            17 if gradient else 5 if groups else 3,
-            kind,
-        )
-        rows = found.reshape(len(found), *shape)
-        answer: Answer[Array] = (AnswerWithGradient if gradient else Answer)(
-            rows[0], rows[1], rows[2], source.reshape(shape)
-        )
-        if groups:
-            length = np.where(answer.source_code == -1, np.nan, length_scale(*columns[:3]))
-            answer._groups = rows[3], rows[4], length
-            answer._certain = (
-                self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
-            )
-        if gradient:
-            answer.gradient = dict(zip(kind.fields, rows[5:11], strict=True))
-            answer.gradient_bound = dict(zip(kind.fields, rows[11:], strict=True))
-        return answer
-
-    def _with_extremes(
-        self, answer: Answer[Array], columns: dict[str, Array], ends: Sequence[Array], kind: Kind
-    ) -> IntervalAnswer[Array]:
-        """``answer`` for the middle of an interval of k, and the extremes over it."""
-        shape = answer.mu_macro.shape
-        first, last = ends
-        low, high, bound = slices.intervals(
-            self._data_of(kind),
-            [_flat_or_one(column, shape) for column in {**columns, "k": first}.values()],
-            _flat(last, shape),
-            self.threads,
-            kind,
-        )
-        out: IntervalAnswer[Array] = IntervalAnswer(
-            answer.mu_macro,
-            answer.mu_ratio,
-            np.maximum(answer.error_bound, bound.reshape(shape)),
-            answer.source_code,
-            answer._groups,
-            answer._certain,
-        )
-        if answer.gradient is not None and answer.gradient_bound is not None:
-            out.gradient, out.gradient_bound = answer.gradient, answer.gradient_bound
-        legal = answer.source_code != -1
-        out.mu_macro_low = np.where(legal, np.minimum(low.reshape(shape), answer.mu_macro), np.nan)
-        out.mu_macro_high = np.where(
-            legal, np.maximum(high.reshape(shape), answer.mu_macro), np.nan
-        )
-        return out
 
     def _data_of(self, kind: Kind) -> Data:
         """What the kernel reads; a ball needs rules of quadrature."""
@@ -858,40 +836,6 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
     return found
 
 
-def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
-    """The six inputs by name, omega from f; None where one of them is missing."""
-    try:
-        return (
-            inputs["mu0"],
-            inputs["Fz"],
-            inputs["k"],
-            inputs["y0"],
-            inputs["omega"] if "omega" in inputs else inputs["f"] * RAD_PER_CYCLE,
-            inputs["v0"],
-        )
-    except (KeyError, TypeError, OverflowError):
-        return None
-
-
-_PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
-
-
-def _labelled(inputs: Mapping[str, Any], cases: Any) -> bool:
-    """Whether labels or chunks are to be kept."""
-    return any(_labels(x) for x in (cases, *inputs.values()) if type(x) not in _PLAIN)
-
-
-def _labels(x: Any) -> bool:
-    return type(x).__module__.partition(".")[0] in ("pandas", "xarray", "dask")
-
-
-def _from_arrow(x: Any) -> Any:
-    """A column of Arrow, Polars or another library with Arrow's interface as an array, NaN where it
-    is null."""
-    arrow = hasattr(type(x), "__arrow_c_stream__") or hasattr(type(x), "__arrow_c_array__")
-    return np.asarray(x) if arrow and not _labels(x) else x
-
-
 def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
     """The error of a single point; ``bound`` is that of y~."""
     return (
@@ -901,8 +845,8 @@ def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
     )
 
 
-def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    return flat.reshape(shape) if shape else flat[0].item()
+def _shaped(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    return values.reshape(shape) if shape else values[0].item()
 
 
 def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
@@ -912,32 +856,9 @@ def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
     else:
         v, y = real("v_tilde", v_tilde), real("y_tilde", y_tilde)
     try:
-        shape = _common_shape((v, y))
+        shape = common_shape((v, y))
     except ValueError as error:
         raise InputError(
             "y_tilde", y.shape, f"of a shape that broadcasts with that of v_tilde, {v.shape}"
         ) from error
-    return _flat(v, shape), _flat(y, shape), shape
-
-
-def _common_shape(arrays: Sequence[Array]) -> tuple[int, ...]:
-    """The shape to which arrays broadcast; ValueError where they do not."""
-    shapes = {array.shape for array in arrays} - {()}
-    return np.broadcast_shapes(*shapes) if len(shapes) > 1 else shapes.pop() if shapes else ()
-
-
-def _contiguous(a: Array) -> Array:
-    """``a`` as the kernel wants it: contiguous, aligned float64."""
-    return a if a.flags.carray and a.dtype == np.float64 else np.require(a, np.float64, ["C", "A"])
-
-
-def _flat_or_one(a: Any, shape: tuple[int, ...]) -> Array | float:
-    """As :func:`_flat`; a value that holds for all cases stays one value."""
-    if type(a) is not np.ndarray:
-        return float(a)
-    return float(a.item()) if a.size == 1 else _flat(a, shape)
-
-
-def _flat(a: Array, shape: tuple[int, ...]) -> Array:
-    """``a`` broadcast to ``shape``, flat and contiguous."""
-    return _contiguous(a if a.shape == shape else np.broadcast_to(a, shape)).reshape(-1)
+    return flat(v, shape), flat(y, shape), shape

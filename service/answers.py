@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from mumacro import Surrogate
+from mumacro.inputs.cases import middle
 from mumacro.inputs.fields import FIELDS
-from mumacro.inputs.k_range import middle
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
@@ -273,7 +273,7 @@ def _evaluated(
     if include:
         if asked.interval:
             cases = {name: cases[name] for name in asked.kind.fields if name != "k"} | {
-                "k": middle(cases, "nan")[2]
+                "k": middle(cases)[2]
             }
         known = Cases(surrogate, cases, found, wanted.std, asked.kind)
         more += [column for name in include for column in QUANTITIES[name].compute(known)]

@@ -21,14 +21,13 @@ from mumacro.inputs.fields import (
     RAD_PER_CYCLE,
     RIGID,
     is_rigid,
-    number_hint,
     refusal,
-    unknown_name,
 )
 from mumacro.inputs.fields import NAMES as INPUTS
 from mumacro.inputs.k_range import BOUND, ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING
 from mumacro.inputs.kind import Kind as ContactKind
+from mumacro.inputs.units import number_hint, unknown_name
 from mumacro.kernel.arrays import Array
 
 from .problems import FieldFault, Kind, RequestError, refuse

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
-from mumacro.inputs.fields import BOUNDS, LIKE, POSITIVE, RAD_PER_CYCLE, UNITS_OF, Scale, unit_of
+from mumacro.inputs.fields import BOUNDS, LIKE, POSITIVE, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.surrogate import Surrogate
 
 #: the content security policy of the page: no inline script, no inline style, nothing from another

@@ -20,8 +20,9 @@ from starlette.responses import Response
 from starlette.types import Scope
 
 from mumacro.errors import InputError, MumacroError, TableError
-from mumacro.inputs.fields import BOUNDS, number_hint, unknown_name
+from mumacro.inputs.fields import BOUNDS
 from mumacro.inputs.fields import NAMES as INPUTS
+from mumacro.inputs.units import number_hint, unknown_name
 
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80

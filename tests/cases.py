@@ -53,11 +53,8 @@ def as_kind(
     """The keywords of a pair, its fields, and ``case`` with Fz_amplitude = ``share`` Fz where the
     pair has it."""
     kind = kind_of(*pair)
-    return (
-        kind.names,
-        kind.fields,
-        kind.as_given({**case, "y0": share * case["Fz"]} if kind.normal else case),
-    )
+    amplitude = {"Fz_amplitude": share * case["Fz"]} if kind.normal else {"y0": case["y0"]}
+    return kind.names, kind.fields, {**without(case, "y0"), **amplitude}
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:

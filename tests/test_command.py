@@ -17,7 +17,8 @@ from mumacro import Surrogate, fit
 from mumacro.analysis.validity import model_rows
 from mumacro.cli.main import COMMANDS, main
 from mumacro.contacts.geometries import GEOMETRIES, contact_of
-from mumacro.inputs.fields import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
+from mumacro.inputs.fields import NAMES, SI
+from mumacro.inputs.units import UNITS_OF, read_number, scale_of, split_unit, suggestion
 from tests.cases import Capture, Case
 from tests.comparing import close
 

@@ -1,6 +1,7 @@
 """From SI inputs to dimensionless groups: legal values, messages for illegal values, and the ends
 of the range."""
 
+import inspect
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -244,6 +245,37 @@ def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
             index,
             repr(bad),
         )
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.int16, int])
+def test_a_frequency_of_few_digits_is_taken_as_it_stands(table: Surrogate, kind: Any) -> None:
+    """omega = 2 pi f is a double whatever the type of f, alone as in an array."""
+    rest, frequency = without(CASE, "omega"), kind(20_000)
+    alone = table.evaluate(**rest, f=frequency)
+    assert alone.mu_macro == table.evaluate(**rest, f=float(frequency)).mu_macro
+    assert alone.mu_macro == table.evaluate(**rest, f=np.array([frequency])).mu_macro[0]
+
+
+def test_a_whole_number_beyond_double_range_is_refused_beside_arrays(table: Surrogate) -> None:
+    for name in ("mu0", "k", "omega"):
+        with pytest.raises(InputError) as caught:
+            table.evaluate(**{**CASE, name: 10**400, "v0": np.array([0.01, 0.02])})
+        assert caught.value.field == name
+
+
+def test_the_index_of_an_illegal_value_is_that_of_its_case(table: Surrogate) -> None:
+    force = np.array([[10.0], [-1.0]])
+    for v0, case in (([0.01, 0.02, 0.03], 3), (0.01, 1)):
+        with pytest.raises(InputError) as caught:
+            table.evaluate(**{**CASE, "Fz": force, "v0": v0}, illegal="raise")
+        assert (caught.value.field, caught.value.value, caught.value.index) == ("Fz", -1.0, case)
+
+
+def test_every_input_is_named_in_the_signature(table: Surrogate) -> None:
+    named = inspect.signature(table.evaluate).parameters
+    for name in (*FIELDS, "f", "Fz_amplitude", "k_range", "k_low", "k_high"):
+        assert named[name].kind is inspect.Parameter.KEYWORD_ONLY
+        assert repr(named[name].default) == "left out"
 
 
 def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> None:

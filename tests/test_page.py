@@ -15,8 +15,8 @@ from starlette.testclient import TestClient
 
 from mumacro import Surrogate
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
-from mumacro.inputs.fields import UNITS_OF
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
+from mumacro.inputs.units import UNITS_OF
 from service.app import create_app
 from service.settings import Settings
 from tests.browser import START

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from mumacro import plotting
 from mumacro.analysis.measured_points import HARDLY, STD, UNKNOWNS, Measured
 from mumacro.errors import InputError, missing
-from mumacro.inputs.fields import real
+from mumacro.inputs.cases import real
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 

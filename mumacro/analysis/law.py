@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from mumacro import plotting
 from mumacro.analysis.borders import Crossing, border_crossings
 from mumacro.analysis.load import Stiffening, stiffening_of
-from mumacro.analysis.sweep import Sweep, checked_case
+from mumacro.analysis.sweep import Sweep
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
-from mumacro.inputs.fields import FIELDS, POSITIVE, real
-from mumacro.inputs.k_range import without_interval
+from mumacro.inputs.cases import other_five, real, without_interval
+from mumacro.inputs.fields import FIELDS, POSITIVE
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
@@ -192,7 +192,7 @@ def law(
     kind = kind_of(contact, direction)
     one_k, ends = without_interval(case, along)
     one_k, stiffening = stiffening_of(one_k, along, kind, stiffness_exponent)
-    others = checked_case(one_k, along, kind)
+    others = other_five(one_k, along, kind)
     sweep = Sweep(surrogate, others, along, kind, stiffening)
     ends_of_range = float(x[0]), float(x[-1])
     border = border_crossings(
@@ -200,11 +200,11 @@ def law(
     )
     if refine:
         x = sweep.refined(np.union1d(x, [mark.value for mark in border]))
-    answer = sweep.answer(x, groups=True, illegal="raise")
+    answer = sweep.answer(x, groups=True, strict=True)
     if ends:
         interval = {**{name: one for name, one in others.items() if name != "k"}, **ends}
         over = Sweep(surrogate, interval, along, kind, stiffening)
-        answer = over.answer(x, groups=True, illegal="raise")
+        answer = over.answer(x, groups=True, strict=True)
     at_rest = sweep.answer(x, v0=0.0) if along != "v0" else sweep.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
     return Law(along, x, answer, mu_static, border, others, kind, sweep.stiffening)

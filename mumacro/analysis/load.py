@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import check_inputs, real
+from mumacro.inputs.cases import check, real
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import CONTACTS, Kind
 from mumacro.kernel.arrays import Array
@@ -97,6 +97,6 @@ def stiffening_of(
     loads = real("Fz", load)
     if loads.size != 1:
         raise InputError("Fz", load, "one number: the load at which k holds")
-    check_inputs({"Fz": loads})
+    check({"Fz": loads})
     rest = {name: value for name, value in case.items() if name != "Fz"}
     return rest, Stiffening(power, float(loads.item())) if power else None

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import NAMES, as_columns, check_inputs, picked, real, unknown_name
+from mumacro.inputs.cases import by_name, check, columns_of, picked, real
+from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
+from mumacro.inputs.units import unknown_name
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
@@ -55,7 +57,7 @@ class Measured:
             direction,
             surrogate,
         )
-        self.said = kind_of(contact, direction).names
+        self.kind = kind_of(contact, direction)
         self.amplitude = AMPLITUDE if direction == "normal" else "y0"
         self._read(self._given(data, fixed))
         self._check()
@@ -102,20 +104,12 @@ class Measured:
             for name in ("mu_macro", STD)
             if name in given
         }
-        six = {"y0": 0.0, **given, **dict.fromkeys(self.unknowns, 1.0)}
-        frequency, six = (
-            six.get("f"),
-            {n: x if x is None else np.asarray(x) for n, x in six.items() if n in NAMES},
-        )
-        if self.amplitude == "y0" and "y0" not in given:
-            raise InputError("y0", None, "given [m]")
-        columns = as_columns(six)
-        check_inputs(columns, frequency)
-        if self.amplitude != "y0":
-            if self.amplitude not in given:
-                raise InputError(self.amplitude, None, "given [N]")
-            columns[self.amplitude] = real(self.amplitude, np.asarray(given[self.amplitude]))
-            del columns["y0"]
+        # labels are not given back
+        values = {name: x if x is None else np.asarray(x) for name, x in given.items()}
+        inputs = by_name(None, {**values, **dict.fromkeys(self.unknowns, 1.0)}, self.kind)
+        numbers = columns_of(inputs, self.kind)
+        check(numbers, inputs.get("f"))
+        columns = {name: np.asarray(x, np.float64) for name, x in numbers.items()}
         whole = {**columns, **measured}
         lengths = {name: x.shape for name, x in whole.items() if x.ndim}
         if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in whole.values()):
@@ -174,7 +168,7 @@ class Measured:
         self, values: Mapping[str, float], columns: Mapping[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
         """mu_macro, and its slopes along the unknowns."""
-        inputs: dict[str, Any] = {**columns, **values, **self.said}
+        inputs: dict[str, Any] = {**columns, **values, **self.kind.names}
         found = self.surrogate.evaluate(**inputs, gradient=True)
         slopes = {
             name: np.nan_to_num(found.gradient[name], posinf=0.0, neginf=0.0)
@@ -191,7 +185,7 @@ class Measured:
         rows = {"k": k[:, None], "mu0": mu0[:, None]}
         inputs: dict[str, Any] = {
             **self.columns,
-            **self.said,
+            **self.kind.names,
             **{name: rows[name] for name in self.unknowns},
         }
         return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)

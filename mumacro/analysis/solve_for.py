@@ -40,11 +40,11 @@ from numpy.typing import ArrayLike
 
 from mumacro.analysis.load import Stiffening, stiffening_of
 from mumacro.analysis.rootfinding import TINY, Curve, curves_between, last_double, samples
-from mumacro.analysis.sweep import EVERYWHERE, Sweep, checked_case
+from mumacro.analysis.sweep import EVERYWHERE, Sweep
 from mumacro.answer import Answer
 from mumacro.errors import InputError
-from mumacro.inputs.fields import POSITIVE, real
-from mumacro.inputs.k_range import without_interval
+from mumacro.inputs.cases import other_five, real, without_interval
+from mumacro.inputs.fields import POSITIVE
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.surrogate import Surrogate
@@ -175,7 +175,7 @@ def solve_for(
         )
         return replace(middle, ends=(softest, stiffest))
     others, stiffening = stiffening_of(others, unknown, kind, stiffness_exponent)
-    sweep = Sweep(surrogate, checked_case(others, unknown, kind), unknown, kind, stiffening)
+    sweep = Sweep(surrogate, other_five(others, unknown, kind), unknown, kind, stiffening)
     levels = real("target", target).ravel()
     bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:

@@ -8,54 +8,13 @@ import numpy as np
 
 from mumacro.analysis.load import Stiffening
 from mumacro.answer import Answer
-from mumacro.errors import InputError
-from mumacro.inputs.fields import as_columns, check_inputs, unknown_name
-from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.cases import Cases
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
 _CHORD, _HALVINGS = 1e-3, 8  # of a refined sweep: error of a straight line over the height, rounds
-
-
-def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
-    """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an
-    infinite ``k`` is rigid.
-
-    ``f`` [Hz] may stand for ``omega`` [rad/s], the word ``rigid`` for an infinite ``k``.
-    """
-    if without not in kind.fields:
-        raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")
-    for name in ("k_range", *ENDS):
-        if case.get(name) is not None:
-            told = (
-                "left out: over an interval of k a target has an interval of roots; solve for "
-                "both ends of it"
-            )
-            raise InputError(name, case[name], told)
-    names = [*kind.columns, *({"y0", AMPLITUDE} - {*kind.columns})]
-    for name in case.keys() - {*names, *ENDS, "k_range"}:
-        bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
-        raise InputError(name, case[name], bound)
-    given = {
-        name: value for name, value in case.items() if value is not None or name == "k" != without
-    }
-    for name in given.keys() & ({"omega", "f"} if without == "omega" else {without}):
-        raise InputError(name, given[name], f"left out, because {without} is the unknown")
-    given = kind.as_six({**given, without: 1.0})
-    try:
-        six = as_columns(given)
-        columns = kind.as_given(six)
-        for name, column in columns.items():
-            if column.size != 1:
-                raise InputError(name, given.get(name, given.get("f")), "one number")
-        check_inputs(six, given.get("f"))
-        if kind.normal and without not in ("Fz", AMPLITUDE):
-            kind.check_lift_off(six["y0"], six["Fz"])
-    except InputError as error:
-        raise kind.refused(error) from error.__cause__
-    return {name: float(column.item()) for name, column in columns.items() if name != without}
 
 
 class Sweep:
@@ -76,14 +35,20 @@ class Sweep:
         self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
         self.stiffening = None if case.get("k") == math.inf else stiffening
 
-    def answer(self, x: Any, **more: Any) -> Answer[Any]:
-        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in
-        ``evaluate``."""
+    def answer(
+        self,
+        x: Any,
+        *,
+        gradient: bool = False,
+        groups: bool = False,
+        strict: bool = False,
+        **others: Any,
+    ) -> Answer[Any]:
+        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``others`` replace
+        inputs of the case.  InputError for a value out of bounds where ``strict``, else NaN."""
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
-        answer: Answer[Any] = self.surrogate.evaluate(
-            **{**self.case, **k, self.unknown: x, **self.kind.names, **more}
-        )
-        return answer
+        inputs = {**self.case, **k, self.unknown: x, **others}
+        return self.surrogate.answer(Cases.of(inputs, self.kind, strict), gradient, groups)
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""

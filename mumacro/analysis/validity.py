@@ -16,9 +16,9 @@ from mumacro.analysis.load import EXPONENTS, ROUGH, Stiffening
 from mumacro.analysis.measured_points import HARDLY
 from mumacro.analysis.settling import settling
 from mumacro.errors import InputError
-from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID, as_columns, length_scale
-from mumacro.inputs.k_range import without_interval
-from mumacro.inputs.kind import kind_of
+from mumacro.inputs.cases import Cases, by_name, without_interval
+from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
+from mumacro.inputs.kind import Kind, kind_of
 from mumacro.surrogate import Surrogate
 
 #: names of the rows, as in the table of docs/validity.md
@@ -68,14 +68,15 @@ def model_rows(
     >>> found["text"]
     'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
     """
-    case, ends = without_interval(case, "")
+    case, ends = without_interval(case)
     mu = surrogate.evaluate(**case, **kind_of(contact, direction).names).mu_macro
-    six = _six(case)
-    swing = case["Fz_amplitude"] if direction == "normal" else six["y0"]
+    kind = kind_of(contact, direction)
+    one = _one(case, kind)
+    six = {"y0": 0.0, **one}  # 0 for normal
+    swing = six.get("Fz_amplitude", six["y0"])
     if math.isinf(six["k"]) or six["omega"] == 0.0 or swing == 0.0:
         return []
-    # 0 for normal
-    y = six["y0"] / float(length_scale(*(np.array(six[name]) for name in ("mu0", "Fz", "k"))))
+    y = six["y0"] / float(Cases.of(one, kind).length_scale())
     if y > _FAR:
         text = f"y~ = {y:.3g}; contacts have 0.1 to 100: is y0 = {six['y0']:.3g} in metres?"
         return [{"row": "units", "text": text, "effect": None}]
@@ -137,8 +138,8 @@ def k_effect(
     if not 0.0 < known < math.inf:
         raise InputError("known", known, "finite and > 0")
     words = kind_of(contact, direction).names
-    one, ends = without_interval(case, "")
-    found = _six(one)["k"]
+    one, ends = without_interval(case)
+    found = _one(one, kind_of(contact, direction))["k"]
     if math.isinf(found):
         return 0.0
     if ends:
@@ -165,13 +166,13 @@ def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
     return min(max(math.ceil(-math.log10(uncertainty)) + 1, least), most)
 
 
-def _six(case: Mapping[str, Any]) -> dict[str, float]:
-    """The six inputs as numbers: omega from f, k infinite for a rigid contact, y0 = 0 where the
-    normal force swings."""
-    six = as_columns({"y0": 0.0, **case})
-    if any(x.ndim for x in six.values()):
-        raise InputError("case", {name: x.shape for name, x in six.items()}, "one case: numbers")
-    return {name: float(x) for name, x in six.items()}
+def _one(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
+    """The six inputs as numbers: omega from f, k infinite for a rigid contact."""
+    one = Cases.of(by_name(None, case, kind), kind)
+    if one.shape:
+        shapes = {name: np.shape(value) for name, value in case.items()}
+        raise InputError("case", shapes, "one case: numbers")
+    return {name: float(column) for name, column in one.columns.items()}
 
 
 def _kind(

@@ -20,19 +20,11 @@ import numpy as np
 from mumacro import plotting
 from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.fields import (
-    LIKE,
-    NAMES,
-    RAD_PER_CYCLE,
-    check_inputs,
-    read_number,
-    read_range,
-    scale_of,
-    suggestion,
-    unit_of,
-)
+from mumacro.inputs.cases import check, without_interval
+from mumacro.inputs.fields import LIKE, NAMES, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.text_tables import SEPARATORS
+from mumacro.inputs.units import read_number, read_range, scale_of, suggestion
 from mumacro.surrogate import Surrogate
 
 INPUTS = """\
@@ -220,7 +212,7 @@ def read_case(
             faults.append(f"{name} is given twice")
         case[name] = math.nan
         try:
-            case[name] = _read(name, text, kind, one_k)
+            case[name] = _read(name, text, one_k)
         except ValueError as error:
             faults.append(str(error))
     absent = {*optional} - case.keys()
@@ -230,7 +222,7 @@ def read_case(
     return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}
 
 
-def _read(name: str, text: str, kind: Kind, one_k: str) -> float | tuple[float, float]:
+def _read(name: str, text: str, one_k: str) -> float | tuple[float, float]:
     """The value of an input, or the ends of k; ValueError where it is none, or out of bounds."""
     if name == "k" and ".." in text:
         ends = read_range(name, text)
@@ -239,10 +231,7 @@ def _read(name: str, text: str, kind: Kind, one_k: str) -> float | tuple[float, 
         return ends
     value = read_number(name, text)
     field, in_model = ("omega", value * RAD_PER_CYCLE) if name == "f" else (name, value)
-    try:
-        check_inputs(kind.as_six({field: np.asarray(in_model)}), value if name == "f" else None)
-    except InputError as error:
-        raise kind.refused(error) from None
+    check({field: in_model}, value if name == "f" else None)
     return value
 
 
@@ -299,11 +288,8 @@ def without_or_load(unknown: str) -> dict[str, Any]:
 
 def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
     """A case with the geometric middle in place of an interval of k."""
-    found = dict(case)
-    if "k_range" in found:
-        low, high = found.pop("k_range")
-        found["k"] = math.sqrt(low) * math.sqrt(high)
-    return found
+    found, _ = without_interval(case)
+    return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in found.items()}
 
 
 def in_words(text: str, case: Mapping[str, Any]) -> str:

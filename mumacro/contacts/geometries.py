@@ -16,7 +16,8 @@ from mumacro.contacts.stiffness import (
     hertz_cylinder,
 )
 from mumacro.errors import InputError
-from mumacro.inputs.fields import UNITS_OF, Scale, read_quantity, real, unknown_name
+from mumacro.inputs.cases import real
+from mumacro.inputs.units import UNITS_OF, Scale, read_quantity, unknown_name
 
 
 class Argument(NamedTuple):

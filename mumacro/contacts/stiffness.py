@@ -43,7 +43,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import real
+from mumacro.inputs.cases import real
 
 SMALLEST, LARGEST = 1e-60, 1e60  # of numbers in SI: every product of them below is a double
 AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder

@@ -6,7 +6,6 @@ Columns that are named like a missing input are refused.
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -14,10 +13,12 @@ import pyarrow.compute as pc
 
 from mumacro.answer import BAND
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.fields import GAP, LIKE, SI, Scale, refusal, split_unit
+from mumacro.inputs.cases import Cases
+from mumacro.inputs.fields import GAP, LIKE, SI, refusal
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.text_tables import TOO_LARGE, absent, find_heads, meant_by, read_cell
+from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
@@ -170,9 +171,8 @@ def answer_columns(
     for name, (heading, scale) in places.items():
         given[heading], faults[name] = numbers(batch.column(heading), name, decimal)
         values[name] = _in_si(given[heading], scale, faults[name])
-    inputs: dict[str, Any] = {**values, **kind.names, "gradient": "d_mu_macro_d_mu0" in names}
-    with np.errstate(over="ignore"):  # omega of a frequency beyond double range, which is refused
-        found = surrogate.evaluate(**inputs)
+    cases = Cases.of(values, kind)
+    found = surrogate.answer(cases, gradient="d_mu_macro_d_mu0" in names)
     bad = found.source_code < 0
     mask = bad if bad.any() else None
     code = np.where(bad, 0, found.source_code).astype(np.int8)
@@ -194,9 +194,7 @@ def answer_columns(
     ]
     rejects = []
     for i in np.flatnonzero(bad).tolist():
-        name, why = _refused(
-            surrogate, {name: float(column[i]) for name, column in values.items()}, kind
-        )
+        name, why = _in_words(cases.reason(i))
         cell = batch.column(places[name][0])[i].as_py()
         rejects.append((i, name, None if cell is None else str(cell), faults[name].get(i, why)))
     return columns, rejects, given
@@ -253,17 +251,13 @@ def numbers(array: pa.Array, name: str, decimal: str = ".") -> tuple[Array, dict
     return found, faults
 
 
-def _refused(surrogate: Surrogate, row: Mapping[str, Any], kind: Kind) -> tuple[str, str]:
-    """The first input of a row that has no result, and why."""
-    try:
-        surrogate.evaluate(**row, **kind.names)
-    except InputError as error:
-        name = (
-            error.field
-            if error.field in row
-            else next((end for end in ENDS if math.isnan(row[end])), ENDS[0])
-        )
-        if math.isnan(row[name]):
-            return name, GAP if name == "k" else "is missing"
-        return name, refusal(name, row[name]) if name in SI else f"must be {error.bound}"
-    raise AssertionError(f"{row} has a result")
+def _in_words(error: InputError) -> tuple[str, str]:
+    """The input of a row that has no result, and why."""
+    name, value = error.field, error.value
+    if isinstance(value, tuple):  # of an interval the end that is missing, or the lower one
+        at = int(math.isnan(value[1]) and not math.isnan(value[0]))
+        name, value = ENDS[at], value[at]
+    number = float(value)  # type: ignore[arg-type]  # a number of the row
+    if math.isnan(number):
+        return name, GAP if name == "k" else "is missing"
+    return name, refusal(name, number) if name in SI else f"must be {error.bound}"

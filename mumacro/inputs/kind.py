@@ -9,14 +9,10 @@ Fz_amplitude cos(omega t).  The formulas are in ``kernel/contact.c`` and ``kerne
 here are the names.
 """
 
-from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
-
-import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.fields import FIELDS
-from mumacro.kernel.arrays import Array
 
 ContactName = Literal["spring", "ball"]
 DirectionName = Literal["across", "along", "normal"]
@@ -55,41 +51,6 @@ class Kind(NamedTuple):
     def columns(self) -> tuple[str, ...]:
         """What a table of cases may hold."""
         return (*self.fields, "f")
-
-    def check_lift_off(self, amplitude: Array, force: Array) -> None:
-        """Refuse an amplitude of the normal force that is not below it."""
-        bad = np.atleast_1d(~(amplitude < force))
-        if bad.any():
-            i = int(np.flatnonzero(bad.ravel())[0])
-            value = float(np.broadcast_to(amplitude, bad.shape).flat[i])
-            raise self.refused(
-                InputError("y0", value, "", i if np.ndim(amplitude) or np.ndim(force) else None)
-            )
-
-    def refused(self, error: InputError) -> InputError:
-        """``error`` by the name and the bound that the user knows."""
-        if not self.normal or error.field != "y0":
-            return error
-        bound = "given [N] for direction normal" if error.value is None else LIFTS_OFF
-        return InputError(AMPLITUDE, error.value, bound, error.index)
-
-    def as_six(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Inputs with the amplitude in the place of y0; InputError for one that does not belong to
-        the direction."""
-        wrong, right = ("y0", AMPLITUDE) if self.normal else (AMPLITUDE, "y0")
-        if wrong in inputs:
-            word = DIRECTIONS[self.direction]
-            raise InputError(
-                wrong, inputs[wrong], f"left out for direction {word}, whose amplitude is {right}"
-            )
-        return {"y0" if name == AMPLITUDE else name: value for name, value in inputs.items()}
-
-    def as_given(self, six: Mapping[str, Any]) -> dict[str, Any]:
-        """The inputs of :meth:`as_six` by the user's names."""
-        return {
-            AMPLITUDE if name == "y0" and self.normal else name: value
-            for name, value in six.items()
-        }
 
 
 SPRING = Kind(0, 0)

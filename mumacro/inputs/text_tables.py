@@ -6,17 +6,15 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from mumacro.inputs.fields import (
-    LIKE,
+from mumacro.inputs.fields import LIKE, is_rigid, unit_of
+from mumacro.inputs.units import (
     PLAIN,
     UNITS_OF,
     Scale,
-    is_rigid,
     number_hint,
     scale_of,
     split_unit,
     suggestion,
-    unit_of,
 )
 
 #: what may stand between the cells of CSV, by the word for it

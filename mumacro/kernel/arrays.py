@@ -1,4 +1,6 @@
-"""The types of arrays."""
+"""The types of arrays, and arrays as the kernel takes them: of one shape, flat and contiguous."""
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,3 +9,18 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Codes = NDArray[np.int8]  # of sources
 Places = NDArray[np.intp]
+
+
+def common_shape(arrays: Iterable[Array]) -> tuple[int, ...]:
+    """The shape to which arrays broadcast; ValueError where they do not."""
+    shapes = {array.shape for array in arrays} - {()}
+    return np.broadcast_shapes(*shapes) if len(shapes) > 1 else shapes.pop() if shapes else ()
+
+
+def flat(array: Array, shape: tuple[int, ...]) -> Array:
+    """``array`` broadcast to ``shape``, as flat, contiguous and aligned float64."""
+    if array.shape != shape:
+        array = np.broadcast_to(array, shape)
+    if not (array.flags.carray and array.dtype == np.float64):
+        array = np.require(array, np.float64, ["C", "A"])
+    return array if array.ndim == 1 else array.reshape(-1)

@@ -208,7 +208,7 @@ class Kernel:
             data.pointer, *kind, n, pointers, strides, _numbers(high), out, rows.shape[1]
         )
 
-    def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:
+    def one(self, pointer: Any, six: Sequence[float], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also
         slopes and bounds."""
         out, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six  # named: a call with *six takes longer

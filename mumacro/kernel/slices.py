@@ -88,12 +88,16 @@ def cases(
     """Answers to n cases, see :meth:`mumacro.kernel.binding.Kernel.cases`: rows (3, 5 or 17, n),
     and sources (n,)."""
     out, source = np.empty((rows, n)), np.empty(n, np.int8)
+    cost = COST if any(kind) else 1
+    if n <= SLICE // cost:  # most calls; the shorter way
+        _KERNEL.cases(data, n, columns, out, source, 0, kind)
+        return out, source
 
     def work(part: slice) -> None:
-        six = columns if part.stop - part.start == n else _slice(columns, part)
+        six = _slice(columns, part)
         _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start, kind)
 
-    share_out(n, threads, work, COST if any(kind) else 1)
+    share_out(n, threads, work, cost)
     return out, source
 
 

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.inputs.fields import LIKE, UNITS_OF, Scale, scale_of, split_unit
+from mumacro.inputs.fields import LIKE
 from mumacro.inputs.kind import Kind as ContactKind
+from mumacro.inputs.units import UNITS_OF, Scale, scale_of, split_unit
 
 from ..case import Columns, Reason, columns_of, numbers, too_large
 from ..options import kind_in

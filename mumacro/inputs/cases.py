@@ -1,0 +1,447 @@
+"""Cases in their one form: six columns of numbers by name, made once from whatever was asked.
+
+Keywords, a mapping, a data frame, Arrow columns, a row of a file or of JSON become names and values
+(:func:`by_name`), and these become :class:`Cases`.  Whoever asks the kernel asks with them.  Labels
+of pandas, xarray and Dask are taken off and put back by :mod:`mumacro.frames`, between the two
+steps.
+"""
+
+import enum
+import math
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from mumacro.errors import InputError
+from mumacro.inputs.fields import (
+    BOUNDS,
+    POSITIVE,
+    RAD_PER_CYCLE,
+    STIFFNESS,
+    UNITS,
+    is_rigid,
+    refusal,
+)
+from mumacro.inputs.k_range import BOUND, ENDS
+from mumacro.inputs.kind import AMPLITUDE, DIRECTIONS, LIFTS_OFF, SPRING, Kind
+from mumacro.inputs.units import unknown_name
+from mumacro.kernel.arrays import Array, common_shape, flat
+
+
+class Absent(enum.Enum):
+    """The default of an input.  None is no such default: it is a gap, and k has none."""
+
+    ABSENT = "left out"
+
+    def __repr__(self) -> str:
+        return self.value
+
+
+ABSENT: Final = Absent.ABSENT
+#: types of one real number
+NUMBERS = frozenset(
+    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
+)
+NUMBERS_AND_ARRAYS = NUMBERS | {np.ndarray}
+_UNLABELLED = NUMBERS_AND_ARRAYS | {list, tuple, type(None), dict, str}
+_FLOAT = np.dtype(np.float64)
+_AMPLITUDES = ("y0", AMPLITUDE)
+
+
+class Cases(NamedTuple):
+    """Cases of one kind, as the kernel takes them."""
+
+    kind: Kind
+    #: by the names of ``kind.fields`` and in their order: one number for all cases, or an array
+    #: (n,); k is infinite where rigid, and the geometric middle of an interval
+    columns: dict[str, float | Array]
+    #: of the inputs, broadcast: () for one case alone
+    shape: tuple[int, ...]
+    #: lowest and highest k of an interval, each (n,)
+    ends: tuple[Array, Array] | None = None
+    #: what was given as f [Hz], which reasons name in place of omega
+    frequency: Any = None
+
+    @classmethod
+    def of(cls, inputs: Mapping[str, Any], kind: Kind = SPRING, strict: bool = False) -> "Cases":
+        """Cases from inputs by name, see :func:`by_name`.
+
+        InputError where an input is missing, is no real number, or shapes do not broadcast.  A
+        value out of bounds is one where ``strict``, and for a case alone.
+
+        >>> inputs = dict(mu0=0.3, Fz=10.0, k="rigid", y0=[1e-6, 2e-6], omega=1e5, v0=0.01)
+        >>> cases = Cases.of(inputs)
+        >>> cases.shape, cases.columns["k"]
+        ((2,), inf)
+        """
+        low = high = ends = None
+        if "k_low" in inputs:
+            low, high, between = middle(inputs, strict)
+            inputs = {**inputs, "k": between}
+        columns = columns_of(inputs, kind)
+        arrays = {name: x for name, x in columns.items() if not isinstance(x, float)}
+        try:
+            shape = common_shape(arrays.values())
+        except ValueError as error:
+            shapes = {name: np.shape(column) for name, column in columns.items()}
+            raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
+        if strict or not shape:
+            check(columns, inputs.get("f"), shape)
+        for name, array in arrays.items():
+            columns[name] = flat(array, shape) if array.size != 1 else array.item()
+        if low is not None and high is not None:
+            ends = flat(low, shape or (1,)), flat(high, shape or (1,))
+        return cls(
+            kind,
+            columns,
+            shape,
+            ends,
+            inputs.get("f"),
+        )
+
+    @property
+    def size(self) -> int:
+        """How many cases."""
+        return math.prod(self.shape)
+
+    def reason(self, index: int) -> InputError:
+        """Why the case at ``index`` has no answer."""
+        case = {
+            name: column if isinstance(column, float) else float(column[index])
+            for name, column in self.columns.items()
+        }
+        if self.ends is not None and math.isnan(case["k"]):
+            return InputError("k_range", tuple(float(end[index]) for end in self.ends), BOUND)
+        f = None if self.frequency is None else real("f", self.frequency)
+        try:
+            check(
+                case, f if f is None else float(np.broadcast_to(f, self.shape or (1,)).flat[index])
+            )
+        except InputError as error:
+            return error
+        raise AssertionError(f"{case} has an answer")
+
+    def length_scale(self) -> Array:
+        """l0 = mu0 Fz / k [m], eq. (5), without overflow of mu0 Fz; 0 for rigid contact; (n,)."""
+        mu0, Fz, k = np.broadcast_arrays(*(self.columns[name] for name in ("mu0", "Fz", "k")))
+        with np.errstate(all="ignore"):
+            quotient = Fz / k
+            out = np.asarray(mu0 * quotient)
+            low, high = np.minimum(quotient, out), np.maximum(quotient, out)
+            odd = ~((low > 1e-290) & (high < 1e290))  # a partial result may have lost digits
+            if odd.any():
+                (a, i), (b, j), (c, n) = (np.frexp(x[odd]) for x in (mu0, Fz, k))
+                out[odd] = np.ldexp(a * (b / c), i + j - n)
+        return out
+
+
+# --- from what was asked to names and values ------------------------------------------------------
+
+
+def by_name(cases: Any, inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, Any]:
+    """The inputs of ``cases`` and those given by keyword, each once, by the names of ``kind``.
+
+    An interval of k is ``k_low`` and ``k_high``; columns of Arrow are arrays.  InputError for an
+    input given twice, an amplitude of another direction, k beside an interval of it.
+
+    >>> by_name({"mu0": 0.3, "note": "dry"}, {"k_range": (1e6, 2e6)})
+    {'mu0': 0.3, 'k_low': 1000000.0, 'k_high': 2000000.0}
+    """
+    found = dict(inputs)
+    if cases is not None:
+        columns = picked("cases", cases, (*kind.columns, *ENDS))
+        if twice := columns.keys() & inputs.keys():
+            name = min(twice)
+            raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
+        found = {**columns, **inputs}
+    right = _AMPLITUDES[kind.normal]
+    wrong = _AMPLITUDES[not kind.normal]
+    if wrong in found:
+        told = f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is {right}"
+        raise InputError(wrong, found[wrong], told)
+    if not found.keys().isdisjoint(("k_range", *ENDS)):
+        found = as_ends(found)
+    for name, value in found.items():
+        if type(value) not in _UNLABELLED and not library_of(value) and _of_arrow(value):
+            found[name] = np.asarray(value)  # NaN where it is null
+    return found
+
+
+def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset
+    has."""
+    # such as a reader of batches
+    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):
+        # its columns come from one reading: a second one may have another order
+        import pyarrow as pa
+
+        cases = pa.table(cases)
+    try:
+        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars
+        # have lists of names
+        there = (
+            cases
+            if hasattr(cases, "keys")
+            else getattr(cases, "column_names", None) or cases.columns
+        )
+        return {name: cases[name] for name in names if name in there}
+    except (AttributeError, TypeError, KeyError) as error:
+        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
+        raise InputError(
+            argument,
+            kind,
+            "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
+            "give anything else as {name: array}, what is lazy after its collect() or read_all()",
+        ) from error
+
+
+def _of_arrow(value: Any) -> bool:
+    """Whether a column comes from Arrow, Polars or another library with Arrow's interface."""
+    kind = type(value)
+    return hasattr(kind, "__arrow_c_stream__") or hasattr(kind, "__arrow_c_array__")
+
+
+def library_of(value: Any) -> str:
+    """The library whose labels or chunks a value has: pandas, xarray, dask; or nothing."""
+    name = type(value).__module__.partition(".")[0]
+    return name if name in ("pandas", "xarray", "dask") else ""
+
+
+def labelled(cases: Any, inputs: Mapping[str, Any]) -> bool:
+    """Whether there are labels to give back."""
+    values = (cases, *inputs.values())
+    return not _UNLABELLED.issuperset(map(type, values)) and any(map(library_of, values))
+
+
+def other_five(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
+    """The inputs of one case beside the unknown or swept one, by the names of ``kind.fields``; an
+    infinite ``k`` is rigid.
+
+    ``f`` may stand for ``omega``, what is None is left out.  InputError where one of the five is
+    missing, is not one legal number, or the unknown is there, too.
+    """
+    if unknown not in kind.fields:
+        raise InputError("unknown", unknown, f"one of {', '.join(kind.fields)}")
+    for name in ("k_range", *ENDS):
+        if case.get(name) is not None:
+            told = (
+                "left out: over an interval of k a target has an interval of roots; solve for "
+                "both ends of it"
+            )
+            raise InputError(name, case[name], told)
+    for name in case.keys() - {*kind.columns, *_AMPLITUDES, "k_range", *ENDS}:
+        bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
+        raise InputError(name, case[name], bound)
+    inputs = {
+        name: value for name, value in case.items() if value is not None or name == "k" != unknown
+    }
+    for name in inputs.keys() & ({"omega", "f"} if unknown == "omega" else {unknown}):
+        raise InputError(name, inputs[name], f"left out, because {unknown} is the unknown")
+    columns = columns_of(by_name(None, {**inputs, unknown: 1.0}, kind), kind)
+    for name, column in columns.items():
+        if np.size(column) != 1:
+            raise InputError(name, inputs.get(name, inputs.get("f")), "one number")
+    del columns[unknown]
+    check(columns, inputs.get("f"))
+    return {name: float(np.ravel(column)[0]) for name, column in columns.items()}
+
+
+# --- an interval of k -----------------------------------------------------------------------------
+
+
+def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Inputs with ``k_low`` and ``k_high`` for ``k_range``; InputError for k beside it, half an
+    interval, or what is no pair."""
+    found = dict(inputs)
+    if "k_range" in found:
+        if beside := [name for name in ("k", *ENDS) if name in found]:
+            raise InputError(beside[0], found[beside[0]], "left out beside k_range")
+        pair = found.pop("k_range")
+        try:
+            found["k_low"], found["k_high"] = pair
+        except (TypeError, ValueError) as error:
+            raise InputError("k_range", pair, BOUND) from error
+    if missing := [name for name in ENDS if name not in found]:
+        raise InputError(missing[0], None, "given [N/m] beside the other end of the interval")
+    if "k" in found:
+        raise InputError("k", found["k"], "left out beside an interval of it")
+    return found
+
+
+def middle(inputs: Mapping[str, Any], strict: bool = False) -> tuple[Array, Array, Array]:
+    """Both ends of an interval, and its geometric middle: NaN for what is none, or InputError where
+    ``strict`` and for one alone."""
+    low, high = (real(name, inputs[name]) for name in ENDS)
+    try:
+        shape = common_shape((low, high))
+    except ValueError as error:
+        raise InputError(
+            "k_range", (low.shape, high.shape), "of shapes that broadcast together"
+        ) from error
+    legal = (low > 0.0) & (low <= high) & (high < math.inf)
+    if not legal.all() and (strict or not legal.ndim):
+        i = int(np.flatnonzero(~legal)[0])
+        ends = tuple(float(np.broadcast_to(end, shape).flat[i]) for end in (low, high))
+        raise InputError("k_range", ends, BOUND, i if shape else None)
+    least, most = (np.where(legal, end, np.nan) for end in (low, high))
+    return low, high, np.asarray(np.clip(np.sqrt(least) * np.sqrt(most), least, most))
+
+
+def without_interval(
+    case: Mapping[str, Any], along: str = ""
+) -> tuple[Mapping[str, Any], dict[str, Any]]:
+    """A case with the middle stiffness, and the ends of an interval of it, if any; there is none
+    where k is swept."""
+    if all(case.get(name) is None for name in ("k_range", *ENDS)):
+        return case, {}
+    found = as_ends(case)
+    if along == "k":
+        raise InputError(
+            "k_range", (found["k_low"], found["k_high"]), "left out where k is the swept input"
+        )
+    between = middle(found, strict=True)[2]
+    ends = {name: found.pop(name) for name in ENDS}
+    return {**found, "k": between}, ends
+
+
+# --- from values to numbers -----------------------------------------------------------------------
+
+
+def columns_of(inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, float | Array]:
+    """The six inputs by the names of ``kind.fields``, each one number or an array of float64.
+
+    ``inputs`` has them by name, ``f`` [Hz] in place of ``omega`` if not None.  InputError where one
+    is missing, is given twice, or is no real number.
+    """
+    columns: dict[str, float | Array] = {}
+    for name in kind.fields:
+        source = _frequency_in(inputs) if name == "omega" else name
+        value = inputs.get(source, ABSENT)
+        if type(value) is not float:
+            value = _column(source, value)
+        if source == "f":
+            with np.errstate(over="ignore"):  # infinite, which is refused as a value of f
+                value = value * RAD_PER_CYCLE
+        columns[name] = value
+    return columns
+
+
+def _frequency_in(inputs: Mapping[str, Any]) -> str:
+    """Which of omega and f there is."""
+    both = inputs.get("omega") is not None
+    if both == (inputs.get("f") is not None):
+        told = "not both" if both else "one of them"
+        raise InputError("omega", inputs.get("omega"), f"given or f [Hz] in its place, {told}")
+    return "omega" if both else "f"
+
+
+def _column(name: str, value: Any) -> float | Array:
+    """A value of the input ``name`` as one number or an array of float64; InputError with the
+    remedy where it is none."""
+    if type(value) is np.ndarray and value.dtype == _FLOAT:
+        return value if value.ndim else float(value)
+    if value is ABSENT or (name == AMPLITUDE and value is None):
+        hint = f" [{UNITS.get(name, 'N')}]"
+        hint = (
+            f": {STIFFNESS}"
+            if name == "k"
+            else hint + " for direction normal" * (name == AMPLITUDE)
+        )
+        raise InputError(name, None, f"given{hint}")
+    if type(value) in NUMBERS:
+        with suppress(OverflowError):  # a whole number beyond double range is refused below
+            return float(value)
+    try:
+        array = real(name, value)
+    except InputError as error:
+        if name == AMPLITUDE:
+            raise InputError(name, value, LIFTS_OFF) from error.__cause__
+        if name != "k":
+            raise
+        array = _stiffness(value)
+    return array if array.ndim else float(array)
+
+
+def _stiffness(value: Any) -> Array:
+    """A stiffness, or an array of them, which may say ``rigid``; InputError with the remedy for a
+    gap."""
+    try:
+        return real("k", _rigid_as_infinity(value))
+    except InputError as error:
+        raise InputError("k", value, STIFFNESS) from error
+
+
+def _rigid_as_infinity(value: Any) -> Any:
+    """A stiffness, or an array of them, with infinity for the word ``rigid``."""
+    if isinstance(value, str):
+        return math.inf if is_rigid(value) else value
+    if not isinstance(value, (list, tuple)) and getattr(
+        getattr(value, "dtype", None), "kind", ""
+    ) not in ("O", "U"):
+        return value
+    try:
+        texts = np.asarray(value, dtype=object)
+        read = [math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]
+        return np.array(read).reshape(texts.shape)
+    except ValueError:  # lists of several lengths
+        return value
+
+
+def real(name: str, value: Any) -> Array:
+    """``value`` as float64; complex numbers, times, text and None are refused, also where numpy
+    would convert them.
+
+    What is masked is unknown: NaN.
+    """
+    try:
+        if isinstance(value, np.ma.MaskedArray):
+            value = (
+                np.ma.filled(value.astype(np.float64), math.nan)
+                if value.dtype.kind in "fiub"
+                else value.data
+            )
+        array = np.asarray(value)
+        if array.dtype.kind in "fiub":
+            return array.astype(np.float64, copy=False)
+        if array.dtype.kind == "O" and not any(
+            isinstance(x, (str, bytes)) or x is None for x in array.ravel()
+        ):
+            return array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InputError(name, value, "a real number or an array of them")
+
+
+def check(
+    columns: Mapping[str, float | Array], frequency: Any = None, shape: tuple[int, ...] = ()
+) -> None:
+    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in
+    place of omega, ``shape`` what the columns broadcast to, for the index of the case."""
+    for name, values in columns.items():
+        legal = np.greater(values, 0.0) if name in POSITIVE else np.greater_equal(values, 0.0)
+        bad = ~(legal if name == "k" else legal & np.isfinite(values))
+        if bad.any():
+            field, given = name, values
+            if name == "omega" and frequency is not None:
+                field, given = "f", real("f", frequency)
+            value = float(np.ravel(given)[np.flatnonzero(bad)[0]])
+            bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
+            bound = STIFFNESS if field == "k" and math.isnan(value) else bound
+            bound = LIFTS_OFF if field == AMPLITUDE else bound
+            raise InputError(field, value, bound, _first_case(bad, shape))
+    if AMPLITUDE in columns and "Fz" in columns:
+        bad = ~np.less(columns[AMPLITUDE], columns["Fz"])
+        if bad.any():
+            amplitude = np.broadcast_to(columns[AMPLITUDE], bad.shape)
+            value = float(amplitude.flat[np.flatnonzero(bad)[0]])
+            raise InputError(AMPLITUDE, value, LIFTS_OFF, _first_case(bad, shape))
+
+
+def _first_case(bad: Any, shape: tuple[int, ...]) -> int | None:
+    """The first case that a column spoils; None for a value alone, which spoils all of them."""
+    if not bad.ndim:
+        return None
+    cases = np.flatnonzero(np.broadcast_to(bad, shape or bad.shape))
+    return int(cases[0]) if cases.size else 0
