@@ -17,7 +17,7 @@ import numpy as np
 from mumacro import Surrogate
 from mumacro.contacts import quadrature
 from mumacro.contacts.quadrature import driven_rule, put_rules, rules
-from mumacro.kernel import slices
+from mumacro.kernel import threads as shared_out
 from tests.cases import TOLERANCES, Array, opened
 
 KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
@@ -33,7 +33,9 @@ def costs() -> str:
         spring = 0.0
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
-            ask = functools.partial(slices.values, 0, s._data, v, amplitude, threads=1, kind=kind)
+            ask = functools.partial(
+                shared_out.values, 0, s._data, v, amplitude, threads=1, kind=kind
+            )
             each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
             spring = spring or each
             rows.append((name, f"{tolerance:g}", f"{1e9 * each:.0f}", f"{each / spring:.1f}"))

@@ -8,8 +8,8 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.contacts.quadrature import put_rules
-from mumacro.kernel import slices
-from mumacro.kernel.binding import Kernel, kernels
+from mumacro.kernel import threads as shared_out
+from mumacro.kernel.binding import CaseRows, Kernel, kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import (
     CHARTS,
@@ -37,8 +37,8 @@ def one_by_one(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> 
         one = slice(i, i + 1)
         found.append(
             (
-                *slices.values(code, data, v[one], y[one], 1),
-                *slices.slopes(code, data, v[one], y[one], 1),
+                *shared_out.values(code, data, v[one], y[one], 1),
+                *shared_out.slopes(code, data, v[one], y[one], 1),
             )
         )
     return [np.concatenate(part) for part in zip(*found, strict=True)]
@@ -197,7 +197,7 @@ def test_every_level_with_fused_multiply_add_gives_the_same_bits(
 def test_contacts_and_directions_have_the_same_bits(
     table: Surrogate, kind: tuple[int, int]
 ) -> None:
-    """On every level with fused multiply-add, in an array and alone: all 17 rows, of cases and
+    """On every level with fused multiply-add, in an array and alone: all rows, of cases and
     their neighbours."""
     rng, n = np.random.default_rng(13), 1500
     six = [
@@ -211,9 +211,9 @@ def test_contacts_and_directions_have_the_same_bits(
 
     def asked(kernel: Kernel, part: slice) -> list[Any]:
         columns = [np.ascontiguousarray(column[part]) for column in six]
-        rows, source = np.empty((17, columns[0].size)), np.empty(columns[0].size, np.int8)
-        kernel.cases(table._data, source.size, columns, rows, source, kind=kind)
-        return [rows, source]
+        answers = CaseRows.empty(columns[0].size, "gradient")
+        kernel.cases(table._data, columns[0].size, columns, answers, kind=kind)
+        return [answers.numbers, answers.source]
 
     best = asked(kernels[-1], slice(None))
     assert np.unique(best[1]).size >= 4

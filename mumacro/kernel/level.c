@@ -32,12 +32,12 @@ static void mu_borders_as(const mumacro_data *data, int contact, int direction, 
 static void mu_intervals(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
                          const int64_t *strides, const double *high, double *out, int64_t stride) {
     for (int64_t i = 0; i < n; ++i) {
-        double six[6], found[3];
+        double six[6], extremes[MU_EXTREME_ROWS];
         mu_inputs low;
         for (int j = 0; j < 6; ++j) six[j] = columns[j][strides[j] ? i : 0];
         memcpy(&low, six, sizeof low);
-        mu_extremes_of(data, contact, direction, &low, high[i], found);
-        for (int j = 0; j < 3; ++j) out[j * stride + i] = found[j];
+        mu_extremes_of(data, contact, direction, &low, high[i], extremes);
+        for (int j = 0; j < MU_EXTREME_ROWS; ++j) out[j * stride + i] = extremes[j];
     }
 }
 
