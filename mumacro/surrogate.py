@@ -248,7 +248,7 @@ class Surrogate:
             if mu == mu:
                 return mu
         v, y, shape = _points(v_tilde, y_tilde)
-        found = shared_out.alone(atlas.MU, self._data, v, y, self.threads)
+        found = shared_out.alone(atlas.MU, self._data, v, y, self._asked_threads)
         if not shape and math.isnan(found[0]):
             raise _illegal(v, y)
         return _shaped(found, shape)
@@ -329,7 +329,7 @@ class Surrogate:
         '-1.000e-05'
         """
         data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
-        rows = shared_out.slopes(_CODES[of], data, v, y, self.threads)
+        rows = shared_out.slopes(_CODES[of], data, v, y, self._asked_threads)
         if not shape and math.isnan(rows.value[0]):
             raise _illegal(v, y)
         return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
@@ -393,7 +393,7 @@ class Surrogate:
             )
         v, y, shape = _points(v_tilde, y_tilde)
         value, bound, source = shared_out.values(
-            _CODES[name], self._data_of(kind), v, y, self.threads, kind
+            _CODES[name], self._data_of(kind), v, y, self._asked_threads, kind
         )
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
@@ -699,7 +699,12 @@ class Surrogate:
         groups = groups or gradient or not cases.shape
         detail: Detail = "gradient" if gradient else "groups" if groups else "values"
         rows = shared_out.cases(
-            self._data_of(kind), [*columns.values()], math.prod(shape), self.threads, detail, kind
+            self._data_of(kind),
+            [*columns.values()],
+            math.prod(shape),
+            self._asked_threads,
+            detail,
+            kind,
         ).reshaped(shape)
         answer: Answer[Any] = (
             IntervalAnswer if cases.ends else AnswerWithGradient if gradient else Answer
@@ -740,7 +745,7 @@ class Surrogate:
             self._data_of(cases.kind),
             [*{**cases.columns, "k": first}.values()],
             last,
-            self.threads,
+            self._asked_threads,
             cases.kind,
         )
         low, high = rows.low.reshape(shape), rows.high.reshape(shape)

@@ -279,14 +279,14 @@ def test_every_input_is_named_in_the_signature(table: Surrogate) -> None:
 
 
 def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> None:
-    rest = without(CASE, "v0")
+    rest: Any = without(CASE, "v0")
     expected = table.evaluate(**CASE).mu_macro
     assert table.evaluate({**CASE, "note": "passed by"}).mu_macro == expected
     assert table.evaluate(rest, v0=CASE["v0"]).mu_macro == expected
     with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(CASE, v0=1.0)
     with pytest.raises(InputError, match=r"^speed must be one of mu0, "):
-        table.evaluate(**CASE, speed=1.0)
+        table.evaluate(**CASE, speed=1.0)  # type: ignore[call-overload]
     for bad in ([1.0], 3.0, "cases", object()):
         with pytest.raises(InputError, match=r"^cases must be a mapping"):
             table.evaluate(bad)

@@ -333,7 +333,7 @@ def test_bad_input_is_named_with_the_remedy(data: Any, given: Any, said: Any) ->
 
 @pytest.mark.parametrize("amplitude", [-1.0, 10.0, 20.0])
 def test_an_amplitude_that_lifts_the_contact_off_is_refused(amplitude: float) -> None:
-    rig = {"Fz": 10.0, "f": 20e3, "Fz_amplitude": amplitude}
+    rig: dict[str, Any] = {"Fz": 10.0, "f": 20e3, "Fz_amplitude": amplitude}
     with pytest.raises(InputError, match="lifts off") as caught:
         fit({"v0": [0.01, 0.02, 0.03], "mu_macro": [0.2, 0.22, 0.24]}, direction="normal", **rig)
     assert (caught.value.field, caught.value.value) == ("Fz_amplitude", amplitude)

@@ -155,7 +155,7 @@ def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
         name: log_uniform(rng, *ends, n) for name, ends in zip(CASE, ranges, strict=True)
     }
     columns["v0"][::7] = columns["y0"][::11] = 0.0
-    whole = table.evaluate(**columns, gradient=True)
+    whole: Any = table.evaluate(**columns, gradient=True)
     plain = table.evaluate(**columns)
     assert len(set(whole.source)) >= 6
     for name in ("v_tilde", "y_tilde", "length_scale"):
@@ -200,7 +200,7 @@ def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(
     cases: list[Case] = [
         {**{name: shaped(x) for name, x in CASE.items()}, "v0": v0} for shaped in shapes
     ]
-    expected, *others = (fine.evaluate(**case).mu_macro for case in cases)
+    expected, *others = (np.asarray(fine.evaluate(**case).mu_macro) for case in cases)
     assert all(np.array_equal(found.ravel(), expected) for found in others)
 
 

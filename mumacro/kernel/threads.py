@@ -53,19 +53,20 @@ def default_threads() -> int:
     return processors()
 
 
-def share_out(n: int, threads: int, work: Callable[[slice], None], cost: int = 1) -> None:
+def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: int = 1) -> None:
     """Call ``work`` with every slice of n points, which cost about ``cost`` times as much as those
-    of one spring."""
+    of one spring; on :func:`default_threads` where ``threads`` is None."""
     length = SLICE // cost
     if n <= length:
         work(slice(0, n))
         return
     parts = [slice(low, min(low + length, n)) for low in range(0, n, length)]
-    if threads <= 1 or n < FEW // cost:
+    workers = 1 if n < FEW // cost else threads or default_threads()
+    if workers == 1:
         for part in parts:
             work(part)
         return
-    with ThreadPoolExecutor(min(threads, len(parts)), thread_name_prefix="mumacro") as pool:
+    with ThreadPoolExecutor(min(workers, len(parts)), thread_name_prefix="mumacro") as pool:
         for _ in pool.map(work, parts):
             pass
 
@@ -75,7 +76,12 @@ def _slice(columns: Sequence[Array | float], part: slice) -> list[Array | float]
 
 
 def values(
-    quantity: int, data: Data, v: Array, y: Array, threads: int, kind: tuple[int, int] = (0, 0)
+    quantity: int,
+    data: Data,
+    v: Array,
+    y: Array,
+    threads: int | None,
+    kind: tuple[int, int] = (0, 0),
 ) -> tuple[Array, Array, Codes]:
     """A quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
     value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
@@ -89,7 +95,7 @@ def values(
     return value, bound, source
 
 
-def alone(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
+def alone(quantity: int, data: Data, v: Array, y: Array, threads: int | None) -> Array:
     """A quantity at (n,) points without its bound; NaN where illegal."""
     value = np.empty(v.size)
     share_out(
@@ -100,7 +106,7 @@ def alone(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
     return value
 
 
-def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> SlopeRows:
+def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int | None) -> SlopeRows:
     """Any quantity at (n,) points with its slopes and their bounds."""
     rows = SlopeRows.empty(v.size)
     share_out(
@@ -115,7 +121,7 @@ def cases(
     data: Data,
     columns: Sequence[Array | float],
     n: int,
-    threads: int,
+    threads: int | None,
     detail: Detail,
     kind: tuple[int, int] = (0, 0),
 ) -> CaseRows:
@@ -138,7 +144,7 @@ def intervals(
     data: Data,
     columns: Sequence[Array | float],
     high: Array,
-    threads: int,
+    threads: int | None,
     kind: tuple[int, int] = (0, 0),
 ) -> ExtremeRows:
     """Extremes of cases whose k reaches from its column to ``high``, see
