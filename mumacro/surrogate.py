@@ -16,7 +16,15 @@ from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.contacts.quadrature import put_rules
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.frames import evaluate_labelled
-from mumacro.inputs.cases import ABSENT, NUMBERS, NUMBERS_AND_ARRAYS, Cases, by_name, labelled, real
+from mumacro.inputs.cases import (
+    ABSENT,
+    NUMBERS,
+    NUMBERS_AND_ARRAYS,
+    Cases,
+    by_name,
+    has_labels,
+    real,
+)
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import (
     SPRING,
@@ -677,7 +685,7 @@ class Surrogate:
             "v0": v0,
         }
         inputs = by_name(cases, {name: x for name, x in said.items() if x is not ABSENT}, kind)
-        if labelled(cases, inputs):
+        if has_labels(cases, inputs):
             options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
             return evaluate_labelled(
                 self.evaluate,

@@ -11,7 +11,7 @@ import numpy as np
 from mumacro.analysis.load import Stiffening
 from mumacro.analysis.rootfinding import TINY, last_double
 from mumacro.analysis.sweep import EVERYWHERE, Sweep
-from mumacro.inputs.cases import other_five
+from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
@@ -62,7 +62,7 @@ def border_crossings(
     contact (never any stick) and without oscillation.
     """
     kind = kind_of(contact, direction)
-    sweep = Sweep(surrogate, other_five(case, along, kind), along, kind, stiffening)
+    sweep = Sweep(surrogate, fixed_inputs(case, along, kind), along, kind, stiffening)
     if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values() or sweep.proportional:
         return ()
     low = max(low, TINY)  # at 0 nothing oscillates or slides

@@ -14,7 +14,7 @@ from mumacro.analysis.load import Stiffening, stiffening_of
 from mumacro.analysis.sweep import Sweep
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
-from mumacro.inputs.cases import other_five, real, without_interval
+from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import FIELDS, POSITIVE
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array
@@ -192,7 +192,7 @@ def law(
     kind = kind_of(contact, direction)
     one_k, ends = without_interval(case, along)
     one_k, stiffening = stiffening_of(one_k, along, kind, stiffness_exponent)
-    others = other_five(one_k, along, kind)
+    others = fixed_inputs(one_k, along, kind)
     sweep = Sweep(surrogate, others, along, kind, stiffening)
     ends_of_range = float(x[0]), float(x[-1])
     border = border_crossings(

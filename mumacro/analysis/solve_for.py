@@ -1,7 +1,6 @@
 """The inverse problem: which values of one input give a mu_macro.
 
-What is known of mu_macro as a function of one input, the others constant, for an oscillation
-across:
+The course of mu_macro over one input, the others constant, for an oscillation across:
 
 =====  =====================================  =====================================================
 input  course                                 roots
@@ -43,7 +42,7 @@ from mumacro.analysis.rootfinding import TINY, Curve, curves_between, last_doubl
 from mumacro.analysis.sweep import EVERYWHERE, Sweep
 from mumacro.answer import Answer
 from mumacro.errors import InputError
-from mumacro.inputs.cases import other_five, real, without_interval
+from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import POSITIVE
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.kernel.arrays import Array, Bools, Places
@@ -158,7 +157,7 @@ def solve_for(
     [['2.8570e-06 m'], []]
     """
     kind = kind_of(contact, direction)
-    others, interval = without_interval(case, unknown)
+    inputs, interval = without_interval(case, unknown)
     if interval:
         softest, middle, stiffest = (
             solve_for(
@@ -169,13 +168,13 @@ def solve_for(
                 contact=contact,
                 direction=direction,
                 stiffness_exponent=stiffness_exponent,
-                **{**others, "k": k},
+                **{**inputs, "k": k},
             )
-            for k in (interval["k_low"], others["k"], interval["k_high"])
+            for k in (interval["k_low"], inputs["k"], interval["k_high"])
         )
         return replace(middle, ends=(softest, stiffest))
-    others, stiffening = stiffening_of(others, unknown, kind, stiffness_exponent)
-    sweep = Sweep(surrogate, other_five(others, unknown, kind), unknown, kind, stiffening)
+    inputs, stiffening = stiffening_of(inputs, unknown, kind, stiffness_exponent)
+    sweep = Sweep(surrogate, fixed_inputs(inputs, unknown, kind), unknown, kind, stiffening)
     levels = real("target", target).ravel()
     bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:
@@ -204,10 +203,10 @@ def solve_for(
     constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
     if within is None and unknown in EVERYWHERE and not constant:
         reach = _without_limit(sweep, reach)
-    found = _roots(sweep, [] if constant else curves, levels)
+    candidates = _roots(sweep, [] if constant else curves, levels)
     roots = (
-        tuple(some) if reach.holds(level) else ()
-        for level, some in zip(levels.tolist(), found, strict=True)
+        tuple(of_level) if reach.holds(level) else ()
+        for level, of_level in zip(levels.tolist(), candidates, strict=True)
     )
     targets = tuple(levels.tolist())
     return Solution(unknown, targets, tuple(roots), reach, constant, stiffening=sweep.stiffening)
@@ -268,10 +267,10 @@ def _soft_to_rigid(sweep: Sweep, targets: Array, least: float) -> tuple[float, f
         stiff = max(stiff, stiff * r, 1e3 * r * r)
     low, high = sorted((sweep.where(soft), sweep.where(stiff)))
     if unknown == "mu0":  # mu_macro grows with it without limit
-        wanted = targets[targets > 0.0]
+        positive = targets[targets > 0.0]
         low, high = (
-            0.5 * float(wanted.min(initial=2.0 * low)),
-            2.0 * float(wanted.max(initial=0.5 * high)),
+            0.5 * float(positive.min(initial=2.0 * low)),
+            2.0 * float(positive.max(initial=0.5 * high)),
         )
     return max(low, 1e-300), min(high, 1e300)
 
@@ -313,31 +312,31 @@ def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[flo
 
 def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]]:
     """All roots on all pieces, ascending."""
-    found: list[list[Root]] = [[] for _ in targets]
+    roots: list[list[Root]] = [[] for _ in targets]
     for curve in curves:
-        which = np.flatnonzero(curve.holds(targets))
-        if not which.size:
+        indices = np.flatnonzero(curve.holds(targets))
+        if not indices.size:
             continue
-        wanted, start = targets[which], curve.x[0]
+        levels, start = targets[indices], curve.x[0]
         # a target equal to the value at an edge has its root there; just inside, rounding may hide
         # it
-        value = np.where(wanted == curve.mu[0], start, curve.meet(wanted))
-        last = wanted == curve.mu[-1]
+        value = np.where(levels == curve.mu[0], start, curve.meet(levels))
+        last = levels == curve.mu[-1]
         if last.any():
-            value = np.where(last & (sweep.mu(value) != wanted), curve.end(), value)
+            value = np.where(last & (sweep.mu(value) != levels), curve.end(), value)
         answer, slope = sweep.with_slope(value)
-        low, high = _enclosures(sweep, curve, wanted, value, answer, slope)
+        low, high = _enclosures(sweep, curve, levels, value, answer, slope)
         columns = (value, low, high, answer.mu_macro, answer.regime)
         for i, root in zip(
-            which.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True
+            indices.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True
         ):
-            if not found[i] or root.value != found[i][-1].value:
-                found[i].append(root)
-    return found
+            if not roots[i] or root.value != roots[i][-1].value:
+                roots[i].append(root)
+    return roots
 
 
 def _enclosures(
-    sweep: Sweep, curve: Curve, wanted: Array, value: Array, answer: Answer[Any], slope: Array
+    sweep: Sweep, curve: Curve, targets: Array, value: Array, answer: Answer[Any], slope: Array
 ) -> tuple[Array, Array]:
     """Between which values mu_macro is within its error bound of the target: ``low`` and ``high``
     of a root, (n,).
@@ -349,26 +348,33 @@ def _enclosures(
         beside = np.minimum(np.nextafter(value, HUGE), curve.x[-1])
         bound = np.maximum(bound, sweep.answer(beside).error_bound)
     # a root is found to rounding, even where mu_macro is exact
-    bound = np.maximum(bound, 2.0**-50 * wanted)
+    bound = np.maximum(bound, 2.0**-50 * targets)
     # an end may be a jump of mu_macro, at the border or a seam, with a larger bound beyond it: then
     # that one counts
-    bounds, left = np.concatenate((bound, bound)), np.arange(2 * value.size)
-    ends, outwards, targets = (
-        np.empty(left.size),
+    bounds, pending = np.concatenate((bound, bound)), np.arange(2 * value.size)
+    ends, outwards, end_targets = (
+        np.empty(pending.size),
         np.repeat([0.0, HUGE], value.size),
-        np.concatenate((wanted, wanted)),
+        np.concatenate((targets, targets)),
     )
-    while left.size:
-        ends[left] = _where_off(
-            sweep, curve, left % value.size, left >= value.size, bounds[left], wanted, value, slope
+    while pending.size:
+        ends[pending] = _where_off(
+            sweep,
+            curve,
+            pending % value.size,
+            pending >= value.size,
+            bounds[pending],
+            targets,
+            value,
+            slope,
         )
         beyond = sweep.answer(
-            np.clip(np.nextafter(ends[left], outwards[left]), curve.x[0], curve.x[-1])
+            np.clip(np.nextafter(ends[pending], outwards[pending]), curve.x[0], curve.x[-1])
         )
-        still = np.abs(beyond.mu_macro - targets[left]) < 0.97 * beyond.error_bound
-        still &= beyond.error_bound > bounds[left]
-        left = left[still]
-        bounds[left] = beyond.error_bound[still]
+        exceeded = np.abs(beyond.mu_macro - end_targets[pending]) < 0.97 * beyond.error_bound
+        exceeded &= beyond.error_bound > bounds[pending]
+        pending = pending[exceeded]
+        bounds[pending] = beyond.error_bound[exceeded]
     return np.minimum(ends[: value.size], value), np.maximum(ends[value.size :], value)
 
 
@@ -378,21 +384,21 @@ def _where_off(
     i: Places,
     above: Bools,
     bound: Array,
-    wanted: Array,
+    targets: Array,
     value: Array,
     slope: Array,
 ) -> Array:
     """Where, above or below the roots ``i``, mu_macro is off its target by ``bound``, each (m,)."""
     sign = np.where(above, 1.0, -1.0)
-    levels = wanted[i] + sign * curve.sign * bound
+    levels = targets[i] + sign * curve.sign * bound
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         step = bound / (curve.sign * slope[i])
         ends: Array = value[i] * np.exp(sign * step)
         straight = (ends > curve.x[0]) & (ends < curve.x[-1]) & (step > 0.0)
     # most often the curve is straight over so short a way; where it is not, the levels are searched
     # for
-    tried = np.where(straight, ends, curve.x[0])
-    straight &= np.abs(sweep.mu(tried) - levels) <= 0.01 * bound
+    trial = np.where(straight, ends, curve.x[0])
+    straight &= np.abs(sweep.mu(trial) - levels) <= 0.01 * bound
     curved = np.flatnonzero(~straight)
     if curved.size:
         ends[curved] = curve.meet(levels[curved], leave=above[curved])
