@@ -154,11 +154,11 @@ class Answer(Generic[Number]):
             np.ravel(np.asarray(x)) for x in (self.v_tilde, self.y_tilde, self.regime_code)
         )
         regimes = {name: code == i for i, name in enumerate(REGIMES)}
-        # an answer has no table
+        # an answer has no table, whose border would be exact
         return plotting.plot_cases(v, y, regimes, closed_forms.border_blend, axes)
 
     def columns(self) -> dict[str, Any]:
-        """What is known of each case, by name: mu_macro first, then what was requested beside
+        """The results of each case by name: mu_macro first, then those that were requested beside
         it."""
         names = [
             "mu_macro",

@@ -15,8 +15,8 @@ MOVED = {
 
 
 class Signposts:
-    """A finder of modules that finds none: where nothing else does either, it names what to use
-    instead."""
+    """A finder of modules that loads none; for an import path of a former version its error names
+    the replacement."""
 
     @staticmethod
     def find_spec(name: str, *_: object) -> None:

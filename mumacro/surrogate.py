@@ -44,8 +44,10 @@ from mumacro.table.netcdf import error_distribution, json_attributes, parse_tabl
 from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
 
 _KERNEL = kernels[-1]
-_ONE = kernels[:2][-1]  # a single point does not fill the widest registers; the bits are the same
-_RATIO = _ONE.ratio
+_SCALAR_KERNEL = kernels[:2][
+    -1
+]  # a single point does not fill the widest registers; the bits are the same
+_RATIO = _SCALAR_KERNEL.ratio
 _CODES = {name: code for code, name in enumerate(atlas.QUANTITY_NAMES)}
 _FLOAT = np.dtype(np.float64)
 #: effects of an illegal value in an array
@@ -115,9 +117,9 @@ class Surrogate:
 
     @classmethod
     def _of_image(cls, image: bytes, path: Path, threads: int | None) -> Self:
-        found = cls(parse_table(image, path), path, threads)
-        found._image = image
-        return found
+        surrogate = cls(parse_table(image, path), path, threads)
+        surrogate._image = image
+        return surrogate
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle small: a bundled table by name and checksum, valid on another machine, too;
@@ -155,9 +157,9 @@ class Surrogate:
 
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__, _asked_threads=1)
-        return other
+        copy = object.__new__(type(self))
+        copy.__dict__.update(self.__dict__, _asked_threads=1)
+        return copy
 
     @property
     def threads(self) -> int:
@@ -194,8 +196,8 @@ class Surrogate:
         "0.5" to "1", and bound over error, ``least``, ``median`` and ``largest``; empty for a
         table that does not state them.
 
-        >>> found = Surrogate.open(1e-7).error_distribution["mu_ratio"]
-        >>> found["0.5"] < found["0.95"] < found["0.99"] < found["1"] < 1e-7
+        >>> errors = Surrogate.open(1e-7).error_distribution["mu_ratio"]
+        >>> errors["0.5"] < errors["0.95"] < errors["0.99"] < errors["1"] < 1e-7
         True
         """
         return error_distribution(self.table)
@@ -256,10 +258,10 @@ class Surrogate:
             if mu == mu:
                 return mu
         v, y, shape = _points(v_tilde, y_tilde)
-        found = shared_out.alone(atlas.MU, self._data, v, y, self._asked_threads)
-        if not shape and math.isnan(found[0]):
+        values = shared_out.alone(atlas.MU, self._data, v, y, self._asked_threads)
+        if not shape and math.isnan(values[0]):
             raise _illegal(v, y)
-        return _shaped(found, shape)
+        return _shaped(values, shape)
 
     def ratio_with_bound(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
@@ -287,10 +289,10 @@ class Surrogate:
         if type(y_tilde) is float and y_tilde >= 0.0 and kind == SPRING:
             return float(self.border(np.array((y_tilde,)))[0])
         _, y, shape = _points(0.0, y_tilde)
-        found = _KERNEL.border(self._data, y, kind)
-        if not shape and math.isnan(found[0]):
+        crit = _KERNEL.border(self._data, y, kind)
+        if not shape and math.isnan(crit[0]):
             raise InputError("y_tilde", float(y[0]), ">= 0 and < 1" if kind.normal else ">= 0")
-        return _shaped(found, shape)
+        return _shaped(crit, shape)
 
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
         """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
@@ -343,7 +345,7 @@ class Surrogate:
         return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
 
     def _with(self, quantity: str, argument: str = "name") -> Data:
-        """What the kernel reads, with the cells of a quantity; they are cut on first use."""
+        """The data that the kernel reads, with the cells of a quantity; made on first use."""
         code = _CODES[quantity] if quantity in atlas.QUANTITY_NAMES else None
         if code not in self._data.quantities:
             if code is None or quantity not in self.table.quantities:
@@ -356,7 +358,7 @@ class Surrogate:
         return self._data
 
     def derivatives(self, *_: object, **__: object) -> NoReturn:
-        """Gone; the error names what replaces it."""
+        """Removed; the error names what replaces it."""
         raise MumacroError(
             "Surrogate.derivatives is gone: slopes(v_tilde, y_tilde, of) gives v~ d/dv~ and y~ "
             "d/dy~, evaluate(..., gradient=True) the slopes by the six inputs"
@@ -388,9 +390,9 @@ class Surrogate:
         data, kind = self._with(name), kind_of(contact, direction)
         if kind == SPRING and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
             try:
-                one = _ONE.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
-                if one[2] >= 0:
-                    return one
+                scalar = _SCALAR_KERNEL.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+                if scalar[2] >= 0:
+                    return scalar
             except OverflowError:  # a whole number beyond double range
                 pass
         if kind.normal and name == "power":
@@ -652,15 +654,15 @@ class Surrogate:
             and illegal in ILLEGAL
             and not unknown
         ):
-            # the usual kind in plain numbers and arrays takes a short way, which saves most of the
-            # time of a call: its names are those of the columns; what is refused goes the long one
+            # One spring across in plain numbers and arrays takes this short way, which saves most
+            # of the time of a call.  Illegal inputs go the long way, which has the messages.
             types = {*map(type, (mu0, Fz, k, y0, omega if f is ABSENT else f, v0))}
             if types <= NUMBERS:
                 with suppress(OverflowError):  # a whole number beyond double range
                     angular = omega if f is ABSENT else RAD_PER_CYCLE * float(f)
-                    one = self._one((mu0, Fz, k, y0, angular, v0), gradient)
-                    if one.source_code >= 0:
-                        return one
+                    answer = self._scalar_answer((mu0, Fz, k, y0, angular, v0), gradient)
+                    if answer.source_code >= 0:
+                        return answer
             elif types <= NUMBERS_AND_ARRAYS:
                 columns = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "v0": v0}
                 columns |= {"omega": omega} if f is ABSENT else {"f": f}
@@ -671,7 +673,7 @@ class Surrogate:
         if unknown:
             name = min(unknown)
             raise InputError(name, unknown[name], f"one of {', '.join(kind.fields)} or f")
-        said = {
+        keywords = {
             "mu0": mu0,
             "Fz": Fz,
             "k": k,
@@ -684,7 +686,7 @@ class Surrogate:
             "f": f,
             "v0": v0,
         }
-        inputs = by_name(cases, {name: x for name, x in said.items() if x is not ABSENT}, kind)
+        inputs = by_name(cases, {name: x for name, x in keywords.items() if x is not ABSENT}, kind)
         if has_labels(cases, inputs):
             options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
             return evaluate_labelled(
@@ -703,7 +705,7 @@ class Surrogate:
         """:meth:`evaluate` of cases in their one form."""
         kind, columns, shape = cases.kind, cases.columns, cases.shape or (1,)
         if not cases.shape and kind == SPRING and cases.ends is None:
-            return self._one([*columns.values()], gradient)
+            return self._scalar_answer([*columns.values()], gradient)
         groups = groups or gradient or not cases.shape
         detail: Detail = "gradient" if gradient else "groups" if groups else "values"
         rows = shared_out.cases(
@@ -730,22 +732,22 @@ class Surrogate:
             self._add_extremes(answer, cases)
         return answer if cases.shape else single(answer)
 
-    def _one(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
-        """The answer to one case of the usual kind; NaN where it is illegal."""
-        one = _ONE.one(self._pointer, six, gradient)
-        groups = (one.v_tilde, one.y_tilde, one.length_scale)
+    def _scalar_answer(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
+        """The answer to one case of one spring across; NaN where it is illegal."""
+        row = _SCALAR_KERNEL.one(self._pointer, six, gradient)
+        groups = (row.v_tilde, row.y_tilde, row.length_scale)
         answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
-            one.mu_macro, one.mu_ratio, one.error_bound, one.source, groups, self._certain
+            row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, self._certain
         )
         if gradient:
-            answer.gradient = dict(zip(FIELDS, one.gradient, strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, one.gradient_bound, strict=True))
+            answer.gradient = dict(zip(FIELDS, row.gradient, strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, row.gradient_bound, strict=True))
         return answer
 
     def _add_extremes(self, answer: IntervalAnswer[Array], cases: Cases) -> None:
         """Add to the answer for the middle of an interval of k the extremes over it."""
         shape, legal = answer.mu_macro.shape, answer.source_code != -1
-        # NaN where they are no interval, so that the kernel has no answer either
+        # NaN for an illegal interval, so that the kernel has no answer either
         first, last = (
             np.where(np.isnan(cases.columns["k"]), np.nan, end) for end in cases.ends or ()
         )
@@ -766,18 +768,18 @@ class Surrogate:
     ) -> tuple[float, float, float, int]:
         """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1
         if illegal."""
-        one = _ONE.one(self._pointer, (mu0, Fz, k, y0, omega, v0), False)
-        return one.mu_macro, one.mu_ratio, one.error_bound, one.source
+        row = _SCALAR_KERNEL.one(self._pointer, (mu0, Fz, k, y0, omega, v0), False)
+        return row.mu_macro, row.mu_ratio, row.error_bound, row.source
 
     def _data_of(self, kind: Kind) -> Data:
-        """What the kernel reads; a ball needs rules of quadrature."""
+        """The data that the kernel reads; for a ball with its rules of quadrature."""
         if kind.contact:
             put_rules(self._data, self.tolerance)
         return self._data
 
     def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
-        """Whether v~ is further from v~crit than that is known, and than rounding may move v~ and
-        y~."""
+        """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~
+        together."""
         v, y = np.asarray(v_tilde), np.asarray(y_tilde)
         crit = _KERNEL.border(
             self._data, np.atleast_1d(np.asarray(y, dtype=np.float64)), kind
@@ -797,8 +799,8 @@ KNOWN_CONTINUOUS = 0.9545954718694023
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
-    """Refuse a stored border whose nodes are not near the formula for every y~: blocks are found
-    with it."""
+    """Refuse a stored border whose nodes are not near the formula for every y~, since it selects
+    the block of a case."""
     for index, ((name, axis, _), piece) in enumerate(zip(atlas.BORDER_PIECES, pieces, strict=True)):
         y = axis.amplitude(piece.nodes)
         crit = piece.values * _KERNEL.border_scales(index, y)[0]
@@ -819,14 +821,14 @@ def _bundled(tolerance: float | None) -> Path:
         or not tolerance > 0.0
     ):
         raise InputError("tolerance", tolerance, "a path, a tolerance > 0, or None")
-    fit = [found for found in tables if found <= tolerance]
-    if not fit:
+    sufficient = [candidate for candidate in tables if candidate <= tolerance]
+    if not sufficient:
         raise InputError(
             "tolerance",
             tolerance,
             f">= {min(tables):g}, the tightest bundled table, or the path of another",
         )
-    return tables[max(fit)]
+    return tables[max(sufficient)]
 
 
 @functools.cache  # a worker gets the same surrogate with every task
@@ -834,13 +836,15 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
     """Unpickle: from the bytes, or from the bundled table of that name."""
     if image is not None:
         return Surrogate._of_image(image, Path(path), threads)
-    found = Surrogate.open(
+    surrogate = Surrogate.open(
         next((table for table in bundled_tables() if table.name == path), path), threads
     )
-    if found.checksum != checksum:
-        told = f"holds {found.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"
-        raise TableError(found.path, f"{told}: install the same release on both sides")
-    return found
+    if surrogate.checksum != checksum:
+        mismatch = (
+            f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"
+        )
+        raise TableError(surrogate.path, f"{mismatch}: install the same release on both sides")
+    return surrogate
 
 
 def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:

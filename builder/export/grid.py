@@ -49,7 +49,7 @@ FORMATS: dict[str, tuple[str, Callable[[Table], bytes] | None]] = {
 }
 
 
-#: format that is gone -> what does its work
+#: removed format -> what does its work
 GONE = {
     "mat": "csv, or the netCDF file itself, which MATLAB and Octave read",
     "modelica": "fmu, or csv for a table of your own",
@@ -59,7 +59,7 @@ GONE = {
 
 
 def check_format(kind: str) -> None:
-    """Raise ExportError for what is no format, in a line that names those that there are."""
+    """ExportError with the list of formats where ``kind`` is none of them."""
     if kind in GONE:
         raise ExportError(f"format {kind!r} is gone: use {GONE[kind]}")
     if kind not in FORMATS:

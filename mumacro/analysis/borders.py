@@ -39,7 +39,7 @@ class Crossing:
     @property
     def name(self) -> str:
         """Which border it is."""
-        regime = next(one for one in ("continuous", "reverse_slip") if one in self.regimes)
+        regime = next(regime for regime in ("continuous", "reverse_slip") if regime in self.regimes)
         return BORDER_NAMES[regime]
 
 
@@ -68,7 +68,7 @@ def border_crossings(
     low = max(low, TINY)  # at 0 nothing oscillates or slides
     middle = low if along in EVERYWHERE or direction != "across" else sweep.where(_Y_CLOSEST)
     edges = np.array([low, middle, high] if low < middle < high else [low, high])
-    found = []
+    pairs = []
     for regime in ("continuous", "reverse_slip"):
         state = sweep.answer(edges).regime == regime
         i = np.flatnonzero(state[1:] != state[:-1])
@@ -78,8 +78,8 @@ def border_crossings(
             return same
 
         cuts = last_double(before, edges[i], edges[i + 1])
-        found += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
-    below, first = np.array(sorted(set(found))).reshape(-1, 2).T
+        pairs += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
+    below, first = np.array(sorted(set(pairs))).reshape(-1, 2).T
     after = sweep.answer(first)
     regimes = zip(sweep.answer(below).regime.tolist(), after.regime.tolist(), strict=True)
     return tuple(map(Crossing, first.tolist(), after.mu_macro.tolist(), regimes))

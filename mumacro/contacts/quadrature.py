@@ -72,16 +72,14 @@ _DRIVEN_PIECE = 3  # whose powers it has
 
 def rules(tolerance: float) -> list[tuple[Array, Array]]:
     """Points (nodes, 2) and errors (2, 5) of every piece, for a table of this tolerance."""
-    chosen = _RULES[
-        max((known for known in _RULES if known <= 1.01 * tolerance), default=min(_RULES))
-    ]
-    found = []
-    for piece, (nodes, *stated) in enumerate(chosen):
+    table_rules = _RULES[max((t for t in _RULES if t <= 1.01 * tolerance), default=min(_RULES))]
+    pieces = []
+    for piece, (nodes, *error_rows) in enumerate(table_rules):
         errors = np.zeros((2, 5))
-        for row, numbers in zip(errors, stated, strict=True):
+        for row, numbers in zip(errors, error_rows, strict=True):
             row[: len(numbers)] = numbers
-        found.append((points(piece, nodes), errors))
-    return found
+        pieces.append((points(piece, nodes), errors))
+    return pieces
 
 
 def points(piece: int, nodes: int) -> Array:

@@ -1,9 +1,8 @@
-"""The six inputs of a case: names, units, bounds, and what may stand for them.  The one truth of a
-case.
+"""The six inputs of a case: names, units, bounds, and what may stand for them.
 
 The library, the files, the command line, the service and the exports take their fields from here.
 A frequency ``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one
-of them.  The stiffness ``k`` is always said: a positive number, or rigid contact by the word
+of them.  The stiffness ``k`` has no default: it is a positive number, or rigid contact by the word
 ``rigid`` or by infinity.
 
 **A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column
@@ -13,7 +12,7 @@ of them.  The stiffness ``k`` is always said: a positive number, or rigid contac
 import math
 import sys
 
-#: names that may be given, and the SI unit in words, for errors such as "give metres"
+#: names of inputs, and the SI unit in words, for errors such as "give metres"
 SI = {
     "mu0": ("-", "a plain number"),
     "Fz": ("N", "newtons"),
@@ -38,7 +37,7 @@ BOUNDS = {
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
 RIGID = "rigid"  # the word for a stiffness without bound
 GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
-#: what a stiffness must be, told by :class:`InputError`
+#: what a stiffness must be, in messages of :class:`InputError`
 STIFFNESS = 'a number > 0 [N/m], or for a rigid contact "rigid" or math.inf'
 MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
 

@@ -154,13 +154,13 @@ class Chart:
         return self.regime != CONTINUOUS or quantity.while_sliding
 
 
-def _axis(found: Any) -> Axis:
-    return Axis(_text(found.name), found.low, found.high)
+def _axis(axis: Any) -> Axis:
+    return Axis(_text(axis.name), axis.low, axis.high)
 
 
 def _quantity(q: Any) -> Quantity:
-    said = _text(q.name), _text(q.variable), _text(q.meaning)
-    return Quantity(*said, bool(q.while_sliding), bool(q.smooth_at_border))
+    texts = _text(q.name), _text(q.variable), _text(q.meaning)
+    return Quantity(*texts, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
 #: a block's place in this list is the source code of its values
@@ -168,7 +168,7 @@ CHARTS = tuple(
     Chart(_text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding)
     for c in (_ATLAS.chart[i] for i in range(_ATLAS.charts))
 )
-NAMES = tuple(chart.name for chart in CHARTS)
+BLOCK_NAMES = tuple(chart.name for chart in CHARTS)
 #: v~crit in pieces: name, coordinate, what its nodes hold
 BORDER_PIECES = tuple(
     (_text(p.name), _axis(p.axis), _text(p.tabulated))

@@ -79,19 +79,19 @@ def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
     start, stop = axis.span
     edge = np.arange(cells)[:, None]
     x = (start + (stop - start) * (0.5 * (2.0 * edge + 1.0 + LOCAL[None, :]) / cells)).ravel()
-    at = axis.to_file(x)
+    position = axis.to_file(x)
     if axis.name == "s":
-        dead = axis.to_file(atlas.SQRT2 * (np.arange(cells) + 1.0) / cells) <= axis.low
-        at.reshape(cells, WIDTH)[dead] = axis.low
-    return x, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
+        below = axis.to_file(atlas.SQRT2 * (np.arange(cells) + 1.0) / cells) <= axis.low
+        position.reshape(cells, WIDTH)[below] = axis.low
+    return x, (2.0 * position - axis.low - axis.high) / (axis.high - axis.low)
 
 
 def cells_1d(piece: int, values: Array, cells: int) -> Array:
     """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node
     ``values`` (n,)."""
-    x, at = cell_positions(atlas.BORDER_PIECES[piece][1], cells)
+    x, positions = cell_positions(atlas.BORDER_PIECES[piece][1], cells)
     local = (
-        interpolation_matrix(values.size, at)
+        interpolation_matrix(values.size, positions)
         @ chebyshev_coefficients(values)
         * cell_scale(piece, x)
     )
@@ -169,8 +169,8 @@ def block_rows(blocks: Sequence[Block]) -> Array:
 
 
 def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
-    """What :meth:`mumacro.kernel.binding.Data.put` wants of a quantity: polynomials, errors, errors
-    in every cell."""
+    """A quantity for :meth:`mumacro.kernel.binding.Data.put`: polynomials, errors, errors in every
+    cell."""
     name, errors = atlas.QUANTITY_NAMES[quantity], np.zeros((len(atlas.SOURCES) + 1, 2))
     patches, in_cells = [], []
     for error, chart, block in zip(errors, atlas.CHARTS, blocks, strict=False):
@@ -215,6 +215,6 @@ class Border:
         )
 
     def __call__(self, y: Array) -> Array:
-        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN for what is no
-        amplitude."""
+        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN below 0 and for
+        NaN."""
         return kernels[-1].border(self._data, np.ascontiguousarray(y).reshape(-1)).reshape(y.shape)
