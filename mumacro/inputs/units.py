@@ -1,4 +1,4 @@
-"""Numbers and units as text: what a person writes, read in SI; and hints for texts that are none."""
+"""Numbers and units as text, read in SI; and hints for a text that cannot be read."""
 
 import difflib
 import math
