@@ -147,7 +147,7 @@ def _parts(evaluate: Evaluate, cases: Any, options: dict[str, Any]) -> Any:
     columns show."""
     import pandas as pd
 
-    empty = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in cases.dtypes.items()})
+    empty = pd.DataFrame({name: pd.Series(dtype=dtype) for name, dtype in cases.dtypes.items()})
     return cases.map_partitions(evaluate, meta=evaluate(empty, **options), **options)
 
 

@@ -71,7 +71,7 @@ class Surrogate:
     def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
         if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
             raise InputError("threads", threads, "None or a whole number from 1 to 1024")
-        self._asked_threads = threads
+        self._thread_limit = threads
         self._image: bytes | None = None
         self.path = Path(path)
         self.table = table
@@ -130,7 +130,7 @@ class Surrogate:
             if bundled
             else (str(self.path), self._image or read_image(self.path))
         )
-        return _reopen, (path, self.checksum, self._asked_threads, image)
+        return _reopen, (path, self.checksum, self._thread_limit, image)
 
     def __repr__(self) -> str:
         return (
@@ -164,7 +164,7 @@ class Surrogate:
     @property
     def threads(self) -> int:
         """Threads that a call from here divides a large array among."""
-        return default_threads() if self._asked_threads is None else self._asked_threads
+        return default_threads() if self._thread_limit is None else self._thread_limit
 
     @property
     def id(self) -> str:
@@ -182,7 +182,7 @@ class Surrogate:
                 "ranges": [[chart.a.low, chart.a.high], [chart.b.low, chart.b.high]],
                 "shape": [block.a.size, block.b.size],
                 "cells": list(block.cells),
-                "quantity": chart.quantity,
+                "quantity": chart.tabulated,
                 "verified_max_abs_error": block.max_abs_error,
                 "verified_max_rel_error": block.max_rel_error,
                 "errors": {name: block.errors[name].tolist() for name in self.table.quantities},
@@ -257,8 +257,8 @@ class Surrogate:
                 mu = math.nan
             if mu == mu:
                 return mu
-        v, y, shape = _points(v_tilde, y_tilde)
-        values = shared_out.alone(atlas.MU, self._data, v, y, self._asked_threads)
+        v, y, shape = _flat_groups(v_tilde, y_tilde)
+        values = shared_out.alone(atlas.MU, self._data, v, y, self._thread_limit)
         if not shape and math.isnan(values[0]):
             raise _illegal(v, y)
         return _shaped(values, shape)
@@ -288,7 +288,7 @@ class Surrogate:
         kind = kind_of(contact, direction)
         if type(y_tilde) is float and y_tilde >= 0.0 and kind == SPRING:
             return float(self.border(np.array((y_tilde,)))[0])
-        _, y, shape = _points(0.0, y_tilde)
+        _, y, shape = _flat_groups(0.0, y_tilde)
         crit = _KERNEL.border(self._data, y, kind)
         if not shape and math.isnan(crit[0]):
             raise InputError("y_tilde", float(y[0]), ">= 0 and < 1" if kind.normal else ">= 0")
@@ -338,8 +338,8 @@ class Surrogate:
         >>> f"{along_y:.3e}"     # eq. (31): -y~^2 / (2 (1 + v~^2))
         '-1.000e-05'
         """
-        data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
-        rows = shared_out.slopes(_CODES[of], data, v, y, self._asked_threads)
+        data, (v, y, shape) = self._with(of, "of"), _flat_groups(v_tilde, y_tilde)
+        rows = shared_out.slopes(_CODES[of], data, v, y, self._thread_limit)
         if not shape and math.isnan(rows.value[0]):
             raise _illegal(v, y)
         return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
@@ -401,9 +401,9 @@ class Surrogate:
                 direction,
                 "across or along for the power: the load's path is not modelled",
             )
-        v, y, shape = _points(v_tilde, y_tilde)
+        v, y, shape = _flat_groups(v_tilde, y_tilde)
         value, bound, source = shared_out.values(
-            _CODES[name], self._data_of(kind), v, y, self._asked_threads, kind
+            _CODES[name], self._data_of(kind), v, y, self._thread_limit, kind
         )
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
@@ -712,7 +712,7 @@ class Surrogate:
             self._data_of(kind),
             [*columns.values()],
             math.prod(shape),
-            self._asked_threads,
+            self._thread_limit,
             detail,
             kind,
         ).reshaped(shape)
@@ -755,7 +755,7 @@ class Surrogate:
             self._data_of(cases.kind),
             [*{**cases.columns, "k": first}.values()],
             last,
-            self._asked_threads,
+            self._thread_limit,
             cases.kind,
         )
         low, high = rows.low.reshape(shape), rows.high.reshape(shape)
@@ -860,7 +860,7 @@ def _shaped(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
     return values.reshape(shape) if shape else values[0].item()
 
 
-def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
+def _flat_groups(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Both broadcast together, flat and contiguous, and their shape."""
     if type(v_tilde) is np.ndarray is type(y_tilde) and v_tilde.dtype == y_tilde.dtype == _FLOAT:
         v, y = v_tilde, y_tilde

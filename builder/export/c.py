@@ -131,10 +131,10 @@ def table_text(table: Table, linkage: str) -> str:
         "outer": outer_cells(),
     }
     rows = [f"{len(border)}, {_names('', arrays)}"]
-    quantities = []
+    quantity_texts = []
     for code, name in enumerate(atlas.QUANTITY_NAMES):
         if name not in table.quantities:
-            quantities.append("{0, 0, NULL, NULL, NULL}")
+            quantity_texts.append("{0, 0, NULL, NULL, NULL}")
             continue
         polynomials, errors, slope_errors = quantity_cells(table.blocks, code)
         # the stick fraction is zero in continuous sliding
@@ -145,16 +145,16 @@ def table_text(table: Table, linkage: str) -> str:
             "slope_errors": slope_errors[first:],
         }
         arrays |= {f"{name}_{part}": array for part, array in parts.items()}
-        quantities.append(f"{{{first}, {len(polynomials) - first}, {_names(f'{name}_', parts)}}}")
-    rows.append("{" + ",\n      ".join(quantities) + "}")
+        quantity_texts.append(
+            f"{{{first}, {len(polynomials) - first}, {_names(f'{name}_', parts)}}}"
+        )
+    rows.append("{" + ",\n      ".join(quantity_texts) + "}")
     attributes = table.attributes
     quadrature = []
-    for index, (points, errors) in enumerate(rules(float(attributes["tolerance"]))):
-        arrays[f"rule_{index}"] = points
+    for index, (rule, errors) in enumerate(rules(float(attributes["tolerance"]))):
+        arrays[f"rule_{index}"] = rule
         numbers = ("{" + ",".join(map(_number, row)) + "}" for row in errors.tolist())
-        quadrature.append(
-            f"{{{len(points)}, mumacro_table_rule_{index}, {{{', '.join(numbers)}}}}}"
-        )
+        quadrature.append(f"{{{len(rule)}, mumacro_table_rule_{index}, {{{', '.join(numbers)}}}}}")
     rows.append("{" + ",\n      ".join(quadrature) + "}")
     arrays["rule_driven"] = driven_rule()
     rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")

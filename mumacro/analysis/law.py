@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from mumacro import plotting
 from mumacro.analysis.borders import Crossing, border_crossings
+from mumacro.analysis.input_curve import InputCurve
 from mumacro.analysis.load import Stiffening, stiffening_of
-from mumacro.analysis.sweep import Sweep
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
@@ -192,19 +192,19 @@ def law(
     kind = kind_of(contact, direction)
     middle_case, ends = without_interval(case, along)
     middle_case, stiffening = stiffening_of(middle_case, along, kind, stiffness_exponent)
-    others = fixed_inputs(middle_case, along, kind)
-    sweep = Sweep(surrogate, others, along, kind, stiffening)
+    fixed = fixed_inputs(middle_case, along, kind)
+    curve = InputCurve(surrogate, fixed, along, kind, stiffening)
     ends_of_range = float(x[0]), float(x[-1])
     border = border_crossings(
-        surrogate, along, others, *ends_of_range, **kind.names, stiffening=stiffening
+        surrogate, along, fixed, *ends_of_range, **kind.names, stiffening=stiffening
     )
     if refine:
-        x = sweep.refined(np.union1d(x, [crossing.value for crossing in border]))
-    answer = sweep.answer(x, groups=True, strict=True)
+        x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
+    answer = curve.answer(x, groups=True, strict=True)
     if ends:
-        interval = {**{name: value for name, value in others.items() if name != "k"}, **ends}
-        band_sweep = Sweep(surrogate, interval, along, kind, stiffening)
-        answer = band_sweep.answer(x, groups=True, strict=True)
-    at_rest = sweep.answer(x, v0=0.0) if along != "v0" else sweep.answer(0.0)
+        interval = {**{name: value for name, value in fixed.items() if name != "k"}, **ends}
+        band_curve = InputCurve(surrogate, interval, along, kind, stiffening)
+        answer = band_curve.answer(x, groups=True, strict=True)
+    at_rest = curve.answer(x, v0=0.0) if along != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
-    return Law(along, x, answer, mu_static, border, others, kind, sweep.stiffening)
+    return Law(along, x, answer, mu_static, border, fixed, kind, curve.stiffening)

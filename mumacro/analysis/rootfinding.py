@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro.analysis.sweep import Sweep
+from mumacro.analysis.input_curve import InputCurve
 from mumacro.kernel.arrays import Array, Bools, Places
 
 TINY = 5e-324
@@ -23,28 +23,28 @@ _PER_CALL = 512
 _MAX_SAMPLES = 20_001
 
 
-class Curve:
-    """A piece of a sweep on which mu_macro is monotone: samples ``x`` (m,), ascending, and ``mu``
+class Branch:
+    """A branch of a curve on which mu_macro is monotone: samples ``x`` (m,), ascending, and ``mu``
     (m,) there."""
 
-    def __init__(self, sweep: Sweep, x: Array, mu: Array) -> None:
-        self.sweep, self.x, self.mu = sweep, x, mu
+    def __init__(self, curve: InputCurve, x: Array, mu: Array) -> None:
+        self.curve, self.x, self.mu = curve, x, mu
         self.sign = 1.0 if mu[-1] >= mu[0] else -1.0
         # Rounding may make a plateau fall by a digit; a root is where its level is first reached.
         self._risen = np.maximum.accumulate(self.sign * mu)
 
     def holds(self, level: Array) -> Bools:
-        """Which of the levels (n,) lie between the ends of the piece, these included."""
+        """Which of the levels (n,) lie between the ends of the branch, these included."""
         low, high = sorted((float(self.mu[0]), float(self.mu[-1])))
         return np.asarray((level >= low) & (level <= high))
 
     def end(self) -> float:
-        """Where the piece first has its last value: at its end, or where the plateau begins that
+        """Where the branch first has its last value: at its end, or where the plateau begins that
         ends it."""
         index = int(np.argmax(self.mu == self.mu[-1]))
         before, first_x = self.x[max(index - 1, 0) : index], self.x[index : index + 1]
         return float(
-            last_double(lambda x: self.sweep.mu(x) != self.mu[-1], before, first_x)[1][0]
+            last_double(lambda x: self.curve.mu(x) != self.mu[-1], before, first_x)[1][0]
             if index
             else first_x[0]
         )
@@ -53,7 +53,7 @@ class Curve:
         """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,)
         [SI].
 
-        To a rounding error of mu_macro; an end of the piece where it never does.
+        To a rounding error of mu_macro; an end of the branch where it never does.
         """
         leaving = np.broadcast_to(np.asarray(leave, dtype=np.bool_), level.shape)
         first, beyond = (
@@ -79,7 +79,7 @@ class Curve:
         while i.size:
             lower, upper = a[i], b[i]
             trial = np.where((x[i] > lower) & (x[i] < upper), x[i], _middle(lower, upper))
-            answer, slope = self.sweep.with_slope(trial)
+            answer, slope = self.curve.with_slope(trial)
             f, slope = self.sign * (np.asarray(answer.mu_macro) - level[i]), self.sign * slope
             below = (f < 0.0) | (leave[i] & (f == 0.0))
             a[i], fa[i] = np.where(below, trial, lower), np.where(below, f, fa[i])
@@ -113,12 +113,12 @@ def samples(low: float, high: float, per_decade: int) -> Array:
         return np.clip(np.exp(np.linspace(start, stop, count)), max(low, TINY), high)
 
 
-def curves_between(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
-    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the
+def branches_between(curve: InputCurve, edges: list[float], x: Array, mu: Array) -> list[Branch]:
+    """The monotone branches between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the
     whole range."""
     edge_x = np.array(edges)
-    ends = sweep.mu(edge_x)
-    curves = []
+    ends = curve.mu(edge_x)
+    branches = []
     for i in range(edge_x.size - 1):
         pair = slice(i, i + 2)
         inside = slice(
@@ -127,10 +127,10 @@ def curves_between(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> lis
         )
         # next to a turning point a sample may lie beyond it by a rounding error
         inner_mu = np.clip(mu[inside], ends[pair].min(), ends[pair].max())
-        curves.append(
-            Curve(sweep, np.insert(edge_x[pair], 1, x[inside]), np.insert(ends[pair], 1, inner_mu))
+        branches.append(
+            Branch(curve, np.insert(edge_x[pair], 1, x[inside]), np.insert(ends[pair], 1, inner_mu))
         )
-    return curves
+    return branches
 
 
 def _middle(a: Array, b: Array) -> Array:

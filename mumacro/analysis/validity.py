@@ -31,7 +31,9 @@ ROWS = (
     "constant normal force",
     "no wear, no heating",
 )
-KNOWN = 0.1  # relative uncertainty of k by default: materials and geometry give no better one
+K_UNCERTAINTY = (
+    0.1  # relative uncertainty of k by default: materials and geometry give no better one
+)
 _FAR = 1e4  # y~ that no contact has
 _RATE = 0.01  # a of mu0 + a ln(slip speed), rock, polymers and metals (docs/validity.md)
 _TILT, _NORMAL = 0.01, 1.21  # misalignment; normal over tangential stiffness of steel on steel
@@ -81,7 +83,7 @@ def model_rows(
         text = f"y~ = {y:.3g}; contacts have 0.1 to 100: is y0 = {six['y0']:.3g} in metres?"
         return [{"row": "units", "text": text, "effect": None}]
     rows = [
-        _kind(surrogate, case, mu, contact, direction),
+        _other_contact(surrogate, case, mu, contact, direction),
         None if ends else _stiffness(surrogate, case, y, contact, direction),
         _tilt(six["mu0"], y),
         *(_cycle(surrogate, six) if direction == "across" else ()),
@@ -127,7 +129,7 @@ def k_effect(
     case: Mapping[str, Any],
     contact: str = "spring",
     direction: str = "across",
-    known: float = KNOWN,
+    known: float = K_UNCERTAINTY,
 ) -> float:
     """By how much, relatively, mu_macro may differ [-] where k may by the factor 1 + ``known`` up
     or down; 0 if rigid.
@@ -175,7 +177,7 @@ def _six_inputs(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
     return {name: float(column) for name, column in cases.columns.items()}
 
 
-def _kind(
+def _other_contact(
     surrogate: Surrogate, case: Mapping[str, Any], mu: float, contact: str, direction: str
 ) -> Row | None:
     alternative = "ball" if contact == "spring" else "spring"
@@ -206,7 +208,7 @@ def _stiffness(
     surrogate: Surrogate, case: Mapping[str, Any], y: float, contact: str, direction: str
 ) -> Row | None:
     effect = k_effect(surrogate, case, contact, direction)
-    margin, change = f"{100.0 * KNOWN:g} %", f"{100.0 * effect:.2g} %"
+    margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{100.0 * effect:.2g} %"
     if effect >= 1e-3:
         text = f"k known to {margin} leaves mu_macro uncertain by {change}: give k_range, or fit k"
     elif y > HARDLY:

@@ -78,11 +78,11 @@ def rules(tolerance: float) -> list[tuple[Array, Array]]:
         errors = np.zeros((2, 5))
         for row, numbers in zip(errors, error_rows, strict=True):
             row[: len(numbers)] = numbers
-        pieces.append((points(piece, nodes), errors))
+        pieces.append((piece_rule(piece, nodes), errors))
     return pieces
 
 
-def points(piece: int, nodes: int) -> Array:
+def piece_rule(piece: int, nodes: int) -> Array:
     """The rule of a piece, (nodes, 2): the share of the piece beyond a node, and its weight."""
     p, q = _POWERS[piece]
     x, weight = np.polynomial.legendre.leggauss(nodes)
@@ -107,7 +107,7 @@ def driven_rule() -> Array:
     degrees = np.arange(DRIVEN_NODES - 3, DRIVEN_NODES)
     nulls = np.polynomial.legendre.legvander(x, DRIVEN_NODES)[:, degrees] * (2 * degrees + 1)
     return np.ascontiguousarray(
-        np.concatenate([points(_DRIVEN_PIECE, DRIVEN_NODES), nulls], axis=1)
+        np.concatenate([piece_rule(_DRIVEN_PIECE, DRIVEN_NODES), nulls], axis=1)
     )
 
 

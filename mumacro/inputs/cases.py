@@ -43,7 +43,7 @@ class Absent(enum.Enum):
 ABSENT: Final = Absent.ABSENT
 #: types of one real number
 NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
+    (float, int, bool, np.bool_, *(np.dtype(code).type for code in "efdbhilqBHILQ"))
 )
 NUMBERS_AND_ARRAYS = NUMBERS | {np.ndarray}
 _UNLABELLED = NUMBERS_AND_ARRAYS | {list, tuple, type(None), dict, str}
@@ -192,10 +192,10 @@ def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
         )
         return {name: cases[name] for name in names if name in present}
     except (AttributeError, TypeError, KeyError) as error:
-        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
+        type_name = f"{type(cases).__module__}.{type(cases).__qualname__}"
         raise InputError(
             argument,
-            kind,
+            type_name,
             "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
             "give anything else as {name: array}, what is lazy after its collect() or read_all()",
         ) from error
@@ -203,8 +203,8 @@ def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
 
 def _of_arrow(value: Any) -> bool:
     """Whether a column comes from Arrow, Polars or another library with Arrow's interface."""
-    kind = type(value)
-    return hasattr(kind, "__arrow_c_stream__") or hasattr(kind, "__arrow_c_array__")
+    value_type = type(value)
+    return hasattr(value_type, "__arrow_c_stream__") or hasattr(value_type, "__arrow_c_array__")
 
 
 def library_of(value: Any) -> str:

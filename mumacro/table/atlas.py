@@ -120,7 +120,7 @@ class Chart:
     regime: int
     a: Axis
     b: Axis
-    quantity: str
+    tabulated: str
     floor: float = field(repr=False)
     rounding: float = field(repr=False)
 

@@ -36,12 +36,12 @@ class Group:
         """Whether there is a group or variable of this name."""
         return bool(self._id.links.exists(name.encode()))
 
-    def _open(self, name: str, kind: type, role: str) -> Any:
+    def _open(self, name: str, part_type: type, role: str) -> Any:
         if not self.holds(name) or self._id.links.get_info(name.encode()).type != h5l.TYPE_HARD:
             # other links may lead to other files
             raise self.refuse(f"{role} {name!r} is missing in {self.path}")
         part = h5o.open(self._id, name.encode())
-        if not isinstance(part, kind):
+        if not isinstance(part, part_type):
             raise self.refuse(f"{name!r} in {self.path} is no {role}")
         return part
 
@@ -88,13 +88,13 @@ class Group:
         return values.astype(np.float64)
 
     def _value(self, name: str, attribute: Any) -> Any:
-        kind, shape = attribute.get_type(), attribute.shape
+        hdf5_type, shape = attribute.get_type(), attribute.shape
         if attribute.get_storage_size() > MOST_TEXT or math.prod(shape) > MOST_ITEMS:
             raise self.refuse(f"attribute {name!r} of {self.path} is too large")
-        is_text = isinstance(kind, h5t.TypeStringID) and shape in ((), (1,))
-        if not is_text and not isinstance(kind, (h5t.TypeFloatID, h5t.TypeIntegerID)):
+        is_text = isinstance(hdf5_type, h5t.TypeStringID) and shape in ((), (1,))
+        if not is_text and not isinstance(hdf5_type, (h5t.TypeFloatID, h5t.TypeIntegerID)):
             raise self.refuse(f"attribute {name!r} of {self.path} is neither text nor numbers")
-        values = np.empty(shape, kind.dtype if is_text else kind.dtype.newbyteorder("="))
+        values = np.empty(shape, hdf5_type.dtype if is_text else hdf5_type.dtype.newbyteorder("="))
         attribute.read(values)
         first = values.reshape(-1)[0] if values.size == 1 else values
         return first.decode() if isinstance(first, bytes) else str(first) if is_text else first

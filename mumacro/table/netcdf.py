@@ -133,7 +133,7 @@ def _put_cell_errors(group: Any, table: Table) -> None:
 def _geometry(chart: atlas.Chart) -> dict[str, Any]:
     return {
         "regime": atlas.REGIMES[chart.regime],
-        "quantity": chart.quantity,
+        "quantity": chart.tabulated,
         "range_of_a": np.array([chart.a.low, chart.a.high]),
         "range_of_b": np.array([chart.b.low, chart.b.high]),
     }
@@ -168,7 +168,7 @@ def _fill(root: Any, table: Table) -> None:
         _put(group, axes[1], block.b, atlas.COORDINATES[axes[1]])
         for quantity in table.held(chart):
             meaning = (
-                chart.quantity
+                chart.tabulated
                 if quantity.name == "mu_ratio"
                 else f"{quantity.meaning}, scaled for this block"
             )
@@ -341,7 +341,7 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
     na, nb = _cells(group, 2)
     block = Block(a, b, (na, nb), node_values)
     block.max_abs_error, block.max_rel_error = (
-        _error(group, f"verified_max_{kind}_error") for kind in ("abs", "rel")
+        _error(group, f"verified_max_{norm}_error") for norm in ("abs", "rel")
     )
     errors = _errors(group, "errors", group.numbers("errors", 3 * len(names)))
     block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))

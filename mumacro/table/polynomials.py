@@ -168,10 +168,10 @@ def block_rows(blocks: Sequence[Block]) -> Array:
     return rows
 
 
-def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
+def quantity_cells(blocks: Sequence[Block], code: int) -> tuple[Array, Array, Array]:
     """A quantity for :meth:`mumacro.kernel.binding.Data.put`: polynomials, errors, errors in every
     cell."""
-    name, errors = atlas.QUANTITY_NAMES[quantity], np.zeros((len(atlas.SOURCES) + 1, 2))
+    name, errors = atlas.QUANTITY_NAMES[code], np.zeros((len(atlas.SOURCES) + 1, 2))
     patches, in_cells = [], []
     for error, chart, block in zip(errors, atlas.CHARTS, blocks, strict=False):
         cells = block.cells[0] * block.cells[1]
@@ -182,7 +182,7 @@ def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array
             else cells_2d(chart.a, chart.b, nodes, block.cells)
         )
         error[0] = block.errors[name][0]
-        if quantity == atlas.MU:
+        if code == atlas.MU:
             error += chart.rounding, chart.floor
         in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))  # none where it is zero
     return _joined(patches), errors, np.concatenate(in_cells)

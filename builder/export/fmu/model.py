@@ -178,14 +178,14 @@ def _description(version: int, token: str) -> str:
         f' variableNamingConvention="flat"'
         f"{' numberOfEventIndicators=' + quoteattr('0') if fmi2 else ''}>",
     ]
-    for kind, extra in (
+    for interface, extra in (
         ("ModelExchange", ""),
         ("CoSimulation", ' canHandleVariableCommunicationStepSize="true"'),
     ):
         inside = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if fmi2 else ""
         lines.append(
-            f'<{kind} modelIdentifier="mumacro" {state_flag}="true" '
-            f'{derivatives_flag}="true"{extra}>{inside}</{kind}>'
+            f'<{interface} modelIdentifier="mumacro" {state_flag}="true" '
+            f'{derivatives_flag}="true"{extra}>{inside}</{interface}>'
         )
     lines += [
         _UNITS,

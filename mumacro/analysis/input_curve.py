@@ -1,4 +1,4 @@
-"""A sweep: mu_macro as a function of one input, the other five constant."""
+"""mu_macro as a curve over one input, the other five constant."""
 
 import math
 from collections.abc import Mapping
@@ -14,10 +14,10 @@ from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
-_CHORD, _HALVINGS = 1e-3, 8  # of a refined sweep: error of a straight line over the height, rounds
+_CHORD, _HALVINGS = 1e-3, 8  # of a refined curve: error of a straight line over the height, rounds
 
 
-class Sweep:
+class InputCurve:
     """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
     ``k`` is rigid.
 
