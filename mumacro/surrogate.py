@@ -182,7 +182,7 @@ class Surrogate:
                 "ranges": [[chart.a.low, chart.a.high], [chart.b.low, chart.b.high]],
                 "shape": [block.a.size, block.b.size],
                 "cells": list(block.cells),
-                "quantity": chart.tabulated,
+                "quantity": chart.quantity,
                 "verified_max_abs_error": block.max_abs_error,
                 "verified_max_rel_error": block.max_rel_error,
                 "errors": {name: block.errors[name].tolist() for name in self.table.quantities},

@@ -228,7 +228,7 @@ ATLASES = {
         "stick_slip_mid: range_of_a is",
     ),
     "another quantity": (
-        replace(MID, tabulated="mu_ratio^2"),
+        replace(MID, quantity="mu_ratio^2"),
         "stick_slip_mid: quantity is 'mu_ratio.2'",
     ),
     "another regime": (

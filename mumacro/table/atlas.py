@@ -113,14 +113,15 @@ class Chart:
     """One block: name, regime, coordinates with their ranges, and what its nodes hold for mu~.
 
     ``floor`` and ``rounding`` are what the bound of mu~ allows for rounding, absolute and relative
-    to the factor.
+    to the factor.  The checksum of a table covers the repr of its charts, so the names of the other
+    fields here and in :class:`Axis` belong to the file's format.
     """
 
     name: str
     regime: int
     a: Axis
     b: Axis
-    tabulated: str
+    quantity: str
     floor: float = field(repr=False)
     rounding: float = field(repr=False)
 

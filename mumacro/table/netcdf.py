@@ -133,7 +133,7 @@ def _put_cell_errors(group: Any, table: Table) -> None:
 def _geometry(chart: atlas.Chart) -> dict[str, Any]:
     return {
         "regime": atlas.REGIMES[chart.regime],
-        "quantity": chart.tabulated,
+        "quantity": chart.quantity,
         "range_of_a": np.array([chart.a.low, chart.a.high]),
         "range_of_b": np.array([chart.b.low, chart.b.high]),
     }
@@ -168,7 +168,7 @@ def _fill(root: Any, table: Table) -> None:
         _put(group, axes[1], block.b, atlas.COORDINATES[axes[1]])
         for quantity in table.held(chart):
             meaning = (
-                chart.tabulated
+                chart.quantity
                 if quantity.name == "mu_ratio"
                 else f"{quantity.meaning}, scaled for this block"
             )
