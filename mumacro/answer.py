@@ -10,7 +10,7 @@ from mumacro import closed_forms, plotting
 from mumacro.errors import MumacroError
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-#: float for one case; an array of float64 for many, or what holds labels in its place
+#: float for one case; for many an array of float64, or a labelled object in its place
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 

@@ -1,4 +1,4 @@
-"""Import paths of former versions, and what stands in their place."""
+"""Import paths of former versions, and their replacements."""
 
 MOVED = {
     "mumacro.inverse": "mumacro.solve_for(surrogate, unknown, target, **case)",

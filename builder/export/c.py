@@ -19,7 +19,7 @@ from mumacro.table.blocks import Table
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.version import __version__
 
-#: of the bundled table that is written if none is named: a C program holds it in its text
+#: picks the table that is exported by default: a C program holds all of its numbers as text
 DEFAULT_TOLERANCE = 1e-7
 _KERNEL = Path(mumacro.__file__).parent / "kernel"
 _BANNER = f"/* Written by mumacro {__version__}; do not edit.  {{}}. */\n"

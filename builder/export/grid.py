@@ -77,7 +77,7 @@ def export_table(path: str | Path, name: str, out: str | Path) -> Table:
     TableError
         The table cannot be read.
     OSError
-        ``out`` cannot be written; what was there before is still there.
+        ``out`` cannot be written; an older file of that name is unchanged.
     """
     check_format(name)
     path, out = Path(path), Path(out)

@@ -13,7 +13,7 @@ from mumacro.inputs.kind import SPRING
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
-#: column -> what it is and where it is given; NaN elsewhere.  Without an equation number it is this
+#: column -> its formula and range; NaN elsewhere.  A formula without an equation number is this
 #: project's own.
 APPROXIMATIONS = {
     "static": "eqs. (16), (38), the limit v0 -> 0: mu0 sqrt(1 - y~^2), 0 for y~ >= 1",
@@ -33,7 +33,7 @@ APPROXIMATIONS = {
     "corner": "slow sliding near y~ = 1, root of mu~^3 + 2 (y~ - 1) mu~ = pi v~; given for |y~ - "
     "1| <= 0.5, mu~ <= 0.7",
 }
-#: v0 at which continuous sliding begins: column -> what it is and where it is given
+#: v0 at which continuous sliding begins: column -> its formula and range
 BORDERS = {
     "exact": "the table's border",
     "eq_23": "l0 omega v~, v~ the root of y~^2 = 2 v~ (1 + v~^2)(sqrt(1 + v~^2) + v~); given for "
@@ -76,7 +76,7 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     with np.errstate(all="ignore"):
         creep = law.mu_static + at_rest.gradient["v0"] * inputs["v0"]
         border, fit_border = surrogate.v_tilde_crit(y), closed_forms.border_27(y)
-        # without oscillation there is no border, and every speed but 0 is infinitely far above it
+        # without oscillation v~crit is 0, and v~/v~crit is infinite for every speed but 0
         rho, fit_rho = (np.where(v > 0.0, v / crit, 0.0) for crit in (border, fit_border))
         static, critical, top = (
             closed_forms.static_limit(y),

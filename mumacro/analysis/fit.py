@@ -30,7 +30,7 @@ _PER_DECADE, _MOST_NODES = 10, 600  # of the scan
 
 @dataclass(frozen=True)
 class Fit:
-    """What measured points say about a contact.
+    """k and mu0 of a contact, fitted to measured points.
 
     Attributes
     ----------
@@ -48,12 +48,12 @@ class Fit:
     residuals : ndarray
         Measured mu_macro minus the fit's [-], (n,).
     chi2, reduced_chi2 : float
-        Sum of squared residuals over their variances (1 if not given); the same over the degrees of
-        freedom, NaN if there is none.
+        Sum of squared residuals over their variances (1 by default); the same over the degrees of
+        freedom, NaN without any.
     solutions : tuple of dict
         All minima that the points allow within 95 %, best first, each with values and ``chi2``.
     warnings : tuple of str
-        What the points do not determine.
+        Each names a value that the points do not determine, or a doubt about the fit.
     contact, direction : str
         Of the contact that was fitted.
     points : dict of ndarray
@@ -91,8 +91,8 @@ class Fit:
     def plot(self, ax: Any = None) -> Any:
         """Points, fit and its 95 % band over the input that varies most; returns matplotlib's axes.
 
-        There is a curve for each set of the other inputs; more than 8 of them have no legend.
-        Where each point has its own, such as mu0, there is one line through the fit at the points.
+        Each set of the other inputs has a curve; more than 8 of them have no legend.  Where each
+        point has a set of its own, such as its mu0, one line joins the fit at the points.
         """
         inputs = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(inputs, key=lambda name: (np.unique(inputs[name]).size, name == "v0"))
@@ -238,7 +238,7 @@ class _Minimum(NamedTuple):
 
 
 class _Problem(Measured):
-    """Where the points and the model agree best."""
+    """The search for the unknowns at which the model fits the points best."""
 
     def _scan(self) -> _Scan:
         """Every legal k from so soft that friction is mu0 to rigid, the last node; or every mu0 of

@@ -24,7 +24,7 @@ _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their product
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:
-    """What is fitted by default: k and mu0, or k alone where mu0 is a column."""
+    """The unknowns by default: k and mu0, or k alone where mu0 is a column."""
     return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
 
 
@@ -33,9 +33,8 @@ class Measured:
     :func:`mumacro.fit`.
 
     ``columns`` has the known inputs [SI], (n,), by the names that ``evaluate`` takes; ``mu`` is
-    mu_macro [-], ``std`` its standard deviations, None where not known, ``weight`` one over them,
-    or 1; ``amplitude`` is the input that says how far the contact is moved or unloaded: y0, or
-    Fz_amplitude.
+    mu_macro [-], ``std`` its standard deviations or None, ``weight`` one over them, or 1;
+    ``amplitude`` is the name of the oscillation's input: y0, or Fz_amplitude.
     """
 
     def __init__(

@@ -75,7 +75,7 @@ def settling(
     mu0, Fz, k, y0, v0, omega or f : array_like
         The case [-, N, N/m, m, m/s, rad/s or Hz], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float
-        What is left of the disturbance [-], 0 < remaining < 1.
+        Share of the disturbance that is left [-], 0 < remaining < 1.
     contact : str
         "spring"; or "ball", for which the periods are those of its slowest spring.
     direction : str

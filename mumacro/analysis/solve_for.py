@@ -99,7 +99,7 @@ class Solution:
     targets: tuple[float, ...]  #: the wanted mu_macro [-]
     #: of each target, ascending; empty where it is not reachable
     roots: tuple[tuple[Root, ...], ...]
-    reach: Reach  #: what is reachable in the range that was searched
+    reach: Reach  #: the reachable mu_macro in the range of the search
     #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
     constant: bool
     #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
@@ -234,8 +234,8 @@ def _checked_range(curve: InputCurve, within: tuple[float, float]) -> tuple[floa
 
 
 def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
-    """Everywhere; or from a soft contact to a rigid one, to 1e-12 or so, and what the targets need
-    beyond."""
+    """All legal values; or from a soft contact to a rigid one, to 1e-12 or so, and further where
+    the targets need it."""
     case, unknown, (least, most) = curve.case, curve.unknown, _legal(curve)
     if unknown in EVERYWHERE:
         return least, most
@@ -248,7 +248,7 @@ def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
 
 
 def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[float, float]:
-    """The same for k, Fz and mu0, whose smallest legal value is ``least``."""
+    """The range for k, Fz and mu0, whose smallest legal value is ``least``."""
     case, unknown = curve.case, curve.unknown
     amplitude = case[AMPLITUDE if curve.kind.normal else "y0"]
     if 0.0 in (amplitude, case["omega"]) or curve.proportional:
@@ -352,7 +352,7 @@ def _enclosures(
     if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
         beside = np.minimum(np.nextafter(value, HUGE), branch.x[-1])
         bound = np.maximum(bound, curve.answer(beside).error_bound)
-    # a root is found to rounding, even where mu_macro is exact
+    # a root is exact to rounding only, even where mu_macro is exact
     bound = np.maximum(bound, 2.0**-50 * targets)
     # an end may be a jump of mu_macro, at the border or a seam, with a larger bound beyond it: then
     # that one counts
@@ -400,8 +400,7 @@ def _where_off(
         step = bound / (branch.sign * slope[i])
         ends: Array = value[i] * np.exp(sign * step)
         straight = (ends > branch.x[0]) & (ends < branch.x[-1]) & (step > 0.0)
-    # most often the curve is straight over so short a way; where it is not, the levels are searched
-    # for
+    # over so short a way the curve is mostly straight; where it is not, Newton steps follow
     trial = np.where(straight, ends, branch.x[0])
     straight &= np.abs(curve.mu(trial) - levels) <= 0.01 * bound
     curved = np.flatnonzero(~straight)

@@ -1,5 +1,5 @@
-"""What an answer says about the model: the rows of docs/validity.md that a case falls in, with the
-size of each effect.
+"""How far the model holds for a case: the rows of docs/validity.md that apply to it, with the size
+of each effect.
 
 The error bound of an answer is the table's distance to the model.  How far the model is from a
 contact is another question, and mostly the larger one.  Two assumptions cannot be judged from the
@@ -43,8 +43,8 @@ _PERIODS, _WATTS = 100.0, 0.1  # above them a row on settling, on heat
 
 
 class Row(TypedDict):
-    """One row: its name in :data:`ROWS`, a sentence, and the relative change of mu_macro, None
-    where none is known."""
+    """One row: its name in :data:`ROWS`, a sentence, and the relative change of mu_macro, or
+    None where its size is unknown."""
 
     row: str
     text: str

@@ -1,5 +1,4 @@
-"""The geometries of :mod:`mumacro.contacts.stiffness` by name, with arguments, units and meaning:
-the one list of them.
+"""The geometries of :mod:`mumacro.contacts.stiffness` by name, with arguments, units and meaning.
 
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
@@ -31,7 +30,7 @@ class Argument(NamedTuple):
 
 
 class Geometry(NamedTuple):
-    """One geometry: its function, what it is, and its own arguments beside those of the two
+    """One geometry: its function, its meaning, and its own arguments beside those of the two
     bodies."""
 
     function: Callable[..., Contact]

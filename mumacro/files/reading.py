@@ -1,6 +1,6 @@
 """The three formats: which files and columns there are, and blocks of records.
 
-Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else stays text.
+Cells of CSV and values of NDJSON are text.  Inputs become numbers; other columns stay text.
 """
 
 import csv
@@ -197,7 +197,7 @@ class TextSource:
     def _columns(
         self, records: Any, names: Sequence[str], where: str
     ) -> tuple[dict[str, Any], Sequence[str | None]]:
-        """Values by column, and what is wrong with each record."""
+        """Values by column, and the fault of each record, if any."""
         if self.sep:
             width = len(self.head)
             faults = [
@@ -244,7 +244,7 @@ def _is_utf8(record: Sequence[str]) -> bool:
 
 
 def _object(text: bytes) -> tuple[dict[str, Any], str | None]:
-    """The object of a line, and what is wrong with it."""
+    """The object of a line, and its fault, if any."""
     try:
         value = _DECODER.decode(text.decode("utf-8-sig"))
         if b"\\u" in text:

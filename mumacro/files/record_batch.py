@@ -110,7 +110,7 @@ def find_columns(
     kind: Kind = SPRING,
     where: str = "",
 ) -> tuple[dict[str, tuple[str, Scale]], list[str]]:
-    """By input, in their order, the heading and what its unit is in SI; and the names of the
+    """By input, in their order, the heading and the scale of its unit; and the names of the
     columns that are added.
 
     FilesError names, after ``where``, all columns that stand twice in the heading, would be written

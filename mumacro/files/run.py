@@ -223,7 +223,7 @@ class _Run:
                     pa.ArrowException,
                 ):  # an input must be changed before this run can end
                     self._clear()
-                    self._refuse_changed()  # first: what was half written looks like a damaged row
+                    self._refuse_changed()  # first: a half-written input looks damaged
                     raise
                 self._finish(state)
             self._clear()

@@ -449,7 +449,7 @@ def check(
 
 
 def _first_case(illegal: Any, shape: tuple[int, ...]) -> int | None:
-    """The first case that a column spoils; None for a value alone, which spoils all of them."""
+    """The first case with an illegal value; None for one value that is in all cases."""
     if not illegal.ndim:
         return None
     cases = np.flatnonzero(np.broadcast_to(illegal, shape or illegal.shape))

@@ -1,4 +1,4 @@
-"""The six inputs of a case: names, units, bounds, and what may stand for them.
+"""The six inputs of a case: names, units, bounds, and the inputs in their place.
 
 The library, the files, the command line, the service and the exports take their fields from here.
 A frequency ``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one
@@ -22,8 +22,8 @@ SI = {
     "f": ("Hz", "hertz"),
     "v0": ("m/s", "metres per second"),
 }
-#: what may stand for an input, and the input that has its unit: the amplitude of the normal force,
-#: the ends of k
+#: inputs in place of another one -> the input whose unit they have: the amplitude of the normal
+#: force, the ends of k
 LIKE = {"Fz_amplitude": "Fz", "k_low": "k", "k_high": "k"}
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
@@ -52,7 +52,7 @@ def is_rigid(text: str) -> bool:
 
 
 def unit_of(name: str) -> str:
-    """The SI unit of an input, or of what may stand for one.
+    """The SI unit of an input, or of one in its place.
 
     >>> unit_of("k_low"), unit_of("f")
     ('N/m', 'Hz')
@@ -61,7 +61,7 @@ def unit_of(name: str) -> str:
 
 
 def field_of(name: str) -> tuple[str, float]:
-    """The field behind the name of an input, and what one unit of the name is of it.
+    """The field behind the name of an input, and its value for one unit of the name.
 
     >>> field_of("f"), field_of("y0")
     (('omega', 6.283185307179586), ('y0', 1.0))

@@ -17,7 +17,7 @@ from mumacro.inputs.units import (
     suggestion,
 )
 
-#: what may stand between the cells of CSV, by the word for it
+#: separators of the cells of CSV, by name
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"
 NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
@@ -105,7 +105,7 @@ def read_head(
 def find_heads(
     heads: Sequence[str], like: Mapping[str, str]
 ) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
-    """Where the columns are, what one unit of each is, and what is wrong with the heads.
+    """The place and unit of each column by name, and the faults of the heads.
 
     ``like`` has the names of the columns, and for each the input whose units it has; other columns
     are left out.

@@ -146,7 +146,7 @@ def split_unit(column: str) -> tuple[str, str | None]:
 
 
 def scale_of(name: str, unit: str) -> Scale | None:
-    """What one ``unit`` of the input ``name`` is in SI; None for a unit that is not in the table.
+    """The scale of a ``unit`` of the input ``name``; None for a unit that is not in the table.
 
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
@@ -246,8 +246,8 @@ def read_number(name: str, text: str) -> float:
 def read_quantity(
     name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False
 ) -> float:
-    """As :func:`read_number`, of any quantity: what it is in ``words``, its ``units``, whether it
-    may be ``rigid``."""
+    """As :func:`read_number`, of any quantity: ``words`` for its SI unit, its ``units``, whether
+    it may be ``rigid``."""
     text = text.strip()
     if rigid and is_rigid(text):
         return math.inf

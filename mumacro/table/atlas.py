@@ -32,7 +32,7 @@ CONTINUOUS, STICK_SLIP, STATIC = (
     REGIMES.index(name) for name in ("continuous", "stick_slip", "static")
 )
 
-#: coordinate of a table file -> what it is
+#: coordinate of a table file -> its meaning
 COORDINATES = {
     "y_squared": "square of the dimensionless amplitude",
     "v_squared_share": "v_tilde^2/(1 + v_tilde^2)",

@@ -218,7 +218,7 @@ def _image(table: Table) -> bytes:
     """The bytes of a file that holds ``table``.
 
     A temporary file: where the disk is full the netCDF library reports little and keeps the file
-    open.  What it makes in memory holds the time of day.
+    open.  A file that it makes in memory contains the time of day.
     """
     import tempfile  # only writing needs it: reading a table starts sooner without
 
@@ -277,7 +277,7 @@ def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
 
 
 def _check_distribution(root: hdf5.Group, attributes: dict[str, Any]) -> None:
-    """Refuse a distribution of errors that is not one; an older table has none."""
+    """Refuse a damaged distribution of errors; older tables have no distribution."""
     if "verified_quantities" not in attributes:
         return
     shares, names = (

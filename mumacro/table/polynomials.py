@@ -99,7 +99,7 @@ def cells_1d(piece: int, values: Array, cells: int) -> Array:
 
 
 def cell_scale(piece: int, x: Array) -> Array:
-    """What a piece of v~crit is multiplied by from nodes to cells, at its coordinate ``x`` (n,)."""
+    """Factor from node values to cell values of a piece of v~crit, at its coordinate ``x`` (n,)."""
     with np.errstate(divide="ignore", invalid="ignore"):  # both are infinite at y~ = infinity
         of_nodes, of_cells = kernels[-1].border_scales(
             piece, atlas.BORDER_PIECES[piece][1].amplitude(x)
@@ -184,7 +184,9 @@ def quantity_cells(blocks: Sequence[Block], code: int) -> tuple[Array, Array, Ar
         error[0] = block.errors[name][0]
         if code == atlas.MU:
             error += chart.rounding, chart.floor
-        in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))  # none where it is zero
+        in_cells.append(
+            block.cell_errors.get(name, np.zeros((cells, 3)))
+        )  # zero where it is not tabulated
     return _joined(patches), errors, np.concatenate(in_cells)
 
 

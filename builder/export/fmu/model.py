@@ -143,7 +143,7 @@ def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
 
 
 def _zig(target: str) -> list[str] | None:
-    """The command that compiles for a target of zig's; None where the package ziglang is not
+    """The command that compiles for a target of zig; None where the package ziglang is not
     installed."""
     package = importlib.util.find_spec("ziglang")
     return [sys.executable, "-m", "ziglang", "cc", "-target", target] if package else None
