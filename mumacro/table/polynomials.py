@@ -184,9 +184,8 @@ def quantity_cells(blocks: Sequence[Block], code: int) -> tuple[Array, Array, Ar
         error[0] = block.errors[name][0]
         if code == atlas.MU:
             error += chart.rounding, chart.floor
-        in_cells.append(
-            block.cell_errors.get(name, np.zeros((cells, 3)))
-        )  # zero where it is not tabulated
+        # zero where the block does not tabulate the quantity
+        in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))
     return _joined(patches), errors, np.concatenate(in_cells)
 
 
