@@ -115,8 +115,8 @@ def evaluate_labelled(
         return apply(lambda codes: [entries[codes]], {"source_code": code}, [name])[0]
 
     def labelled_certain(v: Any, y: Any) -> Any:
-        both = {"v_tilde": v, "y_tilde": y}
-        return apply(lambda v, y: [certain(v, y)], both, ["regime_certain"])[0]
+        groups_by_name = {"v_tilde": v, "y_tilde": y}
+        return apply(lambda v, y: [certain(v, y)], groups_by_name, ["regime_certain"])[0]
 
     mu_macro, mu_ratio, bound, code = (results[name] for name in names[:4])
     answer: Any = (IntervalAnswer if interval else Answer)(
@@ -172,7 +172,7 @@ def _on_arrays(function: Callable[..., Any], names: Sequence[str]) -> Callable[.
     return wrapper
 
 
-def _aligned(call: Callable[[], Any], inputs: Mapping[str, Any]) -> list[Any]:
+def _call_aligned(call: Callable[[], Any], inputs: Mapping[str, Any]) -> list[Any]:
     """All results of ``call``; InputError where the labels or shapes of its arguments do not
     fit."""
     try:
@@ -198,8 +198,8 @@ def _pandas(
     arrays_in = [
         x.to_numpy() if isinstance(x, (pd.Series, pd.Index)) else x for x in inputs.values()
     ]
-    arrays = _aligned(lambda: _on_arrays(function, names)(*arrays_in), inputs)
-    return _aligned(
+    arrays = _call_aligned(lambda: _on_arrays(function, names)(*arrays_in), inputs)
+    return _call_aligned(
         lambda: tuple(pd.Series(x, index, name=n) for x, n in zip(arrays, names, strict=True)),
         inputs,
     )
@@ -226,13 +226,13 @@ def _xarray(
         "output_dtypes": _dtypes(names),
     }
     options |= {"dask": "parallelized", "keep_attrs": False}
-    arrays = _aligned(
+    arrays = _call_aligned(
         lambda: xr.apply_ufunc(_on_arrays(function, names), *inputs.values(), **options), inputs
     )
-    named = [array.rename(name) for array, name in zip(arrays, names, strict=True)]
-    for array, name in zip(named, names, strict=True):
+    results = [array.rename(name) for array, name in zip(arrays, names, strict=True)]
+    for array, name in zip(results, names, strict=True):
         array.attrs = dict(zip(("units", "long_name"), _ABOUT[name], strict=True))
-    return named
+    return results
 
 
 def _dask(
@@ -246,7 +246,7 @@ def _dask(
         "output_dtypes": _dtypes(names) if len(names) > 1 else _dtypes(names)[0],
         "vectorize": False,
     }
-    return _aligned(
+    return _call_aligned(
         lambda: apply(_on_arrays(function, names), signature, *inputs.values(), **options), inputs
     )
 

@@ -112,7 +112,7 @@ class Surrogate:
         >>> Surrogate.open(1e-8).id
         'mumacro-1e-10'
         """
-        path = Path(table) if isinstance(table, (str, Path)) else _bundled(table)
+        path = Path(table) if isinstance(table, (str, Path)) else _bundled_table(table)
         return cls._of_image(read_image(path), path, threads)
 
     @classmethod
@@ -261,7 +261,7 @@ class Surrogate:
         values = shared_out.alone(atlas.MU, self._data, v, y, self._thread_limit)
         if not shape and math.isnan(values[0]):
             raise _illegal(v, y)
-        return _shaped(values, shape)
+        return _reshape(values, shape)
 
     def ratio_with_bound(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
@@ -292,7 +292,7 @@ class Surrogate:
         crit = _KERNEL.border(self._data, y, kind)
         if not shape and math.isnan(crit[0]):
             raise InputError("y_tilde", float(y[0]), ">= 0 and < 1" if kind.normal else ">= 0")
-        return _shaped(crit, shape)
+        return _reshape(crit, shape)
 
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
         """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
@@ -342,7 +342,7 @@ class Surrogate:
         rows = shared_out.slopes(_CODES[of], data, v, y, self._thread_limit)
         if not shape and math.isnan(rows.value[0]):
             raise _illegal(v, y)
-        return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
+        return tuple(_reshape(row, shape) for row in rows[: 5 if bounds else 3])
 
     def _with(self, quantity: str, argument: str = "name") -> Data:
         """The data that the kernel reads, with the cells of a quantity; made on first use."""
@@ -408,7 +408,7 @@ class Surrogate:
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
             raise _illegal(v, y, ">= 0 and < 1" if kind.normal else finite)
-        return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
+        return _reshape(value, shape), _reshape(bound, shape), _reshape(source, shape)
 
     # --- dimensional ------------------------------------------------------------------------------
 
@@ -808,7 +808,7 @@ def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
             raise TableError(path, f"the nodes of border/{name} are not v~crit(y~)")
 
 
-def _bundled(tolerance: float | None) -> Path:
+def _bundled_table(tolerance: float | None) -> Path:
     """The tightest bundled table, or the smallest that meets ``tolerance``."""
     tables = {float(path.stem.removeprefix("mumacro-")): path for path in bundled_tables()}
     if not tables:
@@ -856,7 +856,7 @@ def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
     )
 
 
-def _shaped(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
+def _reshape(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
     return values.reshape(shape) if shape else values[0].item()
 
 

@@ -74,8 +74,8 @@ def border_crossings(
         i = np.flatnonzero(state[1:] != state[:-1])
 
         def before(x: Array, regime: str = regime, states: Bools = state[i, None]) -> Bools:
-            same: Bools = (curve.answer(x).regime == regime) == states
-            return same
+            agrees: Bools = (curve.answer(x).regime == regime) == states
+            return agrees
 
         cuts = last_double(before, edges[i], edges[i + 1])
         pairs += [*zip(*(cut.tolist() for cut in cuts), strict=True)]

@@ -106,7 +106,7 @@ class Fit:
         curves = []
         for i, row in enumerate(sets.T):
             in_set = member.ravel() == i
-            varied = [
+            set_labels = [
                 f"{name} = {x:.4g}"
                 for name, x, all_ in zip(names, row, sets, strict=True)
                 if np.ptp(all_) > 0.0
@@ -114,21 +114,21 @@ class Fit:
             x_curve = np.unique(np.concatenate([fine, x[in_set]]))
             mu, deviation = self.predict(**{along: x_curve}, **dict(zip(names, row, strict=True)))
             bars = self.points[STD][in_set] if STD in self.points else None
-            label, measured = ", ".join(varied) or "fit", self.points["mu_macro"][in_set]
+            label, mu_measured = ", ".join(set_labels) or "fit", self.points["mu_macro"][in_set]
             curves.append(
-                plotting.Curve(label, x[in_set], measured, bars, x_curve, mu, width * deviation)
+                plotting.Curve(label, x[in_set], mu_measured, bars, x_curve, mu, width * deviation)
             )
         return plotting.plot_fit(along, curves, ", ".join(self._value_texts()), ax)
 
     def _plot_each(self, along: str, ax: Any) -> Any:
         """The same where each point has its own other inputs, such as mu0: one line."""
         order = np.argsort(self.points[along])
-        x, measured = self.points[along][order], self.points["mu_macro"][order]
+        x, mu_measured = self.points[along][order], self.points["mu_macro"][order]
         mu, deviation = (column[order] for column in self.predict())
         std = self.points.get(STD)
         width = quantile(None if std is not None else x.size - len(self.values))
         bars, label = None if std is None else std[order], "fit, at the inputs of each point"
-        curve = plotting.Curve(label, x, measured, bars, x, mu, width * deviation)
+        curve = plotting.Curve(label, x, mu_measured, bars, x, mu, width * deviation)
         return plotting.plot_fit(along, [curve], ", ".join(self._value_texts()), ax)
 
     def _value_texts(self) -> list[str]:
@@ -205,7 +205,7 @@ def fit(
     names = (
         (unknowns,) if isinstance(unknowns, str) else None if unknowns is None else tuple(unknowns)
     )
-    problem = _Problem(data, names, contact, direction, surrogate or _bundled(), fixed)
+    problem = _Problem(data, names, contact, direction, surrogate or _bundled_surrogate(), fixed)
     with np.errstate(all="ignore"):  # a value that the points do not determine is infinite
         result = problem.solve()
     for text in result.warnings:
@@ -214,7 +214,7 @@ def fit(
 
 
 @functools.cache
-def _bundled() -> Surrogate:
+def _bundled_surrogate() -> Surrogate:
     return Surrogate.open()
 
 
@@ -292,8 +292,10 @@ class _Problem(Measured):
                 f"or {self.amplitude}"
             )
             raise InputError("data", f"{self.n} points", bound)
-        padded = np.concatenate(([math.inf], scan.chi2, [math.inf]))
-        lowest = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
+        walled_chi2 = np.concatenate(([math.inf], scan.chi2, [math.inf]))
+        lowest = np.flatnonzero(
+            (walled_chi2[1:-1] < walled_chi2[:-2]) & (walled_chi2[1:-1] <= walled_chi2[2:])
+        )
         minima = sorted((self._refine(scan, int(i)) for i in lowest), key=lambda m: m.chi2)
         chi2, dof = minima[0].chi2, self.n - len(self.unknowns)
         rounding = 1e-30 * size  # of exact points: mu_macro has sixteen digits

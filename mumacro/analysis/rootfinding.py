@@ -141,7 +141,7 @@ def _middle(a: Array, b: Array) -> Array:
     return np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
 
 
-def _ordered(x: ArrayLike) -> NDArray[np.int64]:
+def _order_key(x: ArrayLike) -> NDArray[np.int64]:
     """Doubles >= 0 as integers of the same order.  Adding 0.0 turns -0.0, the smallest integer,
     into 0.0."""
     return (np.asarray(x, dtype=np.float64) + 0.0).view(np.int64)
@@ -158,7 +158,7 @@ def last_double(
     maps (n, m) values, row i for bracket i, to bool; from true at ``low`` (n,) to false at ``high``
     it changes once.
     """
-    a, b = _ordered(low).copy(), _ordered(high).copy()
+    a, b = _order_key(low).copy(), _order_key(high).copy()
     rows = np.arange(a.size)
     # a call costs as much as some hundred points: few brackets are cut into many parts at once
     parts = min(max(_PER_CALL // max(a.size, 1), 2), 64)

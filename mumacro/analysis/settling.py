@@ -132,8 +132,8 @@ def settling(
     with np.errstate(all="ignore"):
         # slip speed of the foot in units of l0 omega; infinite for rigid contact and beyond double
         # range
-        dragged = np.where(speed == 0.0, 0.0, speed / l0 / frequency)
-        rate = np.where(inside, v * ratio + power, np.where(unshaken, dragged, np.inf))
+        drag_rate = np.where(speed == 0.0, 0.0, speed / l0 / frequency)
+        rate = np.where(inside, v * ratio + power, np.where(unshaken, drag_rate, np.inf))
         rate = np.where(np.isnan(answer.mu_ratio), np.nan, rate)  # an illegal case of an array
         relative_error = np.where(inside, (v * bound + power_bound) / rate, 0.0)
         slip_path = 2.0 * math.pi * rate

@@ -300,12 +300,12 @@ def _turning_points(curve: InputCurve, x: Array, mu: Array, noise: Array) -> lis
     if rise[top] <= noise[::order][top]:
         return []
     bottom = int(np.argmin(falling[: top + 1]))
-    places = np.array([bottom, top] if order == 1 else [x.size - 1 - top, x.size - 1 - bottom])
+    indices = np.array([bottom, top] if order == 1 else [x.size - 1 - top, x.size - 1 - bottom])
     sign = np.array([[-1.0], [1.0]])[::order]
-    inside = (places > 0) & (places < x.size - 1)
-    places, sign = places[inside], sign[inside]
+    inside = (indices > 0) & (indices < x.size - 1)
+    indices, sign = indices[inside], sign[inside]
     _, turns = last_double(
-        lambda at: ~(sign * curve.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1]
+        lambda at: ~(sign * curve.with_slope(at)[1] < 0.0), x[indices - 1], x[indices + 1]
     )
     return [*map(float, turns)]
 
@@ -350,8 +350,8 @@ def _enclosures(
     """
     bound = answer.error_bound
     if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
-        beside = np.minimum(np.nextafter(value, HUGE), branch.x[-1])
-        bound = np.maximum(bound, curve.answer(beside).error_bound)
+        neighbour = np.minimum(np.nextafter(value, HUGE), branch.x[-1])
+        bound = np.maximum(bound, curve.answer(neighbour).error_bound)
     # a root is exact to rounding only, even where mu_macro is exact
     bound = np.maximum(bound, 2.0**-50 * targets)
     # an end may be a jump of mu_macro, at the border or a seam, with a larger bound beyond it: then
@@ -376,10 +376,10 @@ def _enclosures(
         beyond = curve.answer(
             np.clip(np.nextafter(ends[pending], outwards[pending]), branch.x[0], branch.x[-1])
         )
-        exceeded = np.abs(beyond.mu_macro - end_targets[pending]) < 0.97 * beyond.error_bound
-        exceeded &= beyond.error_bound > bounds[pending]
-        pending = pending[exceeded]
-        bounds[pending] = beyond.error_bound[exceeded]
+        exceeds = np.abs(beyond.mu_macro - end_targets[pending]) < 0.97 * beyond.error_bound
+        exceeds &= beyond.error_bound > bounds[pending]
+        pending = pending[exceeds]
+        bounds[pending] = beyond.error_bound[exceeds]
     return np.minimum(ends[: value.size], value), np.maximum(ends[value.size :], value)
 
 
@@ -403,7 +403,7 @@ def _where_off(
     # over so short a way the curve is mostly straight; where it is not, Newton steps follow
     trial = np.where(straight, ends, branch.x[0])
     straight &= np.abs(curve.mu(trial) - levels) <= 0.01 * bound
-    curved = np.flatnonzero(~straight)
-    if curved.size:
-        ends[curved] = branch.meet(levels[curved], leave=above[curved])
+    bent = np.flatnonzero(~straight)
+    if bent.size:
+        ends[bent] = branch.meet(levels[bent], leave=above[bent])
     return ends

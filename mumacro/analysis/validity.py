@@ -234,18 +234,18 @@ def _tilt(mu0: float, y: float) -> Row | None:
 
 def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
     """Rows that follow from the slip path of a period, taken from one spring."""
-    settled = settling(surrogate, **six)
+    decay = settling(surrogate, **six)
     force = six["mu0"] * six["Fz"]
     # [m], [Hz]
-    slip_path, frequency = float(settled.slip_path) * force / six["k"], six["omega"] / RAD_PER_CYCLE
+    slip_path, frequency = float(decay.slip_path) * force / six["k"], six["omega"] / RAD_PER_CYCLE
     watts, rows = force * slip_path * frequency, list[Row]()
-    if math.isinf(settled.periods):
+    if math.isinf(decay.periods):
         text = "nothing slips at rest: this is the largest force that the contact can hold"
         rows.append({"row": "steady cycle", "text": text, "effect": None})
-    elif settled.periods > _PERIODS:
+    elif decay.periods > _PERIODS:
         text = (
-            f"creeping: a disturbance falls to 1 % within {settled.periods:.3g} periods, "
-            f"{settled.time:.3g} s"
+            f"creeping: a disturbance falls to 1 % within {decay.periods:.3g} periods, "
+            f"{decay.time:.3g} s"
         )
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:

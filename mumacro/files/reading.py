@@ -30,15 +30,15 @@ LONGEST = 64 * 2**20  # bytes of a line
 class Block(NamedTuple):
     """Some records in order; ``share`` is how much of the file is read after them.
 
-    A record that could not be read is a row of nulls; ``wrong`` has by its index the text and the
-    fault. ``texts`` are the records as they came in, where they are text: cells of CSV, lines of
+    A record that could not be read is a row of nulls; ``unreadable`` has its index, its text and
+    the fault. ``texts`` are the unchanged records, where they are text: cells of CSV, lines of
     NDJSON.
     """
 
     batch: pa.RecordBatch
     share: float
     texts: Sequence[Any] = ()
-    wrong: Sequence[tuple[int, str, str]] = ()
+    unreadable: Sequence[tuple[int, str, str]] = ()
 
 
 def format_of(path: Path) -> tuple[str, bool]:
@@ -174,8 +174,10 @@ class TextSource:
                     skip - len(texts) + 1 + next(i for i, x in enumerate(texts) if not _is_utf8(x))
                 )
                 raise FilesError(f"{lines.path}: row {row} {NO_UTF8}") from None
-            wrong = [(i, self._excerpt(texts[i]), fault) for i, fault in enumerate(faults) if fault]
-            yield Block(batch, lines.share, texts, wrong)
+            unreadable = [
+                (i, self._excerpt(texts[i]), fault) for i, fault in enumerate(faults) if fault
+            ]
+            yield Block(batch, lines.share, texts, unreadable)
 
     def _records(self, lines: _Lines) -> Iterator[Any]:
         """Lists of cells, or lines."""
@@ -204,8 +206,8 @@ class TextSource:
                 None if len(x) == width else f"has {len(x)} cells, the header has {width}"
                 for x in records
             ]
-            whole = (row if len(row) == width else [None] * width for row in records)
-            return dict(zip(self.schema.names, zip(*whole, strict=True), strict=True)), faults
+            rows = (row if len(row) == width else [None] * width for row in records)
+            return dict(zip(self.schema.names, zip(*rows, strict=True), strict=True)), faults
         objects, faults = zip(*map(_object, records), strict=True)
         if not self.verbatim and (
             new := {name for record in objects for name in record} - {*names}

@@ -142,7 +142,7 @@ class _Run:
                 f"--sep and --decimal are both {sep!r}; give another --sep, such as ';'"
             )
         self.files, input_format = reading.find_files(cases)
-        output_format, packed = reading.format_of(out)
+        output_format, compressed = reading.format_of(out)
         if not output_format or out.is_dir():
             raise FilesError(f"{out}: must be the name of a file that ends in {reading.ENDINGS}")
         self.out, self.parts, self.rejects, self.record = (
@@ -176,15 +176,15 @@ class _Run:
             decimal if input_format == "csv" else ".",
         )
         input_headings = [heading for heading, _ in headings.values()]
-        self.output = Output(output_format, packed, sep, decimal, headings.get("k", (None,))[0])
-        copied = [
+        self.output = Output(output_format, compressed, sep, decimal, headings.get("k", (None,))[0])
+        input_fields = [
             field.with_type(pa.float64())
             if field.name in input_headings and input_format != "parquet"
             else field
             for field in self.source.schema
         ]
         self.columns_read = input_headings if self.verbatim else self.source.schema.names
-        fields = [*([] if self.verbatim else copied), *added_fields(names)]
+        fields = [*([] if self.verbatim else input_fields), *added_fields(names)]
         self.schema = pa.schema(fields, self.source.schema.metadata)
         plan = {
             "version": __version__,
@@ -202,17 +202,17 @@ class _Run:
     ) -> Summary:
         """Keep the sound pieces of an earlier run, do the rest, and put the files into place."""
         with alone_in(self.parts):
-            if resumed := None if force else self._complete():
-                state = resumed
+            if earlier := None if force else self._complete():
+                state = earlier
                 say(f"{self.out}: is complete already; nothing is left to do")
             else:
-                resumed = self._begin(force, say)
-                state = resumed or _State()
+                earlier = self._begin(force, say)
+                state = earlier or _State()
                 try:
                     # no flush to the disk here: after a loss of power the checksums show which
                     # pieces are whole
                     with self.log.open("ab") as log:
-                        for state, text, share in self._evaluated(resumed):
+                        for state, text, share in self._new_pieces(earlier):
                             note = json.dumps([len(text), zlib.crc32(text), *state]).encode()
                             log.write(b"%08x %b\n" % (zlib.crc32(note), note))
                             log.write(text)
@@ -227,14 +227,14 @@ class _Run:
                     raise
                 self._finish(state)
             self._clear()
-        rows, rejected, resumed_rows = state.rows, state.rejected, resumed.rows if resumed else 0
+        rows, rejected, rows_before = state.rows, state.rejected, earlier.rows if earlier else 0
         return Summary(
             rows,
             rows - rejected,
             rejected,
             self.out,
             self.rejects if rejected else None,
-            resumed_rows,
+            rows_before,
         )
 
     def _complete(self) -> _State | None:
@@ -263,21 +263,22 @@ class _Run:
         with suppress(FileNotFoundError), self.log.open("rb") as log:
             first_line = log.readline()
         if first_line == self.plan_line:
-            (state, end), *_ = deque(((state, end) for state, _, end in self._kept()), 1) or [
-                (None, len(first_line))
-            ]
-            more = "; what follows them was cut or changed, and is done again" * (
+            (state, end), *_ = deque(
+                ((state, end) for state, _, end in self._sound_pieces()), 1
+            ) or [(None, len(first_line))]
+            remark = "; what follows them was cut or changed, and is done again" * (
                 end < self.log.stat().st_size
             )
             os.truncate(self.log, end)
             rows, rejected = (state or _State())[2:4]
-            say(f"{self.parts}: {rows:,} rows are done already ({rejected:,} rejected){more}")
+            say(f"{self.parts}: {rows:,} rows are done already ({rejected:,} rejected){remark}")
             return state
         if first_line and not force:
-            plan, old = json.loads(self.plan_line), json.loads(first_line)
-            differ = ", ".join(name for name in plan if old.get(name) != plan[name])
+            plan, earlier_plan = json.loads(self.plan_line), json.loads(first_line)
+            differences = ", ".join(name for name in plan if earlier_plan.get(name) != plan[name])
             raise FilesError(
-                f"{self.parts}: has parts of another run ({differ} differ); --force deletes them"
+                f"{self.parts}: has parts of another run ({differences} differ); "
+                "--force deletes them"
             )
         for path in (self.out, self.rejects):
             if path.exists() and not force:
@@ -286,7 +287,7 @@ class _Run:
         write_whole(self.log, self.plan_line)
         return None
 
-    def _kept(self) -> Iterator[tuple[_State, bytes, int]]:
+    def _sound_pieces(self) -> Iterator[tuple[_State, bytes, int]]:
         """The sound pieces of the log: the state after each, its text, and where it ends."""
         with self.log.open("rb") as log:
             log.readline()
@@ -300,7 +301,7 @@ class _Run:
                     return
                 yield _State(*state), text, log.tell()
 
-    def _evaluated(self, state: _State | None) -> Iterator[tuple[_State, bytes, float]]:
+    def _new_pieces(self, state: _State | None) -> Iterator[tuple[_State, bytes, float]]:
         """The pieces that follow a state, with the share of the input that is read; at the
         beginning the head comes first."""
         if state is None:
@@ -328,7 +329,7 @@ class _Run:
         """A block as it stands in the output, and the state after it."""
         added, rejects, columns_in = answer_columns(block.batch, *self.evaluation)
         faults = {row: reason for row, *reason in rejects}
-        faults |= {i: [None, text, reason] for i, text, reason in block.wrong}
+        faults |= {i: [None, text, reason] for i, text, reason in block.unreadable}
         columns = [
             column if column.type == field.type else pa.array(columns_in[field.name])
             for field, column in zip(
@@ -355,12 +356,12 @@ class _Run:
             with self.unfinished.open(
                 "w", encoding="utf-8", errors="surrogateescape", newline=""
             ) as stream:
-                stream.writelines(kept.rejects for kept, *_ in self._kept())
+                stream.writelines(state_before.rejects for state_before, *_ in self._sound_pieces())
             put(self.unfinished, self.rejects)
         else:
             self.rejects.unlink(missing_ok=True)
         self.output.whole(
-            self.unfinished, self.schema, (text for _, text, _ in self._kept() if text)
+            self.unfinished, self.schema, (text for _, text, _ in self._sound_pieces() if text)
         )
         put(self.unfinished, self.out)
         write_whole(self.record, json.dumps(self._record(state), indent=1).encode())

@@ -22,7 +22,7 @@ def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
 
 
 class Output(NamedTuple):
-    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``packed`` (.gz) piece by
+    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``compressed`` (.gz) piece by
     piece.
 
     ``sep`` and ``decimal`` are those of CSV; in the column ``stiffness`` infinity is written as
@@ -30,7 +30,7 @@ class Output(NamedTuple):
     """
 
     format: str
-    packed: bool
+    compressed: bool
     sep: str
     decimal: str
     stiffness: str | None
@@ -39,7 +39,7 @@ class Output(NamedTuple):
         """A piece of text as it is in the file."""
         data = text.encode("utf-8", "surrogateescape")
         # without name and time, so that the same text gives the same bytes
-        return gzip.compress(data, 6, mtime=0) if self.packed else data
+        return gzip.compress(data, 6, mtime=0) if self.compressed else data
 
     def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes:
         """Rows as bytes; where ``texts`` has the unchanged input records, the columns stand behind
@@ -105,9 +105,11 @@ class Output(NamedTuple):
             with path.open("wb") as stream:
                 stream.writelines(pieces)
             return
-        coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
+        dictionary_columns = [
+            field.name for field in schema if not pa.types.is_floating(field.type)
+        ]
         with pa.parquet.ParquetWriter(
-            path, schema, use_dictionary=coded, compression="snappy"
+            path, schema, use_dictionary=dictionary_columns, compression="snappy"
         ) as writer:
             for piece in pieces:
                 writer.write_table(pa.ipc.open_stream(piece).read_all())

@@ -129,13 +129,13 @@ class Cases(NamedTuple):
         mu0, Fz, k = np.broadcast_arrays(*(self.columns[name] for name in ("mu0", "Fz", "k")))
         with np.errstate(all="ignore"):
             quotient = Fz / k
-            out = np.asarray(mu0 * quotient)
-            low, high = np.minimum(quotient, out), np.maximum(quotient, out)
-            odd = ~((low > 1e-290) & (high < 1e290))  # a partial result may have lost digits
-            if odd.any():
-                (a, i), (b, j), (c, n) = (np.frexp(x[odd]) for x in (mu0, Fz, k))
-                out[odd] = np.ldexp(a * (b / c), i + j - n)
-        return out
+            length = np.asarray(mu0 * quotient)
+            low, high = np.minimum(quotient, length), np.maximum(quotient, length)
+            inexact = ~((low > 1e-290) & (high < 1e290))  # a partial result may have lost digits
+            if inexact.any():
+                (a, i), (b, j), (c, n) = (np.frexp(x[inexact]) for x in (mu0, Fz, k))
+                length[inexact] = np.ldexp(a * (b / c), i + j - n)
+        return length
 
 
 # --- from inputs of any form to names and values --------------------------------------------------
@@ -153,8 +153,8 @@ def by_name(cases: Any, inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[
     values = dict(inputs)
     if cases is not None:
         columns = select("cases", cases, (*kind.columns, *ENDS))
-        if twice := columns.keys() & inputs.keys():
-            name = min(twice)
+        if duplicates := columns.keys() & inputs.keys():
+            name = min(duplicates)
             raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
         values = {**columns, **inputs}
     own_amplitude = _AMPLITUDES[kind.normal]

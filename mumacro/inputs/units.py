@@ -171,8 +171,8 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
     if plain in _SYNONYMS:
         return _SYNONYMS[plain]
     if loosely and len(plain) > 1:
-        near = difflib.get_close_matches(plain, _SYNONYMS, n=1, cutoff=0.75)
-        return _SYNONYMS[near[0]] if near else None
+        matches = difflib.get_close_matches(plain, _SYNONYMS, n=1, cutoff=0.75)
+        return _SYNONYMS[matches[0]] if matches else None
     return None
 
 
@@ -281,10 +281,10 @@ def _hint(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
     if not (match := _WITH_UNIT.fullmatch(text)):
         return None
     number, unit = match[1], match[2].replace(" ", "")
-    near = [symbol for symbol in units if symbol.lower() == unit.lower()]
+    symbols = [symbol for symbol in units if symbol.lower() == unit.lower()]
     partner = {"omega": "f", "f": "omega"}.get(name)
-    if near:
-        return f"did you mean {' or '.join(f'{number}{symbol}' for symbol in near)}?"
+    if symbols:
+        return f"did you mean {' or '.join(f'{number}{symbol}' for symbol in symbols)}?"
     if partner and (
         partner_unit := next(
             (symbol for symbol in UNITS_OF[partner] if symbol.lower() == unit.lower()), None

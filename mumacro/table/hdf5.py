@@ -68,11 +68,11 @@ class Group:
         count, by_age = h5a.get_num_attrs(self._id), h5py.h5.INDEX_CRT_ORDER
         if count > MOST_ATTRIBUTES:
             raise self.refuse(f"{self.path} has more than {MOST_ATTRIBUTES} attributes")
-        opened = (h5a.open(self._id, index=i, index_type=by_age) for i in range(count))
-        named = {attribute.name.decode(): attribute for attribute in opened}
+        handles = (h5a.open(self._id, index=i, index_type=by_age) for i in range(count))
+        handle_by_name = {handle.name.decode(): handle for handle in handles}
         return {
-            name: self._value(name, attribute)
-            for name, attribute in named.items()
+            name: self._value(name, handle)
+            for name, handle in handle_by_name.items()
             if not name.startswith("_")
         }
 

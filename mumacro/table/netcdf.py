@@ -240,8 +240,8 @@ def _nodes(group: hdf5.Group, axis: atlas.Axis) -> Array:
     if values.ndim != 1 or not 2 <= values.size <= MOST_NODES:
         raise group.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
     # the cosine's last digit differs between mathematical libraries
-    off = np.abs(values - nodes(values.size, axis.low, axis.high))
-    if np.any(off > 1e-15 * max(abs(axis.low), abs(axis.high))):
+    deviation = np.abs(values - nodes(values.size, axis.low, axis.high))
+    if np.any(deviation > 1e-15 * max(abs(axis.low), abs(axis.high))):
         raise group.refuse(
             f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart"
         )

@@ -124,9 +124,9 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from 7 down to
     0.
     """
-    left = interpolation_matrix(values.shape[0], cell_positions(a, cells[0])[1])
-    right = interpolation_matrix(values.shape[1], cell_positions(b, cells[1])[1])
-    local = (left @ chebyshev_coefficients(values) @ right.T).reshape(
+    matrix_a = interpolation_matrix(values.shape[0], cell_positions(a, cells[0])[1])
+    matrix_b = interpolation_matrix(values.shape[1], cell_positions(b, cells[1])[1])
+    local = (matrix_a @ chebyshev_coefficients(values) @ matrix_b.T).reshape(
         cells[0], WIDTH, cells[1], WIDTH
     )
     mean = local.mean(axis=(1, 3))
@@ -137,7 +137,7 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
     return np.asarray(power, dtype=np.float64).reshape(-1, WIDTH, WIDTH)
 
 
-def _joined(patches: Sequence[Array]) -> Array:
+def _join_patches(patches: Sequence[Array]) -> Array:
     """The patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line: a row
     lies in one."""
     shape = (sum(p.shape[0] for p in patches), WIDTH, WIDTH)
@@ -186,7 +186,7 @@ def quantity_cells(blocks: Sequence[Block], code: int) -> tuple[Array, Array, Ar
             error += chart.rounding, chart.floor
         # zero where the block does not tabulate the quantity
         in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))
-    return _joined(patches), errors, np.concatenate(in_cells)
+    return _join_patches(patches), errors, np.concatenate(in_cells)
 
 
 @functools.cache

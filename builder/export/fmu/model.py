@@ -182,10 +182,10 @@ def _description(version: int, token: str) -> str:
         ("ModelExchange", ""),
         ("CoSimulation", ' canHandleVariableCommunicationStepSize="true"'),
     ):
-        inside = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if fmi2 else ""
+        source_files = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if fmi2 else ""
         lines.append(
             f'<{interface} modelIdentifier="mumacro" {state_flag}="true" '
-            f'{derivatives_flag}="true"{extra}>{inside}</{interface}>'
+            f'{derivatives_flag}="true"{extra}>{source_files}</{interface}>'
         )
     lines += [
         _UNITS,
