@@ -158,7 +158,7 @@ class Surrogate:
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
         copy = object.__new__(type(self))
-        copy.__dict__.update(self.__dict__, _asked_threads=1)
+        copy.__dict__.update(self.__dict__, _thread_limit=1)
         return copy
 
     @property
