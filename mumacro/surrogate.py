@@ -783,7 +783,7 @@ class Surrogate:
 
 
 # mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits
-# (tests/test_surrogate.py solves them anew)
+# (tests/mumacro/test_surrogate.py solves them anew)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
 
