@@ -72,9 +72,9 @@ _END: dict[Detail, int] = {
 class CaseRows:
     """Answers to n cases, which :meth:`Kernel.cases` fills in, by the names of ``mumacro_row``.
 
-    ``v_tilde`` and ``y_tilde`` are there from the detail "groups" on, ``gradient`` and
-    ``gradient_bound``, six rows each, for "gradient".  ``source`` holds codes, -1 for an illegal
-    case, whose numbers are NaN.
+    ``v_tilde``, ``y_tilde`` and ``length_scale`` are there from the detail "groups" on,
+    ``gradient`` and ``gradient_bound``, six rows each, for "gradient".  ``source`` holds codes, -1
+    for an illegal case, whose numbers are NaN.
     """
 
     __slots__ = ("numbers", "source")
@@ -118,6 +118,11 @@ class CaseRows:
     def y_tilde(self) -> Array:
         """Dimensionless amplitude [-]."""
         return self._row("MU_ROW_Y_TILDE")
+
+    @property
+    def length_scale(self) -> Array:
+        """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact."""
+        return self._row("MU_ROW_LENGTH_SCALE")
 
     @property
     def gradient(self) -> Array:
