@@ -383,6 +383,7 @@ class Known:
 
     def with_slope(self, x: Any) -> Any:
         self.calls += 1
+        assert self.calls < 1000, "the search does not end"
         return SimpleNamespace(mu_macro=self.function(x)), self.slope(x)
 
 
