@@ -43,6 +43,13 @@ typedef struct {
     mumacro_driven_rule driven;
 } mumacro_data;
 
+/* The six inputs of n cases, mu0, Fz, k, y0 (normal: Fz_amplitude), omega, v0: each an array (n,), or one constant where
+ * its array is NULL. */
+typedef struct {
+    const double *array[6];
+    double constant[6];
+} mumacro_columns;
+
 /* Rows of the answers to cases.  A call fills all of them, or those before the gradient, or those before v~. */
 enum mumacro_row {
     MU_ROW_MU_MACRO,
