@@ -13,13 +13,16 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mumacro import Surrogate
 from mumacro.contacts import quadrature
 from mumacro.contacts.quadrature import driven_rule, put_rules, rules
 from mumacro.kernel import threads as shared_out
-from tests.cases import TOLERANCES, Array, opened
 
+Array = NDArray[np.float64]
+TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
+opened = functools.cache(Surrogate.open)
 KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
 
 

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from benchmarks import extended
 from benchmarks.measuring import main, markdown, quantity, sections
+from benchmarks.support.driven import answered, hard, ordinary
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
 from mumacro.kernel.binding import CaseRows, kernels
-from tests.test_driven_bounds import answered, hard, ordinary
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]

@@ -708,28 +708,33 @@ class Surrogate:
             return self._scalar_answer([*columns.values()], gradient)
         groups = groups or gradient or not cases.shape
         detail: Detail = "gradient" if gradient else "groups" if groups else "values"
-        rows = shared_out.cases(
-            self._data_of(kind),
-            [*columns.values()],
-            math.prod(shape),
-            self._thread_limit,
-            detail,
-            kind,
-        ).reshaped(shape)
-        answer: Answer[Any] = (
-            IntervalAnswer if cases.ends else AnswerWithGradient if gradient else Answer
-        )(rows.mu_macro, rows.mu_ratio, rows.error_bound, rows.source)
+        six, n, data = [*columns.values()], math.prod(shape), self._data_of(kind)
+        rows = shared_out.cases(data, six, n, self._thread_limit, detail, kind).reshaped(shape)
+        answer: Answer[Any]
+        if cases.ends is not None:
+            low, high = cases.ends
+            six = [*{**columns, "k": low}.values()]
+            extremes = shared_out.intervals(data, six, high, self._thread_limit, kind)
+            answer = IntervalAnswer(
+                rows.mu_macro,
+                rows.mu_ratio,
+                np.maximum(rows.error_bound, extremes.error_bound.reshape(shape)),
+                rows.source,
+            )
+            answer.mu_macro_low = np.minimum(rows.mu_macro, extremes.low.reshape(shape))
+            answer.mu_macro_high = np.maximum(rows.mu_macro, extremes.high.reshape(shape))
+        else:
+            answer = (AnswerWithGradient if gradient else Answer)(
+                rows.mu_macro, rows.mu_ratio, rows.error_bound, rows.source
+            )
         if groups:
-            length = np.where(rows.source.ravel() == -1, np.nan, cases.length_scale())
-            answer._groups = rows.v_tilde, rows.y_tilde, length.reshape(shape)
+            answer._groups = rows.v_tilde, rows.y_tilde, rows.length_scale
             answer._certain = (
                 self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
             )
         if gradient:
             answer.gradient = dict(zip(kind.fields, rows.gradient, strict=True))
             answer.gradient_bound = dict(zip(kind.fields, rows.gradient_bound, strict=True))
-        if isinstance(answer, IntervalAnswer):
-            self._add_extremes(answer, cases)
         return answer if cases.shape else single(answer)
 
     def _scalar_answer(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
@@ -743,25 +748,6 @@ class Surrogate:
             answer.gradient = dict(zip(FIELDS, row.gradient, strict=True))
             answer.gradient_bound = dict(zip(FIELDS, row.gradient_bound, strict=True))
         return answer
-
-    def _add_extremes(self, answer: IntervalAnswer[Array], cases: Cases) -> None:
-        """Add to the answer for the middle of an interval of k the extremes over it."""
-        shape, legal = answer.mu_macro.shape, answer.source_code != -1
-        # NaN for an illegal interval, so that the kernel has no answer either
-        first, last = (
-            np.where(np.isnan(cases.columns["k"]), np.nan, end) for end in cases.ends or ()
-        )
-        rows = shared_out.intervals(
-            self._data_of(cases.kind),
-            [*{**cases.columns, "k": first}.values()],
-            last,
-            self._thread_limit,
-            cases.kind,
-        )
-        low, high = rows.low.reshape(shape), rows.high.reshape(shape)
-        answer.error_bound = np.maximum(answer.error_bound, rows.error_bound.reshape(shape))
-        answer.mu_macro_low = np.where(legal, np.minimum(low, answer.mu_macro), np.nan)
-        answer.mu_macro_high = np.where(legal, np.maximum(high, answer.mu_macro), np.nan)
 
     def evaluate_case(
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
@@ -793,7 +779,7 @@ class Surrogate:
 
 
 # mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits
-# (tests/test_surrogate.py solves them anew)
+# (tests/mumacro/test_surrogate.py solves them anew)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
 

@@ -2,10 +2,10 @@
 the same bytes.
 
 While it runs, ``OUT.parts/log`` holds a line for the plan (inputs with checksums, options, table),
-and then the pieces of the output, each behind a note: size and checksum of the piece, what is done
-with it, its rejects, and a checksum of the note itself.  Pieces that fit their notes are kept; what
-follows them is done again. ``OUT.run.json`` stays: it tells what the output was made of, so that
-the same command finds it complete.
+and then the pieces of the output, each behind a note: size and checksum of the piece, the state
+after it, its rejects, and a checksum of the note itself.  Pieces that fit their notes are kept;
+the rest is done again.  ``OUT.run.json`` stays: it records how the output was made, so that the same
+command recognises it as complete.
 """
 
 import hashlib

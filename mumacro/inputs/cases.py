@@ -124,19 +124,6 @@ class Cases(NamedTuple):
             return error
         raise AssertionError(f"{case} has an answer")
 
-    def length_scale(self) -> Array:
-        """l0 = mu0 Fz / k [m], eq. (5), without overflow of mu0 Fz; 0 for rigid contact; (n,)."""
-        mu0, Fz, k = np.broadcast_arrays(*(self.columns[name] for name in ("mu0", "Fz", "k")))
-        with np.errstate(all="ignore"):
-            quotient = Fz / k
-            length = np.asarray(mu0 * quotient)
-            low, high = np.minimum(quotient, length), np.maximum(quotient, length)
-            inexact = ~((low > 1e-290) & (high < 1e290))  # a partial result may have lost digits
-            if inexact.any():
-                (a, i), (b, j), (c, n) = (np.frexp(x[inexact]) for x in (mu0, Fz, k))
-                length[inexact] = np.ldexp(a * (b / c), i + j - n)
-        return length
-
 
 # --- from inputs of any form to names and values --------------------------------------------------
 
@@ -230,11 +217,11 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
         raise InputError("unknown", unknown, f"one of {', '.join(kind.fields)}")
     for name in ("k_range", *ENDS):
         if case.get(name) is not None:
-            advice = (
+            bound = (
                 "left out: over an interval of k a target has an interval of roots; solve for "
                 "both ends of it"
             )
-            raise InputError(name, case[name], advice)
+            raise InputError(name, case[name], bound)
     for name in case.keys() - {*kind.columns, *_AMPLITUDES, "k_range", *ENDS}:
         bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
         raise InputError(name, case[name], bound)

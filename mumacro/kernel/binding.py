@@ -28,7 +28,7 @@ _FFI = FFI()
 _FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
 _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "mumacro_case *"))
 _POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
-_SIX, _STRIDES, _COLUMNS = map(_FFI.typeof, ("double[6]", "int64_t[6]", "double *[6]"))
+_COLUMNS = _FFI.typeof("mumacro_columns *")
 _NOTHING: Any = _FFI.NULL
 _new = _FFI.new
 
@@ -43,18 +43,17 @@ def _out(rows: Sequence[Array], start: int) -> tuple[Any, int]:
     return _numbers(whole.reshape(-1)[start:]), whole.shape[1]
 
 
-def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, Any, list[Any]]:
-    """Six columns, (n,) or one number, as pointers with their strides, and what these point to."""
-    constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
-    kept = [constants]
+def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, list[Any]]:
+    """Six columns, (n,) or one number, as a ``mumacro_columns``, and what it points to."""
+    of_kernel, kept = _new(_COLUMNS), []
+    arrays, constants = of_kernel.array, of_kernel.constant
     for i, column in enumerate(columns):
         if isinstance(column, float):
             constants[i] = column
-            pointers[i] = constants + i
         else:
-            pointers[i], strides[i] = pointer, _ = _numbers(column), 1
+            arrays[i] = pointer = _numbers(column)
             kept.append(pointer)
-    return pointers, strides, kept
+    return of_kernel, kept
 
 
 _ROW = _FFI.typeof("enum mumacro_row").relements
@@ -72,9 +71,9 @@ _END: dict[Detail, int] = {
 class CaseRows:
     """Answers to n cases, which :meth:`Kernel.cases` fills in, by the names of ``mumacro_row``.
 
-    ``v_tilde`` and ``y_tilde`` are there from the detail "groups" on, ``gradient`` and
-    ``gradient_bound``, six rows each, for "gradient".  ``source`` holds codes, -1 for an illegal
-    case, whose numbers are NaN.
+    ``v_tilde``, ``y_tilde`` and ``length_scale`` are there from the detail "groups" on,
+    ``gradient`` and ``gradient_bound``, six rows each, for "gradient".  ``source`` holds codes, -1
+    for an illegal case, whose numbers are NaN.
     """
 
     __slots__ = ("numbers", "source")
@@ -118,6 +117,11 @@ class CaseRows:
     def y_tilde(self) -> Array:
         """Dimensionless amplitude [-]."""
         return self._row("MU_ROW_Y_TILDE")
+
+    @property
+    def length_scale(self) -> Array:
+        """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact."""
+        return self._row("MU_ROW_LENGTH_SCALE")
 
     @property
     def gradient(self) -> Array:
@@ -292,13 +296,13 @@ class Kernel:
         ``columns`` are the six inputs, (n,) or one number.  ``kind``: another contact and
         direction, see :class:`mumacro.inputs.kind.Kind`.
         """
-        pointers, strides, _kept = _columns_of(columns)
+        six, _kept = _columns_of(columns)
         rows, stride = answers.numbers.shape
         numbers, codes = answers.numbers, answers.source
         if start:
             numbers, codes = numbers.reshape(-1)[start:], codes[start:]
         out, sources = _numbers(numbers), _FFI.from_buffer(_CODES, codes)
-        self._cases(data.pointer, *kind, n, pointers, strides, rows, out, stride, sources)
+        self._cases(data.pointer, *kind, n, six, rows, out, stride, sources)
 
     def intervals(
         self,
@@ -311,10 +315,8 @@ class Kernel:
         kind: tuple[int, int] = (0, 0),
     ) -> None:
         """As :meth:`cases`, with k from its column to ``high`` (n,)."""
-        pointers, strides, _kept = _columns_of(columns)
-        self._found.intervals(
-            data.pointer, *kind, n, pointers, strides, _numbers(high), *_out(rows, start)
-        )
+        six, _kept = _columns_of(columns)
+        self._found.intervals(data.pointer, *kind, n, six, _numbers(high), *_out(rows, start))
 
     def one(self, pointer: Any, six: Sequence[float], with_gradient: bool) -> Any:
         """One case in plain numbers: a ``mumacro_case``, its gradient only where asked for."""

@@ -172,6 +172,15 @@ MU_INLINE void mu_pass_groups(int n, double in[6][MU_CHUNK], double *v, double *
     }
 }
 
+/* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact. */
+static double mu_length_scale(double mu0, double Fz, double k) {
+    const double quotient = Fz / k, length = mu0 * quotient;
+    int64_t i, j, l;
+    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290)) return length;
+    const double mantissa = mu_split(mu0, &i) * (mu_split(Fz, &j) / mu_split(k, &l));
+    return mu_scale(mantissa, i + j - l);
+}
+
 /* Up to MU_CHUNK cases; in: the six inputs, filled up to whole lanes. */
 static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_CHUNK], int rows, double *out,
                               int64_t stride, int8_t *source) {
@@ -209,6 +218,9 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
     if (rows > MU_ROW_V_TILDE) {
         memcpy(out + MU_ROW_V_TILDE * stride, v, (size_t)n * sizeof *v);
         memcpy(out + MU_ROW_Y_TILDE * stride, y, (size_t)n * sizeof *y);
+        for (int i = 0; i < n; ++i)
+            out[MU_ROW_LENGTH_SCALE * stride + i] =
+                source[i] < 0 ? NAN : mu_length_scale(in[0][i], in[1][i], in[2][i]);
     }
 }
 
@@ -248,19 +260,12 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
         if (rows > MU_ROW_V_TILDE) {
             out[MU_ROW_V_TILDE * stride + i] = v;
             out[MU_ROW_Y_TILDE * stride + i] = y;
+            out[MU_ROW_LENGTH_SCALE * stride + i] =
+                found.source < 0 ? NAN : mu_length_scale(six.mu0, six.Fz, six.k);
         }
         if (rows == MU_ROWS)
             mu_gradient(data, contact, direction, &six, found, slopes, v, y, out + MU_ROW_GRADIENT * stride + i, stride);
     }
-}
-
-/* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact. */
-static double mu_length_scale(double mu0, double Fz, double k) {
-    const double quotient = Fz / k, length = mu0 * quotient;
-    int64_t i, j, l;
-    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290)) return length;
-    const double mantissa = mu_split(mu0, &i) * (mu_split(Fz, &j) / mu_split(k, &l));
-    return mu_scale(mantissa, i + j - l);
 }
 
 static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
@@ -276,7 +281,7 @@ static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, do
     out->error_bound = rows[MU_ROW_ERROR_BOUND];
     out->v_tilde = rows[MU_ROW_V_TILDE];
     out->y_tilde = rows[MU_ROW_Y_TILDE];
-    out->length_scale = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
+    out->length_scale = rows[MU_ROW_LENGTH_SCALE];
     out->source = source;
     if (with_gradient) {
         memcpy(out->gradient, rows + MU_ROW_GRADIENT, sizeof out->gradient);

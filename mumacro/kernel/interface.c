@@ -17,7 +17,11 @@ static double mu_held_value(int quantity, double v, double y, double *bound) {
 
 /* An answer from its rows; what is returned. */
 static int mu_fill(const double *rows, int source, int returned, mumacro_answer *out) {
-    memcpy(out, rows, MU_ROW_GRADIENT * sizeof *rows); /* the first members are these rows */
+    out->mu_macro = rows[MU_ROW_MU_MACRO];
+    out->mu_ratio = rows[MU_ROW_MU_RATIO];
+    out->error_bound = rows[MU_ROW_ERROR_BOUND];
+    out->v_tilde = rows[MU_ROW_V_TILDE];
+    out->y_tilde = rows[MU_ROW_Y_TILDE];
     out->source = source;
     out->regime = source < 0 ? -1 : MU_REGIME_OF_SOURCE[source];
     memcpy(out->gradient, rows + MU_ROW_GRADIENT, sizeof out->gradient);

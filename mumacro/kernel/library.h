@@ -31,13 +31,12 @@ typedef struct {
     /* a quantity and its slopes: mumacro_slope_row, stride apart */
     void (*slopes)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *out,
                    int64_t stride);
-    /* dimensional cases: columns mu0, Fz, k, y0 (normal: Fz_amplitude), omega, v0, each with a stride of 1, or 0 for one
-     * value.  out has the first `rows` of mumacro_row, stride apart: those before v~, those before the gradient, or all */
-    void (*cases)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
-                  const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source);
+    /* dimensional cases; out has the first `rows` of mumacro_row, stride apart: those before v~, those before the gradient, or all */
+    void (*cases)(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *columns,
+                  int rows, double *out, int64_t stride, int8_t *source);
     /* cases whose k, the third column, reaches to high: mumacro_extreme_row, stride apart */
-    void (*intervals)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
-                      const int64_t *strides, const double *high, double *out, int64_t stride);
+    void (*intervals)(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *columns,
+                      const double *high, double *out, int64_t stride);
     /* of a spring, across, alone, in a fraction of the time: mu~; and one case, its gradient only where asked for */
     double (*ratio)(const mumacro_data *data, double v, double y);
     void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
