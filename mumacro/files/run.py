@@ -4,8 +4,8 @@ the same bytes.
 While it runs, ``OUT.parts/log`` holds a line for the plan (inputs with checksums, options, table),
 and then the pieces of the output, each behind a note: size and checksum of the piece, the state
 after it, its rejects, and a checksum of the note itself.  Pieces that fit their notes are kept;
-the rest is done again.  ``OUT.run.json`` stays: it records how the output was made, so that the same
-command recognises it as complete.
+the rest is done again.  ``OUT.run.json`` stays: it records how the output was made, so that the
+same command recognises it as complete.
 """
 
 import hashlib
