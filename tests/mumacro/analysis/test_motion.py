@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.cases import Array, Capture
-from tests.comparing import close
 
 from benchmarks.motion import CASE, L0, beside_table, phase_sweep, random_motions, ratios
 from mumacro import Element, InputError, Motion, Surrogate, motion, settling
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
+from tests.support.cases import Array, Capture
+from tests.support.comparing import close
 
 SCENE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
 COMMAND = "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=2cm/s"
