@@ -232,7 +232,7 @@ def motion(
 
     >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, f=20e3, v0=0.02)
     >>> motion(**case, x=2e-6, y=2e-6)
-    <Motion of a spring: mu_macro 0.130052, mu_lateral -0.105596, error_estimate 6.1e-09>
+    <Motion of a spring: mu_macro 0.130052, mu_lateral -0.105596, error_estimate 1.2e-08>
     """
     kind = kind_of(contact)
     terms = tuple(
@@ -410,7 +410,8 @@ def _answer(scenes: Scenes, rows: Array, shape: tuple[int, ...]) -> Motion:
             "power": work / (2.0 * math.pi) * limit * length * c["omega"],
             "power_drive": mu * c["Fz"] * c["v0"],
             "error_estimate": c["mu0"] * error,
-            "periods": math.log(1.0 / REMAINING) / decay,
+            # a decay that small is rounding of a contact that sticks
+            "periods": np.where(decay <= 1e-12, math.inf, math.log(1.0 / REMAINING) / decay),
         }
     answers: dict[str, Any] = {
         name: column.reshape(shape) if shape else float(column[0])

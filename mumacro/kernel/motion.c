@@ -16,7 +16,7 @@
 
 enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
-#define MU_MOTION_ROUNDING 1e-10 /* of the mean force: sticks too short to be found */
+#define MU_MOTION_ROUNDING 2e-10 /* of the mean force: sticks too short to be found */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
 
@@ -704,7 +704,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, mu_grid 
     for (int level = 0;; ++level) {
         mu_keep_below(limit, f);
         out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.01 * tolerance, f);
-        out.error = level > 0 ? mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
+        out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
         if (out.error <= tolerance || level == MU_MOTION_LEVELS || !mu_halve(steps, grid)) return out;
         last = out;
         of_step *= 0.06;
