@@ -139,11 +139,32 @@ class Surrogate:
         """The map of mu~ with a ``point`` (v~, y~), see ``mumacro.plotting.plot_map``; needs
         matplotlib."""
         kind = kind_of(contact, direction)
-        v = np.geomspace(*plotting.V_RANGE, 281)
-        y = np.geomspace(*plotting.y_range(kind.normal), 201)
+        ratio, border = self.map_of(kind, 281, 201)
+        title = rf"$\mu_\mathrm{{macro}} / \mu_0$: {contact}, {direction}"
+        return plotting.plot_map(
+            ratio,
+            border,
+            axes,
+            point=point,
+            normal=kind.normal,
+            areas=self.regimes_on_map(kind),
+            title=title,
+        )
+
+    def map_of(self, kind: Kind, width: int, height: int) -> tuple[Array, Array]:
+        """mu~ (height, width) on the map of a kind of contact, rows from its foot, and v~crit of
+        each row (height,)."""
+        v, y = plotting.speeds(width), plotting.amplitudes(height, kind.normal)
         ratio = self.quantity("mu_ratio", v, y[:, None], **kind.names)[0]
-        border = self.v_tilde_crit(y, **kind.names)
-        return plotting.plot_map(v, y, ratio, border, axes, point=point, normal=kind.normal)
+        return ratio, self.v_tilde_crit(y, **kind.names)
+
+    def regimes_on_map(self, kind: Kind) -> list[str]:
+        """The regimes at ``plotting.AREAS`` of the map of a kind of contact."""
+        v, y = zip(*(plotting.place(*at, kind.normal) for at in plotting.AREAS), strict=True)
+        swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
+        # v~ = v0 and y~ = y0
+        groups = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v)}
+        return [str(name) for name in self.evaluate(**groups, **swing, **kind.names).regime]
 
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
@@ -715,6 +736,7 @@ class Surrogate:
             answer._certain = (
                 self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
             )
+            answer._border = functools.partial(self.v_tilde_crit, **kind.names)
         if gradient:
             answer.gradient = dict(zip(kind.fields, rows[5:11], strict=True))
             answer.gradient_bound = dict(zip(kind.fields, rows[11:], strict=True))
@@ -728,6 +750,7 @@ class Surrogate:
         answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
             row[0], row[1], row[2], int(row[6]), (row[3], row[4], row[5]), self._certain
         )
+        answer._border = self.v_tilde_crit
         if gradient:
             answer.gradient = dict(zip(FIELDS, row[7:13], strict=True))
             answer.gradient_bound = dict(zip(FIELDS, row[13:], strict=True))

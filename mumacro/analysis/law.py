@@ -76,6 +76,7 @@ class Law:
             borders=[(crossing.value, crossing.name) for crossing in self.border],
             roots=roots,
             target=target,
+            title=plotting.in_words(self.case, self.kind.names),
         )
 
 

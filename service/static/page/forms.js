@@ -25,25 +25,45 @@ export function inputForm(set, setSI, status) {
     const radio = (value) => make("label", {}, make("input", { type: "radio", name, value }), value);
     $(name).append(...Object.keys(words).map(radio));
   }
+  $("contact").append(make("label", { class: "switch" }, rigid, "rigid"));
+  /** Which contact and oscillation there are beside what is chosen; the others cannot be, and why. */
+  function offer({ contact, direction, k }) {
+    const reasons = [];
+    for (const [name, kind] of [["contact", (one) => `${one} ${direction}`], ["direction", (one) => `${contact} ${one}`]]) {
+      for (const radio of $(name).querySelectorAll("[type=radio]")) {
+        const reason = about.impossible[kind(radio.value)];
+        radio.disabled = reason !== undefined;
+        if (reason) reasons.push(reason);
+      }
+    }
+    const body = k === RIGID ? "rigid contact" : about.choices.contact[contact];
+    const said = `${body}, ${about.choices.direction[direction]}`;
+    $("chosen").textContent = reasons[0] ?? `${said[0].toUpperCase()}${said.slice(1)}.`;
+    for (const part of $("sketch").querySelectorAll(".body, .motion")) {
+      part.toggleAttribute("hidden", !part.matches(`.body.${k === RIGID ? "rigid" : contact}, .motion.${direction}`));
+    }
+    $("sketch").setAttribute("aria-label", `The set-up: ${said}`);
+  }
   const options = [["along", "symbol"], ["unknown", "label"]].flatMap(([id, word]) => {
     $(id).append(...Object.entries(about.inputs).map(([name, input]) => new Option(input[word], name)));
     return [...$(id).options];
   });
   $("unknown").value = "y0";
-  const rows = Object.entries(about.inputs).map(([name, { label, symbol, range: [low, high] }]) => {
+  const rows = Object.entries(about.inputs).map(([name, { label, symbol, note, range: [low, high] }]) => {
     const fault = make("p", { id: `fault-${name}`, class: "fault" });
     const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
     const steps = { min: low * STEPS, max: high * STEPS, step: 1 };
     const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...steps });
     slider.addEventListener("input", () => setSI({ [name]: 10 ** (slider.value / STEPS) }));
-    const elastic = name === "k" && make("label", { class: "switch" }, rigid, "rigid (no spring)");
-    const row = make("div", { class: "field" }, make("label", { for: input.id }, label), input, slider, elastic, fault);
-    return { name, symbol, row, input, slider, fault };
+    const words = make("label", { for: input.id }, label, note && make("small", {}, note));
+    return { name, symbol, row: make("div", { class: "field" }, words, input, slider), input, slider, fault };
   });
+  $("messages").append(...rows.map(({ fault }) => fault));
   $("form").append(...rows.map(({ row }) => row));
   return (now) => {
     if (now === state) return; // what is being typed stays
     state = now;
+    offer(state);
     rigid.checked = state.k === RIGID;
     if (!rigid.checked) elastic = state.k.text;
     fill($("range"), state.range);
@@ -56,7 +76,8 @@ export function inputForm(set, setSI, status) {
       fill(input, quantity);
       slider.value = size > 0 ? Math.round(STEPS * Math.log10(size)) : slider.min;
       slider.setAttribute("aria-valuetext", `${symbolOf(name, quantity.unit)} = ${quantity.text}`);
-      fault.textContent = quantity.fault ? `${symbol}: ${quantity.fault}.` : "";
+      fault.textContent = quantity.fault && !row.hidden ? `${symbol}: ${quantity.fault}.` : "";
+      fault.classList.toggle("bad", input.ariaInvalid === "true");
       status.set(`typed ${name}`, row.hidden ? "" : fault.textContent, input.ariaInvalid === "false");
     }
   };
@@ -95,7 +116,7 @@ function panel(name, path, read, show) {
 
 /** Shows lines: [text], or [text, ...given] with a button for `use(...given)`. */
 const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...given]) => {
-  const button = make("button", { "aria-label": `use ${text}` }, "Use");
+  const button = make("button", { class: "use", "aria-label": `use ${text}` }, "Use");
   button.addEventListener("click", () => use(...given));
   return make("li", {}, text, given.length > 0 && button);
 }));
@@ -152,11 +173,16 @@ export function stiffness(use) {
   });
 }
 
-/** k and µ₀ from measured points. */
-export function fit(use) {
+/** k and µ₀ from measured points; `load(case)` takes the case of the example, in the words of an address. */
+export function fit(use, load) {
   let paint = () => [];
   let told;
   const plot = new Plot($("fit-plot"), (...size) => paint(...size));
+  $("example").title = about.example.label;
+  $("example").addEventListener("click", () => {
+    $("points").value = about.example.points;
+    load(about.example.case);
+  });
   $("fit-image").addEventListener("click", () => plot.save(told, "friction-fit.svg"));
   return panel("fit", "v1/fit", (state) => {
     const points = readPoints($("points").value);
