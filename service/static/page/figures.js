@@ -101,7 +101,7 @@ export function mapPanel(set, nudge, status) {
     const at = (x, up) => [left + x * wide, top + (1 - up) * tall];
     const shade = ({ colour, heights }) => {
       const edge = heights.map((up, i) => at(i / (heights.length - 1), up).join(" "));
-      const path = make("path", { d: `M${edge.join("L")}V${top - 1}H${left - 1}Z`, class: "shade" });
+      const path = make("path", { d: `M${edge.join("L")}V${top}H${left}Z`, class: "shade" });
       path.style.fill = colour;
       return path;
     };

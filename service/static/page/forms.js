@@ -189,7 +189,7 @@ export function fit(use, load) {
     const unknowns = $("unknowns").value.split(" ").filter((name) => !(name in points)); // a column mu0 is known
     if (!unknowns.length) refuse("µ₀ is a column of the points: choose k as the unknown");
     return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...points };
-  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, curve }, asked, state) => {
+  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, residuals, curve }, asked, state) => {
     /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
     const text = (name, value, digits = 4) =>
       (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, state[name].unit, digits));
@@ -208,22 +208,25 @@ export function fit(use, load) {
     told = lines.map(([line]) => line).join("; ");
     list("fit-found", lines, use);
     list("fit-warnings", warnings.map((line) => [line]));
-    paint = (width, height) => picture(width, height, asked, curve, state.v0.unit);
+    paint = (width, height) => picture(width, height, asked, curve, residuals, state.v0.unit);
     plot.redraw();
   });
 }
 
-/** Points with their standard deviations, the curve of the fit (null: there is none) and its 95 % band. */
-function picture(width, height, { v0, mu_macro: mu, std = [] }, curve, unit) {
+/** Points with their standard deviations, the curve of the fit and its 95 % band; where there is none (null), such as
+ *  with mu0 at each point, a line through the fit at the points. */
+function picture(width, height, { v0, mu_macro: mu, std = [] }, curve, residuals, unit) {
   const [speeds, at] = [v0, curve?.v0 ?? []].map((column) => column.map((value) => fromSI("v0", value, unit)));
+  const fitted = speeds.map((one, i) => [one, mu[i] - residuals[i]]).sort(([a], [b]) => a - b);
   const [least, most] = [Math.min(...speeds, ...at), Math.max(...speeds, ...at)];
   const log = least > 0 && most > 10 * least;
   const x = { low: log ? least / 1.2 : 0, high: log ? most * 1.2 : 1.05 * most || 1, log, title: `v₀ [${unit}]` };
   const ends = mu.map((one, i) => [one - (std[i] ?? 0), one + (std[i] ?? 0)]);
   const top = 1.06 * Math.max(1e-300, ...ends.flat(), ...(curve?.mu_macro ?? []));
-  const frame = new Frame(width, height, x, { low: 0, high: top, title: "µ macro" });
+  const frame = new Frame(width, height, x, { low: 0, high: top, title: "friction µ macro" });
   return [frame.axes(), frame.inside(
     curve && [frame.band(at, curve.low, curve.high), frame.curve(at, curve.mu_macro, "curve")],
+    !curve && frame.curve(...[0, 1].map((i) => fitted.map((one) => one[i])), "curve"),
     speeds.map((one, i) => [frame.curve([one, one], ends[i], "measured"), frame.dot(one, mu[i], 3.5, "measured")]),
   )];
 }
