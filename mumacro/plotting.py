@@ -310,7 +310,7 @@ def plot_map(
     halo = [_loaded("patheffects").withStroke(linewidth=2.5, foreground="white")]
     manual = [place(u, w, normal) for _, u, w in places]
     for text in axes.clabel(
-        lines, levels=LABELLED, manual=manual, fmt="%g", fontsize=9.0, inline_spacing=3
+        lines, levels=LABELLED, manual=manual, fmt="%g", fontsize=9.0, inline_spacing=3, colors=INK
     ):
         text.set_path_effects(halo)
     for (u, w), name in zip(AREAS, areas, strict=False):

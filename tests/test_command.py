@@ -587,7 +587,29 @@ def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     many = surrogate.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
     axes = many.plot(figure.add_subplot())
     shown = {line.get_label(): len(line.get_xdata()) for line in axes.lines[:-1]}
-    assert shown == {"continuous": 2, "stick_slip": 1}  # v~ = 0 has no place on a logarithmic axis
+    # v~ = 0 has no place on a logarithmic axis
+    assert shown == {"continuous sliding": 2, "stick and slip": 1}
+
+
+@pytest.mark.parametrize(
+    "kind", [("spring", "across"), ("spring", "along"), ("ball", "across"), ("ball", "along")]
+)
+def test_a_picture_of_cases_has_the_border_of_their_contact(
+    surrogate: Surrogate, kind: Any
+) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    names = dict(zip(("contact", "direction"), kind, strict=True))
+    many = surrogate.evaluate(**{**VALUES, "v0": np.array([1e-3, 1.0])}, **names, groups=True)
+    axes = many.plot(figure.add_subplot())
+    v, y = axes.lines[-1].get_data()
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
+    one = surrogate.evaluate(**VALUES, **names).plot(figure.add_subplot())
+    v, y = one.lines[-1].get_data()
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
+
+
+def test_a_picture_needs_the_groups(surrogate: Surrogate) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
     with pytest.raises(AttributeError, match="groups=True"):
         surrogate.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}).plot(figure.add_subplot())
 

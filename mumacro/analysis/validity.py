@@ -238,7 +238,7 @@ def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
     if _ADAPTS[0] < way < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
         text = (
-            f"slip path {1e6 * way:.2g} um a period, near the micrometres in which friction "
+            f"slip path {1e6 * way:.3g} um a period, near the micrometres in which friction "
             "adapts to speed; "
         )
         text += f"a factor of 100 in slip speed changes mu0 by {100.0 * effect:.2g} %"
