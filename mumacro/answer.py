@@ -51,9 +51,9 @@ class Answer(Generic[Number]):
     Examples
     --------
     >>> from mumacro import Surrogate
-    >>> a = Surrogate.open().evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> a = Surrogate.open().evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=0.01)
     >>> f"{a.mu_macro:.6f} {a.regime} {a.source}"
-    '0.240012 stick_slip stick_slip_low'
+    '0.240467 stick_slip stick_slip_low'
     """
 
     __slots__ = (

@@ -53,9 +53,9 @@ class Surrogate:
     Examples
     --------
     >>> s = Surrogate.open()
-    >>> answer = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> answer = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=0.01)
     >>> round(answer.mu_macro, 6), answer.regime
-    (0.240012, 'stick_slip')
+    (0.240467, 'stick_slip')
     """
 
     def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
@@ -599,7 +599,8 @@ class Surrogate:
         k_low, k_high : array_like
             The same as two columns.
         y0 : array_like
-            Amplitude of the oscillation [m], >= 0, across or along the sliding direction.
+            Amplitude of the oscillation [m], half of peak to peak, >= 0, across or along the
+            sliding direction.
         Fz_amplitude : array_like
             Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction
             is "normal".

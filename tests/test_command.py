@@ -53,12 +53,10 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(
     shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
     assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
     told = [f"model  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
-    told = [line.replace("k_range", "k=9e+05..1.1e+06") for line in told]
+    told = [line.replace("k_range", "k=0.9..1.1N/um") for line in told]
     assert rows[-len(told) - 1 : -1] == told
     assert (
-        said(capsys, 0, CASE.replace("k=1e6", "k=9e+05..1.1e+06"))
-        .splitlines()[1]
-        .startswith("from ")
+        said(capsys, 0, CASE.replace("k=1e6", "k=0.9..1.1N/um")).splitlines()[1].startswith("from ")
     )
     assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(
         surrogate, VALUES
@@ -708,11 +706,11 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
 
 
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:
-    out = tmp_path / "grid.csv"
-    found = json.loads(
-        said(capsys, 0, "export", "--format", "csv", "--out", str(out), "--table", "1e-4")
-    )
-    assert found["table"] == str(tables_dir / "mumacro-1e-4.nc")
+    out, table = tmp_path / "grid.csv", str(tables_dir / "mumacro-1e-4.nc")
+    words = ("export", "--format", "csv", "--out", str(out), "--table", "1e-4")
+    assert json.loads(said(capsys, 0, *words, "--json"))["table"] == table
+    rows = [line.split() for line in said(capsys, 0, *words).splitlines()]
+    assert rows[:3] == [["table", table], ["format", "csv"], ["out", str(out)]]
     assert out.read_text().startswith("v_tilde,")
 
 

@@ -73,7 +73,7 @@ def _serve(words: Sequence[str]) -> int:
     service = _part("service")
     if "MUMACRO_TABLES" not in os.environ and bundled_tables():
         os.environ["MUMACRO_TABLES"] = os.pathsep.join(map(str, bundled_tables()))
-    return int(service.main(list(words)))
+    return int(service.main(list(words), "mumacro serve"))
 
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
