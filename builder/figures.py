@@ -346,7 +346,7 @@ def _draw(panel: Panel, axes: Any) -> None:
 
 def _legend(figure: Any) -> None:
     """One legend for all panels, below them: it covers no curve."""
-    handles = {}
+    handles: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)

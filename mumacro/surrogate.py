@@ -163,8 +163,8 @@ class Surrogate:
         v, y = zip(*(plotting.place(*at, kind.normal) for at in plotting.AREAS), strict=True)
         swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
         # v~ = v0 and y~ = y0
-        groups = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v)}
-        return [str(name) for name in self.evaluate(**groups, **swing, **kind.names).regime]
+        cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v), **swing}
+        return [str(name) for name in self.evaluate(cases, **kind.names).regime]
 
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""

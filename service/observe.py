@@ -141,9 +141,8 @@ class LogLines(logging.Handler):
 
         Line breaks within a line are escaped, so that a client cannot forge one.
         """
-        told, form = 0, partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
-        if os.isatty(1):
-            form = for_people
+        as_json = partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
+        told, form = 0, for_people if os.isatty(1) else as_json
         while True:
             time.sleep(_WRITE_EVERY_S)
             self._writes = True
