@@ -2,6 +2,10 @@
 missing points."""
 
 import math
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -139,3 +143,49 @@ def test_the_digest_covers_sources_and_compiler(
     monkeypatch.setattr("numba.__version__", "0.0.0")
     digests.add(compiled.source_digest())
     assert len(digests) == 4
+
+
+def test_compiled_functions_are_kept_until_a_source_changes(tmp_path: Path) -> None:
+    """Also a function whose own module stays the same, while one that it calls changes."""
+    package = tmp_path / "builder"
+    shutil.copytree(Path(compiled.__file__).parents[1], package)
+    calls = "from .compiled import solver_kernel\n"
+    inner = calls + "@solver_kernel\ndef inner(x):\n    return {} * x\n"
+    outer = calls + "from .inner import inner\n@solver_kernel\ndef outer(x):\n    return inner(x)\n"
+    (package / "solver" / "outer.py").write_text(outer)
+    store = tmp_path / "store"
+
+    def result(factor: int) -> tuple[float, set[Path]]:
+        (package / "solver" / "inner.py").write_text(inner.format(factor))
+        script = "from builder.solver.outer import outer; print(outer(1.0))"
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(store), "PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return float(done.stdout), set(store.rglob("*.nbc"))
+
+    first, kept = result(2)
+    again, kept_again = result(2)
+    changed, kept_after_change = result(3)
+    assert (first, again, changed) == (2.0, 2.0, 3.0)
+    assert kept == kept_again < kept_after_change
+
+
+def test_the_solver_runs_where_nothing_can_be_kept(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    script = "from builder.solver.sections import border_guess; print(border_guess(1.0))"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "file" / "store")}
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=Path(compiled.__file__).parents[2],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert float(done.stdout) > 0.0
