@@ -1,7 +1,8 @@
 """Screenshots of the page for the documents, with a separate service and a headless Chromium.
 
 ``python benchmarks/page.py`` replaces docs/img/page.png and docs/img/page-phone.png.  Needs
-Chromium with its ChromeDriver and the PyPI package selenium: ``.ci/peers -- python benchmarks/page.py``.
+Chromium with its ChromeDriver and the PyPI package selenium:
+``.ci/peers -- python benchmarks/page.py``.
 """
 
 import base64

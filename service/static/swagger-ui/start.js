@@ -42,5 +42,8 @@ function show(spec) {
   });
 }
 
+new Channel(() => get("static/page/names.json"), ({ guide }) => {
+  for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !guide;
+}, () => {}).push(null);
 const tell = (text) => { $("status").textContent = text; };
 new Channel(() => get("openapi.json"), show, tell).push(null);
