@@ -263,6 +263,7 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
     that is not on the map.
     """
     across = np.linspace(0.0, 1.0, ratio.shape[1])
+    words = [(u + aside, w) for u, w in AREAS for aside in (-0.12, 0.0, 0.12)]  # a name is wide
     lines = {level: heights(ratio, level) for level in LEVELS}
     placed: list[tuple[float, float, float]] = []
     for level in LABELLED:
@@ -277,7 +278,7 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
             [np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1) for line in others],
             axis=0,
         )
-        for u, w in [*AREAS, *(at[1:] for at in placed)]:
+        for u, w in [*words, *(at[1:] for at in placed)]:
             apart = np.minimum(apart, 0.5 * np.hypot(x - u, y - w))
         best = int(apart.argmax())
         placed.append((level, float(x[best]), float(y[best])))

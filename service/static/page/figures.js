@@ -105,10 +105,15 @@ export function mapPanel(set, nudge, status) {
       path.style.fill = colour;
       return path;
     };
+    const areas = data.areas.map(([x, up, text]) => {
+      const [[px, py], half] = [at(x, up), 4.2 * text.length + 8];
+      return [text, Math.min(Math.max(px, left + half), left + wide - half), py, half];
+    });
     const numbers = []; // those that have room
     for (const one of data.labels) {
       const [px, py] = at(one[1], one[2]);
-      if (numbers.every(([, x, y]) => Math.hypot(x - px, y - py) > 24)) numbers.push([one, px, py]);
+      const free = areas.every(([, x, y, half]) => Math.abs(x - px) > half + 8 || Math.abs(y - 4 - py) > 20);
+      if (free && numbers.every(([, x, y]) => Math.hypot(x - px, y - py) > 24)) numbers.push([one, px, py]);
     }
     /** The number of a level, turned along its line. */
     const number = ([[level, x], ...place]) => {
@@ -122,11 +127,7 @@ export function mapPanel(set, nudge, status) {
     };
     return [
       frame.inside(data.shades.map(shade)), frame.axes(false),
-      frame.inside(border, numbers.map(number), data.areas.map(([x, up, text]) => {
-        const [px, py] = at(x, up);
-        const half = 4.2 * text.length + 8;
-        return label(text, Math.min(Math.max(px, left + half), left + wide - half), py, "tag area");
-      })),
+      frame.inside(border, numbers.map(number), areas.map(([text, ...place]) => label(text, ...place.slice(0, 2), "tag area"))),
       point && frame.point(...point),
     ];
   }
