@@ -5,7 +5,7 @@ import { test } from "node:test";
 import {
   RIGID, about, attempt, caseOf, friction, fromAddress, inUnit, question, readInterval, readPoints, readQuantity, readValue,
   show, startState, toAddress, valueOf,
-} from "../../service/static/page/inputs.js";
+} from "../../../service/static/page/inputs.js";
 
 const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
 Object.assign(about, told);
