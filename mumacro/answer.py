@@ -10,7 +10,7 @@ from mumacro import plotting
 from mumacro.errors import MumacroError
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-#: float for one case; an array of float64 for many, or what holds labels in its place
+#: float for one case; for many an array of float64, or a labelled object in its place
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
@@ -160,7 +160,7 @@ class Answer(Generic[Number]):
         return plotting.plot_cases(v, y, regimes, self._border, axes)
 
     def columns(self) -> dict[str, Any]:
-        """What is known of each case, by name: mu_macro first, then what was requested beside
+        """The results of each case by name: mu_macro first, then those that were requested beside
         it."""
         names = [
             "mu_macro",
