@@ -63,9 +63,9 @@ class Surrogate:
     Examples
     --------
     >>> s = Surrogate.open()
-    >>> answer = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> answer = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=0.01)
     >>> round(answer.mu_macro, 6), answer.regime
-    (0.240012, 'stick_slip')
+    (0.240467, 'stick_slip')
     """
 
     def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
@@ -149,11 +149,32 @@ class Surrogate:
         """The map of mu~ with a ``point`` (v~, y~), see ``mumacro.plotting.plot_map``; needs
         matplotlib."""
         kind = kind_of(contact, direction)
-        v = np.geomspace(*plotting.V_RANGE, 281)
-        y = np.geomspace(*plotting.y_range(kind.normal), 201)
+        ratio, border = self.map_of(kind, 281, 201)
+        title = rf"$\mu_\mathrm{{macro}} / \mu_0$: {contact}, {direction}"
+        return plotting.plot_map(
+            ratio,
+            border,
+            axes,
+            point=point,
+            normal=kind.normal,
+            areas=self.regimes_on_map(kind),
+            title=title,
+        )
+
+    def map_of(self, kind: Kind, width: int, height: int) -> tuple[Array, Array]:
+        """mu~ (height, width) on the map of a kind of contact, rows from its foot, and v~crit of
+        each row (height,)."""
+        v, y = plotting.speeds(width), plotting.amplitudes(height, kind.normal)
         ratio = self.quantity("mu_ratio", v, y[:, None], **kind.names)[0]
-        border = self.v_tilde_crit(y, **kind.names)
-        return plotting.plot_map(v, y, ratio, border, axes, point=point, normal=kind.normal)
+        return ratio, self.v_tilde_crit(y, **kind.names)
+
+    def regimes_on_map(self, kind: Kind) -> list[str]:
+        """The regimes at ``plotting.AREAS`` of the map of a kind of contact."""
+        v, y = zip(*(plotting.place(*at, kind.normal) for at in plotting.AREAS), strict=True)
+        swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
+        # v~ = v0 and y~ = y0
+        cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v), **swing}
+        return [str(name) for name in self.evaluate(cases, **kind.names).regime]
 
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
@@ -588,7 +609,8 @@ class Surrogate:
         k_low, k_high : array_like
             The same as two columns.
         y0 : array_like
-            Amplitude of the oscillation [m], >= 0, across or along the sliding direction.
+            Amplitude of the oscillation [m], half of peak to peak, >= 0, across or along the
+            sliding direction.
         Fz_amplitude : array_like
             Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction
             is "normal".
@@ -732,6 +754,7 @@ class Surrogate:
             answer._certain = (
                 self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
             )
+            answer._border = functools.partial(self.v_tilde_crit, **kind.names)
         if gradient:
             answer.gradient = dict(zip(kind.fields, rows.gradient, strict=True))
             answer.gradient_bound = dict(zip(kind.fields, rows.gradient_bound, strict=True))
@@ -744,6 +767,7 @@ class Surrogate:
         answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
             row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, self._certain
         )
+        answer._border = self.v_tilde_crit
         if gradient:
             answer.gradient = dict(zip(FIELDS, row.gradient, strict=True))
             answer.gradient_bound = dict(zip(FIELDS, row.gradient_bound, strict=True))

@@ -76,6 +76,7 @@ class Law:
             borders=[(crossing.value, crossing.name) for crossing in self.border],
             roots=roots,
             target=target,
+            title=plotting.in_words(self.case, self.kind.names),
         )
 
 
@@ -178,10 +179,10 @@ def law(
     Examples
     --------
     >>> import mumacro
-    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
     >>> sweep = mumacro.law(mumacro.open(), start=1e-4, stop=1.0, points=3, **case)
     >>> sweep.answer.mu_macro.round(4).tolist(), round(sweep.border[0].value, 5)
-    ([0.2238, 0.24, 0.2957], 0.07105)
+    ([0.2238, 0.2405, 0.296], 0.06868)
     """
     if values is None:
         x = sweep_values(along, _end("start", start), _end("stop", stop), points, scale)

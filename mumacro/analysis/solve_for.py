@@ -151,10 +151,10 @@ def solve_for(
     Examples
     --------
     >>> import mumacro
-    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
     >>> solution = mumacro.solve_for(mumacro.open(), "y0", target=[0.15, 0.4], **case)
     >>> [[f"{root.value:.4e} m" for root in roots] for roots in solution.roots]  # 0.4: above mu0
-    [['2.8570e-06 m'], []]
+    [['2.8656e-06 m'], []]
     """
     kind = kind_of(contact, direction)
     inputs, interval = without_interval(case, unknown)

@@ -252,8 +252,8 @@ def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
         text = (
-            f"slip path {slip_path:.2g} m a period, near the micrometres in which friction adapts "
-            "to speed; "
+            f"slip path {1e6 * slip_path:.3g} um a period, near the micrometres in which friction "
+            "adapts to speed; "
         )
         text += f"a factor of 100 in slip speed changes mu0 by {100.0 * effect:.2g} %"
         rows.append({"row": "Coulomb friction", "text": text, "effect": effect})

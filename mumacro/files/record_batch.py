@@ -88,7 +88,7 @@ def answer(
     Examples
     --------
     >>> case = {"mu0": [0.3], "Fz": [10], "k": ["rigid"], "y0 [um]": [2.0]}
-    >>> case |= {"f": [20690], "v0": [-1.0]}
+    >>> case |= {"f": [20e3], "v0": [-1.0]}
     >>> answered, rejects = answer(pa.RecordBatch.from_pydict(case))
     >>> rejects.to_pylist()
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]

@@ -50,7 +50,6 @@ SHOWN: list[tuple[str, str, Callable[[Any], Any], float, float]] = [
             ("fig04_regions", "border, exact"),
             ("fig05_border_small_amplitude", "exact, solved"),
             ("fig06_border", "exact, solved"),
-            ("fig07_surface", "border"),
         )
     ),
     ("fig04_regions", "(20)", lambda y: np.sqrt(y * y - 1.0), 1e-6, 1e-9),
@@ -101,7 +100,10 @@ def test_the_surface_is_the_models(shown: Shown) -> None:
     surface = shown["fig07_surface"][0].curves[0]
     assert surface.z is not None
     for i, j in ((1, 1), (20, 120), (90, 60), (180, 240), (60, 200)):
-        assert surface.z[i, j] == close(solve(surface.y[i], surface.x[j]).mu_ratio, abs=1e-11)
+        assert surface.z[j, i] == close(solve(surface.x[i], surface.y[j]).mu_ratio, abs=1e-11)
+    line = shown["fig07_surface"][0].curves[1]  # y~ over v~, as every map
+    at = np.flatnonzero(line.y > 0.0)[::10]
+    assert line.x[at] == close([border(y)[0] for y in line.y[at]], rel=1e-11)
 
 
 @pytest.mark.parametrize("name", AMPLITUDES)

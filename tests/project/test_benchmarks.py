@@ -124,3 +124,10 @@ def test_tables_keep_their_tolerance_where_plain_grids_do_not() -> None:
 def test_picture_of_the_surface_is_drawn(tmp_path: Path) -> None:
     assert run("surface", str(tmp_path / "surface.png")) == []
     assert (tmp_path / "surface.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_picture_of_the_set_ups_is_the_sketch_of_the_page(tmp_path: Path) -> None:
+    """It is written anew where the sketch has changed: python benchmarks/setups.py."""
+    assert run("setups", str(tmp_path / "setups.svg")) == []
+    drawn = (tmp_path / "setups.svg").read_bytes()
+    assert drawn == (ROOT / "docs" / "img" / "setups.svg").read_bytes()

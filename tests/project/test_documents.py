@@ -59,19 +59,6 @@ def test_github_strikes_nothing_through_and_eats_nothing(page: Path) -> None:
         )
 
 
-def test_the_readme_has_the_figures_of_the_page_on_accuracy() -> None:
-    readme, page = (
-        (ROOT / "README.md").read_text("utf-8"),
-        (DOCS / "accuracy.md").read_text("utf-8"),
-    )
-    rows = re.findall(
-        r"^\| \**(\w[\w-]+(?: order \d+)?).*?\** \| +(\S+) \| +(\S+) \|$", readme, re.MULTILINE
-    )
-    assert len(rows) >= 3
-    for method, *figures in rows:
-        assert re.search(rf"{method}\b.*\| +{figures[0]} \| +{figures[1]} \|", page), method
-
-
 def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Surrogate) -> None:
     page = (DOCS / "python.md").read_text("utf-8")
     seen = set()

@@ -14,7 +14,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from benchmarks.support.browser import START
-from mumacro import Surrogate
+from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from mumacro.inputs.units import UNITS_OF
@@ -23,24 +23,54 @@ from service.settings import Settings
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow
+KINDS = [
+    (contact, direction)
+    for contact in CONTACTS
+    for direction in DIRECTIONS
+    if (contact, direction) != ("ball", "normal")
+]
 AXE = "tests/data/axe-core/axe.min.js"
 
 
-def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate) -> None:
-    response = client.get("/static/page/map.json")
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate, kind: Any) -> None:
+    names = dict(zip(("contact", "direction"), kind, strict=True))
+    address = f"/static/page/map.json?contact={kind[0]}&direction={kind[1]}"
+    response = client.get(address)
     data = response.json()
     v, y = (
-        np.geomspace(axis["start"], axis["stop"], axis["n"])
+        (np.geomspace if axis["log"] else np.linspace)(axis["start"], axis["stop"], axis["n"])
         for axis in (data["v_tilde"], data["y_tilde"])
     )
     grid = data["unit"] * np.array(data["mu_ratio"]).reshape(y.size, v.size)
-    assert (
-        np.max(np.abs(grid - surrogate.mu_ratio(v[None, :], y[:, None]))) <= 0.5001 * data["unit"]
-    )
+    ratio, _, _ = surrogate.quantity("mu_ratio", v[None, :], y[:, None], **names)
+    assert np.max(np.abs(grid - ratio)) <= 0.5001 * data["unit"]
     border = np.array(data["border"])
-    assert border[:, 0] == close(surrogate.v_tilde_crit(border[:, 1]), rel=1e-5)
+    assert border[:, 0] == close(surrogate.v_tilde_crit(border[:, 1], **names), rel=1e-5, abs=1e-12)
+    # a number stands on its line
+    for level, along, up in data["labels"]:
+        place = plotting.place(along, up, kind[1] == "normal")
+        assert surrogate.quantity("mu_ratio", *place, **names)[0] == close(level, rel=0.06)
+    assert len(data["labels"]) >= 7
+    for along, up, words in data["areas"]:
+        v_there, y_there = plotting.place(along, up, kind[1] == "normal")
+        slides = v_there > surrogate.v_tilde_crit(y_there, **names)
+        assert (words == "continuous sliding") is bool(slides)
     etag = response.headers["etag"]
-    assert client.get("/static/page/map.json", headers={"If-None-Match": etag}).status_code == 304
+    assert client.get(address, headers={"If-None-Match": etag}).status_code == 304
+    other = client.get("/static/page/map.json", headers={"If-None-Match": etag})
+    assert other.status_code == (304 if kind == ("spring", "across") else 200)
+
+
+def test_there_is_no_map_of_what_is_not_modelled(client: Any, problem: Any) -> None:
+    path = "/static/page/map.json"
+    assert (
+        "contact radius"
+        in problem(client.get(f"{path}?contact=ball&direction=normal"), 422)["detail"]
+    )
+    problem(client.get(f"{path}?contact=box"), 422)
+    told = client.get("/static/page/names.json").json()
+    assert [*told["impossible"]] == ["ball normal"]
 
 
 def test_units_and_geometries_are_the_librarys(client: Any) -> None:
@@ -162,11 +192,14 @@ def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
     page = open_page(width=width, height=height)
     drawn, law, mu, inputs = (page.find(f"#{name}").rect for name in ("map", "law", "mu", "inputs"))
     assert min(drawn["width"], law["width"]) >= 0.25 * width
-    # the map and the result are seen without scrolling; the inputs are beside or just below them
-    foot = drawn["y"] + drawn["height"]
-    assert foot <= height
-    assert 0 < mu["y"] < height
-    assert inputs["x"] < drawn["x"] - 50 or 0 < inputs["y"] - foot < 150
+    # the result is seen without scrolling, on a small phone on the second screen; beside the
+    # inputs, or below them and above the law, which is above the map
+    assert 0 < mu["y"] < height * (2 if width < 390 else 1)
+    if width > 760:
+        assert drawn["y"] + drawn["height"] <= height
+        assert inputs["x"] < drawn["x"] - 50
+    else:
+        assert inputs["y"] + inputs["height"] < mu["y"] < law["y"] < drawn["y"]
     page = open_page("#k=rigid&digits=all&bad=1", width=width, height=height)
     assert page.run("return document.documentElement.scrollWidth;") <= width
     # no section lies on another, and controls are large enough for a finger
@@ -196,7 +229,7 @@ def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
     )
     rows = (
         "return ['contact', 'direction'].map((id) => new "
-        "Set([...document.getElementById(id).children].map((one) =>"
+        "Set([...document.getElementById(id).querySelectorAll('label')].map((one) =>"
     )
     assert (cut, page.run(f"{rows} one.getBoundingClientRect().y)).size);")) == (0, [1, 1])
 
@@ -227,7 +260,7 @@ def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) ->
         page.type(f"#argument-{name}", text, commit=False)
     page.choose("#points", "0.001 0.1\n0.1 0.2", "input")
     for panel in ("solve", "stiffness", "fit"):
-        page.click(f"#{panel}-form button")
+        page.click(f"#{panel}-form button:not([type])")
         assert page.find(f"#{panel}-result").is_displayed()
     assert inaccessible(page, repository) == {}
     assert page.run("return document.documentElement.scrollWidth;") <= width

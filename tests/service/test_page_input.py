@@ -84,7 +84,7 @@ def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) ->
     assert not page.find("#field-k").is_enabled()
     assert "k=rigid" in page.address()
     assert (page.shown()["ṽ = v₀/(l₀ω)"], page.shown()["shaker power"]) == ("∞", "– (rigid)")
-    assert page.text("#model").startswith("Model: rigid contact, oscillation across")
+    assert page.text("#model").startswith("One model: rigid contact, oscillation across")
     assert "rigid contact has no point" in page.text("#map-out")
     page.touched("#map", 0.5, 0.5, click=True)
     assert page.value("#field-v0") == "10 mm/s"

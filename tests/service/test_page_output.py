@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.support.browser import RECORDED, START
-from mumacro import Surrogate
+from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import contact_of
 from service.routes.page import ASSETS
 from tests.support.comparing import close
@@ -21,6 +21,7 @@ ODD, SEEN = (
     r"NaN|undefined|null|Infinity|\[object",
     "return document.querySelector('main').innerText;",
 )
+SKETCH = ("spring", "ball", "rigid", "across", "along", "normal")
 # of the law's axis
 HEADING = "return document.querySelector('#law > .upright').previousSibling.textContent;"
 
@@ -33,10 +34,13 @@ def test_it_loads_and_shows_the_known_value(
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
     assert page.text("#regime") == "stick slip"
     assert page.text("#model") == (
-        "Model: one spring of stiffness k, oscillation across the sliding direction; compared "
+        "One model: one spring of stiffness k, oscillation across the sliding direction; compared "
         "with one published set of measured points, along."
     )
-    assert "k is known: k known to 10 % leaves mu_macro uncertain by" in page.text("#rows")
+    assert page.text("#known").startswith("k known to 10\xa0% leaves µ uncertain by")
+    assert page.find("#known").is_displayed()
+    assert "one spring: a ball on a flat with the same k has µ = " in page.text("#rows")
+    assert page.find("#rows").is_displayed()
     stick = surrogate.stick_fraction(answer.v_tilde, answer.y_tilde)
     power = surrogate.power(answer.v_tilde, answer.y_tilde) * 0.3 * 10 * 3e-6 * START["omega"]
     expected = {
@@ -70,9 +74,9 @@ def test_it_loads_and_shows_the_known_value(
 
 def test_units_that_no_contact_has_are_told_beside_the_number(open_page: Any) -> None:
     page = open_page("#y0=2")
-    assert re.fullmatch(r"Check the units: y~ = .*: is y0 = 2 in metres\?", page.text("#units"))
+    assert re.fullmatch(r"Check the units: ỹ = .*: is y₀ = 2 in metres\?", page.text("#units"))
     assert page.find("#units").is_displayed()
-    assert page.text("#rows") == ""  # nothing of the closed line is needed
+    assert page.text("#rows") == ""
     page.type("#field-y0", "2 um")
     assert page.text("#units") == ""
 
@@ -154,12 +158,9 @@ def test_a_point_outside_of_the_map_is_marked_on_its_frame(
     assert page.text("#status") == ""
 
 
-def test_the_map_has_a_colour_between_two_levels(
-    open_page: Any, surrogate: Surrogate, repository: Path
-) -> None:
+def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
-    script = (repository / "service/static/page/figures.js").read_text("utf-8")
-    levels = sorted(float(one) for one in re.findall(r'\[(0\.\d+), "#', script))
+    levels = plotting.LEVELS
     v, y = (
         low.ravel() for low in np.meshgrid(np.geomspace(2e-4, 5e2, 30), np.geomspace(2e-2, 5e2, 30))
     )
@@ -171,9 +172,11 @@ def test_the_map_has_a_colour_between_two_levels(
     colours = page.run(
         "const plot = document.querySelector('#map'); plot.scrollIntoView();"
         "const { x: left, y: top, width, height } = "
-        "plot.querySelector('.shade').getBoundingClientRect();return "
+        "plot.querySelector('.shade').getBoundingClientRect();"
+        "const line = 0.25; return "  # half of its width, around the area
         f"{np.column_stack((x_share, y_share)).tolist()}.map(([x, y]) => "
-        "document.elementsFromPoint(left + x * width, top + y * height).find((one) => "
+        "document.elementsFromPoint(left + line + x * (width - 2 * line),"
+        " top + line + y * (height - 2 * line)).find((one) => "
         "one.matches('.shade')).style.fill);"
     )
     told = {
@@ -181,7 +184,8 @@ def test_the_map_has_a_colour_between_two_levels(
     }
     assert len(told) == len({band for band, _ in told}) == len({colour for _, colour in told}) > 10
     shades = [colour for _, colour in sorted(told)]
-    assert (shades[0], shades[-1]) == ("rgb(68, 1, 84)", "rgb(253, 231, 37)")  # viridis
+    written = ["#" + "".join(f"{int(x):02x}" for x in re.findall(r"\d+", one)) for one in shades]
+    assert written == plotting.band_colours()
 
 
 def test_the_law_is_read_in_the_units_of_its_field_over_a_range(
@@ -266,8 +270,16 @@ def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None
         )
 
 
-@pytest.mark.parametrize("direction", ["across", "along", "normal"])
-@pytest.mark.parametrize("contact", ["spring", "ball"])
+@pytest.mark.parametrize(
+    ("contact", "direction"),
+    [
+        ("spring", "across"),
+        ("spring", "along"),
+        ("spring", "normal"),
+        ("ball", "across"),
+        ("ball", "along"),
+    ],
+)
 def test_all_contacts_and_directions_answer(
     open_page: Any, surrogate: Surrogate, contact: Any, direction: Any
 ) -> None:
@@ -275,18 +287,12 @@ def test_all_contacts_and_directions_answer(
         page.click(f"[name=contact][value={contact}]")
         page.click(f"[name=direction][value={direction}]")
         normal = direction == "normal"
-        there = {
-            "#field-Fz_amplitude": normal,
-            "#field-y0": not normal,
-            f"#sketch .{direction}": True,
-        }
+        there = {"#field-Fz_amplitude": normal, "#field-y0": not normal}
+        there |= {f"#sketch .{one}": one in (contact, direction) for one in SKETCH}
         for selector, shown in there.items():
             assert page.find(selector).is_displayed() is shown
         page.type("#field-k", "0.8..1.2 N/um")
         assert (f"contact={contact}" in page.address()) is (contact != "spring")
-        if (contact, direction) == ("ball", "normal"):
-            page.wait_for("#status", "refuses this: .*(ball|contact)")
-            return
         swing = {"y0": None, "Fz_amplitude": 5.0} if normal else {}
         case = {name: x for name, x in {**START, **swing, "k": None}.items() if x is not None}
         expected = surrogate.evaluate(
@@ -299,16 +305,64 @@ def test_all_contacts_and_directions_answer(
         )
         assert len(page.texts("#law .band")) == 1
         assert (page.text("#rows") != "") is not normal
-        assert ("does not hold" in page.text("#map-out")) is (
-            (contact, direction) != ("spring", "across")
-        )
+        # the map is that of this contact, with the point on it
+        assert (page.text("#map-out"), len(page.texts("#map .point"))) == ("", 1)
+        page.touched("#map", 0.4, 0.7)
+        read = page.wait_for("#map-read", r"ṽ = (\S+), ỹ = (\S+): µ/µ₀ ≈ (\S+)$")
+        v, y, ratio = (float(read[i]) for i in (1, 2, 3))
+        exact, _, _ = surrogate.quantity("mu_ratio", v, y, contact=contact, direction=direction)
+        assert ratio == close(exact, abs=0.02)
         assert page.asked("v1/law")["k_range"] == close([8e5, 1.2e6], rel=1e-15)
         page.choose("#along", "k")
         assert "k_range" not in page.asked("v1/law")
         assert not re.search(ODD, page.run(SEEN))
         assert page.text("#status") == page.text("#law-status") == ""
+        page.touched("#map", 0.4, 0.7, click=True)
+        found = [float(page.shown()[name]) for name in page.shown() if name[0] in "ṽỹ"]
+        assert found == close([v, y], rel=0.01)
         page.click("#reset")
         assert (page.text("#map-out"), page.value("#field-k")) == ("", "1 N/µm")
+
+
+def test_a_ball_whose_load_oscillates_cannot_be_chosen(open_page: Any) -> None:
+    page = open_page("#contact=ball")
+    normal, ball = (page.find(f"[value={name}]") for name in ("normal", "ball"))
+    assert not normal.is_enabled()
+    assert "not modelled" in page.text("#chosen")
+    page.click("[name=contact][value=spring]")
+    assert normal.is_enabled()
+    page.click("[name=direction][value=normal]")
+    assert not ball.is_enabled()
+    assert "not modelled" in page.text("#chosen")
+    page = open_page("#contact=ball&direction=normal")
+    assert "direction = normal (not for a ball)" in page.text("#notice-text")
+    assert page.find("[value=ball]").is_selected()
+
+
+def test_no_message_moves_the_form(open_page: Any) -> None:
+    page = open_page()
+    places = (
+        "return ['field-v0', 'answer', 'map', 'law'].map((id) =>"
+        " document.getElementById(id).getBoundingClientRect().y);"
+    )
+    before = page.run(places)
+    for text in ("5 mm", "", "abc", "12"):
+        page.type("#field-Fz", text)
+        assert page.run(places) == before
+    for name in ("ball", "along", "spring", "normal", "across"):
+        page.click(f"[type=radio][value={name}]")
+        assert page.run(places)[0] == before[0]
+
+
+def test_the_measured_example_is_loaded_and_fitted(open_page: Any) -> None:
+    page = open_page()
+    page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
+    page.click("#example")
+    assert page.value("#field-Fz") == "10.79 N"
+    assert page.find("[value=along]").is_selected()
+    page.run("[...document.querySelectorAll('#fit-form button')].at(-1).click();")
+    page.wait_for("#fit-found", r"^k = 9.974 N/µm ± 0.076 N/µm")  # docs/how-to/fit.md
+    assert len(page.texts("#fit-plot :is(circle.measured, path.curve)")) == 6
 
 
 def test_the_panels_ask_and_fill_the_form(
@@ -348,7 +402,7 @@ def test_the_panels_ask_and_fill_the_form(
             for speed, friction in zip(v0.tolist(), mu.tolist(), strict=True)
         ]
         page.choose("#points", "\n".join(["v0 [mm/s];mu;std", *rows]), "input")
-        page.click("#fit-form button")
+        page.click("#fit-form button:not([type])")
         asked = page.asked("v1/fit")
         assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
         assert (asked["contact"], asked["unknowns"], "k" in asked) == ("ball", ["k", "mu0"], False)
@@ -364,7 +418,7 @@ def test_the_panels_ask_and_fill_the_form(
         assert not page.is_old("#fit")
         page.choose("#points", "1 2 3 4", "input")
         assert page.is_old("#fit")  # the result is that of other points
-        page.click("#fit-form button")
+        page.click("#fit-form button:not([type])")
         page.wait_for("#fit-status", "^needs two or three columns: v0, mu_macro, std; .*Grey")
 
 
@@ -380,7 +434,7 @@ def test_the_fit_takes_decimal_commas_and_a_column_mu0(
     with open_page.faked(RECORDED) as page:
         page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
         page.choose("#points", "\n".join(["v0 [mm/s];mu_macro;mu0", *rows]), "input")
-        page.click("#fit-form button")
+        page.click("#fit-form button:not([type])")
         asked = page.asked("v1/fit")
         assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
         assert (asked["mu0"], asked["unknowns"]) == (mu0.tolist(), ["k"])
@@ -388,5 +442,5 @@ def test_the_fit_takes_decimal_commas_and_a_column_mu0(
         assert re.fullmatch("k = 1.3 N/µm ± .*Use", line)
         assert page.text("#fit-status") == ""
         page.choose("#unknowns", "mu0", "input")
-        page.click("#fit-form button")
+        page.click("#fit-form button:not([type])")
         page.wait_for("#fit-status", "^µ₀ is a column of the points: choose k as the unknown")

@@ -11,14 +11,17 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mumacro import Surrogate
+from service.observe import for_people
 from tests.support.cases import Case
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
@@ -307,3 +310,41 @@ def test_a_log_reader_that_stalls_delays_no_request(
     lost = sum(int(line["message"].split()[0]) for line in told)
     assert lost > 0
     assert lost + len(accesses(lines)) >= 14_000
+
+
+@pytest.mark.slow
+def test_at_a_terminal_it_speaks_to_a_person(repository: Path) -> None:
+    import pty
+
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    reader, writer = pty.openpty()
+    command = [sys.executable, "-m", "mumacro", "serve", "--port", str(port)]
+    with subprocess.Popen(command, cwd=repository, stdout=writer, stderr=writer) as process:
+        os.close(writer)
+        shown, until = b"", time.monotonic() + 180.0
+        try:
+            while b"Open http" not in shown and time.monotonic() < until:
+                shown += os.read(reader, 65536)
+            address = f"http://127.0.0.1:{port}"
+            assert f"Open {address} ".encode() in shown
+            with urllib.request.urlopen(f"{address}/v1/table", timeout=30):
+                pass
+            while b"/v1/table" not in shown and time.monotonic() < until:
+                shown += os.read(reader, 65536)
+        finally:
+            process.terminate()
+            while True:  # a terminal that nobody reads would hold the process
+                try:
+                    shown += os.read(reader, 65536)
+                except OSError:
+                    break
+    os.close(reader)
+    assert re.search(rb"\d\d:\d\d:\d\d  GET /v1/table 200 [\d.]+ ms\r\n", shown)
+    assert b"{" not in shown
+
+
+def test_a_line_for_people_moves_no_cursor_and_forges_no_line() -> None:
+    now = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+    line = {"time": now, "level": "warning", "logger": "x", "message": "a\x1b[2J\nb µ", "n": 1}
+    assert for_people(line) == "03:04:05  warning: a\\x1b[2J\\x0ab µ n=1\n".encode()

@@ -83,7 +83,7 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
     table: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["export", str(PATH), "--format", "csv"]) == 0
+    assert main(["export", str(PATH), "--format", "csv", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
         "table": str(PATH),
         "format": "csv",

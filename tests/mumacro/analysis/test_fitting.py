@@ -261,7 +261,8 @@ def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -
         **{name: value for name, value in given.items() if name != along},
     )
     axes = found.plot()
-    assert axes.get_xlabel() == {"v0": "v0 [m/s]", "y0": "y0 [m]"}[along]
+    assert axes.get_xlabel() == {"v0": "$v_0$ [m/s]", "y0": "$y_0$ [m]"}[along]
+    assert axes.get_ylabel() == r"$\mu_\mathrm{macro}$ [-]"
     points, curve = axes.lines[0], axes.lines[-1]
     assert np.array_equal(points.get_xdata(), x)
     assert np.interp(x, curve.get_xdata(), curve.get_ydata()) == close(points.get_ydata(), abs=1e-3)

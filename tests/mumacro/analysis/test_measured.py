@@ -92,5 +92,9 @@ def test_the_plot_of_points_with_their_own_mu0_is_one_line_through_the_fit() -> 
     fit_line = axes.get_lines()[-1]
     assert fit_line.get_xdata() == close(measured.points().v0, rel=1e-15)
     assert fit_line.get_ydata() == close(found.predict()[0], rel=1e-15)
-    assert len(axes.get_legend().get_texts()) == 1
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "fit, at the inputs of each point",
+        "95 % band of the fit",
+        "measured",
+    ]
     pyplot.close("all")

@@ -53,12 +53,10 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(
     shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
     assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
     told = [f"model  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
-    told = [line.replace("k_range", "k=9e+05..1.1e+06") for line in told]
+    told = [line.replace("k_range", "k=0.9..1.1N/um") for line in told]
     assert rows[-len(told) - 1 : -1] == told
     assert (
-        said(capsys, 0, CASE.replace("k=1e6", "k=9e+05..1.1e+06"))
-        .splitlines()[1]
-        .startswith("from ")
+        said(capsys, 0, CASE.replace("k=1e6", "k=0.9..1.1N/um")).splitlines()[1].startswith("from ")
     )
     assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(
         surrogate, VALUES
@@ -587,7 +585,29 @@ def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     many = surrogate.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
     axes = many.plot(figure.add_subplot())
     shown = {line.get_label(): len(line.get_xdata()) for line in axes.lines[:-1]}
-    assert shown == {"continuous": 2, "stick_slip": 1}  # v~ = 0 has no place on a logarithmic axis
+    # v~ = 0 has no place on a logarithmic axis
+    assert shown == {"continuous sliding": 2, "stick and slip": 1}
+
+
+@pytest.mark.parametrize(
+    "kind", [("spring", "across"), ("spring", "along"), ("ball", "across"), ("ball", "along")]
+)
+def test_a_picture_of_cases_has_the_border_of_their_contact(
+    surrogate: Surrogate, kind: Any
+) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    names = dict(zip(("contact", "direction"), kind, strict=True))
+    many = surrogate.evaluate(**{**VALUES, "v0": np.array([1e-3, 1.0])}, **names, groups=True)
+    axes = many.plot(figure.add_subplot())
+    v, y = axes.lines[-1].get_data()
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
+    one = surrogate.evaluate(**VALUES, **names).plot(figure.add_subplot())
+    v, y = one.lines[-1].get_data()
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
+
+
+def test_a_picture_needs_the_groups(surrogate: Surrogate) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
     with pytest.raises(AttributeError, match="groups=True"):
         surrogate.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}).plot(figure.add_subplot())
 
@@ -686,11 +706,11 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
 
 
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:
-    out = tmp_path / "grid.csv"
-    found = json.loads(
-        said(capsys, 0, "export", "--format", "csv", "--out", str(out), "--table", "1e-4")
-    )
-    assert found["table"] == str(tables_dir / "mumacro-1e-4.nc")
+    out, table = tmp_path / "grid.csv", str(tables_dir / "mumacro-1e-4.nc")
+    words = ("export", "--format", "csv", "--out", str(out), "--table", "1e-4")
+    assert json.loads(said(capsys, 0, *words, "--json"))["table"] == table
+    rows = [line.split() for line in said(capsys, 0, *words).splitlines()]
+    assert rows[:3] == [["table", table], ["format", "csv"], ["out", str(out)]]
     assert out.read_text().startswith("v_tilde,")
 
 

@@ -5,7 +5,7 @@ import { test } from "node:test";
 import {
   RIGID, about, attempt, caseOf, friction, fromAddress, inUnit, question, readInterval, readPoints, readQuantity, readValue,
   show, startState, toAddress, valueOf,
-} from "../../service/static/page/inputs.js";
+} from "../../../service/static/page/inputs.js";
 
 const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
 Object.assign(about, told);
@@ -20,7 +20,8 @@ const READ = [ // input, unit of its field, text: SI value, or part of the reaso
   ["omega", "Hz", "20kHz", 2 * Math.PI * 20e3], ["omega", "kHz", "130 krad/s", 1.3e5],
   ["omega", "kHz", "6000 rpm", 2 * Math.PI * 100], ["mu0", "-", "30 %", 0.3], ["v0", "mm/s", "0", 0],
   ["v0", "mm/s", "−0", 0], ["Fz", "N", "1.5E3", 1500],
-  ["y0", "µm", "2,9", "the decimal sign is a point, 2.9"], ["Fz", "N", "1 500", "“500” is not a unit of Fz"],
+  ["y0", "µm", "2,9", 2.9e-6], ["mu0", "-", "0,125", 0.125], ["y0", "µm", "0,2um", 2e-7], ["v0", "mm/s", "1,5e3", 1.5],
+  ["Fz", "N", "1,500", "can be 1.500 or 1500: write one of them"], ["Fz", "N", "1 500", "“500” is not a unit of Fz"],
   ["Fz", "N", "1,500,000", "is not a number"], ["Fz", "N", "1.2.3", "is not a number"], ["Fz", "N", "", "give a number"],
   ["Fz", "N", "abc", "is not a number"], ["Fz", "N", "1e", "“e” is not a unit of Fz: give N, mN, kN"],
   ["Fz", "N", "5 mm", "“mm” is not a unit of Fz"], ["Fz", "N", "3 n", "did you mean N?"],
@@ -124,6 +125,7 @@ for (const [address, said] of [
   ["std_mu0=1&range=z", "range = z (“z” is not an interval: write low..high); std_mu0 = 1 (unknown)"],
   ["along=k&range=1..rigid", "range = 1..rigid (must be an interval of two numbers)"], ["direction=normal&y0=1um", "y0 = 1um (unknown)"],
   ["contact=box", "contact = box (must be one of spring, ball)"],
+  ["contact=ball&direction=normal", "direction = normal (not for a ball)"],
 ]) {
   test(`a link with ${address} is reported`, () => {
     const { state, faults } = fromAddress(`#${encodeURIComponent(address).replace(/%(3D|26)/g, decodeURIComponent)}`);
