@@ -1,0 +1,280 @@
+"""JSON in and out: columns, rows, and lines of either (NDJSON).
+
+Long lists of numbers and rows are read by orjson piece by piece, so that other threads run
+meanwhile.  Everything else, and whatever it refuses, is read by Python's ``json``, which gives the
+reasons.
+"""
+
+import re
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import orjson
+from pydantic import ValidationError
+
+from mumacro.errors import InputError
+from mumacro.inputs.cases import by_name, columns_of
+from mumacro.inputs.kind import SPRING, Kind, kind_of
+
+from ..batch import Batch, Body, Form, Reason, too_large
+from ..models.inputs import EXAMPLE, MAX_REASONS, Case
+from ..models.options import BatchOptions, CaseColumns
+from ..problems import FieldFault, Kind as ProblemKind, RequestError, faults_of, reason_of, refuse
+from ..quantities import Outputs, names_of, nested
+from ..reading import decode, dump
+
+_NAMES = (*CaseColumns.model_fields,)
+_READ = 256 * 1024  # bytes of rows that are read at a time
+_TOKEN = secrets.token_hex(16).encode()  # stands in place of a list; nobody else knows it
+_SHORT = 4096  # bytes of a list that json reads
+_ROWS = 8192  # cases that are written at a time
+_OPENS_LIST = re.compile(rb"\s*\[")
+_BETWEEN = re.compile(rb"\}\s*,")
+
+
+def read(text: bytearray, max_batch: int, options: BatchOptions) -> Body:
+    """The cases and the options of a body: columns or one case, or a list of rows."""
+    _limit_values(text, max_batch)
+    if _OPENS_LIST.match(text):
+        kind = kind_of(options.contact or "spring", options.direction or "across")
+        return _of_rows(_rows(text, max_batch), kind)
+    members = _members(text)
+    if not isinstance(members, dict):
+        refuse([FieldFault((), "must be an object of columns or a list of rows", members)])
+    return Body(members)
+
+
+def _limit_values(text: bytearray, max_batch: int) -> None:
+    """Refuse a body that holds more values than a batch may have, before it is decoded.
+
+    Every value but the first of its list or object has a comma before it, every list or object a
+    bracket, every member of an object a colon.
+    """
+    room = max_batch + 64
+    objects = text.count(b"{")
+    if text.count(b",") > len(_NAMES) * room or text.count(b"[") + objects > room:
+        raise too_large(max_batch)
+    if text.count(b":") > len(_NAMES) * objects + 64:
+        raise RequestError(
+            ProblemKind.INVALID_VALUE,
+            "the body has objects with more members than there are fields",
+        )
+
+
+# --- columns --------------------------------------------------------------------------------------
+
+
+def _members(text: bytearray) -> Any:
+    """What ``json`` reads, with long lists of numbers by orjson: a text stands in place of each
+    while it reads."""
+    kept, lists, at = list[bytes | bytearray](), list[Any](), 0
+    while (start := text.find(b"[", at)) >= 0 and (end := text.find(b"]", start) + 1) > 0:
+        numbers = _list(text[start:end]) if end - start > _SHORT else None
+        kept.append(
+            text[at:end] if numbers is None else text[at:start] + b'"%b%d"' % (_TOKEN, len(lists))
+        )
+        lists += [] if numbers is None else [numbers]
+        at = end
+    members = decode(b"".join([*kept, text[at:]]), large=True)
+    if isinstance(members, dict):
+        token = _TOKEN.decode()
+        for name, value in members.items():
+            if isinstance(value, str) and value.startswith(token):
+                members[name] = lists[int(value[len(token) :])]
+    return members
+
+
+def _list(text: bytearray) -> Any:
+    """A list of finite numbers as an array; a list of anything else as it is; None for what orjson
+    refuses, such as 1e400."""
+    with suppress(ValueError):
+        values = orjson.loads(text)
+        if {*map(type, values)} <= {float, int}:
+            with suppress(OverflowError):
+                return np.array(values, np.float64)
+    return None
+
+
+# --- rows -----------------------------------------------------------------------------------------
+
+
+def _rows(text: bytearray, max_batch: int) -> list[Any]:
+    """The rows, read piece by piece.  A piece that does not end between two rows is no JSON."""
+    rows: list[Any] = []
+    at = 0
+    while at < len(text):
+        cut = _BETWEEN.search(text, at + _READ)
+        piece = (
+            (b"[" if at else b"")
+            + text[at : cut.start() + 1 if cut else None]
+            + (b"]" if cut else b"")
+        )
+        try:
+            some = orjson.loads(piece)
+        except ValueError:
+            some = None
+        # one colon for each member: none is named twice
+        members = None if some is None else sum(len(x) for x in some if isinstance(x, dict))
+        if members != piece.count(b":"):
+            rows = decode(text, large=True)
+            break
+        rows += some
+        if len(rows) > max_batch:
+            break
+        at = cut.end() if cut else len(text)
+    if len(rows) > max_batch:
+        raise too_large(max_batch)
+    return rows
+
+
+def _of_rows(rows: list[Any], kind: Kind) -> Body:
+    """Rows as columns: at once where all of them are numbers of the same names, else one by one."""
+    first = rows[0] if rows else dict.fromkeys(kind.fields, 0.0)
+    names = first.keys() if isinstance(first, dict) else {}.keys()
+    if names <= {*kind.columns, "k_low", "k_high"} and all(
+        isinstance(row, dict) and row.keys() == names for row in rows
+    ):
+        columns = {name: [row[name] for row in rows] for name in names}
+        numbers = all(
+            {*map(type, column)} <= ({float, int, str} if name == "k" else {float, int})
+            for name, column in columns.items()
+        )
+        if numbers and _complete(columns, kind):
+            return Body(columns, rows=True)
+    return _one_by_one(rows, kind)
+
+
+def _complete(columns: Mapping[str, Any], kind: Kind) -> bool:
+    """Whether such names make a case."""
+    try:
+        columns_of(_with_k(by_name(None, dict.fromkeys(columns, 1.0), kind)), kind)
+    except InputError:
+        return False
+    return True
+
+
+def _with_k(inputs: dict[str, Any]) -> dict[str, Any]:
+    return {**inputs, "k": 1.0} if "k_low" in inputs else inputs
+
+
+def _one_by_one(rows: list[Any], kind: Kind) -> Body:
+    """Rows one by one: each is checked as one case, and a bad one gets its first reason."""
+    interval = any(isinstance(row, dict) and _interval_in(row) for row in rows)
+    fields = [end for name in kind.fields for end in _ends(name, interval)]
+    columns = {name: np.full(len(rows), np.nan) for name in fields}
+    reasons: dict[int, Reason] = {}
+    for i, row in enumerate(rows):
+        try:
+            inputs = _with_k(by_name(None, _case(row).inputs, kind))
+            six = columns_of(inputs, kind) | {
+                name: inputs[name] for name in ("k_low", "k_high") if name in inputs
+            }
+            for name in fields:
+                columns[name][i] = six[name] if name in six else six["k"]
+        except (ValidationError, InputError) as error:
+            if len(reasons) < MAX_REASONS:
+                reasons[i] = _first(error)
+    return Body(dict(columns), reasons, rows=True)
+
+
+def _interval_in(row: dict[str, Any]) -> bool:
+    return not row.keys().isdisjoint(("k_range", "k_low", "k_high"))
+
+
+def _ends(name: str, interval: bool) -> tuple[str, ...]:
+    return ("k_low", "k_high") if interval and name == "k" else (name,)
+
+
+def _case(row: Any) -> Case:
+    if not isinstance(row, dict):
+        raise InputError("", row, "an object")
+    return Case.model_validate(row)
+
+
+def _first(error: ValidationError | InputError) -> Reason:
+    """The first fault of a row, in the order of the inputs."""
+    if isinstance(error, InputError):
+        return (str(error.field) or None), reason_of(error)
+    faults = faults_of(error.errors(include_url=False), Case.model_fields)
+    order = list(Case.model_fields)
+    fault = min(faults, key=lambda one: order.index(one.path[0]) if one.path[0] in order else -1)
+    return str(fault.path[0])[:80], fault.reason
+
+
+# --- answers --------------------------------------------------------------------------------------
+
+
+def write(batch: Batch) -> Iterator[bytes]:
+    """An object of lists, or of the list of results, piece by piece."""
+    return _write_rows(batch) if batch.rows else _write_columns(batch)
+
+
+def _write_columns(batch: Batch) -> Iterator[bytes]:
+    slices = [outputs for outputs, _, _ in batch.slices(_ROWS)]
+    frame = _around(slices[0], b"[\0]")
+    for opening, path in zip(frame, slices[0], strict=False):
+        for outputs in slices:
+            yield opening + _values(path, outputs[path])
+            opening = b","
+    yield frame[-1][:-1] + b"," + dump(batch.end)[1:]
+
+
+def _write_rows(batch: Batch) -> Iterator[bytes]:
+    opening, row = b'{"results":[', b""
+    for outputs, codes, _ in batch.slices(_ROWS):
+        row = row or b"%b".join(text.replace(b"%", b"%%") for text in _around(outputs, b"\0"))
+        columns = [_values(path, column).split(b",") for path, column in outputs.items()]
+        made = [row % cells for cells in zip(*columns, strict=True)] if codes.size else []
+        for i in np.flatnonzero(codes < 0).tolist():
+            made[i] = b"null"
+        yield opening + b",".join(made)
+        opening = b","
+    yield b"]," + dump(batch.end)[1:]
+
+
+def _around(outputs: Outputs, place: bytes) -> list[bytes]:
+    """What stands around the values of an answer; each ``place`` has a zero for a value."""
+    text = dump(nested(dict.fromkeys(outputs, "\0")))
+    return text.replace(b'"\\u0000"', place).split(b"\0")
+
+
+def _values(path: str, column: Any) -> bytes:
+    """The values of a column, separated by commas."""
+    return dump(names_of(path, column) if path in ("regime", "source") else column)[1:-1]
+
+
+# --- forms ----------------------------------------------------------------------------------------
+
+
+def _any_of(*names: str, **more: Any) -> dict[str, Any]:
+    """The description of a text that is one of these models, or a list of one, whose name ends with
+    ``[]``."""
+    refs = [(name, {"$ref": f"#/components/schemas/{name.removesuffix('[]')}"}) for name in names]
+    kinds = [{"type": "array", "items": ref} if name.endswith("[]") else ref for name, ref in refs]
+    return {"schema": {"anyOf": kinds, **more}}
+
+
+_MANY = {"example": {**EXAMPLE, "v0": [0.01, 0.1]}}
+_LINE = "One of these per line, in the order of the lines"
+FORMS = (
+    Form(
+        "application/json",
+        (),
+        read,
+        write,
+        body=_any_of("CaseColumns", "Case[]") | _MANY,
+        answer=_any_of("ColumnsAnswer", "RowsAnswer"),
+    ),
+    Form(
+        "application/x-ndjson",
+        ("application/ndjson", "application/jsonl", "application/x-jsonlines"),
+        read,
+        write,
+        body=_any_of("CaseColumns", "CaseRequest", "Case[]", description=_LINE) | _MANY,
+        answer=_any_of("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem", description=_LINE),
+        streams=True,
+    ),
+)
