@@ -77,10 +77,15 @@ class HeadAsGet:
         if scope["type"] != "http" or scope["method"] != "HEAD":
             return await self._app(scope, receive, send)
 
+        ended = False
+
         async def send_head(message: Message) -> None:
-            if message["type"] == "http.response.body":
-                message = {**message, "body": b""}
-            await send(message)
+            nonlocal ended
+            if message["type"] != "http.response.body":
+                await send(message)
+            elif not ended:  # at once: the client may already send its next request
+                ended = True
+                await send({"type": "http.response.body", "body": b""})
 
         await self._app({**scope, "method": "GET"}, receive, send_head)
 
@@ -110,10 +115,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)
         app.mount("/guide", StaticFiles(directory=settings.guide, html=True))
         opened.add("/guide")
-    paths = {str(route.path) for route in iter_route_contexts(app.routes) if route.path}
+    methods: dict[str, set[str]] = {}
+    for route in iter_route_contexts(app.routes):
+        methods.setdefault(str(route.path), set()).update(route.methods or ())
     state = app.state
+    state.methods = {
+        path: ", ".join(sorted(allowed | ({"HEAD"} if "GET" in allowed else set())))
+        for path, allowed in methods.items()
+    }
     state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
-    state.metrics = Metrics({*paths, *page.OPEN})
+    state.metrics = Metrics({*methods, *page.OPEN})
     app.openapi = lambda: _described(app, closed=bool(settings.keys()))  # type: ignore[method-assign]
     # the last one is the outermost
     app.add_middleware(HeadAsGet)

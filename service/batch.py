@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import ValidationError
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
@@ -18,8 +17,9 @@ from mumacro.kernel.arrays import Codes
 
 from .models.inputs import MAX_REASONS, Column
 from .models.options import MODEL, BatchOptions, CaseColumns
-from .problems import FieldFault, Kind, RequestError, invalid, reason_of, refuse
+from .problems import FieldFault, Kind, RequestError, reason_of, refuse
 from .quantities import Asked, Outputs, answer_columns
+from .reading import of_members
 from .tables import LoadedTable, Tables
 
 #: the bad field, or None for the case as a whole, and why
@@ -82,10 +82,7 @@ class Batch:
         }
         if any(length > max_batch for length in lengths.values()):
             raise too_large(max_batch)
-        try:
-            asked_of = CaseColumns.model_validate(both(body.members, options))
-        except ValidationError as error:
-            raise invalid(error, CaseColumns) from None
+        asked_of = of_members(CaseColumns, both(body.members, options))
         if MODEL in (asked_of.include or ()):
             raise InputError("include", MODEL, f"without {MODEL}, which is for one case")
         given, reasons = asked_of.columns, dict(body.reasons)
@@ -150,9 +147,7 @@ class Batch:
 
 def _part(columns: Mapping[str, Any], start: int, stop: int) -> dict[str, Any]:
     """The columns of the cases from ``start`` to ``stop``."""
-    return {
-        name: x[start:stop] if isinstance(x, np.ndarray) else x for name, x in columns.items()
-    }
+    return {name: x[start:stop] if isinstance(x, np.ndarray) else x for name, x in columns.items()}
 
 
 def _reason(cases: Cases, index: int) -> Reason:

@@ -21,8 +21,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from mumacro.kernel.threads import processors
 
-from .problems import Kind, RequestError
-from .security import HEALTH_PATHS, path_in
+from .problems import Kind, RequestError, path_in
+from .security import HEALTH_PATHS
 from .settings import Settings
 
 T = TypeVar("T")

@@ -22,7 +22,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from .metrics import Metrics
-from .security import HEALTH_PATHS, NOSNIFF, path_in
+from .problems import path_in
+from .security import HEALTH_PATHS, NOSNIFF
 
 
 _GONE = 499  # the usual status for a client that disconnected before the answer

@@ -10,7 +10,7 @@ import asyncio
 import json
 import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
@@ -25,8 +25,10 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.errors import InputError, MumacroError, TableError
-from mumacro.inputs.fields import BOUNDS, LIKE, STIFFNESS, refusal
+from mumacro.inputs.fields import BOUNDS, LIKE, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
+from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.units import number_hint, unknown_name
 
 MAX_FIELD_FAULTS = 100
@@ -147,14 +149,24 @@ def _reason(error: Any, name: str, known: Iterable[str]) -> str:
         return "is required"
     if kind == "extra_forbidden":
         return unknown_name(name, known)
+    if kind == "float_type" and type(value) is int and name in BOUNDS:  # beyond double range
+        return refusal(name, math.inf)
     if kind == "float_type":
         return number_hint(name.removeprefix("std_"), value)
     if kind in _OUT_OF_BOUNDS and name in BOUNDS and len(error["loc"]) == 1:
-        return refusal(name, float(value) if abs(value) < _LARGE else math.inf)
-    if kind in _OUT_OF_BOUNDS and "gt" not in error.get("ctx", {}):
-        return "must be finite" if kind == "finite_number" else f"must be {BOUNDS['v0']}"
+        return refusal(name, math.inf if abs(value) > _LARGE else float(value))
+    if kind in _OUT_OF_BOUNDS and "le" not in error.get("ctx", {}):
+        least = "> 0" if "gt" in error.get("ctx", {}) else ">= 0"
+        return "must be finite" if kind == "finite_number" else f"must be finite and {least}"
     if kind == "literal_error":
         return f"must be one of {error['ctx']['expected'].replace(' or ', ', ')}".replace("'", "")
+    if kind in ("model_type", "model_attributes_type"):
+        return "must be an object"
+    if kind in ("too_short", "too_long"):
+        least, most = (error["ctx"].get(end) for end in ("min_length", "max_length"))
+        return f"must have at least {least} entries" if most is None else (
+            f"may have up to {most} entries"
+        )  # fmt: skip
     message: str = error["msg"]
     return message.replace("Input should be", "must be").replace("Input should", "must")
 
@@ -171,13 +183,32 @@ def names_of(model: type[BaseModel]) -> tuple[str, ...]:
 
 
 def invalid(
-    error: ValidationError, model: type[BaseModel], parameter: bool | None = None
+    error: ValidationError,
+    model: type[BaseModel],
+    members: Mapping[str, Any],
+    parameter: bool | None = None,
 ) -> "RequestError":
-    """The error that reports what a model refuses."""
-    errors = error.errors(include_url=False)
-    if errors[0]["type"] == "json_invalid":
-        return RequestError(Kind.MALFORMED_BODY, f"the body is not JSON: {errors[0]['msg']}")
-    return refused(faults_of(errors, names_of(model), parameter))
+    """The error that reports what a model refuses in the members of a body or query."""
+    faults = faults_of(error.errors(include_url=False), names_of(model), parameter)
+    if "mu0" in model.model_fields and model.model_fields["mu0"].is_required():
+        known = {fault.path for fault in faults}
+        faults += [fault for fault in _absent_in(members) if fault.path not in known]
+    return refused(faults)
+
+
+def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
+    """The faults of inputs of which one of several is required: the library would tell the first
+    of them, when everything else is right."""
+    amplitude = AMPLITUDE if members.get("direction") == "normal" else "y0"
+    for names in (("k", "k_range", *ENDS), (amplitude,), ("omega", "f")):
+        if all(members.get(name) is None for name in names):
+            yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))
+
+
+_ALTERNATIVES = {
+    "omega": "is required: omega [rad/s], or f [Hz] in its place",
+    "k": f"is required: the tangential stiffness [N/m], or {RIGID}",
+}
 
 
 class Kind(Enum):
@@ -224,6 +255,11 @@ class RequestError(MumacroError):
         super().__init__(detail)
 
 
+def path_in(scope: Scope) -> str:
+    """The path without what a proxy has put before it."""
+    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
+
+
 # --- exceptions of the application ----------------------------------------------------------------
 
 
@@ -235,10 +271,14 @@ def _of_fastapi(error: RequestValidationError, scope: Scope) -> RequestError:
     return refused(faults_of(errors, names_of(declared)))
 
 
-def _of_http(error: HTTPException, _: Scope) -> RequestError:
+def _of_http(error: HTTPException, scope: Scope) -> RequestError:
     """What Starlette refuses: no such path, method or part of a file."""
-    kind = {400: Kind.MALFORMED_BODY, 404: Kind.NOT_FOUND, 405: Kind.METHOD_NOT_ALLOWED,
-            416: Kind.RANGE_NOT_SATISFIABLE}.get(error.status_code, Kind.UNEXPECTED)  # fmt: skip
+    if error.status_code == 405:  # Starlette names the methods of one route of the path
+        allowed = scope["app"].state.methods.get(path_in(scope), "GET, HEAD")
+        detail = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
+        return RequestError(Kind.METHOD_NOT_ALLOWED, detail, headers={"Allow": allowed})
+    kinds = (Kind.MALFORMED_BODY, Kind.NOT_FOUND, Kind.RANGE_NOT_SATISFIABLE)
+    kind = next((one for one in kinds if one.status == error.status_code), Kind.UNEXPECTED)
     detail = "no such path: /docs describes all of them" if kind is Kind.NOT_FOUND else error.detail
     return RequestError(kind, detail, headers=error.headers)
 

@@ -279,9 +279,7 @@ def answer_columns(
     return outputs, codes
 
 
-def _answer(
-    surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked
-) -> tuple[Outputs, Any]:
+def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> tuple[Outputs, Any]:
     kind, include = asked.kind, asked.include
     cases = Cases.of(by_name(None, columns, kind), kind)
     slopes = any(QUANTITIES[name].slopes for name in include)

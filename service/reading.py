@@ -9,7 +9,7 @@ solves nothing else: FastAPI's own reading of a case takes longer than its answe
 
 import json
 import string
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Any
 from urllib.parse import parse_qsl
 
@@ -212,10 +212,11 @@ class DirectRoute(APIRoute):
 
         async def of_query(request: Request) -> Response:
             strict = StrictRequest(request.scope, request.receive)
+            members = strict.members
             try:
-                case = model.model_validate(strict.members)
+                case = model.model_validate(members)
             except ValidationError as error:
-                raise invalid(error, model, parameter=True) from None
+                raise invalid(error, model, members, parameter=True) from None
             response: Response = await answer(strict, case)
             return response
 
@@ -224,15 +225,26 @@ class DirectRoute(APIRoute):
         return of_body if in_body else of_query
 
 
+def of_members(model: Any, members: Mapping[str, Any]) -> Any:
+    """The model of these members."""
+    try:
+        return model.model_validate(members)
+    except ValidationError as error:
+        raise invalid(error, model, members) from None
+
+
 def validated(model: Any, text: bytes) -> Any:
     """The model that a JSON text holds."""
     try:
         found = model.model_validate_json(text)
     except ValidationError as error:
         # Python's reader has the reasons for what is no JSON, and for a member given twice
-        if not isinstance(members := decode(text), dict):
+        members = decode(text)
+        if not isinstance(members, dict):
             refuse([FieldFault((), "must be a JSON object", members)])
-        raise invalid(error, model) from None
+        if error.errors()[0]["type"] != "json_invalid":
+            raise invalid(error, model, members) from None
+        return of_members(model, members)  # such as half of a surrogate pair
     # one colon for each member: none is named twice, and there is no object within
     if text.count(b":") != len(found.model_fields_set):
         decode(text)

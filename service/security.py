@@ -6,7 +6,7 @@ from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from .problems import Kind, RequestError
+from .problems import Kind, RequestError, path_in
 
 #: as OpenAPI names the two ways to send a key
 SCHEMES = {
@@ -26,11 +26,6 @@ _ONCE = (
 )
 
 
-def path_in(scope: Scope) -> str:
-    """The path without what a proxy has put before it."""
-    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
-
-
 class Keys:
     """Every path needs a key but those that are named, and what is below ``/guide/``.
 
@@ -42,9 +37,10 @@ class Keys:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request pass with a known key; the name of the key's holder goes into the log."""
-        path = path_in(scope)
-        if scope["type"] == "http" and path not in self._open and not path.startswith("/guide/"):
-            scope["key_holder"] = self._holder(dict(scope["headers"]))
+        if scope["type"] == "http":
+            path = path_in(scope)
+            if path not in self._open and not path.startswith("/guide/"):
+                scope["key_holder"] = self._holder(dict(scope["headers"]))
         await self._app(scope, receive, send)
 
     def _holder(self, headers: Mapping[bytes, bytes]) -> str:

@@ -28,7 +28,7 @@ BAD_ROWS = [
     ({"speed": 1}, "speed", "unknown"),
     ({"v0": True}, "v0", "must be a number"),
     ({"include": []}, "include", "unknown"),
-    ({"k": ...}, "k", "is required: the tangential stiffness"),
+    ({"k": ...}, "k", "rigid"),
 ]
 
 

@@ -98,7 +98,7 @@ def test_an_unexpected_error_is_logged_and_not_shown(
         (MemoryError, 503, "out-of-memory", "1"),
     ):
         monkeypatch.setattr(
-            "mumacro.Surrogate.evaluate_case", Mock(side_effect=error("secret detail"))
+            "mumacro.Surrogate.evaluate", Mock(side_effect=error("secret detail"))
         )
         for response in (
             client.post("/v1/mu-macro", json=case),

@@ -21,18 +21,20 @@ from ..models.options import BatchOptions
 from ..problems import FieldFault, Kind, RequestError, refuse
 from .arrow import tables_of, twice
 
-_LONGEST_LINE = 64 * 1024  # bytes
 _SLICE = 32768  # cases that are written at a time
 _DIGITS = b"0123456789.eE+-"
 
 
 def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
     body = bytes(text).removeprefix(b"\xef\xbb\xbf")
-    head, _, rest = body.replace(b"\r\n", b"\n").replace(b"\r", b"\n").lstrip(b"\n").partition(b"\n")
+    head, _, rest = (
+        body.replace(b"\r\n", b"\n").replace(b"\r", b"\n").lstrip(b"\n").partition(b"\n")
+    )
     if rest.count(b"\n") > 2 * max_batch + 2:
         raise too_large(max_batch)
     try:
         scales = _head(next(csv.reader([head.decode()], strict=True), []))
+        rest.decode()  # pyarrow would tell standard error of a wrong byte in a wrong row
         if rest.count(b'"') % 2:
             raise csv.Error("a quote is not closed")
         wrong: list[Any] = []
@@ -67,7 +69,7 @@ def _parsed(text: bytes, names: list[str], odd: Any) -> Any:
         return pa.table({name: pa.array([], pa.string()) for name in names})
     return pcsv.read_csv(
         io.BytesIO(text),
-        pcsv.ReadOptions(use_threads=False, block_size=_LONGEST_LINE, column_names=names),
+        pcsv.ReadOptions(use_threads=False, column_names=names),
         pcsv.ParseOptions(invalid_row_handler=odd),
         pcsv.ConvertOptions(
             column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
@@ -116,7 +118,7 @@ def _value(scale: Scale, text: str) -> Any:
 
 def _with_gaps(values: Any, places: list[int]) -> list[Any]:
     """A column with a gap at each of these places."""
-    filled = list(values)
+    filled = values if isinstance(values, list) else values.tolist()
     for place in places:
         filled.insert(place, None)
     return filled
@@ -137,9 +139,7 @@ def _write(batch: Batch) -> Iterator[bytes]:
             yield ",".join(plain.column_names).encode() + b"\n"
             opened = True
         sink = io.BytesIO()
-        pcsv.write_csv(
-            plain, sink, pcsv.WriteOptions(include_header=False, quoting_style="needed")
-        )
+        pcsv.write_csv(plain, sink, pcsv.WriteOptions(include_header=False, quoting_style="needed"))
         yield sink.getvalue()
 
 

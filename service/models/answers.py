@@ -122,7 +122,9 @@ class Included(Part[N]):
     std: N | None = quantity(
         "Standard deviation of mu_macro to first order, from the gradient", "-", None
     )
-    std_bound: N | None = quantity("The part of std that comes from the gradient's bound", "-", None)
+    std_bound: N | None = quantity(
+        "The part of std that comes from the gradient's bound", "-", None
+    )
     std_share: StdShare[N] | None = None
     stick_fraction: N | None = quantity(
         "Share of the period during which the contact sticks", "-", None
@@ -240,7 +242,9 @@ class LawAnswer(Columns, Answered):
     unit: str
     values: list[float] = Field(description="The swept input [SI]")
     mu_static: list[float] = quantity("Static limit (v0 -> 0) of each case", "-")
-    k: list[float] | None = quantity("Stiffness at each value, where it grows along Fz", "N/m", None)
+    k: list[float] | None = quantity(
+        "Stiffness at each value, where it grows along Fz", "N/m", None
+    )
     model: list[ModelRow] | None = Field(None, description=_MODEL)
     border: list[BorderMark] = Field(description="Up to two points inside the range")
 

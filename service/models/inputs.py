@@ -48,6 +48,17 @@ def rigid_or(value: Any, number: Callable[[Any], float]) -> float:
 Stiffness = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
 
 
+def optional(description: str, **more: Any) -> Any:
+    """A member that may be left out.  Null says the same, which the description leaves out: a query
+    has none."""
+    return Field(None, description=description, json_schema_extra=_without_null, **more)
+
+
+def _without_null(schema: dict[str, Any]) -> None:
+    kinds = [kind for kind in schema.pop("anyOf", [schema]) if kind != {"type": "null"}]
+    schema |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+
+
 class Strict(BaseModel):
     """A model with its own members only, each of its own type."""
 
@@ -71,19 +82,16 @@ class OneCase(Strict):
     )
     Fz: Positive = Field(description="Normal force [N]", examples=[10.0])
     k: Stiffness = Field(None, description=_K, examples=[1e6])
-    y0: NotNegative | None = Field(None, description=_Y0, examples=[2e-6])
-    omega: NotNegative | None = Field(
-        None,
-        description="Angular frequency of the oscillation [rad/s]; omega or f is required",
+    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
+    omega: NotNegative | None = optional(
+        "Angular frequency of the oscillation [rad/s]; omega or f is required",
         examples=[1.3e5],
     )
-    f: Hertz | None = Field(
-        None, description="Frequency of the oscillation [Hz], in place of omega"
-    )
+    f: Hertz | None = optional("Frequency of the oscillation [Hz], in place of omega")
     v0: NotNegative = Field(description="Sliding velocity [m/s]", examples=[0.01])
-    Fz_amplitude: NotNegative | None = Field(None, description=_AMPLITUDE)
-    k_low: Positive | None = Field(None, description="Lowest stiffness [N/m], with k_high")
-    k_high: Positive | None = Field(None, description="Highest stiffness [N/m], with k_low")
+    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
+    k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
+    k_high: Positive | None = optional("Highest stiffness [N/m], with k_low")
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -97,30 +105,27 @@ class Case(OneCase):
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
 
-    k_range: Pair | None = Field(None, description=f"In place of k: {BOUND}")
+    k_range: Pair | None = optional(f"In place of k: {BOUND}")
 
 
 class OtherInputs(Strict):
     """The inputs of a question about one of them, which is left out or null."""
 
-    mu0: Positive | None = Field(
-        None, description="Coulomb friction coefficient of the contact [-]", examples=[0.3]
+    mu0: Positive | None = optional(
+        "Coulomb friction coefficient of the contact [-]", examples=[0.3]
     )
-    Fz: Positive | None = Field(None, description="Normal force [N]", examples=[10.0])
-    k: Stiffness | None = Field(None, description=_K, examples=[1e6])
-    y0: NotNegative | None = Field(None, description=_Y0, examples=[2e-6])
-    omega: NotNegative | None = Field(
-        None,
-        description="Angular frequency of the oscillation [rad/s]; omega or f is required",
+    Fz: Positive | None = optional("Normal force [N]", examples=[10.0])
+    k: Stiffness | None = optional(_K, examples=[1e6])
+    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
+    omega: NotNegative | None = optional(
+        "Angular frequency of the oscillation [rad/s]; omega or f is required",
         examples=[1.3e5],
     )
-    f: Hertz | None = Field(
-        None, description="Frequency of the oscillation [Hz], in place of omega"
-    )
-    v0: NotNegative | None = Field(None, description="Sliding velocity [m/s]")
-    Fz_amplitude: NotNegative | None = Field(None, description=_AMPLITUDE)
-    k_low: Positive | None = Field(None, description="Lowest stiffness [N/m], with k_high")
-    k_high: Positive | None = Field(None, description="Highest stiffness [N/m], with k_low")
+    f: Hertz | None = optional("Frequency of the oscillation [Hz], in place of omega")
+    v0: NotNegative | None = optional("Sliding velocity [m/s]")
+    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
+    k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
+    k_high: Positive | None = optional("Highest stiffness [N/m], with k_low")
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -231,7 +236,7 @@ class InputColumns(Strict):
     )
     k_low: _positive = Field(None, description="Lowest stiffness [N/m], with k_high")
     k_high: _positive = Field(None, description="Highest stiffness [N/m], with k_low")
-    k_range: Pair | None = Field(None, description=f"For every case, in place of k: {BOUND}")
+    k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")
 
     @property
     def columns(self) -> dict[str, Any]:

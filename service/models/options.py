@@ -18,6 +18,7 @@ from .inputs import (
     OneCase,
     Positive,
     Strict,
+    optional,
     rigid_or,
 )
 
@@ -41,7 +42,7 @@ class Choice(Strict):
 
     contact: ContactName = Field("spring", description=_CONTACT)
     direction: DirectionName = Field("across", description=_DIRECTION)
-    tolerance: Positive | None = Field(None, description=_TOLERANCE)
+    tolerance: Positive | None = optional(_TOLERANCE)
 
     @model_validator(mode="after")
     def _a_kind_that_exists(self) -> Self:
@@ -97,12 +98,8 @@ def check_std(std: InputStd | None, include: list[Any] | None, direction: str) -
 class Options(Choice):
     """The options of a request in JSON."""
 
-    include: Annotated[list[Include], Field(max_length=16)] | None = Field(
-        None, description=_INCLUDE
-    )
-    std: InputStd | None = Field(
-        None, description="Standard deviations of the inputs, for include=std"
-    )
+    include: Annotated[list[Include], Field(max_length=16)] | None = optional(_INCLUDE)
+    std: InputStd | None = optional("Standard deviations of the inputs, for include=std")
 
     @model_validator(mode="after")
     def _std_where_asked(self) -> Self:
@@ -111,11 +108,11 @@ class Options(Choice):
         return self
 
 
-class CaseRequest(Case, Options):
+class CaseRequest(Options, Case):
     """One case and the options of its answer."""
 
 
-class CaseColumns(InputColumns, Options):
+class CaseColumns(Options, InputColumns):
     """Cases as columns and the options of their answers: lists of one length; a number holds for
     every case."""
 
@@ -132,14 +129,14 @@ class CaseColumns(InputColumns, Options):
 class Deviations(Strict):
     """The members of ``std``, each as a parameter of its own."""
 
-    std_mu0: NotNegative | None = Field(None, description="Standard deviation [-]")
-    std_Fz: NotNegative | None = Field(None, description="Standard deviation [N]")
-    std_k: NotNegative | None = Field(None, description="Standard deviation [N/m]")
-    std_y0: NotNegative | None = Field(None, description="Standard deviation [m]")
-    std_omega: NotNegative | None = Field(None, description="Standard deviation [rad/s]")
-    std_f: Hertz | None = Field(None, description="Standard deviation [Hz]")
-    std_v0: NotNegative | None = Field(None, description="Standard deviation [m/s]")
-    std_Fz_amplitude: NotNegative | None = Field(None, description="Standard deviation [N]")
+    std_mu0: NotNegative | None = optional("Standard deviation [-]")
+    std_Fz: NotNegative | None = optional("Standard deviation [N]")
+    std_k: NotNegative | None = optional("Standard deviation [N/m]")
+    std_y0: NotNegative | None = optional("Standard deviation [m]")
+    std_omega: NotNegative | None = optional("Standard deviation [rad/s]")
+    std_f: Hertz | None = optional("Standard deviation [Hz]")
+    std_v0: NotNegative | None = optional("Standard deviation [m/s]")
+    std_Fz_amplitude: NotNegative | None = optional("Standard deviation [N]")
 
     @property
     def std(self) -> InputStd | None:
@@ -156,11 +153,11 @@ class Deviations(Strict):
 _DEVIATIONS = frozenset(Deviations.model_fields)
 
 
-class QueryOptions(Choice, Deviations):
+class QueryOptions(Deviations, Choice):
     """The options of a request as a query."""
 
-    include: Annotated[list[Include], Field(max_length=16)] | None = Field(
-        None, description=f"{_INCLUDE}; joined by commas"
+    include: Annotated[list[Include], Field(max_length=16)] | None = optional(
+        f"{_INCLUDE}; joined by commas"
     )
 
     @model_validator(mode="after")
@@ -174,11 +171,11 @@ class QueryOptions(Choice, Deviations):
 class BatchOptions(Deviations):
     """The options of a batch as a query; what is in the body is left out here."""
 
-    contact: ContactName | None = Field(None, description=_CONTACT)
-    direction: DirectionName | None = Field(None, description=_DIRECTION)
-    tolerance: Positive | None = Field(None, description=_TOLERANCE)
-    include: Annotated[list[Include], Field(max_length=16)] | None = Field(
-        None, description=f"{_INCLUDE}; joined by commas"
+    contact: ContactName | None = optional(_CONTACT)
+    direction: DirectionName | None = optional(_DIRECTION)
+    tolerance: Positive | None = optional(_TOLERANCE)
+    include: Annotated[list[Include], Field(max_length=16)] | None = optional(
+        f"{_INCLUDE}; joined by commas"
     )
 
     @model_validator(mode="after")
@@ -208,11 +205,11 @@ QueryStiffness = Annotated[
     Positive,
     WrapValidator(rigid_or),
     WrapValidator(_interval_or),
-    WithJsonSchema({"anyOf": [*OR_RIGID, _INTERVAL]}),
+    WithJsonSchema({"anyOf": [*OR_RIGID, _INTERVAL], "examples": [1e6]}),
 ]
 
 
-class CaseQuery(OneCase, QueryOptions):
+class CaseQuery(QueryOptions, OneCase):
     """One case and the options of its answer."""
 
     k: QueryStiffness = Field(

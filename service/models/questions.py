@@ -34,6 +34,7 @@ from .inputs import (
     Pair,
     Positive,
     Strict,
+    optional,
     rigid_or,
 )
 from .options import Choice, Options, QueryOptions, QueryStiffness, with_interval
@@ -65,29 +66,28 @@ class Sweep(Strict):
     stop: Positive = Field(description="Last value [SI], > start", examples=[10.0])
     points: _Whole = Field(201, description="Number of values")
     scale: Literal["log", "linear"] = Field("log", description="Spacing of the values")
-    stiffness_exponent: _Exponent | None = Field(None, description=_EXPONENT)
+    stiffness_exponent: _Exponent | None = optional(_EXPONENT)
 
 
 _five = {name: value for name, value in EXAMPLE.items() if name != "v0"}
 _without_y0 = {name: value for name, value in EXAMPLE.items() if name != "y0"}
 
 
-class LawRequest(OtherInputs, Options, Sweep):
+class LawRequest(Options, Sweep, OtherInputs):
     """mu_macro over a range of one input."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{**_five, "start": 1e-4, "stop": 10.0, "points": 5}]}
     )
 
-    k_range: Pair | None = Field(None, description=f"In place of k: {BOUND}")
+    k_range: Pair | None = optional(f"In place of k: {BOUND}")
 
 
-class LawQuery(OtherInputs, QueryOptions, Sweep):
+class LawQuery(QueryOptions, Sweep, OtherInputs):
     """mu_macro over a range of one input."""
 
-    k: QueryStiffness | None = Field(
-        None,
-        description='Tangential stiffness of the contact [N/m], "rigid", or low..high; required, '
+    k: QueryStiffness | None = optional(
+        'Tangential stiffness of the contact [N/m], "rigid", or low..high; required, '
         "unless it is swept",
         examples=[1e6],
     )
@@ -98,14 +98,14 @@ class LawQuery(OtherInputs, QueryOptions, Sweep):
         return with_interval(OtherInputs.inputs.fget(self))  # type: ignore[attr-defined]
 
 
-class SolveForRequest(OtherInputs, Options):
+class SolveForRequest(Options, OtherInputs):
     """Which value of one input gives a wanted mu_macro."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{**_without_y0, "unknown": "y0", "target": 0.15}]}
     )
 
-    k_range: Pair | None = Field(None, description=f"In place of k: {BOUND}")
+    k_range: Pair | None = optional(f"In place of k: {BOUND}")
     unknown: Name = Field(description="The input to solve for, which is left out of the case")
     target: Annotated[
         list[NotNegative],
@@ -129,10 +129,10 @@ class SolveForRequest(OtherInputs, Options):
         "mu_macro",
         description="What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)",
     )
-    range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = Field(
-        None, description="Where to search [SI], ascending; left out: wherever it changes mu_macro"
+    range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = optional(
+        "Where to search [SI], ascending; left out: wherever it changes mu_macro"
     )
-    stiffness_exponent: _Exponent | None = Field(None, description=_EXPONENT)
+    stiffness_exponent: _Exponent | None = optional(_EXPONENT)
 
 
 # --- stiffness ------------------------------------------------------------------------------------
@@ -152,18 +152,16 @@ class StiffnessRequest(Strict):
     )
 
     geometry: Literal["ball", "flat", "cylinder"] = Field(description=_GEOMETRIES)
-    radius: Positive | None = Field(None, description="Radius of the ball, pin or cylinder [m]")
-    length: Positive | None = Field(None, description="Length of the cylinder [m]; of: cylinder")
-    Fz: Positive | None = Field(None, description="Normal force [N]")
-    oscillation: Literal["across", "along"] | None = Field(
-        None, description="To the axis of the cylinder; of: cylinder"
+    radius: Positive | None = optional("Radius of the ball, pin or cylinder [m]")
+    length: Positive | None = optional("Length of the cylinder [m]; of: cylinder")
+    Fz: Positive | None = optional("Normal force [N]")
+    oscillation: Literal["across", "along"] | None = optional(
+        "To the axis of the cylinder; of: cylinder"
     )
     E: _Modulus = Field(description='Young\'s modulus of the first body [Pa], or "rigid"')
     nu: _Poisson = Field(description="Poisson's ratio of the first body [-]")
-    E2: _Modulus | None = Field(
-        None, description="Of the second body [Pa]; left out, both are of one material"
-    )
-    nu2: _Poisson | None = Field(None, description="Of the second body [-]")
+    E2: _Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
+    nu2: _Poisson | None = optional("Of the second body [-]")
 
 
 # --- fit ------------------------------------------------------------------------------------------
@@ -196,9 +194,7 @@ _LISTED = {
 
 
 def _points(*one: dict[str, Any]) -> Any:
-    return Annotated[
-        Any, PlainValidator(_of_points), WithJsonSchema({"anyOf": [*one, _LISTED]})
-    ]
+    return Annotated[Any, PlainValidator(_of_points), WithJsonSchema({"anyOf": [*one, _LISTED]})]
 
 
 _positive = _points({"type": "number", "exclusiveMinimum": 0})
@@ -227,17 +223,17 @@ class FitRequest(Choice):
     )
     v0: _positive = Field(description="Sliding velocity of each point [m/s]")
     mu_macro: _points() = Field(description="Measured mu_macro of each point [-]")
-    std: _positive | None = Field(None, description="Standard deviation of mu_macro [-]")
-    mu0: _positive | None = Field(None, description="Friction coefficient, unless it is fitted [-]")
-    Fz: _positive | None = Field(None, description="Normal force [N]")
-    k: _points(*OR_RIGID) | None = Field(
-        None, description='Tangential stiffness, unless it is fitted [N/m], or "rigid"'
+    std: _positive | None = optional("Standard deviation of mu_macro [-]")
+    mu0: _positive | None = optional("Friction coefficient, unless it is fitted [-]")
+    Fz: _positive | None = optional("Normal force [N]")
+    k: _points(*OR_RIGID) | None = optional(
+        'Tangential stiffness, unless it is fitted [N/m], or "rigid"'
     )
-    y0: _not_negative | None = Field(None, description="Amplitude of the oscillation [m]")
-    omega: _not_negative | None = Field(None, description="Angular frequency [rad/s]; or f")
-    f: _not_negative | None = Field(None, description="Frequency [Hz], in place of omega")
-    Fz_amplitude: _not_negative | None = Field(
-        None, description="Amplitude of the normal force [N], for direction normal in place of y0"
+    y0: _not_negative | None = optional("Amplitude of the oscillation [m]")
+    omega: _not_negative | None = optional("Angular frequency [rad/s]; or f")
+    f: _not_negative | None = optional("Frequency [Hz], in place of omega")
+    Fz_amplitude: _not_negative | None = optional(
+        "Amplitude of the normal force [N], for direction normal in place of y0"
     )
 
     @model_validator(mode="after")

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import ValidationError
 from starlette.requests import ClientDisconnect
 from starlette.types import Receive, Scope, Send
 
@@ -21,9 +20,9 @@ from ..batch import Batch, Body, Form, both
 from ..forms import ALL, FORMS
 from ..limits import AT_ONCE, SMALL_BODY, form_of, read_body, within
 from ..models.options import BatchOptions, CaseRequest
-from ..problems import FieldFault, Kind, RequestError, document_of, invalid, refuse
+from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..quantities import Asked, answer_case
-from ..reading import DirectRoute, decode, dump, validated
+from ..reading import DirectRoute, decode, dump, of_members, validated
 from . import POSTED
 
 router = APIRouter(prefix="/v1", tags=["cases"], route_class=DirectRoute)
@@ -179,10 +178,7 @@ class _Answer(Response):
             members = decode(line)
             if not isinstance(members, dict):
                 refuse([FieldFault((), "must be an object or a list of rows", members)])
-            try:
-                case = CaseRequest.model_validate(both(members, self._options))
-            except ValidationError as error:
-                raise invalid(error, CaseRequest) from None
+            case = of_members(CaseRequest, both(members, self._options))
         else:
             case = validated(CaseRequest, line)
         table, inputs = self._state.tables.pick(case.tolerance), case.inputs

@@ -55,9 +55,7 @@ async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Respo
     return await work.question(lambda: Json(_fitted(table, measured, columns)))
 
 
-def _fitted(
-    table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]
-) -> dict[str, Any]:
+def _fitted(table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]) -> dict[str, Any]:
     words: Any = measured.kind.names
     try:
         with warnings.catch_warnings():  # they are in the answer

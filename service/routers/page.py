@@ -64,9 +64,7 @@ async def get_map(request: Request, tables: Loaded, work: Working) -> Response:
 
 # .js, .css
 ASSETS, _VENDORED = ([*(STATIC / folder).glob("*.*s")] for folder in ("page", "swagger-ui"))
-_FILES = {
-    f"/static/{path.relative_to(STATIC).as_posix()}": path for path in (*ASSETS, *_VENDORED)
-}
+_FILES = {f"/static/{path.relative_to(STATIC).as_posix()}": path for path in (*ASSETS, *_VENDORED)}
 #: what needs no API key: the same for everyone, and without a number of a table
 OPEN = ("/", "/docs", "/static/page/names.json", *_FILES)
 

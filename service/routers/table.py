@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from mumacro.errors import TableError
@@ -11,7 +11,7 @@ from .. import __version__
 from ..models.answers import TableAnswer
 from ..models.inputs import Positive, Strict
 from ..reading import Json, StrictRoute
-from ..tables import Loaded, LoadedTable
+from ..tables import Loaded
 from . import ASKED, file_answer, problems
 
 router = APIRouter(prefix="/v1", tags=["table"], route_class=StrictRoute)
@@ -23,18 +23,15 @@ class TableQuery(Strict):
     tolerance: Positive | None = Field(None, description="Error of mu_macro/mu0 [-]")
 
 
-async def _chosen(query: Annotated[TableQuery, Query()], tables: Loaded) -> LoadedTable:
-    return tables.pick(query.tolerance)
-
-
-Chosen = Annotated[LoadedTable, Depends(_chosen)]
+Chosen = Annotated[TableQuery, Query()]
 
 
 @router.get(
     "/table", responses={200: {"model": TableAnswer}, **ASKED}, summary="Properties of a table"
 )
-async def get_table(table: Chosen, tables: Loaded) -> Response:
+async def get_table(chosen: Chosen, tables: Loaded) -> Response:
     """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
+    table = tables.pick(chosen.tolerance)
     surrogate = table.surrogate
     answer = {
         name: getattr(surrogate, name)
@@ -63,9 +60,10 @@ _PARTS: dict[int | str, Any] = {
     responses={**_PARTS, **ASKED, **problems(416)},
     summary="The table as a netCDF-4 file",
 )
-async def get_table_file(request: Request, table: Chosen) -> Response:
+async def get_table_file(request: Request, chosen: Chosen, tables: Loaded) -> Response:
     """Stream the file from disk; ranges are supported.  It is the file that the answers come
     from."""
+    table = tables.pick(chosen.tolerance)
     table.check()  # a file that was replaced after loading holds another table with the same name
     path = table.surrogate.path
     headers = {"ETag": f'"{table.surrogate.checksum}"', "Cache-Control": "no-cache"}
