@@ -77,14 +77,10 @@ class HeadAsGet:
         if scope["type"] != "http" or scope["method"] != "HEAD":
             return await self._app(scope, receive, send)
 
-        ended = False
-
         async def send_head(message: Message) -> None:
-            nonlocal ended
-            if message["type"] != "http.response.body":
+            if message["type"] == "http.response.start":
                 await send(message)
-            elif not ended:  # at once: the client may already send its next request
-                ended = True
+                # at once: the client may already send its next request
                 await send({"type": "http.response.body", "body": b""})
 
         await self._app({**scope, "method": "GET"}, receive, send_head)
