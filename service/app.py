@@ -15,7 +15,6 @@ import orjson
 from fastapi import FastAPI
 from fastapi.openapi.constants import REF_TEMPLATE
 from fastapi.openapi.utils import get_openapi
-from fastapi.routing import iter_route_contexts
 from pydantic.json_schema import models_json_schema
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import RedirectResponse
@@ -99,21 +98,24 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         docs_url=None,  # the page of routers/page.py loads nothing from elsewhere
         redoc_url=None,
         redirect_slashes=False,
-        strict_content_type=False,
         lifespan=_lifespan,
         exception_handlers=HANDLERS,
-        generate_unique_id_function=lambda route: route.name,
+        # it would ask for a provider of OpenTelemetry at every request
+        telemetry={"tracing": False, "metrics": False, "logs": False},
     )
     for router in (*ROUTERS, page.router):
-        app.include_router(router)
+        # include_router would look for the route of every request twice (docs/decisions.md)
+        app.router.routes.extend(router.routes)
     opened = {*HEALTH_PATHS, *page.OPEN}
     if settings.guide is not None:
         app.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)
         app.mount("/guide", StaticFiles(directory=settings.guide, html=True))
         opened.add("/guide")
     methods: dict[str, set[str]] = {}
-    for route in iter_route_contexts(app.routes):
-        methods.setdefault(str(route.path), set()).update(route.methods or ())
+    for route in app.routes:
+        methods.setdefault(getattr(route, "path", ""), set()).update(
+            getattr(route, "methods", None) or ()
+        )
     state = app.state
     state.methods = {
         path: ", ".join(sorted(allowed | ({"HEAD"} if "GET" in allowed else set())))

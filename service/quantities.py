@@ -237,6 +237,8 @@ class Asked(NamedTuple):
     @property
     def cost(self) -> float:
         """Time of a case, in times of a plain answer."""
+        if not self.include and self.kind == SPRING and not self.interval:
+            return 1.0
         cost = 1.0 + sum(QUANTITIES[name].cost for name in self.include)
         words = (*self.kind.names.values(), *(["k_range"] if self.interval else []))
         return cost * math.prod(_COSTS.get(word, 1.0) for word in words)
@@ -281,9 +283,8 @@ def answer_columns(
 
 def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> tuple[Outputs, Any]:
     kind, include = asked.kind, asked.include
-    cases = Cases.of(by_name(None, columns, kind), kind)
     slopes = any(QUANTITIES[name].slopes for name in include)
-    answer: Any = surrogate.answer(cases, slopes, bool(include))
+    answer: Any = surrogate.evaluate(**columns, **kind.names, gradient=slopes, groups=bool(include))
     codes = answer.source_code
     outputs = {
         "mu_macro": answer.mu_macro,
@@ -295,7 +296,9 @@ def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> t
     if asked.interval:
         outputs |= {"mu_macro_low": answer.mu_macro_low, "mu_macro_high": answer.mu_macro_high}
     if include:
-        known = Answered(surrogate, kind, cases.columns, answer, asked.std)
+        if asked.interval or "f" in columns:
+            columns = Cases.of(by_name(None, columns, kind), kind).columns
+        known = Answered(surrogate, kind, columns, answer, asked.std)
         for name in include:
             outputs |= QUANTITIES[name].compute(known)
     return outputs, codes

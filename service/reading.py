@@ -75,16 +75,55 @@ def dump(values: Any) -> bytes:
 
 
 class Json(Response):
-    """An answer as JSON."""
+    """An answer as JSON; Starlette's own looks for what the headers may lack, which takes as long
+    as a case."""
 
-    media_type = JSON
-
-    def render(self, content: Any) -> bytes:
-        """Write it."""
-        return dump(content)
+    def __init__(self, content: Any, headers: Mapping[str, str] | None = None) -> None:
+        self.status_code, self.body, self.background = 200, dump(content), None
+        self.raw_headers = [
+            (b"content-length", b"%d" % len(self.body)),
+            (b"content-type", b"application/json"),
+            *((name.lower().encode(), value.encode()) for name, value in (headers or {}).items()),
+        ]
 
 
 # --- requests -------------------------------------------------------------------------------------
+
+
+async def small_body(request: Request) -> bytes:
+    """The bytes of a small JSON body, beside which there is no query."""
+    headers = dict(request.scope["headers"])
+    if headers.get(b"content-type") != b"application/json" or b"content-encoding" in headers:
+        form_of(headers, {JSON: JSON})
+    limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
+    body = bytes(await read_body(headers, request.receive, limit))
+    if query := request.scope["query_string"]:
+        refuse(
+            [
+                FieldFault((name,), "belongs in the body", value, parameter=True)
+                for name, value in _pairs(query)[:100]
+            ]
+        )
+    return body
+
+
+def members_of(query: bytes) -> dict[str, Any]:
+    """The parameters of a query as a body has them: numbers as numbers, and both ends of
+    ``k=low..high``."""
+    members: dict[str, Any] = {}
+    twice: dict[str, None] = {}
+    for name, value in _pairs(query):
+        if name in _LISTS:
+            members.setdefault(name, []).extend(part.strip() for part in value.split(","))
+        elif name in members:
+            twice[name] = None
+        elif name == "k" and ".." in value:
+            members[name] = tuple(_number(end) for end in value.split(".."))
+        else:
+            members[name] = _number(value)
+    if twice:
+        refuse([FieldFault((name,), "is given more than once", parameter=True) for name in twice])
+    return members
 
 
 class StrictRequest(Request):
@@ -93,58 +132,21 @@ class StrictRequest(Request):
     _json: Any
     _body: bytes
 
-    async def small_body(self) -> bytes:
-        """The bytes of a small JSON body, beside which there is no query."""
-        headers = dict(self.scope["headers"])
-        if headers.get(b"content-type") != b"application/json" or b"content-encoding" in headers:
-            form_of(headers, {JSON: JSON})
-        limit = min(SMALL_BODY, self.app.state.settings.max_body_bytes)
-        self._body = bytes(await read_body(headers, self.receive, limit))
-        if query := self.scope["query_string"]:
-            refuse(
-                [
-                    FieldFault((name,), "belongs in the body", value, parameter=True)
-                    for name, value in _pairs(query)[:100]
-                ]
-            )
-        return self._body
-
     async def read(self) -> None:
         """Read all that the endpoint may need, so that FastAPI finds it."""
         if self.method == "POST":
-            self._json = decode(await self.small_body())
+            self._body = await small_body(self)
+            self._json = decode(self._body)
             if not isinstance(self._json, dict):
                 refuse([FieldFault((), "must be a JSON object", self._json)])
         else:
-            members = self.members.items()
             # FastAPI takes lists apart again
             pairs = [
                 (name, one)
-                for name, value in members
+                for name, value in members_of(self.scope["query_string"]).items()
                 for one in (value if name in _LISTS else [value])
             ]
             self._query_params: Any = ImmutableMultiDict(pairs)
-
-    @property
-    def members(self) -> dict[str, Any]:
-        """The parameters of the query as a body has them: numbers as numbers, and both ends of
-        ``k=low..high``."""
-        members: dict[str, Any] = {}
-        twice: dict[str, None] = {}
-        for name, value in _pairs(self.scope["query_string"]):
-            if name in _LISTS:
-                members.setdefault(name, []).extend(part.strip() for part in value.split(","))
-            elif name in members:
-                twice[name] = None
-            elif name == "k" and ".." in value:
-                members[name] = tuple(_number(end) for end in value.split(".."))
-            else:
-                members[name] = _number(value)
-        if twice:
-            refuse(
-                [FieldFault((name,), "is given more than once", parameter=True) for name in twice]
-            )
-        return members
 
 
 def _pairs(query: bytes) -> list[tuple[str, str]]:
@@ -205,19 +207,17 @@ class DirectRoute(APIRoute):
         answer: Any = self.endpoint
 
         async def of_body(request: Request) -> Response:
-            strict = StrictRequest(request.scope, request.receive)
-            case = validated(model, await strict.small_body())
-            response: Response = await answer(strict, case)
+            case = validated(model, await small_body(request))
+            response: Response = await answer(request, case)
             return response
 
         async def of_query(request: Request) -> Response:
-            strict = StrictRequest(request.scope, request.receive)
-            members = strict.members
+            members = members_of(request.scope["query_string"])
             try:
                 case = model.model_validate(members)
             except ValidationError as error:
                 raise invalid(error, model, members, parameter=True) from None
-            response: Response = await answer(strict, case)
+            response: Response = await answer(request, case)
             return response
 
         if self.dependant.dependencies:

@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from starlette.requests import ClientDisconnect
 from starlette.types import Receive, Scope, Send
 
@@ -23,9 +23,9 @@ from ..models.options import BatchOptions, CaseRequest
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..quantities import Asked, answer_case
 from ..reading import DirectRoute, decode, dump, of_members, validated
-from . import POSTED
+from . import POSTED, router_of
 
-router = APIRouter(prefix="/v1", tags=["cases"], route_class=DirectRoute)
+router = router_of("cases", DirectRoute)
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from starlette.responses import PlainTextResponse
 
 from mumacro.analysis.validity import digits, k_effect, model_rows
@@ -12,9 +12,9 @@ from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
 from ..quantities import Asked, answer_case
 from ..reading import DirectRoute, Json, dump
-from . import ASKED, POSTED
+from . import ASKED, POSTED, router_of
 
-router = APIRouter(prefix="/v1", tags=["cases"], route_class=DirectRoute)
+router = router_of("cases", DirectRoute)
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
 _CACHED: Any = {
     "model": CaseAnswer,

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from fastapi import APIRouter, Response
+from fastapi import Response
 
 import mumacro
 from mumacro.analysis.fit import Fit, quantile
@@ -24,9 +24,9 @@ from ..models.questions import FitRequest, StiffnessRequest
 from ..problems import Kind, RequestError
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
-from . import POSTED, problems
+from . import POSTED, problems, router_of
 
-router = APIRouter(prefix="/v1", tags=["contact"], route_class=StrictRoute)
+router = router_of("contact", StrictRoute)
 _CURVE = 200  # points of the fitted law
 _MEASURED = ("mu_macro", STD)
 

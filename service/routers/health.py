@@ -3,7 +3,8 @@ are correct), ``/metrics``."""
 
 from typing import Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from .. import API_VERSION, __version__
@@ -11,9 +12,9 @@ from ..limits import Working
 from ..models.answers import Health
 from ..reading import Json
 from ..tables import Loaded
-from . import problems
+from . import problems, router_of
 
-router = APIRouter(tags=["health"])
+router = router_of("health", APIRoute, prefix="")
 _NO_STORE = {"Cache-Control": "no-store"}
 _VERSIONS = {"api_version": API_VERSION, "service_version": __version__}
 _READY: dict[int | str, Any] = {200: {"model": Health}, **problems(503)}

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 
 import mumacro
 from mumacro.analysis.law import Law
@@ -27,9 +27,9 @@ from ..models.questions import LawQuery, LawRequest, SolveForRequest
 from ..quantities import Asked, answer_columns, listed, nested
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
-from . import ASKED, POSTED
+from . import ASKED, POSTED, router_of
 
-router = APIRouter(prefix="/v1", tags=["questions"], route_class=StrictRoute)
+router = router_of("questions", StrictRoute)
 
 
 # --- friction law ---------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from pydantic import Field
 
 from mumacro.errors import TableError
@@ -12,9 +12,9 @@ from ..models.answers import TableAnswer
 from ..models.inputs import Positive, Strict
 from ..reading import Json, StrictRoute
 from ..tables import Loaded
-from . import ASKED, file_answer, problems
+from . import ASKED, file_answer, problems, router_of
 
-router = APIRouter(prefix="/v1", tags=["table"], route_class=StrictRoute)
+router = router_of("table", StrictRoute)
 
 
 class TableQuery(Strict):
