@@ -37,8 +37,8 @@ from .tables import Tables
 ROUTERS = (case.router, batch.router, questions.router, contact.router, table.router, health.router)
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and "
-    "oscillates across or along the sliding direction, or its normal force does; the contact is one "
-    "spring or a ball. Inputs in SI units; answers come from a table verified against the full "
+    "oscillates across or along the sliding direction, or its normal force does; the contact is "
+    "one spring or a ball. Inputs in SI units; answers come from a table verified against the full "
     "model. Errors are problem details (RFC 9457)."
 )
 _TAGS = [
@@ -74,7 +74,8 @@ class HeadAsGet:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
-            return await self._app(scope, receive, send)
+            await self._app(scope, receive, send)
+            return
 
         async def send_head(message: Message) -> None:
             if message["type"] == "http.response.start":

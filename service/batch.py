@@ -7,6 +7,7 @@ them; the form writes the slices.  A bad case spoils only itself.
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +33,7 @@ class Body(NamedTuple):
     #: inputs by name: a number, a list, or an array in which infinity is a rigid contact; options
     members: dict[str, Any]
     #: why cases could not be read, by their index; they have a NaN
-    reasons: dict[int, Reason] = {}
+    reasons: Mapping[int, Reason] = MappingProxyType({})
     rows: bool = False  # whether the cases came one by one
 
 

@@ -25,7 +25,6 @@ from .metrics import Metrics
 from .problems import path_in
 from .security import HEALTH_PATHS, NOSNIFF
 
-
 _GONE = 499  # the usual status for a client that disconnected before the answer
 _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs
 _MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
@@ -127,7 +126,8 @@ class Observe:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request."""
         if scope["type"] != "http":
-            return await self._app(scope, receive, send)
+            await self._app(scope, receive, send)
+            return
         started, method = time.perf_counter(), scope["method"]
         headers: dict[bytes, bytes] = dict(scope["headers"])
         offered = headers.get(b"x-request-id", b"")

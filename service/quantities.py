@@ -1,9 +1,10 @@
 """The answer to cases: the default outputs, and the quantities that ``include`` can add.
 
 A quantity is one function here, a member of ``models/answers.py`` with its unit and meaning, and a
-name in ``models/options.py``.  It takes one case in plain numbers, or many in columns, and gives its
-outputs by path: ``power.saved`` is ``saved`` within ``power``.  Equation numbers are those of Benad,
-Nakano, Popov, Popov, "Active control of friction by transverse oscillations" (Friction, 2018).
+name in ``models/options.py``.  It takes one case in plain numbers, or many in columns, and gives
+its outputs by path: ``power.saved`` is ``saved`` within ``power``.  Equation numbers are those of
+Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations" (Friction,
+2018).
 """
 
 import math

@@ -1,6 +1,6 @@
 """How a request becomes the model that its endpoint declares.
 
-FastAPI reads body and query by its :class:`Request`; :class:`StrictRequest` is its own, as FastAPI's
+FastAPI reads body and query from a request; :class:`StrictRequest` is one of our own, as FastAPI's
 chapter on custom requests has it.  A member or a parameter that is given twice is refused, numbers
 of a query are read as people type them, and limits hold.  :class:`DirectRoute` reads one model and
 solves nothing else: FastAPI's own reading of a case takes longer than its answer

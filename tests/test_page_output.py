@@ -12,7 +12,7 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.contacts.geometries import contact_of
-from service.routes.page import ASSETS
+from service.routers.page import ASSETS
 from tests.browser import RECORDED, START
 from tests.comparing import close
 

@@ -97,9 +97,7 @@ def test_an_unexpected_error_is_logged_and_not_shown(
         (RuntimeError, 500, "unexpected", None),
         (MemoryError, 503, "out-of-memory", "1"),
     ):
-        monkeypatch.setattr(
-            "mumacro.Surrogate.evaluate", Mock(side_effect=error("secret detail"))
-        )
+        monkeypatch.setattr("mumacro.Surrogate.evaluate", Mock(side_effect=error("secret detail")))
         for response in (
             client.post("/v1/mu-macro", json=case),
             client.get("/v1/mu-macro", params=case),

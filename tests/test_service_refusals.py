@@ -231,7 +231,7 @@ def faults_of(client: Any, problem: Any, request_line: str, changed: Any) -> dic
     first = document["errors"][0]
     assert document["detail"].startswith(f"{first['field']}")
     assert document["n_errors"] == len(document["errors"])
-    loose = "tolerance" in changed and changed["tolerance"] == 1e-30 or "=1e-30" in request_line
+    loose = ("tolerance" in changed and changed["tolerance"] == 1e-30) or "=1e-30" in request_line
     assert ("tightest_available" in document) == loose
     return {
         fault.get("pointer", f"?{fault.get('parameter')}"): fault for fault in document["errors"]

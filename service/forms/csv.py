@@ -60,7 +60,8 @@ def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
     if reasons:
         places = sorted(reasons)
         columns = {name: _with_gaps(values, places) for name, values in columns.items()}
-    return Body({**dict.fromkeys(scales, []), **columns}, reasons)
+    others: dict[str, Any] = {name: [] for name in scales}  # which the model refuses by its name
+    return Body({**others, **columns}, reasons)
 
 
 def _parsed(text: bytes, names: list[str], odd: Any) -> Any:

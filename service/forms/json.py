@@ -17,12 +17,13 @@ from pydantic import ValidationError
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import by_name, columns_of
-from mumacro.inputs.kind import SPRING, Kind, kind_of
+from mumacro.inputs.kind import Kind, kind_of
 
 from ..batch import Batch, Body, Form, Reason, too_large
 from ..models.inputs import EXAMPLE, MAX_REASONS, Case
 from ..models.options import BatchOptions, CaseColumns
-from ..problems import FieldFault, Kind as ProblemKind, RequestError, faults_of, reason_of, refuse
+from ..problems import FieldFault, RequestError, faults_of, reason_of, refuse
+from ..problems import Kind as ProblemKind
 from ..quantities import Outputs, names_of, nested
 from ..reading import decode, dump
 

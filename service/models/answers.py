@@ -4,7 +4,7 @@ members.
 A member whose value can be missing is null there; what ``include`` did not ask for is left out.
 """
 
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, Field
 
@@ -12,9 +12,12 @@ from mumacro.inputs.kind import ContactName, DirectionName
 
 from .inputs import Name
 
-N, R, S = TypeVar("N"), TypeVar("R"), TypeVar("S")
+N = TypeVar("N")
+R = TypeVar("R")
+S = TypeVar("S")
 Regime = Literal["continuous", "stick_slip", "static", "partial_slip", "reverse_slip"]
-Number, Numbers = float | None, list[float | None]
+Number: TypeAlias = float | None
+Numbers: TypeAlias = list[float | None]
 
 
 def quantity(text: str, unit: str, default: Any = ...) -> Any:
@@ -26,7 +29,7 @@ class Part(BaseModel, Generic[N]):
     """A part of an answer."""
 
     @classmethod
-    def model_parametrized_name(cls, params: tuple[type[Any], ...]) -> str:
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
         """The name in the description: that of the class, with Columns for lists."""
         return f"{cls.__name__}Columns" if params[0] == Numbers else cls.__name__
 

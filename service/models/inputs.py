@@ -30,7 +30,7 @@ from mumacro.kernel.arrays import Array
 INPUTS = (
     "mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude", "k_low", "k_high", "k_range",
 )  # fmt: skip
-EXAMPLE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 MAX_REASONS = 1000  # bad cases of a batch that are listed
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
@@ -54,6 +54,11 @@ def optional(description: str, **more: Any) -> Any:
     return Field(None, description=description, json_schema_extra=_without_null, **more)
 
 
+def either(description: str, **more: Any) -> Any:
+    """A member that another one may stand for; null is refused."""
+    return Field(None, description=description, **more)
+
+
 def _without_null(schema: dict[str, Any]) -> None:
     kinds = [kind for kind in schema.pop("anyOf", [schema]) if kind != {"type": "null"}]
     schema |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
@@ -65,7 +70,10 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-_K = 'Tangential stiffness of the contact [N/m], or "rigid"; it must be given, here or as an interval'
+_K = (
+    'Tangential stiffness of the contact [N/m], or "rigid"; it must be given, here or as an '
+    "interval"
+)
 _Y0 = (
     "Amplitude of the oscillation [m], across or along the sliding direction; required, unless the "
     "direction is normal"
@@ -81,7 +89,7 @@ class OneCase(Strict):
         description="Coulomb friction coefficient of the contact [-]", examples=[0.3]
     )
     Fz: Positive = Field(description="Normal force [N]", examples=[10.0])
-    k: Stiffness = Field(None, description=_K, examples=[1e6])
+    k: Stiffness = either(_K, examples=[1e6])
     y0: NotNegative | None = optional(_Y0, examples=[2e-6])
     omega: NotNegative | None = optional(
         "Angular frequency of the oscillation [rad/s]; omega or f is required",
@@ -203,17 +211,18 @@ def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
     return real
 
 
-def _described(*one: dict[str, Any], **more: Any) -> Any:
-    several = [{"type": "array", "items": {"anyOf": [*one, {"type": "null"}]}}]
-    return Annotated[
-        Any, PlainValidator(_of_cases), WithJsonSchema({"anyOf": [*one, *several], **more})
-    ]
+def _or_listed(*one: dict[str, Any]) -> WithJsonSchema:
+    several = {"type": "array", "items": {"anyOf": [*one, {"type": "null"}]}}
+    return WithJsonSchema({"anyOf": [*one, several]})
 
 
-_positive = _described({"type": "number", "exclusiveMinimum": 0})
-_not_negative = _described({"type": "number", "minimum": 0})
-_hertz = _described({"type": "number", "minimum": 0, "maximum": MOST_HZ})
-_stiffness = _described(*OR_RIGID)
+_CELLS = PlainValidator(_of_cases)
+PositiveColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "exclusiveMinimum": 0})]
+NotNegativeColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "minimum": 0})]
+HertzColumn = Annotated[
+    Any, _CELLS, _or_listed({"type": "number", "minimum": 0, "maximum": MOST_HZ})
+]
+StiffnessColumn = Annotated[Any, _CELLS, _or_listed(*OR_RIGID)]
 
 
 class InputColumns(Strict):
@@ -222,20 +231,20 @@ class InputColumns(Strict):
     An entry that is no legal number spoils its own case only.
     """
 
-    mu0: _positive = Field(description="Coulomb friction coefficient of the contact [-]")
-    Fz: _positive = Field(description="Normal force [N]")
-    k: _stiffness = Field(
+    mu0: PositiveColumn = Field(description="Coulomb friction coefficient of the contact [-]")
+    Fz: PositiveColumn = Field(description="Normal force [N]")
+    k: StiffnessColumn = Field(
         None, description='Tangential stiffness [N/m], or "rigid"; or k_low and k_high'
     )
-    y0: _not_negative = Field(None, description="Amplitude of the oscillation [m]")
-    omega: _not_negative = Field(None, description="Angular frequency [rad/s]; or f")
-    f: _hertz = Field(None, description="Frequency [Hz], in place of omega")
-    v0: _not_negative = Field(description="Sliding velocity [m/s]")
-    Fz_amplitude: _not_negative = Field(
+    y0: NotNegativeColumn = Field(None, description="Amplitude of the oscillation [m]")
+    omega: NotNegativeColumn = Field(None, description="Angular frequency [rad/s]; or f")
+    f: HertzColumn = Field(None, description="Frequency [Hz], in place of omega")
+    v0: NotNegativeColumn = Field(description="Sliding velocity [m/s]")
+    Fz_amplitude: NotNegativeColumn = Field(
         None, description="Amplitude of the normal force [N], for direction normal in place of y0"
     )
-    k_low: _positive = Field(None, description="Lowest stiffness [N/m], with k_high")
-    k_high: _positive = Field(None, description="Highest stiffness [N/m], with k_low")
+    k_low: PositiveColumn = Field(None, description="Lowest stiffness [N/m], with k_high")
+    k_high: PositiveColumn = Field(None, description="Highest stiffness [N/m], with k_low")
     k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")
 
     @property

@@ -18,6 +18,7 @@ from .inputs import (
     OneCase,
     Positive,
     Strict,
+    either,
     optional,
     rigid_or,
 )
@@ -212,17 +213,15 @@ QueryStiffness = Annotated[
 class CaseQuery(QueryOptions, OneCase):
     """One case and the options of its answer."""
 
-    k: QueryStiffness = Field(
-        None,
-        description='Tangential stiffness of the contact [N/m], "rigid", or low..high; required',
+    k: QueryStiffness = either(
+        'Tangential stiffness of the contact [N/m], "rigid", or low..high; required',
         examples=[1e6],
     )
 
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; two ends are an interval of k."""
-        found = OneCase.inputs.fget(self)  # type: ignore[attr-defined]
-        return with_interval(found)
+        return with_interval(super().inputs)
 
 
 class TextQuery(CaseQuery):

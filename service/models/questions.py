@@ -95,7 +95,7 @@ class LawQuery(QueryOptions, Sweep, OtherInputs):
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; two ends are an interval of k."""
-        return with_interval(OtherInputs.inputs.fget(self))  # type: ignore[attr-defined]
+        return with_interval(super().inputs)
 
 
 class SolveForRequest(Options, OtherInputs):
@@ -193,12 +193,17 @@ _LISTED = {
 }  # fmt: skip
 
 
-def _points(*one: dict[str, Any]) -> Any:
-    return Annotated[Any, PlainValidator(_of_points), WithJsonSchema({"anyOf": [*one, _LISTED]})]
-
-
-_positive = _points({"type": "number", "exclusiveMinimum": 0})
-_not_negative = _points({"type": "number", "minimum": 0})
+_POINTS = PlainValidator(_of_points)
+PositivePoints = Annotated[
+    Any,
+    _POINTS,
+    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, _LISTED]}),
+]
+NotNegativePoints = Annotated[
+    Any, _POINTS, WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, _LISTED]})
+]
+StiffnessPoints = Annotated[Any, _POINTS, WithJsonSchema({"anyOf": [*OR_RIGID, _LISTED]})]
+MeasuredPoints = Annotated[Any, _POINTS, WithJsonSchema(_LISTED)]
 
 
 class FitRequest(Choice):
@@ -221,18 +226,18 @@ class FitRequest(Choice):
     unknowns: Annotated[list[Literal["k", "mu0"]], Field(min_length=1, max_length=2)] = Field(
         ["k", "mu0"], description="What is fitted"
     )
-    v0: _positive = Field(description="Sliding velocity of each point [m/s]")
-    mu_macro: _points() = Field(description="Measured mu_macro of each point [-]")
-    std: _positive | None = optional("Standard deviation of mu_macro [-]")
-    mu0: _positive | None = optional("Friction coefficient, unless it is fitted [-]")
-    Fz: _positive | None = optional("Normal force [N]")
-    k: _points(*OR_RIGID) | None = optional(
+    v0: PositivePoints = Field(description="Sliding velocity of each point [m/s]")
+    mu_macro: MeasuredPoints = Field(description="Measured mu_macro of each point [-]")
+    std: PositivePoints | None = optional("Standard deviation of mu_macro [-]")
+    mu0: PositivePoints | None = optional("Friction coefficient, unless it is fitted [-]")
+    Fz: PositivePoints | None = optional("Normal force [N]")
+    k: StiffnessPoints | None = optional(
         'Tangential stiffness, unless it is fitted [N/m], or "rigid"'
     )
-    y0: _not_negative | None = optional("Amplitude of the oscillation [m]")
-    omega: _not_negative | None = optional("Angular frequency [rad/s]; or f")
-    f: _not_negative | None = optional("Frequency [Hz], in place of omega")
-    Fz_amplitude: _not_negative | None = optional(
+    y0: NotNegativePoints | None = optional("Amplitude of the oscillation [m]")
+    omega: NotNegativePoints | None = optional("Angular frequency [rad/s]; or f")
+    f: NotNegativePoints | None = optional("Frequency [Hz], in place of omega")
+    Fz_amplitude: NotNegativePoints | None = optional(
         "Amplitude of the normal force [N], for direction normal in place of y0"
     )
 

@@ -12,6 +12,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from ..problems import Kind
 
+
 def router_of(tag: str, route_class: type[APIRoute], prefix: str = "/v1") -> APIRouter:
     """A router whose operations have the names of their functions."""
     return APIRouter(

@@ -190,7 +190,7 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
         **case,
     )
     included = _included(table, case, asked, name, solution)
-    answer = {"unknown": question.unknown, "unit": unit_of(question.unknown)}
+    answer: dict[str, Any] = {"unknown": question.unknown, "unit": unit_of(question.unknown)}
     answer["quantity"] = question.quantity
     answer |= _results(question, solution, included, unit, per)
     if solution.ends:
