@@ -5,10 +5,13 @@ meanwhile.  Everything else, and whatever it refuses, is read by Python's ``json
 reasons.
 """
 
+import math
 import re
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
+from itertools import chain
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,8 @@ from pydantic import ValidationError
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import by_name, columns_of
+from mumacro.inputs.fields import is_rigid
+from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import Kind, kind_of
 
 from ..batch import Batch, Body, Form, Reason, too_large
@@ -41,7 +46,12 @@ def read(text: bytearray, max_batch: int, options: BatchOptions) -> Body:
     _limit_values(text, max_batch)
     if _OPENS_LIST.match(text):
         kind = kind_of(options.contact or "spring", options.direction or "across")
-        return _of_rows(_rows(text, max_batch), kind)
+        if body := _quick_rows(text, max_batch, kind):
+            return body
+        rows = decode(text, large=True)
+        if len(rows) > max_batch:
+            raise too_large(max_batch)
+        return _one_by_one(rows, kind)
     members = _members(text)
     if not isinstance(members, dict):
         refuse([FieldFault((), "must be an object of columns or a list of rows", members)])
@@ -102,10 +112,14 @@ def _list(text: bytearray) -> Any:
 # --- rows -----------------------------------------------------------------------------------------
 
 
-def _rows(text: bytearray, max_batch: int) -> list[Any]:
-    """The rows, read piece by piece.  A piece that does not end between two rows is no JSON."""
-    rows: list[Any] = []
-    at = 0
+def _quick_rows(text: bytearray, max_batch: int, kind: Kind) -> Body | None:
+    """Rows of numbers with the same names as columns; None for any other text.
+
+    The text is read piece by piece.  A piece that does not end between two rows is no JSON.
+    """
+    names: tuple[str, ...] = ()
+    blocks: list[Any] = []
+    at = size = 0
     while at < len(text):
         cut = _BETWEEN.search(text, at + _READ)
         piece = (
@@ -114,47 +128,44 @@ def _rows(text: bytearray, max_batch: int) -> list[Any]:
             + (b"]" if cut else b"")
         )
         try:
-            some = orjson.loads(piece)
-        except ValueError:
-            some = None
-        # one colon for each member: none is named twice
-        members = None if some is None else sum(len(x) for x in some if isinstance(x, dict))
-        if members != piece.count(b":"):
-            rows = decode(text, large=True)
-            break
-        rows += some
-        if len(rows) > max_batch:
-            break
+            rows = orjson.loads(piece)
+            names = names or _names_of(rows[0], kind)
+            # one colon for each member: none is named twice, and all rows have as many as the first
+            if piece.count(b":") != sum(map(len, rows)) or len(names) * len(rows) != sum(
+                map(len, rows)
+            ):
+                return None
+            blocks.append(_numbers(rows, names))
+        except (ValueError, TypeError, LookupError, InputError):
+            return None
+        size += len(rows)
+        if size > max_batch:
+            raise too_large(max_batch)
         at = cut.end() if cut else len(text)
-    if len(rows) > max_batch:
-        raise too_large(max_batch)
-    return rows
+    columns = np.concatenate(blocks).T
+    return Body(dict(zip(names, columns, strict=True)), rows=True)
 
 
-def _of_rows(rows: list[Any], kind: Kind) -> Body:
-    """Rows as columns: at once where all of them are numbers of the same names, else one by one."""
-    first = rows[0] if rows else dict.fromkeys(kind.fields, 0.0)
-    names = first.keys() if isinstance(first, dict) else {}.keys()
-    if names <= {*kind.columns, "k_low", "k_high"} and all(
-        isinstance(row, dict) and row.keys() == names for row in rows
-    ):
-        columns = {name: [row[name] for row in rows] for name in names}
-        numbers = all(
-            {*map(type, column)} <= ({float, int, str} if name == "k" else {float, int})
-            for name, column in columns.items()
-        )
-        if numbers and _complete(columns, kind):
-            return Body(columns, rows=True)
-    return _one_by_one(rows, kind)
+def _names_of(row: dict[str, Any], kind: Kind) -> tuple[str, ...]:
+    """The names of a row, if they make a case; else InputError."""
+    columns_of(_with_k(by_name(None, dict.fromkeys(row, 1.0), kind)), kind)
+    if unknown := row.keys() - {*kind.columns, *ENDS}:
+        raise InputError(min(unknown), None, "the name of an input")
+    return tuple(row)
 
 
-def _complete(columns: Mapping[str, Any], kind: Kind) -> bool:
-    """Whether such names make a case."""
-    try:
-        columns_of(_with_k(by_name(None, dict.fromkeys(columns, 1.0), kind)), kind)
-    except InputError:
-        return False
-    return True
+def _numbers(rows: list[Any], names: tuple[str, ...]) -> Any:
+    """Rows of numbers as an array, infinite where k is the word rigid; TypeError for others."""
+    values = list(chain.from_iterable(map(itemgetter(*names), rows)))
+    types = {*map(type, values)}
+    if str in types and "k" in names:
+        for i in range(names.index("k"), len(values), len(names)):
+            if isinstance(values[i], str) and is_rigid(values[i]):
+                values[i] = math.inf
+        types = {*map(type, values)}
+    if not types <= {float, int}:
+        raise TypeError(types)
+    return np.fromiter(values, np.float64, len(values)).reshape(len(rows), -1)
 
 
 def _with_k(inputs: dict[str, Any]) -> dict[str, Any]:
@@ -170,9 +181,7 @@ def _one_by_one(rows: list[Any], kind: Kind) -> Body:
     for i, row in enumerate(rows):
         try:
             inputs = _with_k(by_name(None, _case(row).inputs, kind))
-            six = columns_of(inputs, kind) | {
-                name: inputs[name] for name in ("k_low", "k_high") if name in inputs
-            }
+            six = columns_of(inputs, kind) | {name: inputs[name] for name in ENDS if name in inputs}
             for name in fields:
                 columns[name][i] = six[name] if name in six else six["k"]
         except (ValidationError, InputError) as error:
@@ -182,11 +191,11 @@ def _one_by_one(rows: list[Any], kind: Kind) -> Body:
 
 
 def _interval_in(row: dict[str, Any]) -> bool:
-    return not row.keys().isdisjoint(("k_range", "k_low", "k_high"))
+    return not row.keys().isdisjoint(("k_range", *ENDS))
 
 
 def _ends(name: str, interval: bool) -> tuple[str, ...]:
-    return ("k_low", "k_high") if interval and name == "k" else (name,)
+    return ENDS if interval and name == "k" else (name,)
 
 
 def _case(row: Any) -> Case:
