@@ -1,8 +1,10 @@
 """CSV: a head with the names of the inputs, one case per line; the answer likewise, with a text for
 a bad case.  Needs pyarrow."""
 
+import codecs
 import csv
 import io
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
@@ -21,61 +23,84 @@ from ..models.options import BatchOptions
 from ..problems import FieldFault, Kind, RequestError, refuse
 from .arrow import tables_of, twice
 
+_BLOCK = 1024 * 1024  # bytes that are read at a time; a line may have as many
 _SLICE = 32768  # cases that are written at a time
 _DIGITS = b"0123456789.eE+-"
 
 
 def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
-    body = bytes(text).removeprefix(b"\xef\xbb\xbf")
-    head, _, rest = (
-        body.replace(b"\r\n", b"\n").replace(b"\r", b"\n").lstrip(b"\n").partition(b"\n")
-    )
-    if rest.count(b"\n") > 2 * max_batch + 2:
-        raise too_large(max_batch)
+    start = len(_MARK) if text.startswith(_MARK) else 0
+    found = _HEAD.match(text, start)
+    head, start = (b"", start) if found is None else (found[1], found.end())
+    wrong: list[Any] = []
+    columns: dict[str, list[Any]] = {}
+    size = 0
     try:
         scales = _head(next(csv.reader([head.decode()], strict=True), []))
-        rest.decode()  # pyarrow would tell standard error of a wrong byte in a wrong row
-        if rest.count(b'"') % 2:
-            raise csv.Error("a quote is not closed")
-        wrong: list[Any] = []
-
-        def odd(row: Any) -> str:
-            wrong.append(row)
-            return "skip"
-
-        table = _parsed(rest, [*scales], odd)
+        _check(text)
+        for block in _blocks(text, start, [*scales], wrong):
+            size += block.num_rows
+            if size + len(wrong) > max_batch:
+                raise too_large(max_batch)
+            for name, scale in scales.items():
+                cells = _values(block[name], scale) if name in INPUTS else []
+                columns.setdefault(name, []).append(cells)
     except (UnicodeDecodeError, csv.Error, pa.ArrowInvalid) as error:
         reason = str(error).splitlines()[0][:200]
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not CSV: {reason}") from None
-    if table.num_rows + len(wrong) > max_batch:
+    if size + len(wrong) > max_batch:
         raise too_large(max_batch)
-    columns = {
-        name: _values(table[name], scale) for name, scale in scales.items() if name in INPUTS
+    reasons: dict[int, Reason] = {
+        row.number - 1: (None, f"has {row.actual_columns} cells where the head has {len(scales)}")
+        for row in wrong
     }
-    reasons: dict[int, Reason] = {}
-    for row in wrong:
-        index = row.number - 1 if row.number else len(reasons)
-        reason = f"has {row.actual_columns} cells where the head has {len(scales)}"
-        reasons[index] = (None, reason)
-    if reasons:
-        places = sorted(reasons)
-        columns = {name: _with_gaps(values, places) for name, values in columns.items()}
-    others: dict[str, Any] = {name: [] for name in scales}  # which the model refuses by its name
-    return Body({**others, **columns}, reasons)
+    places = sorted(reasons)
+    members = {name: _joined(columns.get(name, []), places) for name in scales}
+    return Body(members, reasons)
 
 
-def _parsed(text: bytes, names: list[str], odd: Any) -> Any:
-    """The rows as columns of texts."""
-    if not text.strip(b"\n"):
-        return pa.table({name: pa.array([], pa.string()) for name in names})
-    return pcsv.read_csv(
-        io.BytesIO(text),
-        pcsv.ReadOptions(use_threads=False, column_names=names),
-        pcsv.ParseOptions(invalid_row_handler=odd),
+_MARK = b"\xef\xbb\xbf"  # of UTF-8, as spreadsheets write it
+_HEAD = re.compile(rb"[\r\n]*([^\r\n]*)(\r\n|\r|\n|$)")
+
+
+def _check(text: bytearray) -> None:
+    """UnicodeDecodeError for a wrong byte, of which pyarrow would tell standard error where its row
+    is wrong, too; csv.Error for a quote that is not closed."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    for at in range(0, len(text), _BLOCK):
+        decoder.decode(text[at : at + _BLOCK], at + _BLOCK >= len(text))
+    if text.count(b'"') % 2:
+        raise csv.Error("a quote is not closed")
+
+
+def _blocks(text: bytearray, start: int, names: list[str], wrong: list[Any]) -> Iterator[Any]:
+    """The rows as blocks of columns of texts; ``wrong`` gets those with other cells than names."""
+    if not text[start : start + 1000].strip(b"\r\n") and not text[start:].strip(b"\r\n"):
+        return
+
+    def skip(row: Any) -> str:
+        wrong.append(row)
+        return "skip"
+
+    yield from pcsv.open_csv(
+        pa.BufferReader(pa.py_buffer(text)[start:]),
+        pcsv.ReadOptions(use_threads=False, block_size=_BLOCK, column_names=names),
+        pcsv.ParseOptions(invalid_row_handler=skip),
         pcsv.ConvertOptions(
             column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
         ),
     )
+
+
+def _joined(parts: list[Any], gaps: list[int]) -> Any:
+    """A column as an array, or as a list where a cell is no number or has a gap."""
+    if not gaps and parts and all(isinstance(part, np.ndarray) for part in parts):
+        return np.concatenate(parts)
+    column = [cell for part in parts for cell in part]
+    column = [float(cell) if isinstance(cell, np.float64) else cell for cell in column]
+    for place in gaps:
+        column.insert(place, None)
+    return column
 
 
 def _head(cells: list[str]) -> dict[str, Scale]:
@@ -115,14 +140,6 @@ def _value(scale: Scale, text: str) -> Any:
         if not text.encode().translate(None, _DIGITS):
             return scale.si(float(text))
     return text
-
-
-def _with_gaps(values: Any, places: list[int]) -> list[Any]:
-    """A column with a gap at each of these places."""
-    filled = values if isinstance(values, list) else values.tolist()
-    for place in places:
-        filled.insert(place, None)
-    return filled
 
 
 def _write(batch: Batch) -> Iterator[bytes]:
