@@ -2,7 +2,7 @@
 kernel.
 
 The formulas are those of ``mumacro/kernel/directions.c``, checked against a play operator in
-``tests/test_contact_directions.py``; here they are evaluated with the 64 bits of
+``tests/mumacro/contacts/test_contact_directions.py``; here they are evaluated with the 64 bits of
 ``numpy.longdouble`` (x86), by bisection and Newton's method to the last digit, and a ball by rules
 of many nodes.
 Arrays broadcast; rows come in the order of :data:`ROWS`.

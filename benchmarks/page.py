@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 
 from benchmarks.measuring import IMAGES
-from tests import browser as driven
-from tests.serving import serving
+from benchmarks.support import browser as driven
+from benchmarks.support.serving import serving
 
 
 def main() -> None:

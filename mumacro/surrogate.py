@@ -25,9 +25,9 @@ from mumacro.inputs.kind import (
     Kind,
     kind_of,
 )
-from mumacro.kernel import slices
+from mumacro.kernel import threads as shared_out
 from mumacro.kernel.arrays import Array, common_shape, flat
-from mumacro.kernel.binding import Data, kernels
+from mumacro.kernel.binding import Data, Detail, kernels
 from mumacro.kernel.threads import default_threads
 from mumacro.table import atlas
 from mumacro.table.blocks import BorderPiece, Table
@@ -248,7 +248,7 @@ class Surrogate:
             if mu == mu:
                 return mu
         v, y, shape = _points(v_tilde, y_tilde)
-        found = slices.alone(atlas.MU, self._data, v, y, self.threads)
+        found = shared_out.alone(atlas.MU, self._data, v, y, self._asked_threads)
         if not shape and math.isnan(found[0]):
             raise _illegal(v, y)
         return _shaped(found, shape)
@@ -329,8 +329,8 @@ class Surrogate:
         '-1.000e-05'
         """
         data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
-        rows = slices.slopes(_CODES[of], data, v, y, self.threads)
-        if not shape and math.isnan(rows[0, 0]):
+        rows = shared_out.slopes(_CODES[of], data, v, y, self._asked_threads)
+        if not shape and math.isnan(rows.value[0]):
             raise _illegal(v, y)
         return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
 
@@ -392,8 +392,8 @@ class Surrogate:
                 "across or along for the power: the load's path is not modelled",
             )
         v, y, shape = _points(v_tilde, y_tilde)
-        value, bound, source = slices.values(
-            _CODES[name], self._data_of(kind), v, y, self.threads, kind
+        value, bound, source = shared_out.values(
+            _CODES[name], self._data_of(kind), v, y, self._asked_threads, kind
         )
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
@@ -697,70 +697,55 @@ class Surrogate:
         if not cases.shape and kind == SPRING and cases.ends is None:
             return self._one([*columns.values()], gradient)
         groups = groups or gradient or not cases.shape
-        found, source = slices.cases(
-            self._data_of(kind),
-            [*columns.values()],
-            math.prod(shape),
-            self.threads,
-            17 if gradient else 5 if groups else 3,
-            kind,
-        )
-        rows, codes = found.reshape(len(found), *shape), source.reshape(shape)
-        answer: Answer[Any] = (
-            IntervalAnswer if cases.ends else AnswerWithGradient if gradient else Answer
-        )(rows[0], rows[1], rows[2], codes)
+        detail: Detail = "gradient" if gradient else "groups" if groups else "values"
+        six, n, data = [*columns.values()], math.prod(shape), self._data_of(kind)
+        rows = shared_out.cases(data, six, n, self._asked_threads, detail, kind).reshaped(shape)
+        answer: Answer[Any]
+        if cases.ends is not None:
+            low, high = cases.ends
+            six = [*{**columns, "k": low}.values()]
+            extremes = shared_out.intervals(data, six, high, self._asked_threads, kind)
+            answer = IntervalAnswer(
+                rows.mu_macro,
+                rows.mu_ratio,
+                np.maximum(rows.error_bound, extremes.error_bound.reshape(shape)),
+                rows.source,
+            )
+            answer.mu_macro_low = np.minimum(rows.mu_macro, extremes.low.reshape(shape))
+            answer.mu_macro_high = np.maximum(rows.mu_macro, extremes.high.reshape(shape))
+        else:
+            answer = (AnswerWithGradient if gradient else Answer)(
+                rows.mu_macro, rows.mu_ratio, rows.error_bound, rows.source
+            )
         if groups:
-            length = np.where(source == -1, np.nan, cases.length_scale()).reshape(shape)
-            answer._groups = rows[3], rows[4], length
+            answer._groups = rows.v_tilde, rows.y_tilde, rows.length_scale
             answer._certain = (
                 self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
             )
         if gradient:
-            answer.gradient = dict(zip(kind.fields, rows[5:11], strict=True))
-            answer.gradient_bound = dict(zip(kind.fields, rows[11:], strict=True))
-        if isinstance(answer, IntervalAnswer):
-            self._add_extremes(answer, cases)
+            answer.gradient = dict(zip(kind.fields, rows.gradient, strict=True))
+            answer.gradient_bound = dict(zip(kind.fields, rows.gradient_bound, strict=True))
         return answer if cases.shape else single(answer)
 
     def _one(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
         """The answer to one case of the usual kind; NaN where it is illegal."""
-        row = _ONE.one(self._pointer, six, 19 if gradient else 7)
+        one = _ONE.one(self._pointer, six, gradient)
+        groups = (one.v_tilde, one.y_tilde, one.length_scale)
         answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
-            row[0], row[1], row[2], int(row[6]), (row[3], row[4], row[5]), self._certain
+            one.mu_macro, one.mu_ratio, one.error_bound, one.source, groups, self._certain
         )
         if gradient:
-            answer.gradient = dict(zip(FIELDS, row[7:13], strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, row[13:], strict=True))
+            answer.gradient = dict(zip(FIELDS, one.gradient, strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, one.gradient_bound, strict=True))
         return answer
-
-    def _add_extremes(self, answer: IntervalAnswer[Array], cases: Cases) -> None:
-        """Add to the answer for the middle of an interval of k the extremes over it."""
-        shape, legal = answer.mu_macro.shape, answer.source_code != -1
-        # NaN where they are no interval, so that the kernel has no answer either
-        first, last = (
-            np.where(np.isnan(cases.columns["k"]), np.nan, end) for end in cases.ends or ()
-        )
-        rows = slices.intervals(
-            self._data_of(cases.kind),
-            [*{**cases.columns, "k": first}.values()],
-            last,
-            self.threads,
-            cases.kind,
-        )
-        low, high, bound = (row.reshape(shape) for row in rows)
-        answer.error_bound = np.maximum(answer.error_bound, bound)
-        answer.mu_macro_low = np.where(legal, np.minimum(low, answer.mu_macro), np.nan)
-        answer.mu_macro_high = np.where(legal, np.maximum(high, answer.mu_macro), np.nan)
 
     def evaluate_case(
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
     ) -> tuple[float, float, float, int]:
         """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1
         if illegal."""
-        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(
-            self._pointer, (mu0, Fz, k, y0, omega, v0), 7
-        )
-        return mu_macro, mu_ratio, bound, int(source)
+        one = _ONE.one(self._pointer, (mu0, Fz, k, y0, omega, v0), False)
+        return one.mu_macro, one.mu_ratio, one.error_bound, one.source
 
     def _data_of(self, kind: Kind) -> Data:
         """What the kernel reads; a ball needs rules of quadrature."""
@@ -784,7 +769,7 @@ class Surrogate:
 
 
 # mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits
-# (tests/test_surrogate.py solves them anew)
+# (tests/mumacro/test_surrogate.py solves them anew)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
 

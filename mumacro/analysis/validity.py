@@ -69,14 +69,15 @@ def model_rows(
     'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
     """
     case, ends = without_interval(case)
-    mu = surrogate.evaluate(**case, **kind_of(contact, direction).names).mu_macro
     kind = kind_of(contact, direction)
+    answer = surrogate.evaluate(**case, **kind.names)
+    mu = answer.mu_macro
     one = _one(case, kind)
     six = {"y0": 0.0, **one}  # 0 for normal
     swing = six.get("Fz_amplitude", six["y0"])
     if math.isinf(six["k"]) or six["omega"] == 0.0 or swing == 0.0:
         return []
-    y = six["y0"] / float(Cases.of(one, kind).length_scale())
+    y = 0.0 if kind.normal else answer.y_tilde
     if y > _FAR:
         text = f"y~ = {y:.3g}; contacts have 0.1 to 100: is y0 = {six['y0']:.3g} in metres?"
         return [{"row": "units", "text": text, "effect": None}]

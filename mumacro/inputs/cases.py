@@ -123,19 +123,6 @@ class Cases(NamedTuple):
             return error
         raise AssertionError(f"{case} has an answer")
 
-    def length_scale(self) -> Array:
-        """l0 = mu0 Fz / k [m], eq. (5), without overflow of mu0 Fz; 0 for rigid contact; (n,)."""
-        mu0, Fz, k = np.broadcast_arrays(*(self.columns[name] for name in ("mu0", "Fz", "k")))
-        with np.errstate(all="ignore"):
-            quotient = Fz / k
-            out = np.asarray(mu0 * quotient)
-            low, high = np.minimum(quotient, out), np.maximum(quotient, out)
-            odd = ~((low > 1e-290) & (high < 1e290))  # a partial result may have lost digits
-            if odd.any():
-                (a, i), (b, j), (c, n) = (np.frexp(x[odd]) for x in (mu0, Fz, k))
-                out[odd] = np.ldexp(a * (b / c), i + j - n)
-        return out
-
 
 # --- from what was asked to names and values ------------------------------------------------------
 

@@ -204,7 +204,7 @@ static double mu_ball_speed_slope(const mumacro_data *data, double y, double *bo
 static mu_slopes mu_ball_slopes(const mumacro_data *data, double v, double y) {
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_springs c;
-    double rows[5 * MU_CHUNK];
+    double rows[MU_SLOPE_ROWS * MU_CHUNK];
     if (!mu_is_spread(v, y)) {
         out = mu_slopes_at(data, MU_MU_RATIO, v, y);
         if (v < 1e150) {
@@ -227,12 +227,12 @@ static mu_slopes mu_ball_slopes(const mumacro_data *data, double v, double y) {
         for (int i = c.first[k]; i < c.first[k + 1]; ++i) {
             const double share = c.share[i];
             load += share;
-            sum += share * rows[i];
-            out.along_v += share * rows[MU_CHUNK + i];
-            out.along_y += share * rows[2 * MU_CHUNK + i];
-            out.bound_v += share * rows[3 * MU_CHUNK + i];
-            out.bound_y += share * rows[4 * MU_CHUNK + i];
-            along_y += share * fabs(rows[2 * MU_CHUNK + i]);
+            sum += share * rows[MU_SLOPE_VALUE * MU_CHUNK + i];
+            out.along_v += share * rows[MU_SLOPE_V * MU_CHUNK + i];
+            out.along_y += share * rows[MU_SLOPE_Y * MU_CHUNK + i];
+            out.bound_v += share * rows[MU_SLOPE_V_BOUND * MU_CHUNK + i];
+            out.bound_y += share * rows[MU_SLOPE_Y_BOUND * MU_CHUNK + i];
+            along_y += share * fabs(rows[MU_SLOPE_Y * MU_CHUNK + i]);
         }
         out.value += sum;
         out.bound_v += mu_left_out(data, k, MU_ERROR_V, load, mu_least_share(sum, load), y);

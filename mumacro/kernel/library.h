@@ -28,23 +28,19 @@ typedef struct {
      * 2 normal, with Fz_amplitude / Fz for y~.  bound and source may be NULL where both are 0 */
     void (*values)(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
                    const double *y, double *value, double *bound, int8_t *source);
-    /* value, v~ d/d v~, y~ d/d y~, bounds of both slopes: 5 rows of out, stride apart */
+    /* a quantity and its slopes: mumacro_slope_row, stride apart */
     void (*slopes)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *out,
                    int64_t stride);
-    /* dimensional cases: columns mu0, Fz, k, y0 (normal: Fz_amplitude), omega, v0, each with a stride of 1, or 0 for one
-     * value.  Rows of out, stride apart: mu_macro, mu_ratio, bound of mu_macro; of 5 also v~, y~; of 17 also
-     * d mu_macro / d input, bounds */
-    void (*cases)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
-                  const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source);
-    /* cases whose k, the third column, reaches to high: the smallest and the largest mu_macro, and the largest bound met
-     * there, 3 rows of out, stride apart */
-    void (*intervals)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
-                      const int64_t *strides, const double *high, double *out, int64_t stride);
-    /* of a spring, across, alone, in a fraction of the time: mu~; and one case, whose 7 numbers are mu_macro, mu_ratio, bound, v~,
-     * y~, l0 = mu0 Fz / k, source; of 19 also the slopes and their bounds */
+    /* dimensional cases; out has the first `rows` of mumacro_row, stride apart: those before v~, those before the gradient, or all */
+    void (*cases)(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *columns,
+                  int rows, double *out, int64_t stride, int8_t *source);
+    /* cases whose k, the third column, reaches to high: mumacro_extreme_row, stride apart */
+    void (*intervals)(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *columns,
+                      const double *high, double *out, int64_t stride);
+    /* of a spring, across, alone, in a fraction of the time: mu~; and one case, its gradient only where asked for */
     double (*ratio)(const mumacro_data *data, double v, double y);
     void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
-                int numbers, double *out);
+                int with_gradient, mumacro_case *out);
     /* v~crit(y~) of a contact and direction: 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *y, double *crit);
     /* blocks of points with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them, which tail_fast

@@ -1,5 +1,5 @@
 // The inputs: units and bounds, what a person types, numbers as text, the state of the page, its case and its address.
-// Nothing here needs a browser; tests/page tests it with node.
+// Nothing here needs a browser; tests/service/page tests it with node.
 
 /** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
  *  slider's decimal exponents (SI), start value; beside them the choices with their words, geometries
