@@ -42,9 +42,11 @@ _DESCRIPTION = (
     "model. Errors are problem details (RFC 9457)."
 )
 _TAGS = [
-    {"name": "cases", "description": "The friction of one case, and of many at once"},
-    {"name": "questions", "description": "A range of one input: friction law, inverse problem"},
-    {"name": "contact", "description": "What a contact is: from materials, or measured points"},
+    {
+        "name": "answers",
+        "description": "The friction of one case and of many; questions about a "
+        "range of one input; what a contact is, from materials or from measured points",
+    },
     {"name": "table", "description": "The verified table that the answers come from"},
     {"name": "health", "description": "For those who run the service: probes and counters"},
 ]

@@ -25,7 +25,7 @@ from ..quantities import Asked, answer_case
 from ..reading import DirectRoute, decode, dump, of_members, validated
 from . import POSTED, router_of
 
-router = router_of("cases", DirectRoute)
+router = router_of("answers", DirectRoute)
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case

@@ -14,7 +14,7 @@ from ..quantities import Asked, answer_case
 from ..reading import DirectRoute, Json, dump
 from . import ASKED, POSTED, router_of
 
-router = router_of("cases", DirectRoute)
+router = router_of("answers", DirectRoute)
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
 _CACHED: Any = {
     "model": CaseAnswer,

@@ -26,7 +26,7 @@ from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
 from . import POSTED, problems, router_of
 
-router = router_of("contact", StrictRoute)
+router = router_of("answers", StrictRoute)
 _CURVE = 200  # points of the fitted law
 _MEASURED = ("mu_macro", STD)
 

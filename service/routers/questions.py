@@ -29,7 +29,7 @@ from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
 from . import ASKED, POSTED, router_of
 
-router = router_of("questions", StrictRoute)
+router = router_of("answers", StrictRoute)
 
 
 # --- friction law ---------------------------------------------------------------------------------
