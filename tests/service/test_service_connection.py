@@ -74,6 +74,16 @@ def test_a_connection_is_kept_over_errors_and_ends_when_asked(raw: Any) -> None:
     assert to_end(raw) == b""
 
 
+def test_a_head_is_complete_when_its_client_has_it(raw: Any) -> None:
+    for _ in range(20):
+        raw.sendall(b"HEAD /v1/table.nc HTTP/1.1\r\nHost: x\r\n\r\n")
+        response = http.client.HTTPResponse(raw, method="HEAD")
+        response.begin()
+        assert int(response.headers["content-length"]) > 0
+        raw.sendall(GET)
+        assert answer(raw)[0] == 200
+
+
 def test_a_second_request_before_the_answer_is_dropped_and_the_connection_closes(raw: Any) -> None:
     raw.sendall(posted(SINGLE, b"{}") + GET * 5000)
     received = to_end(raw)
