@@ -59,6 +59,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
         _log.warning("%s is not a setting and has no effect", name)
     app.state.tables.load()
     app.state.metrics.start(app.state.tables)
+    app.openapi()  # which FastAPI keeps: no request waits until it is made
     # A full collection visits a hundred thousand objects of the libraries, and no request is
     # answered meanwhile.
     gc.collect()

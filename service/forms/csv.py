@@ -23,6 +23,7 @@ from ..models.options import BatchOptions
 from ..problems import FieldFault, Kind, RequestError, refuse
 from .arrow import tables_of, twice
 
+_LONGEST_HEAD = 64 * 1024  # bytes
 _BLOCK = 1024 * 1024  # bytes that are read at a time; a line may have as many
 _SLICE = 32768  # cases that are written at a time
 _DIGITS = b"0123456789.eE+-"
@@ -32,6 +33,9 @@ def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
     start = len(_MARK) if text.startswith(_MARK) else 0
     found = _HEAD.match(text, start)
     head, start = (b"", start) if found is None else (found[1], found.end())
+    if len(head) > _LONGEST_HEAD:
+        detail = f"the first line of the body has more than {_LONGEST_HEAD} bytes"
+        raise RequestError(Kind.MALFORMED_BODY, detail)
     wrong: list[Any] = []
     columns: dict[str, list[Any]] = {}
     size = 0

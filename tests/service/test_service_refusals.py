@@ -491,7 +491,7 @@ def test_a_body_that_is_no_plain_arrow_stream_or_no_csv_is_malformed(
         packed = stream_of(as_table([CASE] * 10_000), compression=codec)
         assert "compressed" in problem(posted(client, "arrow", packed), 400)["detail"]
     text = as_csv([CASE])
-    for csv in (text.encode("utf-16"), text + '"'):
+    for csv in (text.encode("utf-16"), text + '"', "mu0" * 30_000 + "\n1\n"):
         problem(posted(client, "csv", csv), 400)
 
 
