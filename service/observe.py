@@ -154,9 +154,9 @@ class Observe:
 
         try:
             await self._app(scope, receive, send_marked)
-        except ClientDisconnect:
-            if status != _GONE:  # the answer has begun: the server ends the connection
-                status = _GONE
+        except ClientDisconnect as error:
+            status = _GONE
+            if error.__cause__ is not None:  # the answer has failed: the server ends the connection
                 raise
         finally:
             seconds = time.perf_counter() - started

@@ -192,6 +192,20 @@ def test_a_client_that_leaves_within_a_body_frees_its_place(strict: Any) -> None
         assert time.monotonic() < deadline
 
 
+def test_a_client_that_leaves_its_stream_is_no_fault_of_the_service(strict: Any) -> None:
+    before = len(strict.lines)
+    with connect(strict) as raw:
+        raw.sendall(head(BATCH, None, NDJSON) + chunk(LINE))
+        while b"mu_macro" not in raw.recv(65536):
+            pass
+    until = time.monotonic() + PATIENCE_S
+    while not (left := [line for line in strict.lines[before:] if '"status":499' in line]):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    assert len(left) == 1
+    assert not [line for line in strict.lines[before:] if "Traceback" in line]
+
+
 def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(strict: Any) -> None:
     status, headers, content = strict.ask("POST", SINGLE, b"x" * 3_000_000)
     assert (status, headers["connection"]) == (413, "close")
