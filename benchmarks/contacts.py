@@ -134,7 +134,7 @@ def errors(count: int = 15_000) -> str:
     whole = [np.abs(pair[0]) for pair in asked(s, v, y, "across", rules(1e-12))]
 
     def by(piece: int, nodes: int, constants: Array) -> list[Array]:
-        alone[piece] = (quadrature.points(piece, nodes), constants)
+        alone[piece] = (quadrature.piece_rule(piece, nodes), constants)
         found = asked(s, v, y, "across", alone)
         alone[piece] = (np.zeros((0, 2)), none)
         return found

@@ -61,7 +61,7 @@ class Panel(NamedTuple):
     settings: dict[str, Any] = {}  # noqa: RUF012
 
 
-def _solved(y: NDArray[Any]) -> Array:
+def _solve_border(y: NDArray[Any]) -> Array:
     """v~crit and mu~ there at each amplitude (2, n), each a solve of the full model."""
     return np.array([border(float(value)) for value in y]).T
 
@@ -126,7 +126,7 @@ def _cycle(_: Surrogate) -> list[Panel]:
     for (v, y), title in CASES.items():
         tau, u, sticks = steady_cycle(v, y)
         (slip_x, slip_y), (stick_x, stick_y) = (
-            np.where(at[:, None], u, np.nan).T for at in (~sticks, sticks)
+            np.where(mask[:, None], u, np.nan).T for mask in (~sticks, sticks)
         )
         mean = float(u[:, 0].mean())
         disc = [
@@ -141,8 +141,8 @@ def _cycle(_: Surrogate) -> list[Panel]:
             Curve(tau, u[:, 1], "C1-", "$u_y$, across"),
             Curve(tau, np.where(sticks, -1.05, np.nan), "C3-", "stick"),
         ]
-        axes, fixed = ("$u_x$, along", -1.1, 1.1), {"aspect": "equal", "title": title}
-        discs.append(Panel(axes, ("$u_y$, across", -1.1, 1.1), disc, {}, fixed))
+        axes, settings = ("$u_x$, along", -1.1, 1.1), {"aspect": "equal", "title": title}
+        discs.append(Panel(axes, ("$u_y$, across", -1.1, 1.1), disc, {}, settings))
         traces.append(Panel((r"$\tau = \omega t$", 0.0, 6.2832), ("", -1.1, 1.1), trace))
     return discs + traces
 
@@ -170,7 +170,7 @@ def _small_border(_: Surrogate) -> list[Panel]:
     curves = [
         Curve(y, closed_forms.border_24(y), "C0-", "(24)"),
         Curve(y, closed_forms.border_23(y), "C2--", "(23), of which (24) is an expansion"),
-        Curve(dots, _solved(dots)[0], "ko", "exact, solved"),
+        Curve(dots, _solve_border(dots)[0], "ko", "exact, solved"),
     ]
     return [Panel((Y, 0.0, 1.02), (V, 0.0, 0.4), curves)]
 
@@ -182,10 +182,10 @@ def _whole_border(_: Surrogate) -> list[Panel]:
         np.linspace(0.4, 10.0, 25),
         np.geomspace(0.03, 1e4, 401),
     )
-    exact = _solved(wide)[0]
+    exact = _solve_border(wide)[0]
     formulas = ((closed_forms.border_26, "C3--", "(26)"), (closed_forms.border_27, "C0-", "(27)"))
     curves = [Curve(y, formula(y), look, label) for formula, look, label in formulas]
-    off = [
+    deviations = [
         Curve(wide, 100.0 * (formula(wide) / exact - 1.0), look, label)
         for formula, look, label in formulas
     ]
@@ -193,12 +193,12 @@ def _whole_border(_: Surrogate) -> list[Panel]:
         Panel(
             (Y, 0.0, 10.2),
             (V, 0.0, 1.7),
-            [*curves, Curve(dots, _solved(dots)[0], "ko", "exact, solved")],
+            [*curves, Curve(dots, _solve_border(dots)[0], "ko", "exact, solved")],
         ),
         Panel(
             (Y, 0.03, 1e4),
             ("formula over exact, less 1 [%]", -6.0, 6.0),
-            off,
+            deviations,
             {},
             {"xscale": "log"},
         ),
@@ -221,7 +221,7 @@ def _cuts(s: Surrogate) -> list[Panel]:
     looks = ["k-" if i == 10 else "C0-" for i in range(21)]
     curves = [Curve(v, s.mu_ratio(v, y), look) for y, look in zip(amplitudes, looks, strict=True)]
     curves[10] = curves[10]._replace(label=r"$\tilde y = 1$")
-    crit, top = _solved(amplitudes[1:])
+    crit, top = _solve_border(amplitudes[1:])
     curves.append(Curve(crit, top, "C3o", r"border: $\tilde\mu(\tilde v_\mathrm{crit})$, solved"))
     curves.append(
         Curve(np.zeros(11), closed_forms.static_limit(amplitudes[:11]), "C2s", "static value (16)")
@@ -266,7 +266,7 @@ def _large_amplitudes(s: Surrogate) -> list[Panel]:
     curves = [Curve(x, s.mu_ratio(x * y, y), "C0-") for y in 0.8 * np.arange(1, 101)]
     crosses, (crit, top) = (
         np.concatenate([[0.01, 0.03, 0.06], np.arange(0.1, 2.01, 0.1)]),
-        _solved(dots),
+        _solve_border(dots),
     )
     curves.append(Curve(crit / dots, top, "ko", "border, solved"))
     curves.append(Curve(crosses, closed_forms.outer(1.0 / crosses), "C3x", "(35)"))
@@ -333,7 +333,7 @@ def _draw(panel: Panel, axes: Any) -> None:
         if curve.z is None:
             axes.plot(curve.x, curve.y, curve.look, label=curve.label or None, ms=5, lw=1.2)
         else:
-            shown = axes.contourf(
+            filled = axes.contourf(
                 curve.x, curve.y, curve.z, levels=np.linspace(0.0, 1.0, 41), cmap="YlGnBu_r"
             )
             axes.contour(
@@ -344,7 +344,7 @@ def _draw(panel: Panel, axes: Any) -> None:
                 colors="k",
                 linewidths=0.7,
             )
-            axes.figure.colorbar(shown, label=curve.label, ticks=np.linspace(0.0, 1.0, 11))
+            axes.figure.colorbar(filled, label=curve.label, ticks=np.linspace(0.0, 1.0, 11))
     for (x, y), text in panel.notes.items():
         axes.text(x, y, text, ha="center", va="bottom")
     (x_name, *x_ends), (y_name, *y_ends) = panel.x, panel.y
@@ -369,14 +369,14 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise MumacroError(f"figures need the extra 'figures' (matplotlib): {error}") from error
-    written = []
+    paths = []
     for name, panels_of in FIGURES.items():
         panels, figure = panels_of(surrogate), Figure(figsize=SIZE, layout="constrained")
         FigureCanvasAgg(figure)
-        places = figure.subplots(-(-len(panels) // 3), min(len(panels), 3), squeeze=False)
-        for panel, axes in zip(panels, places.flat, strict=True):
+        axes_grid = figure.subplots(-(-len(panels) // 3), min(len(panels), 3), squeeze=False)
+        for panel, axes in zip(panels, axes_grid.flat, strict=True):
             _draw(panel, axes)
-        written.append(folder / f"{name}.png")
+        paths.append(folder / f"{name}.png")
         # no version of the drawing library in it
-        figure.savefig(written[-1], dpi=DPI, metadata={"Software": None})
-    return written
+        figure.savefig(paths[-1], dpi=DPI, metadata={"Software": None})
+    return paths

@@ -57,5 +57,5 @@ _sys.meta_path.append(_moved.Signposts)
 
 
 def __dir__() -> list[str]:
-    """What users need; the folders and modules behind it are no part of the face."""
+    """The public names; folders and modules behind them are left out."""
     return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

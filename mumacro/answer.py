@@ -10,7 +10,7 @@ from mumacro import closed_forms, plotting
 from mumacro.errors import MumacroError
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-#: float for one case; an array of float64 for many, or what holds labels in its place
+#: float for one case; for many an array of float64, or a labelled object in its place
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
@@ -154,11 +154,11 @@ class Answer(Generic[Number]):
             np.ravel(np.asarray(x)) for x in (self.v_tilde, self.y_tilde, self.regime_code)
         )
         regimes = {name: code == i for i, name in enumerate(REGIMES)}
-        # an answer has no table
+        # an answer has no table, whose border would be exact
         return plotting.plot_cases(v, y, regimes, closed_forms.border_blend, axes)
 
     def columns(self) -> dict[str, Any]:
-        """What is known of each case, by name: mu_macro first, then what was requested beside
+        """The results of each case by name: mu_macro first, then those that were requested beside
         it."""
         names = [
             "mu_macro",

@@ -72,19 +72,17 @@ _DRIVEN_PIECE = 3  # whose powers it has
 
 def rules(tolerance: float) -> list[tuple[Array, Array]]:
     """Points (nodes, 2) and errors (2, 5) of every piece, for a table of this tolerance."""
-    chosen = _RULES[
-        max((known for known in _RULES if known <= 1.01 * tolerance), default=min(_RULES))
-    ]
-    found = []
-    for piece, (nodes, *stated) in enumerate(chosen):
+    table_rules = _RULES[max((t for t in _RULES if t <= 1.01 * tolerance), default=min(_RULES))]
+    pieces = []
+    for piece, (nodes, *error_rows) in enumerate(table_rules):
         errors = np.zeros((2, 5))
-        for row, numbers in zip(errors, stated, strict=True):
+        for row, numbers in zip(errors, error_rows, strict=True):
             row[: len(numbers)] = numbers
-        found.append((points(piece, nodes), errors))
-    return found
+        pieces.append((piece_rule(piece, nodes), errors))
+    return pieces
 
 
-def points(piece: int, nodes: int) -> Array:
+def piece_rule(piece: int, nodes: int) -> Array:
     """The rule of a piece, (nodes, 2): the share of the piece beyond a node, and its weight."""
     p, q = _POWERS[piece]
     x, weight = np.polynomial.legendre.leggauss(nodes)
@@ -109,7 +107,7 @@ def driven_rule() -> Array:
     degrees = np.arange(DRIVEN_NODES - 3, DRIVEN_NODES)
     nulls = np.polynomial.legendre.legvander(x, DRIVEN_NODES)[:, degrees] * (2 * degrees + 1)
     return np.ascontiguousarray(
-        np.concatenate([points(_DRIVEN_PIECE, DRIVEN_NODES), nulls], axis=1)
+        np.concatenate([piece_rule(_DRIVEN_PIECE, DRIVEN_NODES), nulls], axis=1)
     )
 
 

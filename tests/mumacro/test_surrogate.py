@@ -219,6 +219,12 @@ def test_empty_arrays_give_empty_answers(
 # --- threads and xarray ---------------------------------------------------------------------------
 
 
+def test_a_copy_on_one_thread_leaves_the_original_its_threads(fine: Surrogate) -> None:
+    several = Surrogate.open(fine.path, threads=3)
+    assert several.on_one_thread().threads == 1
+    assert several.threads == 3
+
+
 @pytest.mark.parametrize("threads", [0, -1, 1.0, True, "2", 100_000])
 def test_threads_out_of_bounds_are_refused(fine: Surrogate, threads: Any) -> None:
     with pytest.raises(InputError, match="threads"):

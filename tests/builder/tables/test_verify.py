@@ -23,7 +23,7 @@ from builder.tables.verify import (
     verify,
 )
 from mumacro import Surrogate
-from mumacro.table.atlas import CHARTS, NAMES, QUANTITY_NAMES, SIGMA_CUT, SOURCES
+from mumacro.table.atlas import BLOCK_NAMES, CHARTS, QUANTITY_NAMES, SIGMA_CUT, SOURCES
 from mumacro.table.netcdf import read_table
 from mumacro.table.polynomials import chebyshev_coefficients, interpolation_matrix, nodes
 from tests.support.cases import Array, opened, tables
@@ -39,7 +39,7 @@ sound = tables(1e-7)
 def damaged(block: str, factor: Any, key: str = "mu_ratio") -> Surrogate:
     """The same table with one quantity of one block multiplied by ``factor``."""
     table = read_table(TABLE)
-    table.blocks[NAMES.index(block)].nodes[key] *= factor
+    table.blocks[BLOCK_NAMES.index(block)].nodes[key] *= factor
     return Surrogate(table, TABLE)
 
 
@@ -54,7 +54,7 @@ def test_cases_are_legal_and_repeatable_and_reach_every_block_and_the_fast_tail(
         assert np.array_equal((v, y), draw(name, 3000, sound, seed=0))
         assert not np.array_equal(v, draw(name, 3000, sound, seed=2)[0])
         reached |= {SOURCES[code] for code in sound.ratio_with_bound(v, y)[2]}
-    assert reached >= {*NAMES, "tail_fast"}
+    assert reached >= {*BLOCK_NAMES, "tail_fast"}
     assert math.isclose(sum(share for share, _ in CASES.values()), 1.0)
     with pytest.raises(KeyError):
         draw("easy", 5, sound, seed=0)
@@ -160,7 +160,7 @@ def test_a_block_off_by_a_hundred_thousandth_is_found_and_named(
     assert part["not_covered"] == uncovered(found)[key] > 0
     assert [name for name, source in part["sources"].items() if source["not_covered"]] == [block]
     assert [name for name in QUANTITY_NAMES if uncovered(found)[name]] == [key]
-    errors = block_errors(wrong, sweep, 200, seed=1)[NAMES.index(block)]
+    errors = block_errors(wrong, sweep, 200, seed=1)[BLOCK_NAMES.index(block)]
     assert errors.values[key] > 1e-6
     if (key, block) == ("mu_ratio", "corner"):
         assert errors.values[key] == close(1e-5, rel=0.3)
@@ -233,7 +233,7 @@ def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(
 
     Other processors round otherwise: draws of that rounding stand for them.
     """
-    table, index = opened(tolerance), NAMES.index("continuous_tail")
+    table, index = opened(tolerance), BLOCK_NAMES.index("continuous_tail")
     block = table.table.blocks[index]
     _, _, exact, noise = solve_nodes(
         index, finer((block.a.size, block.b.size)), table.border, sweep
@@ -254,7 +254,7 @@ def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(
 def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, block: str) -> None:
     """Every second node off by half the stated error: values stay within their bound, slopes do
     not."""
-    table, index = read_table(TABLE), NAMES.index(block)
+    table, index = read_table(TABLE), BLOCK_NAMES.index(block)
     part = table.blocks[index]
     values = part.nodes["mu_ratio"]
     values += 0.25 * part.errors["mu_ratio"][0] * (-1.0) ** np.arange(values.shape[1])
@@ -267,7 +267,7 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
 
 @pytest.mark.parametrize("block", ["corner", "continuous_mid_1"])
 def test_an_error_along_one_edge_of_a_block_counts_whole(sweep: Sweep, block: str) -> None:
-    table, index = read_table(TABLE), NAMES.index(block)
+    table, index = read_table(TABLE), BLOCK_NAMES.index(block)
     table.blocks[index].nodes["mu_ratio"][:, -1] *= 1.0 + 1e-5
     assert (
         block_errors(Surrogate(table, TABLE), sweep, 200, seed=1)[index].values["mu_ratio"] > 5e-6

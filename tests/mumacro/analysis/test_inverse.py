@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from mumacro import InputError, Surrogate
 from mumacro.analysis.borders import border_crossings
-from mumacro.analysis.rootfinding import TINY, Curve, last_double
+from mumacro.analysis.input_curve import InputCurve
+from mumacro.analysis.rootfinding import TINY, Branch, last_double
 from mumacro.analysis.solve_for import solve_for
-from mumacro.analysis.sweep import Sweep
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
 
@@ -376,7 +376,7 @@ def test_outside_its_range_there_is_no_border(surrogate: Surrogate) -> None:
 
 
 class Known:
-    """A sweep along a known function: f(x) and df / d ln x."""
+    """A curve of a known function: f(x) and df / d ln x."""
 
     def __init__(self, function: Any, slope: Any) -> None:
         self.function, self.slope, self.calls = function, slope, 0
@@ -387,13 +387,13 @@ class Known:
         return SimpleNamespace(mu_macro=self.function(x)), self.slope(x)
 
 
-def curve(sweep: Any, *ends: float) -> Curve:
+def branch_of(curve: Any, *ends: float) -> Branch:
     x = np.array(ends)
-    return Curve(sweep, x, sweep.function(x))
+    return Branch(curve, x, curve.function(x))
 
 
-def sweep_over(surrogate: Surrogate, name: str, **changed: Any) -> Any:
-    return Sweep(surrogate, without({**CASE, **changed}, name), name)
+def curve_over(surrogate: Surrogate, name: str, **changed: Any) -> Any:
+    return InputCurve(surrogate, without({**CASE, **changed}, name), name)
 
 
 def test_neighbouring_doubles_are_found_at_any_scale() -> None:
@@ -410,28 +410,28 @@ def test_neighbouring_doubles_are_found_at_any_scale() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_levels_are_met_to_rounding_in_a_few_steps(sign: Any) -> None:
     known = Known(lambda x: sign * np.arctan(x), lambda x: sign * x / (1.0 + x * x))
-    piece = curve(known, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
+    branch = branch_of(known, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
     level = sign * np.array([1e-290, 1e-12, 0.3, 0.78, 1.5, 1.57])
-    found = piece.meet(level)
+    found = branch.meet(level)
     # 1,250 times flatter at 1.57 than at 0.3
     assert found == close(np.tan(np.abs(level)), rel=1e-12)
     assert np.all(np.abs(known.function(found) - level) <= 2.0 * 2.0**-52 * np.abs(level))
     known.calls = 0
-    piece.meet(sign * np.array([0.3]))
+    branch.meet(sign * np.array([0.3]))
     assert known.calls <= 8
 
 
 def test_a_slope_that_vanishes_at_the_root_is_no_obstacle() -> None:
     known = Known(lambda x: 1.0 + np.log(x) ** 3, lambda x: 3.0 * np.log(x) ** 2)
-    (found,) = curve(known, 1e-5, 1e4).meet(np.array([1.0]))
+    (found,) = branch_of(known, 1e-5, 1e4).meet(np.array([1.0]))
     assert found == close(1.0, abs=1e-5)  # closer to the root the cube is below rounding
 
 
 @pytest.mark.parametrize("slope", [math.nan, math.inf, 0.0, -1.0, 1e-300, 1e300])
 def test_a_wrong_slope_costs_steps_but_no_digits(slope: Any) -> None:
     known = Known(lambda x: np.where(x < math.pi, 0.25, 0.75), lambda x: np.full_like(x, slope))
-    piece = curve(known, 0.0, 1e300)
-    (found,) = piece.meet(np.array([0.5]))
+    branch = branch_of(known, 0.0, 1e300)
+    (found,) = branch.meet(np.array([0.5]))
     assert found in (math.pi, math.nextafter(math.pi, 0.0))
     assert known.calls < 200
 
@@ -441,20 +441,20 @@ def test_a_plateau_is_met_at_its_first_double_and_left_at_its_last() -> None:
         return np.searchsorted([0.1, 10.0, 100.0], x, side="right") - 1.0
 
     known = Known(stairs, np.zeros_like)
-    piece = curve(known, 1e-6, 1e-2, 1.0, 30.0, 1e6)
-    assert piece.meet(np.array([1.0])).tolist() == [10.0]
-    (left,) = piece.meet(np.array([1.0]), leave=True)
+    branch = branch_of(known, 1e-6, 1e-2, 1.0, 30.0, 1e6)
+    assert branch.meet(np.array([1.0])).tolist() == [10.0]
+    (left,) = branch.meet(np.array([1.0]), leave=True)
     assert left in (100.0, math.nextafter(100.0, 0.0))
-    both = piece.meet(np.array([1.0, 1.0]), leave=np.array([False, True]))
+    both = branch.meet(np.array([1.0, 1.0]), leave=np.array([False, True]))
     assert both.tolist() == [10.0, left]
 
 
 def test_a_level_that_is_never_reached_gives_an_end() -> None:
     known = Known(np.arctan, lambda x: x / (1.0 + x * x))
-    piece = curve(known, 0.5, 2.0)
-    assert piece.meet(np.array([0.1, 1.5])).tolist() == [0.5, 2.0]
+    branch = branch_of(known, 0.5, 2.0)
+    assert branch.meet(np.array([0.1, 1.5])).tolist() == [0.5, 2.0]
     assert known.calls == 0
-    assert piece.holds(np.array([0.1, math.atan(0.5), 1.0, 1.5])).tolist() == [
+    assert branch.holds(np.array([0.1, math.atan(0.5), 1.0, 1.5])).tolist() == [
         False,
         True,
         True,
@@ -473,26 +473,26 @@ def test_newton_meets_the_levels_of_a_table_to_the_last_digits(
             for field, value in CASE.items()
             if field != "mu0"
         }
-        sweep = sweep_over(surrogate, name, **changed)
+        curve = curve_over(surrogate, name, **changed)
         x = np.geomspace(1e-12, 1e12, 49) * CASE[name]
-        piece = Curve(sweep, x, sweep.mu(x))
-        low, high = sorted((float(piece.mu[0]), float(piece.mu[-1])))
+        branch = Branch(curve, x, curve.mu(x))
+        low, high = sorted((float(branch.mu[0]), float(branch.mu[-1])))
         level = low + (high - low) * np.array([0.01, 0.3, 0.5, 0.9])
-        newton = piece.meet(level)
-        off = np.abs(sweep.mu(newton) - level)
+        newton = branch.meet(level)
+        off = np.abs(curve.mu(newton) - level)
         # change of mu_macro for one unit in the last place of the input, where the curve is steep
-        grain = np.abs(sweep.mu(np.nextafter(newton, 1e300)) - sweep.mu(np.nextafter(newton, 0.0)))
+        grain = np.abs(curve.mu(np.nextafter(newton, 1e300)) - curve.mu(np.nextafter(newton, 0.0)))
         assert np.all(off <= 4.0 * 2.0**-52 * level + grain)
 
 
 def test_the_cusp_of_the_static_limit_is_met(surrogate: Surrogate) -> None:
-    sweep = sweep_over(surrogate, "y0", v0=0.0)
+    curve = curve_over(surrogate, "y0", v0=0.0)
     x = np.array([0.0, 1e-9, 1e-3])
-    piece = Curve(sweep, x, sweep.mu(x))
+    branch = Branch(curve, x, curve.mu(x))
     level = np.array([0.2, 1e-3, 1e-6])
     expected = 3e-6 * np.sqrt((1.0 - level / 0.3) * (1.0 + level / 0.3))
-    assert piece.meet(level) == close(expected, rel=4e-16)
-    assert piece.meet(np.array([0.0]))[0] == close(3e-6, rel=4e-16)
+    assert branch.meet(level) == close(expected, rel=4e-16)
+    assert branch.meet(np.array([0.0]))[0] == close(3e-6, rel=4e-16)
 
 
 def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> None:

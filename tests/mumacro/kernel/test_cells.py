@@ -10,7 +10,7 @@ from numpy.polynomial import chebyshev
 
 from mumacro.kernel.binding import Kernel, kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import CHARTS, NAMES, SQRT2, Axis, Chart
+from mumacro.table.atlas import BLOCK_NAMES, CHARTS, SQRT2, Axis, Chart
 from mumacro.table.polynomials import WIDTH, cells_1d, cells_2d, nodes
 from tests.support.cases import Array
 from tests.support.comparing import close
@@ -52,7 +52,7 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
 @pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
 def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
     """In stick_slip_mid the power is what is tabulated, 1 q."""
-    index = NAMES.index("stick_slip_mid")
+    index = BLOCK_NAMES.index("stick_slip_mid")
     rng = np.random.default_rng(8)
     made = Cells((1, 1))
     v, y = made.points(index, rng.random(200), rng.uniform(0.5, 0.99, 200))
@@ -70,7 +70,7 @@ def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
         assert found == close(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize("index", range(len(CHARTS)), ids=NAMES)
+@pytest.mark.parametrize("index", range(len(CHARTS)), ids=BLOCK_NAMES)
 @pytest.mark.parametrize("cells", [(1, 1), (2, 7), (7, 2), (40, 1)])
 def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(
     index: int, cells: tuple[int, int]
@@ -127,7 +127,7 @@ def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
     assert ANGLE.to_file(half) == close(2.0 / math.pi * np.arctan2(2.0 * phi, s0), rel=1e-14)
 
 
-@pytest.mark.parametrize("chart", CHARTS, ids=NAMES)
+@pytest.mark.parametrize("chart", CHARTS, ids=BLOCK_NAMES)
 @pytest.mark.parametrize("cells", [(4, 12), (7, 20)])
 def test_cells_of_a_block_follow_a_smooth_function(chart: Chart, cells: tuple[int, int]) -> None:
     """Along s they have an edge at the knot; those below the lowest s of a block are never

@@ -6,15 +6,15 @@ import pytest
 from mumacro import Surrogate
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES
+from mumacro.table.atlas import BLOCK_NAMES, CHARTS, REGIME_OF_SOURCE, SOURCES
 from tests.support.cases import tables
 from tests.support.comparing import close
 
-C_LOW, CORNER = NAMES.index("continuous_low"), NAMES.index("corner")
+C_LOW, CORNER = BLOCK_NAMES.index("continuous_low"), BLOCK_NAMES.index("corner")
 table = tables(1e-4, 1e-12)
 
 
-@pytest.mark.parametrize("index", range(len(CHARTS)), ids=NAMES)
+@pytest.mark.parametrize("index", range(len(CHARTS)), ids=BLOCK_NAMES)
 def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> None:
     rng = np.random.default_rng(index)
     v, y = 10.0 ** rng.uniform(-8.0, 6.0, 60_000), 10.0 ** rng.uniform(-3.0, 8.0, 60_000)

@@ -79,7 +79,7 @@ def test_over_the_whole_quadrant_and_next_to_the_corner(table: Surrogate, name: 
     same(table, np.concatenate(v), np.concatenate(y), name)
     source = table.quantity(name, np.concatenate(v), np.concatenate(y))[2]
     assert np.unique(source).size >= len(CHARTS) - 1
-    assert np.count_nonzero(source == atlas.NAMES.index("corner")) > 500
+    assert np.count_nonzero(source == atlas.BLOCK_NAMES.index("corner")) > 500
 
 
 def test_on_both_sides_of_every_seam(table: Surrogate) -> None:

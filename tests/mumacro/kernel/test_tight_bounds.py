@@ -20,8 +20,8 @@ from mumacro import Surrogate, solve_for
 from mumacro.analysis.settling import settling
 from mumacro.contacts.quadrature import rules
 from mumacro.table.atlas import (
+    BLOCK_NAMES,
     CONTINUOUS,
-    NAMES,
     QUANTITIES,
     QUANTITY_NAMES,
     REGIME_OF_SOURCE,
@@ -166,7 +166,7 @@ def test_the_worst_error_of_every_block_is_about_half_its_bound(
             worst[SOURCES[code]] = max(
                 worst.get(SOURCES[code], 0.0), float(share[source == code].max())
             )
-    blocks = [worst[where] for where in NAMES if where in worst]
+    blocks = [worst[where] for where in BLOCK_NAMES if where in worst]
     assert min(blocks) > 0.3
     assert max(blocks) > 0.5
     assert name != "power" or worst["tail_fast"] > 0.5

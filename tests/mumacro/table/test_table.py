@@ -17,7 +17,7 @@ import pytest
 from builder.tables.build import STEPS, bits, to_bits, to_step
 from mumacro import InputError, Surrogate, TableError
 from mumacro.table import atlas
-from mumacro.table.atlas import BORDER_PIECES, CHARTS, NAMES
+from mumacro.table.atlas import BLOCK_NAMES, BORDER_PIECES, CHARTS
 from mumacro.table.atomic import BusyError, alone_in, write_whole
 from mumacro.table.blocks import Table
 from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, _digest, read_table, write_table
@@ -26,7 +26,7 @@ from tests.support.cases import Array
 from tests.support.places import ROOT
 
 Edit = Callable[..., object]
-CORNER, BLOCK = NAMES.index("corner"), "border/blocks/corner"
+CORNER, BLOCK = BLOCK_NAMES.index("corner"), "border/blocks/corner"
 PLAIN = ("v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit")
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
 
@@ -54,7 +54,7 @@ def infinite(name: str) -> Edit:
 
 GROUPS = [
     *(f"border/{name}" for name, *_ in BORDER_PIECES),
-    *(f"border/blocks/{name}" for name in NAMES),
+    *(f"border/blocks/{name}" for name in BLOCK_NAMES),
 ]
 OF_BLOCK = ("cells", "errors", "verified_max_abs_error", "verified_max_rel_error")
 #: what is changed in the file, without a new checksum -> why it is refused
@@ -220,7 +220,7 @@ def test_what_this_program_does_not_use_is_refused_if_signed(
         read_table(tmp_path / "foreign.nc")
 
 
-MID = CHARTS[NAMES.index("stick_slip_mid")]
+MID = CHARTS[BLOCK_NAMES.index("stick_slip_mid")]
 #: a chart of another release -> what this one says of its table
 ATLASES = {
     "moved seam": (
@@ -260,7 +260,7 @@ def test_another_atlas_is_refused(
     )
     with monkeypatch.context() as other:
         other.setattr(atlas, "CHARTS", (*CHARTS[:index], new, *CHARTS[index + 1 :]))
-        other.setattr(atlas, "NAMES", tuple(chart.name for chart in atlas.CHARTS))
+        other.setattr(atlas, "BLOCK_NAMES", tuple(chart.name for chart in atlas.CHARTS))
         if change == "another border":
             wider = replace(axis, high=2.0 * axis.high)
             sound.border[2].nodes = nodes(sound.border[2].nodes.size, wider.low, wider.high)

@@ -1,4 +1,4 @@
-"""A sweep: mu_macro as a function of one input, the other five constant."""
+"""mu_macro as a curve over one input, the other five constant."""
 
 import math
 from collections.abc import Mapping
@@ -14,10 +14,10 @@ from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
-_CHORD, _HALVINGS = 1e-3, 8  # of a refined sweep: error of a straight line over the height, rounds
+_CHORD, _HALVINGS = 1e-3, 8  # of a refined curve: error of a straight line over the height, rounds
 
 
-class Sweep:
+class InputCurve:
     """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
     ``k`` is rigid.
 
@@ -71,23 +71,28 @@ class Sweep:
         for _ in range(_HALVINGS):
             low, high = values[:-1], values[1:]
             middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
-            inside = self.mu(middle)
-            bent = np.abs(inside - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
-            at = np.flatnonzero(bent & (middle > low) & (middle < high))
-            if not at.size:
+            middle_mu = self.mu(middle)
+            bent = np.abs(middle_mu - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
+            indices = np.flatnonzero(bent & (middle > low) & (middle < high))
+            if not indices.size:
                 break
-            values, mu = np.insert(values, at + 1, middle[at]), np.insert(mu, at + 1, inside[at])
+            values, mu = (
+                np.insert(values, indices + 1, middle[indices]),
+                np.insert(mu, indices + 1, middle_mu[indices]),
+            )
         return values
 
-    def where(self, place: float) -> float:
-        """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``place``, within double range; of
-        a rigid contact any."""
-        one = self.answer(1.0 if self.stiffening is None else self.stiffening.load)
-        at_one = float(one.v_tilde / one.y_tilde if self.kind.normal else one.y_tilde)
-        scale = 1.0 if self.case.get("k") == math.inf else min(max(at_one, 1e-300), 1e300)
+    def where(self, group: float) -> float:
+        """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``group``, within double range;
+        any value for a rigid contact."""
+        reference = self.answer(1.0 if self.stiffening is None else self.stiffening.load)
+        reference_group = float(
+            reference.v_tilde / reference.y_tilde if self.kind.normal else reference.y_tilde
+        )
+        scale = 1.0 if self.case.get("k") == math.inf else min(max(reference_group, 1e-300), 1e300)
         if self.stiffening is not None:
-            return self.stiffening.place(place / scale)
-        return place / scale if self.unknown == "k" else scale / place
+            return self.stiffening.place(group / scale)
+        return group / scale if self.unknown == "k" else scale / group
 
     @property
     def proportional(self) -> bool:
