@@ -97,11 +97,11 @@ async def small_body(request: Request) -> bytes:
         form_of(headers, {JSON: JSON})
     limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
     body = bytes(await read_body(headers, request.receive, limit))
-    if query := request.scope["query_string"]:
+    if pairs := _pairs(request.scope["query_string"]):
         refuse(
             [
                 FieldFault((name,), "belongs in the body", value, parameter=True)
-                for name, value in _pairs(query)[:100]
+                for name, value in pairs[:100]
             ]
         )
     return body
