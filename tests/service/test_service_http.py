@@ -7,8 +7,11 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from fastapi import APIRouter, Depends, Request
 
 from mumacro.inputs.fields import FIELDS, SI
+from service.models.options import CaseRequest
+from service.reading import DirectRoute
 from tests.support.cases import Case
 from tests.support.places import ROOT
 
@@ -97,9 +100,7 @@ def test_an_unexpected_error_is_logged_and_not_shown(
         (RuntimeError, 500, "unexpected", None),
         (MemoryError, 503, "out-of-memory", "1"),
     ):
-        monkeypatch.setattr(
-            "mumacro.Surrogate.evaluate_case", Mock(side_effect=error("secret detail"))
-        )
+        monkeypatch.setattr("mumacro.Surrogate.evaluate", Mock(side_effect=error("secret detail")))
         for response in (
             client.post("/v1/mu-macro", json=case),
             client.get("/v1/mu-macro", params=case),
@@ -158,6 +159,23 @@ def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed: Any, pro
             problem(response, 401)
             assert "s3cret" not in response.text
             assert response.headers["www-authenticate"] == "Bearer"
+
+
+def test_a_route_that_nobody_thought_of_needs_the_key(started: Any) -> None:
+    client = started(api_key=KEY["X-API-Key"])
+    client.app.add_api_route("/new", lambda: "open")
+    with client:
+        assert client.get("/new").status_code == 401
+        assert client.get("/new", headers=KEY).json() == "open"
+
+
+def test_a_direct_route_refuses_a_dependency_that_it_would_not_solve() -> None:
+    router = APIRouter(route_class=DirectRoute)
+
+    async def answer(request: Request, case: CaseRequest) -> None: ...
+
+    with pytest.raises(TypeError, match="does not solve"):
+        router.post("/x", dependencies=[Depends(lambda: None)])(answer)
 
 
 @pytest.mark.parametrize("headers", [KEY, {"Authorization": "bearer s3cret-key"}])
