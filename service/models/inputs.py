@@ -30,7 +30,8 @@ from mumacro.kernel.arrays import Array
 INPUTS = (
     "mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude", "k_low", "k_high", "k_range",
 )  # fmt: skip
-EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+#: the first case of the documentation: mu_macro = 0.2405
+EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
 MAX_REASONS = 1000  # bad cases of a batch that are listed
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
@@ -75,8 +76,8 @@ _K = (
     "interval"
 )
 _Y0 = (
-    "Amplitude of the oscillation [m], across or along the sliding direction; required, unless the "
-    "direction is normal"
+    "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding direction; "
+    "required, unless the direction is normal"
 )
 _AMPLITUDE = "Amplitude of the normal force [N], below Fz: for direction normal in place of y0"
 Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
@@ -92,10 +93,11 @@ class OneCase(Strict):
     k: Stiffness = either(_K, examples=[1e6])
     y0: NotNegative | None = optional(_Y0, examples=[2e-6])
     omega: NotNegative | None = optional(
-        "Angular frequency of the oscillation [rad/s]; omega or f is required",
-        examples=[1.3e5],
+        "Angular frequency of the oscillation [rad/s]; omega or f is required"
     )
-    f: Hertz | None = optional("Frequency of the oscillation [Hz], in place of omega")
+    f: Hertz | None = optional(
+        "Frequency of the oscillation [Hz], in place of omega", examples=[20e3]
+    )
     v0: NotNegative = Field(description="Sliding velocity [m/s]", examples=[0.01])
     Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
     k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
@@ -126,10 +128,11 @@ class OtherInputs(Strict):
     k: Stiffness | None = optional(_K, examples=[1e6])
     y0: NotNegative | None = optional(_Y0, examples=[2e-6])
     omega: NotNegative | None = optional(
-        "Angular frequency of the oscillation [rad/s]; omega or f is required",
-        examples=[1.3e5],
+        "Angular frequency of the oscillation [rad/s]; omega or f is required"
     )
-    f: Hertz | None = optional("Frequency of the oscillation [Hz], in place of omega")
+    f: Hertz | None = optional(
+        "Frequency of the oscillation [Hz], in place of omega", examples=[20e3]
+    )
     v0: NotNegative | None = optional("Sliding velocity [m/s]")
     Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
     k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
@@ -236,7 +239,9 @@ class InputColumns(Strict):
     k: StiffnessColumn = Field(
         None, description='Tangential stiffness [N/m], or "rigid"; or k_low and k_high'
     )
-    y0: NotNegativeColumn = Field(None, description="Amplitude of the oscillation [m]")
+    y0: NotNegativeColumn = Field(
+        None, description="Amplitude of the oscillation [m], half of peak to peak"
+    )
     omega: NotNegativeColumn = Field(None, description="Angular frequency [rad/s]; or f")
     f: HertzColumn = Field(None, description="Frequency [Hz], in place of omega")
     v0: NotNegativeColumn = Field(description="Sliding velocity [m/s]")

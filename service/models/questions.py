@@ -214,10 +214,10 @@ class FitRequest(Choice):
             "examples": [
                 {
                     "v0": [0.001, 0.003, 0.01, 0.03, 0.1, 0.3],
-                    "mu_macro": [0.225, 0.228, 0.24, 0.265, 0.291, 0.298],
+                    "mu_macro": [0.226, 0.23, 0.24, 0.26, 0.273, 0.282],
                     "Fz": 10.0,
                     "y0": 2e-6,
-                    "omega": 1.3e5,
+                    "f": 20e3,
                 }
             ]
         }
@@ -234,7 +234,9 @@ class FitRequest(Choice):
     k: StiffnessPoints | None = optional(
         'Tangential stiffness, unless it is fitted [N/m], or "rigid"'
     )
-    y0: NotNegativePoints | None = optional("Amplitude of the oscillation [m]")
+    y0: NotNegativePoints | None = optional(
+        "Amplitude of the oscillation [m], half of peak to peak"
+    )
     omega: NotNegativePoints | None = optional("Angular frequency [rad/s]; or f")
     f: NotNegativePoints | None = optional("Frequency [Hz], in place of omega")
     Fz_amplitude: NotNegativePoints | None = optional(
