@@ -29,12 +29,15 @@ from .models.inputs import Case
 from .models.options import CaseColumns, CaseRequest
 from .observe import Observe
 from .problems import HANDLERS, Failures
-from .routers import batch, case, contact, health, page, questions, table
+from .routers import batch, case, contact, health, motion, page, questions, table
 from .security import HEALTH_PATHS, SCHEMES, Heads, Keys
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 
-ROUTERS = (case.router, batch.router, questions.router, contact.router, table.router, health.router)
+ROUTERS = (
+    case.router, batch.router, questions.router, motion.router, contact.router, table.router,
+    health.router,
+)  # fmt: skip
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and "
     "oscillates across or along the sliding direction, or its normal force does; the contact is "
@@ -45,7 +48,8 @@ _TAGS = [
     {
         "name": "answers",
         "description": "The friction of one case and of many; questions about a "
-        "range of one input; what a contact is, from materials or from measured points",
+        "range of one input; any periodic motion; what a contact is, from materials or from "
+        "measured points",
     },
     {"name": "table", "description": "The verified table that the answers come from"},
     {"name": "health", "description": "For those who run the service: probes and counters"},

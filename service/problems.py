@@ -24,6 +24,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from mumacro.analysis.motion import PARTS
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs.fields import BOUNDS, LIKE, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
@@ -35,6 +36,8 @@ MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()
 CLOSE = {"Connection": "close"}
+# the members of an object within a body; of std the inputs
+_WITHIN = dict.fromkeys(PARTS, ("harmonic", "amplitude", "phase"))
 # how long, and how many bytes of a refused body are read
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
 _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
@@ -126,7 +129,8 @@ def faults_of(
             value = _NO_VALUE
         names = [str(step) for step in path if isinstance(step, str)]
         name = names[-1] if names else "body"
-        reason = _reason(error, name, known if len(names) == 1 else INPUTS)
+        allowed = _WITHIN.get(names[0], INPUTS) if len(names) > 1 else known
+        reason = _reason(error, name, allowed)
         faults.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(faults.values())
 
@@ -155,9 +159,11 @@ def _reason(error: Any, name: str, known: Iterable[str]) -> str:
         return number_hint(name.removeprefix("std_"), value)
     if kind in _OUT_OF_BOUNDS and name in BOUNDS and len(error["loc"]) == 1:
         return refusal(name, math.inf if abs(value) > _LARGE else float(value))
-    if kind in _OUT_OF_BOUNDS and "le" not in error.get("ctx", {}):
-        least = "> 0" if "gt" in error.get("ctx", {}) else ">= 0"
-        return "must be finite" if kind == "finite_number" else f"must be finite and {least}"
+    if kind == "finite_number":
+        return "must be finite"
+    if kind in _LEAST:
+        sign, bound = _LEAST[kind]
+        return f"must be finite and {sign} {error['ctx'][bound]:g}"
     if kind == "literal_error":
         return f"must be one of {error['ctx']['expected'].replace(' or ', ', ')}".replace("'", "")
     if kind in ("model_type", "model_attributes_type"):
@@ -172,6 +178,7 @@ def _reason(error: Any, name: str, known: Iterable[str]) -> str:
 
 
 _OUT_OF_BOUNDS = ("finite_number", "greater_than", "greater_than_equal", "less_than_equal")
+_LEAST = {"greater_than": (">", "gt"), "greater_than_equal": (">=", "ge")}
 _LARGE = 1e308
 
 

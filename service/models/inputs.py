@@ -76,8 +76,8 @@ _K = (
     "interval"
 )
 _Y0 = (
-    "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding direction; "
-    "required, unless the direction is normal"
+    "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding "
+    "direction; required, unless the direction is normal"
 )
 _AMPLITUDE = "Amplitude of the normal force [N], below Fz: for direction normal in place of y0"
 Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]

@@ -1,5 +1,5 @@
 """A contact: ``POST /v1/stiffness``, from materials and geometry; ``POST /v1/fit``, from measured
-points.  ``POST /v1/motion``, any periodic motion, has its place in a router beside this one."""
+points."""
 
 import math
 import warnings

@@ -26,7 +26,15 @@ FILES = {
 }
 PATHS = {
     **dict.fromkeys(
-        ("/v1/mu-macro/batch", "/v1/solve-for", "/v1/law", "/v1/stiffness", "/v1/fit"), "POST"
+        (
+            "/v1/mu-macro/batch",
+            "/v1/solve-for",
+            "/v1/law",
+            "/v1/motion",
+            "/v1/stiffness",
+            "/v1/fit",
+        ),
+        "POST",
     ),
     **dict.fromkeys(
         (

@@ -552,3 +552,21 @@ def test_values_are_counted_before_they_are_made(few: Any, problem: Any) -> None
         problem(few.post(BATCH, content=body), 413)
     members = ",".join(f'"a{i}":1' for i in range(200))
     assert "more members" in problem(few.post(BATCH, content=f"{{{members}}}"), 422)["detail"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "bound"),
+    [
+        ("/v1/law", {"start": 1e-4, "stop": 1.0, "points": 1}, ">= 2"),
+        (
+            "/v1/stiffness",
+            {"geometry": "ball", "radius": 5e-3, "Fz": 1.0, "E": 2e11, "nu": -1},
+            "> -1",
+        ),
+    ],
+)
+def test_a_number_below_its_bound_is_refused_with_this_bound(
+    client: Any, path: str, body: Any, bound: str
+) -> None:
+    (fault,) = client.post(path, json=body).json()["errors"]
+    assert fault["reason"].endswith(bound)
