@@ -101,8 +101,8 @@ def in_words(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> 
     >>> in_words({"mu0": 0.3, "Fz": 10.0, "k": 1e6}, {"contact": "ball", "direction": "along"})
     '$\\\\mu_0$ = 0.3, $F_z$ = 10 N, $k$ = 1 N/µm; ball, along'
     """
-    told = ", ".join(_quantity(name, value) for name, value in case.items())
-    return "; ".join(part for part in (told, ", ".join((kind or {}).values())) if part)
+    inputs = ", ".join(_quantity(name, value) for name, value in case.items())
+    return "; ".join(part for part in (inputs, ", ".join((kind or {}).values())) if part)
 
 
 def _quantity(name: str, value: Any) -> str:
