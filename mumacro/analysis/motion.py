@@ -153,8 +153,10 @@ class Motion:
     def plot(self, axes: Any = None, *, index: int | None = None) -> Any:
         """Forces over a period and the path of the upper point, see
         ``mumacro.plotting.plot_cycle``; needs matplotlib."""
-        mu0 = float(self.scenes.columns["mu0"][self._place(index)])
-        return plotting.plot_cycle(*self.cycle(index), mu0, axes)
+        i = self._place(index)
+        case = {name: float(column[i]) for name, column in self.scenes.columns.items()}
+        title = plotting.in_words(case, {"contact": self.scenes.contact})
+        return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, axes)
 
     def _place(self, index: int | None) -> int:
         n = np.size(self.mu_macro)
