@@ -14,9 +14,11 @@
  * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of the last two over
  * all marks, which cannot cancel.  A ball is many independent springs, see element.c. */
 
-enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
+enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force: sticks too short to be found */
+#define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
+#define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
 
@@ -27,6 +29,10 @@ typedef struct {
     const double *orders, *terms;
     double drag, scale, acceleration; /* the last is a bound */
     int marks, nodes; /* parts of a period whose sums are kept; steps at least */
+    /* where no order is above MU_MOTION_ORDERS, else 0: the highest, and of each what sin and cos in x, y and the normal
+     * force are multiplied by */
+    int highest;
+    double parts[MU_MOTION_ORDERS][6];
 } mu_shaken;
 
 /* The motion at tau: way, velocity, limit and its slope. */
@@ -45,18 +51,19 @@ typedef struct {
     mu_moment at;
     double f[2];
     int slips;
-    double step, began; /* what the next slip may take; of the last stick */
+    double step, began, slid; /* what the next slip may take; beginning of the last stick; slip since a stick was counted */
     double mean[MU_MEANS], marked[2 * MU_MARKS];
     /* of a small disturbance: the direction that survives first, the last one, what is left as a logarithm, as a factor */
     double first[2], last[2], decay, turned;
-    int slipped, failed;
+    int slipped, failed, sticks;
     mu_grid *steps; /* ends of all its steps */
 } mu_march;
 
 /* A steady cycle: means per period; decay of a disturbance per period as its logarithm; distance to the cycle; the
- * estimate of the error of the mean force. */
+ * estimate of the error of the mean force; how many sticks it has, but for brief ones. */
 typedef struct {
     double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error;
+    int sticks;
 } mu_steady;
 
 /* One cycle at equal times, to be drawn: each spring adds its forces with a weight. */
@@ -92,6 +99,26 @@ static mu_moment mu_moment_at(const mu_shaken *m, double tau) {
     const double *order = m->orders, *term = m->terms;
     mu_moment at = {tau, m->drag * tau, 0.0, m->drag, 0.0, 1.0, 0.0};
     double sine, cosine;
+    if (m->highest) { /* sin and cos of n tau from those of (n - 1) tau */
+        double s = 0.0, c = 1.0;
+        mu_sine_cosine(tau, &sine, &cosine);
+        for (int i = 0; i < m->highest; ++i) {
+            const double *part = m->parts[i], n = i + 1.0, next = s * cosine + c * sine;
+            c = c * cosine - s * sine;
+            s = next;
+            at.x += part[0] * s + part[1] * c;
+            at.wx += n * (part[0] * c - part[1] * s);
+            at.y += part[2] * s + part[3] * c;
+            at.wy += n * (part[2] * c - part[3] * s);
+            at.limit += part[4] * s + part[5] * c;
+            at.slope += n * (part[4] * c - part[5] * s);
+        }
+        at.x *= m->scale;
+        at.y *= m->scale;
+        at.wx *= m->scale;
+        at.wy *= m->scale;
+        return at;
+    }
     for (int i = 0; i < m->counts[0]; ++i, ++order, term += 2) {
         mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
         at.x += term[0] * sine;
@@ -181,7 +208,7 @@ static int mu_slip_step(const mu_shaken *m, const mu_moment *start, double ex, d
         b[i] = length * (at.wy * ex - at.wx * ey) / at.limit;
         u[i] = 0.0;
     }
-    for (int count = 0; change > 1e-10; ++count) {
+    for (int count = 0; change > MU_MOTION_NEWTON; ++count) {
         double rest[3], j[3], c[3][3], d[3], minor[3], determinant;
         if (count == 9) return 0;
         for (int i = 0; i < 3; ++i) {
@@ -493,6 +520,7 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
         mu_draw(drawing, at.limit * nx, at.limit * ny);
     }
     mu_direction(&slip, slip.u[2], &nx, &ny);
+    march->slid += slip.length;
     march->at = slip.stage[2];
     march->f[0] = march->at.limit * nx;
     march->f[1] = march->at.limit * ny;
@@ -543,6 +571,10 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
     *fresh = *fresh && share == 1.0 && stick.length < MU_MOTION_SHORT;
     if (share < 1.0) {
         *ends = march->at.tau - march->began > MU_MOTION_SHORT; /* slip that rounding ends goes on for a step */
+        if (march->at.tau - march->began > MU_MOTION_BRIEF && march->slid > MU_MOTION_BRIEF) {
+            ++march->sticks;
+            march->slid = 0.0;
+        }
         mu_begin_slip(march);
     }
 }
@@ -559,6 +591,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     march->step = step > 0.0 ? step : 0.1 * sqrt(sqrt(tolerance));
     march->turned = 1.0;
     march->began = -1.0;
+    march->slid = 1.0;
     march->steps = steps;
     steps->n = 0;
     march->at = mu_moment_at(m, 0.0);
@@ -621,7 +654,7 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
 }
 
 static mu_steady mu_steady_of(const mu_march *march, double distance) {
-    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0};
+    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
     if (march->slipped) out.decay = march->turned != 0.0 ? march->decay - mu_log1(mu_min(fabs(march->turned), 1.0)) : HUGE_VAL;
@@ -716,8 +749,9 @@ static int mu_halve(const mu_grid *steps, mu_grid *grid) {
     return 1;
 }
 
-/* The steady cycle of a spring: steps are halved until the estimate is below the tolerance. */
-static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps, double *f) {
+/* The steady cycle of a spring: steps are halved until the estimate is below the tolerance, or this many times. */
+static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int levels, mu_grid *grid, mu_grid *steps,
+                                  double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
     double of_step = mu_cube_root_near(mu_min(0.3 * tolerance, 1e-3));
     mu_steady last, out;
@@ -728,7 +762,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, mu_grid 
         mu_keep_below(limit, f);
         out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.01 * tolerance, f);
         out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
-        if (out.error <= tolerance || level == MU_MOTION_LEVELS || !mu_halve(steps, grid)) return out;
+        if (out.error <= tolerance || level == levels || !mu_halve(steps, grid)) return out;
         last = out;
         of_step *= 0.06;
     }
@@ -753,11 +787,14 @@ static double mu_kronrod(int i, double *weight) {
     return i < 7 ? -point[0] : point[0];
 }
 
-/* Springs of a ball from t = low to high: the error of their sum, and their values at both ends by the polynomial through
- * the points. */
+/* Springs of a ball from t = low to high, which may be kinks: the error of their sum, and their values at both ends by the
+ * polynomial through the points. */
 typedef struct {
     double low, high, error, start[2], end[2];
     double mean[MU_MEANS], decay, of_springs;
+    int kinks[2];
+    double at[15];
+    int sticks[15];
 } mu_panel;
 
 /* How rough two functions are at the points of the rule: the size of their four highest coefficients by polynomials that
@@ -798,22 +835,6 @@ static double mu_roughness(double values[15][2], double *start, double *end) {
     return sqrt(square);
 }
 
-/* The error of panel i: its own, and that of a kink between its end and its first point, which shows in the neighbour's
- * other value there. */
-static double mu_panel_error(const mu_panel *panels, int n, int i) {
-    const mu_panel *one = &panels[i];
-    const double gap = 0.5 * (1.0 - MU_KRONROD[7][0]) * (one->high - one->low);
-    double error = one->error;
-    for (int j = 0; j < n; ++j) {
-        const mu_panel *other = &panels[j];
-        if (other->low == one->high)
-            error += gap * mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
-        if (other->high == one->low)
-            error += gap * mu_length(one->start[0] - other->end[0], one->start[1] - other->end[1]);
-    }
-    return error;
-}
-
 /* The motion of a spring with this share of the limit. */
 static mu_shaken mu_of_spring(const mu_shaken *m, double share) {
     mu_shaken out = *m;
@@ -822,32 +843,129 @@ static mu_shaken mu_of_spring(const mu_shaken *m, double share) {
     return out;
 }
 
-/* The springs of a ball from t = low to high: xi = 1 - t^2, so that they lie dense at the rim, where little load may
- * behave otherwise than all the rest. */
-static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, double tolerance, mu_grid *grid, mu_grid *steps,
+/* The springs of a ball at t: xi = 1 - t^2, so that they lie dense at the rim, where little load may behave otherwise
+ * than all the rest.  What a spring adds per t is multiplied by 2 t. */
+static double mu_share_at(double t) { return 1.5 * t * t * (2.0 - t * t); }
+
+static mu_steady mu_spring_at(const mu_shaken *m, double t, double tolerance, int levels, mu_grid *grid, mu_grid *steps,
                               double *f) {
+    const double share = mu_share_at(t);
+    const mu_shaken one = mu_of_spring(m, share);
+    return mu_spring_motion(&one, tolerance / share, levels, grid, steps, f);
+}
+
+/* Where between low and high, with different numbers of slips, the cycle changes its kind. */
+static double mu_kink(const mu_shaken *m, double low, double high, int sticks, double tolerance, mu_grid *grid,
+                      mu_grid *steps, double *f) {
+    const double close = 0.1 * sqrt(tolerance);
+    while (high - low > close) {
+        const double t = 0.5 * (low + high);
+        if (mu_spring_at(m, t, tolerance, 0, grid, steps, f).sticks == sticks) {
+            low = t;
+        } else {
+            high = t;
+        }
+    }
+    return 0.5 * (low + high);
+}
+
+/* t at the share u of a panel, and its slope: at a kink, where springs change as (t - kink)^(3/2), it changes as the
+ * square. */
+static double mu_place_in(const mu_panel *panel, double u, double *slope) {
+    const double width = panel->high - panel->low, rest = 1.0 - u;
+    double share = u;
+    *slope = width;
+    if (panel->kinks[0] && panel->kinks[1]) {
+        share = u * u * (3.0 - 2.0 * u);
+        *slope = 6.0 * u * rest * width;
+    } else if (panel->kinks[0]) {
+        share = u * u;
+        *slope = 2.0 * u * width;
+    } else if (panel->kinks[1]) {
+        share = 1.0 - rest * rest;
+        *slope = 2.0 * rest * width;
+    }
+    return panel->low + share * width;
+}
+
+static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int kink_low, int kink_high, double tolerance,
+                              mu_grid *grid, mu_grid *steps, double *f) {
     mu_panel out;
-    const double half = 0.5 * (high - low), middle = 0.5 * (high + low);
-    double values[15][2];
+    double values[15][2], sums[15][2], ends[2];
     memset(&out, 0, sizeof out);
     out.low = low;
     out.high = high;
+    out.kinks[0] = kink_low;
+    out.kinks[1] = kink_high;
     out.decay = HUGE_VAL;
     for (int i = 0; i < 15; ++i) {
-        double weight;
-        const double t = middle + half * mu_kronrod(i, &weight), share = 1.5 * t * t * (2.0 - t * t);
-        const mu_shaken one = mu_of_spring(m, share);
-        const mu_steady spring = mu_spring_motion(&one, tolerance / share, grid, steps, f);
+        double weight, slope;
+        const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope), share = mu_share_at(t);
+        const mu_steady spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
+        out.at[i] = t;
+        out.sticks[i] = spring.sticks;
         for (int j = 0; j < MU_MEANS; ++j) {
             /* forces and works are in units of its limit, paths in those of its l0 */
             const double unit = 2.0 * t * (j == MU_MEAN_WORK ? share * share : share);
-            out.mean[j] += half * weight * unit * spring.mean[j];
-            if (j <= MU_MEAN_Y) values[i][j] = unit * spring.mean[j];
+            out.mean[j] += 0.5 * weight * slope * unit * spring.mean[j];
+            if (j <= MU_MEAN_Y) {
+                values[i][j] = unit * spring.mean[j];
+                sums[i][j] = slope * values[i][j];
+            }
         }
-        out.of_springs += half * weight * 2.0 * t * share * spring.error;
+        out.of_springs += 0.5 * weight * slope * 2.0 * t * share * spring.error;
         out.decay = mu_min(out.decay, spring.decay);
     }
-    out.error = 3.0 * half * mu_roughness(values, out.start, out.end);
+    (void)mu_roughness(values, out.start, out.end);
+    out.error = 1.5 * mu_roughness(sums, ends, ends);
+    return out;
+}
+
+/* The error of panel i: its own, and that of a kink between its end and its first point, which shows in the neighbour's
+ * other value there. */
+static double mu_panel_error(const mu_panel *panels, int n, int i) {
+    const mu_panel *one = &panels[i];
+    double error = one->error;
+    for (int j = 0; j < n; ++j) {
+        const mu_panel *other = &panels[j];
+        if (other->low == one->high)
+            error += (one->high - one->at[14]) * mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
+        if (other->high == one->low)
+            error += (one->at[0] - one->low) * mu_length(one->start[0] - other->end[0], one->start[1] - other->end[1]);
+    }
+    return error;
+}
+
+/* Panels of a ball before any is divided: from one kink to the next. */
+static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps, double *f, mu_panel *panels) {
+    double edges[MU_MOTION_SCAN + 2] = {0.0}, before = 0.0;
+    int n = 0, last = -1;
+    for (int i = 0; i < MU_MOTION_SCAN; ++i) {
+        const double t = (i + 1.0) / MU_MOTION_SCAN;
+        const int now = mu_spring_at(m, t, tolerance, 0, grid, steps, f).sticks;
+        if (i > 0 && now != last) edges[++n] = mu_kink(m, before, t, last, tolerance, grid, steps, f);
+        last = now;
+        before = t;
+    }
+    if (n == 0) {
+        panels[0] = mu_ball_panel(m, 0.0, 0.5, 0, 0, tolerance, grid, steps, f);
+        panels[1] = mu_ball_panel(m, 0.5, 1.0, 0, 0, tolerance, grid, steps, f);
+        return 2;
+    }
+    edges[n + 1] = 1.0;
+    for (int i = 0; i <= n; ++i) panels[i] = mu_ball_panel(m, edges[i], edges[i + 1], i > 0, i < n, tolerance, grid, steps, f);
+    return n + 1;
+}
+
+/* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the middle. */
+static double mu_division(const mu_shaken *m, const mu_panel *panel, double tolerance, mu_grid *grid, mu_grid *steps,
+                          double *f, int *kink) {
+    int best = -1;
+    double out = 0.5 * (panel->low + panel->high);
+    for (int i = 0; i < 14; ++i)
+        if (panel->sticks[i] != panel->sticks[i + 1] && (best < 0 || abs(2 * i - 13) < abs(2 * best - 13))) best = i;
+    *kink = best >= 0;
+    if (*kink) out = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best], tolerance, grid, steps, f);
     return out;
 }
 
@@ -855,12 +973,11 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, doubl
 static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps) {
     mu_panel panels[MU_MOTION_PANELS];
     double f[2] = {m->drag > 0.0 ? 1.0 : 0.0, 0.0}, error = 0.0;
+    const double half = 0.5 * tolerance;
     mu_steady out;
-    int n = 2;
+    int n = mu_first_panels(m, half, grid, steps, f, panels);
     memset(&out, 0, sizeof out);
     out.decay = HUGE_VAL;
-    panels[0] = mu_ball_panel(m, 0.0, 0.5, 0.5 * tolerance, grid, steps, f);
-    panels[1] = mu_ball_panel(m, 0.5, 1.0, 0.5 * tolerance, grid, steps, f);
     for (;; ++n) {
         double most = -1.0;
         int worst = 0;
@@ -873,11 +990,13 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
                 worst = i;
             }
         }
-        if (error <= 0.5 * tolerance || n == MU_MOTION_PANELS) break;
+        if (error <= half || n == MU_MOTION_PANELS) break;
         {
-            const double low = panels[worst].low, high = panels[worst].high, middle = 0.5 * (low + high);
-            panels[worst] = mu_ball_panel(m, low, middle, 0.5 * tolerance, grid, steps, f);
-            panels[n] = mu_ball_panel(m, middle, high, 0.5 * tolerance, grid, steps, f);
+            const mu_panel whole = panels[worst];
+            int kink;
+            const double middle = mu_division(m, &whole, half, grid, steps, f, &kink);
+            panels[worst] = mu_ball_panel(m, whole.low, middle, whole.kinks[0], kink, half, grid, steps, f);
+            panels[n] = mu_ball_panel(m, middle, whole.high, kink, whole.kinks[1], half, grid, steps, f);
         }
     }
     for (int i = 0; i < n; ++i) {
@@ -890,11 +1009,20 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
 }
 
 static mu_shaken mu_shaken_as(const int32_t *counts, const double *orders, const double *one) {
-    mu_shaken m = {counts, orders, one + 1, one[0], 1.0, 0.0, 16, 16};
+    mu_shaken m = {counts, orders, one + 1, one[0], 1.0, 0.0, 16, 16, 0, {{0.0}}};
     double largest = 1.0;
     for (int i = 0; i < counts[0] + counts[1] + counts[2]; ++i) {
         if (i < counts[0] + counts[1]) m.acceleration += orders[i] * orders[i] * fabs(m.terms[2 * i]);
         largest = mu_max(largest, orders[i]);
+    }
+    if (largest <= MU_MOTION_ORDERS) {
+        m.highest = (int)largest;
+        for (int i = 0; i < counts[0] + counts[1] + counts[2]; ++i) {
+            double *part = m.parts[(int)orders[i] - 1] + (i < counts[0] ? 0 : i < counts[0] + counts[1] ? 2 : 4), sine, cosine;
+            mu_sine_cosine(m.terms[2 * i + 1], &sine, &cosine);
+            part[0] += m.terms[2 * i] * cosine;
+            part[1] += m.terms[2 * i] * sine;
+        }
     }
     m.marks = 16 * (int)mu_min(largest, MU_MARKS / 16);
     m.nodes = m.marks * (((int)largest + MU_MARKS / 16 - 1) / (MU_MARKS / 16));
@@ -909,7 +1037,7 @@ static void mu_motions(int contact, int64_t n, const int32_t *counts, const doub
     for (int64_t i = 0; i < n; ++i, cases += numbers, out += MU_MEANS + 2) {
         const mu_shaken m = mu_shaken_as(counts, orders, cases);
         double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
-        const mu_steady found = contact == MU_BALL ? mu_ball_motion(&m, tolerance, &grid, &steps) : mu_spring_motion(&m, tolerance, &grid, &steps, f);
+        const mu_steady found = contact == MU_BALL ? mu_ball_motion(&m, tolerance, &grid, &steps) : mu_spring_motion(&m, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
         memcpy(out, found.mean, sizeof found.mean);
         out[MU_MEANS] = found.decay;
         out[MU_MEANS + 1] = found.error;
@@ -930,7 +1058,7 @@ static void mu_motion_cycle(const int32_t *counts, const double *orders, const d
         mu_march march;
         march.step = 0.0;
         march.steps = &steps;
-        (void)mu_spring_motion(&spring, tolerance, &grid, &steps, f);
+        (void)mu_spring_motion(&spring, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
         mu_take_period(&spring, &grid, f, tolerance, &march, &drawing);
     }
 }
