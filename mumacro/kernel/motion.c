@@ -753,14 +753,14 @@ static int mu_halve(const mu_grid *steps, mu_grid *grid) {
 static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int levels, mu_grid *grid, mu_grid *steps,
                                   double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
-    double of_step = mu_cube_root_near(mu_min(0.3 * tolerance, 1e-3));
+    double of_step = mu_cube_root_near(mu_min(0.1 * tolerance, 1e-3));
     mu_steady last, out;
     of_step *= of_step;
     grid->n = mu_min(m->nodes, (double)grid->room);
     for (int i = 0; i < grid->n; ++i) grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
     for (int level = 0;; ++level) {
         mu_keep_below(limit, f);
-        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.01 * tolerance, f);
+        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.1 * tolerance, f);
         out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
         if (out.error <= tolerance || level == levels || !mu_halve(steps, grid)) return out;
         last = out;
@@ -888,20 +888,53 @@ static double mu_place_in(const mu_panel *panel, double u, double *slope) {
     return panel->low + share * width;
 }
 
+/* The start of the cycle at u, by the parabola through the nearest three of n points (u, f); as it is, where there are
+ * less. */
+static void mu_predict(double points[15][3], double *f, int n, double u) {
+    int near[3] = {-1, -1, -1};
+    if (n < 3) return;
+    for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < n; ++i)
+            if (i != near[0] && i != near[1] && (near[j] < 0 || fabs(points[i][0] - u) < fabs(points[near[j]][0] - u))) near[j] = i;
+    f[0] = f[1] = 0.0;
+    if (fabs(points[near[0]][0] - u) > fabs(points[near[1]][0] - points[near[0]][0])) { /* beyond them */
+        f[0] = points[near[0]][1];
+        f[1] = points[near[0]][2];
+        return;
+    }
+    for (int j = 0; j < 3; ++j) {
+        const double *one = points[near[j]], *second = points[near[(j + 1) % 3]], *third = points[near[(j + 2) % 3]];
+        const double share = (u - second[0]) * (u - third[0]) / ((one[0] - second[0]) * (one[0] - third[0]));
+        f[0] += share * one[1];
+        f[1] += share * one[2];
+    }
+}
+
 static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int kink_low, int kink_high, double tolerance,
                               mu_grid *grid, mu_grid *steps, double *f) {
     mu_panel out;
-    double values[15][2], sums[15][2], ends[2];
+    double values[15][2], sums[15][2], ends[2], at[15][3];
     memset(&out, 0, sizeof out);
     out.low = low;
     out.high = high;
     out.kinks[0] = kink_low;
     out.kinks[1] = kink_high;
     out.decay = HUGE_VAL;
-    for (int i = 0; i < 15; ++i) {
+    for (int k = 0; k < 15; ++k) { /* every other point first, so that the rest lie between known ones */
+        const int i = k < 7 ? 2 * k + 1 : 2 * (k - 7);
         double weight, slope;
         const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope), share = mu_share_at(t);
-        const mu_steady spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
+        mu_steady spring;
+        mu_predict(at, f, k, u);
+        spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
+        if (spring.error * share > tolerance) { /* from where the search for the cycle begins else */
+            f[0] = m->drag > 0.0 ? 1.0 : 0.0;
+            f[1] = 0.0;
+            spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
+        }
+        at[k][0] = u;
+        at[k][1] = f[0];
+        at[k][2] = f[1];
         out.at[i] = t;
         out.sticks[i] = spring.sticks;
         for (int j = 0; j < MU_MEANS; ++j) {
@@ -957,16 +990,21 @@ static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, 
     return n + 1;
 }
 
-/* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the middle. */
+/* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the middle.  A kink close
+ * to an end is left to later divisions: coarse steps may see it where fine ones do not. */
 static double mu_division(const mu_shaken *m, const mu_panel *panel, double tolerance, mu_grid *grid, mu_grid *steps,
                           double *f, int *kink) {
+    const double middle = 0.5 * (panel->low + panel->high), near = 0.02 * (panel->high - panel->low);
     int best = -1;
-    double out = 0.5 * (panel->low + panel->high);
+    *kink = 0;
     for (int i = 0; i < 14; ++i)
         if (panel->sticks[i] != panel->sticks[i + 1] && (best < 0 || abs(2 * i - 13) < abs(2 * best - 13))) best = i;
-    *kink = best >= 0;
-    if (*kink) out = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best], tolerance, grid, steps, f);
-    return out;
+    if (best >= 0) {
+        const double at = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best], tolerance, grid, steps, f);
+        *kink = at - panel->low > near && panel->high - at > near;
+        if (*kink) return at;
+    }
+    return middle;
 }
 
 /* A ball: adaptive quadrature over its springs. */
