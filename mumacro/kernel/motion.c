@@ -63,7 +63,7 @@ typedef struct {
  * estimate of the error of the mean force; how many sticks it has, but for brief ones. */
 typedef struct {
     double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error;
-    int sticks;
+    int sticks, level;
 } mu_steady;
 
 /* One cycle at equal times, to be drawn: each spring adds its forces with a weight. */
@@ -654,7 +654,7 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
 }
 
 static mu_steady mu_steady_of(const mu_march *march, double distance) {
-    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks};
+    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks, 0};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
     if (march->slipped) out.decay = march->turned != 0.0 ? march->decay - mu_log1(mu_min(fabs(march->turned), 1.0)) : HUGE_VAL;
@@ -761,6 +761,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
     for (int level = 0;; ++level) {
         mu_keep_below(limit, f);
         out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.1 * tolerance, f);
+        out.level = level;
         out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
         if (out.error <= tolerance || level == levels || !mu_halve(steps, grid)) return out;
         last = out;
@@ -913,7 +914,8 @@ static void mu_predict(double points[15][3], double *f, int n, double u) {
 static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int kink_low, int kink_high, double tolerance,
                               mu_grid *grid, mu_grid *steps, double *f) {
     mu_panel out;
-    double values[15][2], sums[15][2], ends[2], at[15][3];
+    double values[15][2], sums[15][2], ends[2], at[15][3], errors[15];
+    int halvings = 0;
     memset(&out, 0, sizeof out);
     out.low = low;
     out.high = high;
@@ -921,17 +923,21 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int k
     out.kinks[1] = kink_high;
     out.decay = HUGE_VAL;
     for (int k = 0; k < 15; ++k) { /* every other point first, so that the rest lie between known ones */
-        const int i = k < 7 ? 2 * k + 1 : 2 * (k - 7);
+        const int i = k < 7 ? 2 * k + 1 : 2 * (k - 7), single = k >= 7 && halvings < 2;
         double weight, slope;
         const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope), share = mu_share_at(t);
         mu_steady spring;
         mu_predict(at, f, k, u);
-        spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
-        if (spring.error * share > tolerance) { /* from where the search for the cycle begins else */
+        spring = mu_spring_at(m, t, tolerance, single ? 0 : MU_MOTION_LEVELS, grid, steps, f);
+        errors[i] = share * spring.error;
+        if (single) errors[i] = mu_max(errors[i ? i - 1 : 1], errors[i < 14 ? i + 1 : 13]) + 3.0 * share * spring.distance;
+        if (!(errors[i] <= tolerance)) { /* from where the search for the cycle begins else */
             f[0] = m->drag > 0.0 ? 1.0 : 0.0;
             f[1] = 0.0;
             spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
+            errors[i] = share * spring.error;
         }
+        halvings = spring.level > halvings ? spring.level : halvings;
         at[k][0] = u;
         at[k][1] = f[0];
         at[k][2] = f[1];
@@ -946,7 +952,7 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int k
                 sums[i][j] = slope * values[i][j];
             }
         }
-        out.of_springs += 0.5 * weight * slope * 2.0 * t * share * spring.error;
+        out.of_springs += 0.5 * weight * slope * 2.0 * t * errors[i];
         out.decay = mu_min(out.decay, spring.decay);
     }
     (void)mu_roughness(values, out.start, out.end);
