@@ -14,7 +14,7 @@
  * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of the last two over
  * all marks, which cannot cancel.  A ball is many independent springs, see element.c. */
 
-enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12 };
+enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
@@ -73,7 +73,7 @@ typedef struct {
 } mu_drawing;
 
 /* sin x and cos x of |x| < 1e5, off by at most 1.2e-16. */
-static void mu_sine_cosine(double x, double *sine, double *cosine) {
+static inline void mu_sine_cosine(double x, double *sine, double *cosine) {
     static const double odd[8] = {2.8114572543455206e-15, -7.647163731819816e-13, 1.6059043836821613e-10,
                                   -2.505210838544172e-08, 2.7557319223985893e-06, -0.0001984126984126984,
                                   0.008333333333333333, -0.16666666666666666};
@@ -91,68 +91,127 @@ static void mu_sine_cosine(double x, double *sine, double *cosine) {
     }
     s = r + r * square * s;
     c = 1.0 + square * c;
-    *sine = n & 1 ? (n & 2 ? -c : c) : (n & 2 ? -s : s);
-    *cosine = n & 1 ? (n & 2 ? s : -s) : (n & 2 ? -c : c);
+    {
+        const double first = n & 1 ? c : s, second = n & 1 ? s : c;
+        *sine = n & 2 ? -first : first;
+        *cosine = (n + 1) & 2 ? -second : second;
+    }
 }
 
+/* The motion at MU_MOMENTS times. */
+static void mu_moments_at(const mu_shaken *m, const double *tau, mu_moment *moments) {
+    double sum[6][MU_MOMENTS] = {{0.0}}, sine[MU_MOMENTS], cosine[MU_MOMENTS], s[MU_MOMENTS], c[MU_MOMENTS];
+    if (m->highest) { /* sin and cos of n tau from those of (n - 1) tau */
+        for (int j = 0; j < MU_MOMENTS; ++j) {
+            mu_sine_cosine(tau[j], &sine[j], &cosine[j]);
+            s[j] = 0.0;
+            c[j] = 1.0;
+        }
+        for (int i = 0; i < m->highest; ++i) {
+            const double *part = m->parts[i], n = i + 1.0;
+            for (int j = 0; j < MU_MOMENTS; ++j) {
+                const double next = s[j] * cosine[j] + c[j] * sine[j];
+                c[j] = c[j] * cosine[j] - s[j] * sine[j];
+                s[j] = next;
+                sum[0][j] += part[0] * s[j] + part[1] * c[j];
+                sum[1][j] += part[2] * s[j] + part[3] * c[j];
+                sum[2][j] += n * (part[0] * c[j] - part[1] * s[j]);
+                sum[3][j] += n * (part[2] * c[j] - part[3] * s[j]);
+                sum[4][j] += part[4] * s[j] + part[5] * c[j];
+                sum[5][j] += n * (part[4] * c[j] - part[5] * s[j]);
+            }
+        }
+    } else {
+        const double *order = m->orders, *term = m->terms;
+        for (int part = 0; part < 3; ++part) {
+            const int way = part < 2 ? part : 4, velocity = part < 2 ? part + 2 : 5;
+            for (int i = 0; i < m->counts[part]; ++i, ++order, term += 2) {
+                for (int j = 0; j < MU_MOMENTS; ++j) {
+                    mu_sine_cosine(*order * tau[j] + term[1], &sine[j], &cosine[j]);
+                    sum[way][j] += term[0] * sine[j];
+                    sum[velocity][j] += *order * term[0] * cosine[j];
+                }
+            }
+        }
+    }
+    for (int j = 0; j < MU_MOMENTS; ++j) {
+        const mu_moment one = {tau[j],
+                               m->scale * (m->drag * tau[j] + sum[0][j]),
+                               m->scale * sum[1][j],
+                               m->scale * (m->drag + sum[2][j]),
+                               m->scale * sum[3][j],
+                               1.0 + sum[4][j],
+                               sum[5][j]};
+        moments[j] = one;
+    }
+}
+
+/* The same at one time. */
 static mu_moment mu_moment_at(const mu_shaken *m, double tau) {
     const double *order = m->orders, *term = m->terms;
-    mu_moment at = {tau, m->drag * tau, 0.0, m->drag, 0.0, 1.0, 0.0};
-    double sine, cosine;
-    if (m->highest) { /* sin and cos of n tau from those of (n - 1) tau */
+    double sum[6] = {0.0}, sine, cosine;
+    if (m->highest) {
         double s = 0.0, c = 1.0;
         mu_sine_cosine(tau, &sine, &cosine);
         for (int i = 0; i < m->highest; ++i) {
             const double *part = m->parts[i], n = i + 1.0, next = s * cosine + c * sine;
             c = c * cosine - s * sine;
             s = next;
-            at.x += part[0] * s + part[1] * c;
-            at.wx += n * (part[0] * c - part[1] * s);
-            at.y += part[2] * s + part[3] * c;
-            at.wy += n * (part[2] * c - part[3] * s);
-            at.limit += part[4] * s + part[5] * c;
-            at.slope += n * (part[4] * c - part[5] * s);
+            sum[0] += part[0] * s + part[1] * c;
+            sum[1] += part[2] * s + part[3] * c;
+            sum[2] += n * (part[0] * c - part[1] * s);
+            sum[3] += n * (part[2] * c - part[3] * s);
+            sum[4] += part[4] * s + part[5] * c;
+            sum[5] += n * (part[4] * c - part[5] * s);
         }
-        at.x *= m->scale;
-        at.y *= m->scale;
-        at.wx *= m->scale;
-        at.wy *= m->scale;
+    } else {
+        for (int part = 0; part < 3; ++part) {
+            for (int i = 0; i < m->counts[part]; ++i, ++order, term += 2) {
+                mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
+                sum[part < 2 ? part : 4] += term[0] * sine;
+                sum[part < 2 ? part + 2 : 5] += *order * term[0] * cosine;
+            }
+        }
+    }
+    {
+        const mu_moment at = {tau,
+                              m->scale * (m->drag * tau + sum[0]),
+                              m->scale * sum[1],
+                              m->scale * (m->drag + sum[2]),
+                              m->scale * sum[3],
+                              1.0 + sum[4],
+                              sum[5]};
         return at;
     }
-    for (int i = 0; i < m->counts[0]; ++i, ++order, term += 2) {
-        mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
-        at.x += term[0] * sine;
-        at.wx += *order * term[0] * cosine;
-    }
-    for (int i = 0; i < m->counts[1]; ++i, ++order, term += 2) {
-        mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
-        at.y += term[0] * sine;
-        at.wy += *order * term[0] * cosine;
-    }
-    for (int i = 0; i < m->counts[2]; ++i, ++order, term += 2) {
-        mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
-        at.limit += term[0] * sine;
-        at.slope += *order * term[0] * cosine;
-    }
-    at.x *= m->scale;
-    at.y *= m->scale;
-    at.wx *= m->scale;
-    at.wy *= m->scale;
-    return at;
+}
+
+/* sin(half) / half of half <= 0.2, to 1e-17. */
+static double mu_damping(double half) {
+    const double z = half * half;
+    return 1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0))));
 }
 
 /* The mean way over a time that no harmonic turns by more than 0.4. */
 static void mu_mean_way(const mu_shaken *m, double tau, double length, double *way) {
     const double *order = m->orders, *term = m->terms, middle = tau + 0.5 * length;
+    double sine, cosine;
     way[0] = m->drag * middle;
     way[1] = 0.0;
-    for (int i = 0; i < m->counts[0] + m->counts[1]; ++i, ++order, term += 2) {
-        const double half = 0.5 * *order * length, z = half * half;
-        /* sin(half) / half, to 1e-17 */
-        const double damping = 1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0))));
-        double sine, cosine;
-        mu_sine_cosine(*order * middle + term[1], &sine, &cosine);
-        way[i >= m->counts[0]] += term[0] * sine * damping;
+    if (m->highest) {
+        double s = 0.0, c = 1.0;
+        mu_sine_cosine(middle, &sine, &cosine);
+        for (int i = 0; i < m->highest; ++i) {
+            const double *part = m->parts[i], damping = mu_damping(0.5 * (i + 1.0) * length), next = s * cosine + c * sine;
+            c = c * cosine - s * sine;
+            s = next;
+            way[0] += damping * (part[0] * s + part[1] * c);
+            way[1] += damping * (part[2] * s + part[3] * c);
+        }
+    } else {
+        for (int i = 0; i < m->counts[0] + m->counts[1]; ++i, ++order, term += 2) {
+            mu_sine_cosine(*order * middle + term[1], &sine, &cosine);
+            way[i >= m->counts[0]] += term[0] * sine * mu_damping(0.5 * *order * length);
+        }
     }
     way[0] *= m->scale;
     way[1] *= m->scale;
@@ -175,7 +234,7 @@ static const double MU_RADAU_REAL = 3.6378342527444962;
 
 /* A step of slip: its stages, with u = tan((th - th0)/2) and the slip speed there. */
 typedef struct {
-    mu_moment stage[3];
+    mu_moment stage[MU_MOMENTS]; /* the last is no stage: four at once take no longer than three */
     double length, u[3], speed[3], error, ex, ey; /* (ex, ey): direction of the force at the start */
 } mu_slip;
 
@@ -197,13 +256,14 @@ static int mu_slip_step(const mu_shaken *m, const mu_moment *start, double ex, d
                         mu_slip *slip) {
     const double a0 = (start->wx * ex + start->wy * ey) / start->limit;
     const double rate = 0.5 * (start->wy * ex - start->wx * ey) / start->limit;
+    const double tau[MU_MOMENTS] = {start->tau + MU_RADAU_AT[0] * length, start->tau + MU_RADAU_AT[1] * length, end, end};
     double a[3], b[3], *u = slip->u, change = 1.0;
     slip->length = length;
     slip->ex = ex;
     slip->ey = ey;
+    mu_moments_at(m, tau, slip->stage);
     for (int i = 0; i < 3; ++i) {
-        const mu_moment at = mu_moment_at(m, i < 2 ? start->tau + MU_RADAU_AT[i] * length : end);
-        slip->stage[i] = at;
+        const mu_moment at = slip->stage[i];
         a[i] = length * (at.wx * ex + at.wy * ey) / at.limit;
         b[i] = length * (at.wy * ex - at.wx * ey) / at.limit;
         u[i] = 0.0;
@@ -388,12 +448,15 @@ static double mu_excess_slope(const mu_moment *at, const double *f) {
     return f[0] * at->wx + f[1] * at->wy - at->limit * at->slope;
 }
 
-/* At which share of its step a stick ends; 1 where it lasts.  fresh: it has just begun, on the limit; then 0 says that
- * it does not begin. */
-static double mu_stick_end(const mu_stick *stick, int fresh) {
+/* At which share of its step a stick ends; 1 where it lasts, whose moment and force are last and at_last.  fresh: it has just
+ * begun, on the limit; then 0 says that it does not begin. */
+static double mu_stick_end(const mu_stick *stick, int fresh, mu_moment *last, double *at_last) {
     double f[2];
     mu_moment at = mu_stuck_at(stick, 1.0, f);
     mu_bracket b = {0.0, 1.0, mu_min(mu_excess(&stick->start, stick->f), 0.0), mu_excess(&at, f), 0};
+    *last = at;
+    at_last[0] = f[0];
+    at_last[1] = f[1];
     if (b.at_high <= 0.0) {
         /* between the ends it may have been outside */
         mu_bracket top = {0.0, 1.0, mu_excess_slope(&stick->start, stick->f), mu_excess_slope(&at, f), 0};
@@ -489,7 +552,7 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
         return;
     }
     factor = slip.error > 0.0 ? 0.85 * sqrt(sqrt(tolerance / slip.error)) : 4.0;
-    factor = mu_max(0.2, mu_min(factor, 4.0));
+    factor = mu_max(0.2, mu_min(factor, 2.0));
     if (slip.error > tolerance) {
         march->step = length * mu_min(factor, 0.9);
         return;
@@ -533,18 +596,25 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
     mu_stick stick = {m, march->at, {march->f[0], march->f[1]}, end - march->at.tau};
     const double speed = mu_length(stick.start.wx, stick.start.wy), way = 0.5 * stick.start.limit;
     const double slowest = speed + sqrt(speed * speed + 2.0 * m->acceleration * way);
-    double share, time;
+    double share, time, at_last[2];
+    mu_moment last;
     int whole = 1;
     if (slowest * stick.length > 2.0 * way) {
         whole = 0;
         stick.length = 2.0 * way / slowest;
     }
-    share = *fresh && stick.length < MU_MOTION_SHORT ? 1.0 : mu_stick_end(&stick, *fresh);
+    if (*fresh && stick.length < MU_MOTION_SHORT) {
+        share = 1.0;
+        last = mu_stuck_at(&stick, 1.0, at_last);
+    } else {
+        share = mu_stick_end(&stick, *fresh, &last, at_last);
+    }
     if (share > 0.0) {
         const double taken = share * stick.length, drag = m->scale * m->drag;
         double dx, dy, fx, fy, size, way[2];
         time = stick.start.tau + taken;
-        march->at = mu_moment_at(m, whole && share == 1.0 ? end : time);
+        march->at = share < 1.0 ? mu_moment_at(m, time) : last;
+        if (whole && share == 1.0) march->at.tau = end;
         dx = march->at.x - stick.start.x;
         dy = march->at.y - stick.start.y;
         fx = stick.f[0] + dx;
