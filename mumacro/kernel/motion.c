@@ -14,7 +14,7 @@
  * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of the last two over
  * all marks, which cannot cancel.  A ball is many independent springs, see element.c. */
 
-enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4 };
+enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
@@ -771,7 +771,7 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
  * there are many, and only its way decides between them. */
 static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance,
                                        double goal, double *f) {
-    double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance;
+    double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance, curved = 0.0;
     mu_march march;
     mu_steady out;
     f[0] = f[1] = 0.0;
@@ -781,7 +781,7 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
     march.step = 0.0;
     march.steps = steps;
     for (int period = 1;; ++period) {
-        double moved[2], rate;
+        double moved[2], rate, leap;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
         moved[0] = march.f[0] - f[0];
         moved[1] = march.f[1] - f[1];
@@ -790,11 +790,27 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
         size[0] = mu_length(moved[0], moved[1]);
         /* what is left to go, as a geometric series */
         rate = mu_max(size[0] / size[1], size[1] / size[2]);
-        distance = march.mean[MU_MEAN_PATH] < 1e-13 ? 0.0 : period > 2 && rate < 1.0 ? mu_min(2.0 * size[0] / (1.0 - rate), 2.0) : 2.0;
+        distance = 2.0;
+        if (march.mean[MU_MEAN_PATH] < 1e-13) {
+            distance = 0.0;
+        } else if (size[0] < 1e-13) { /* rounding */
+            distance = 1e4 * size[0];
+        } else if (period > 2 && rate < 1.0) {
+            distance = mu_min(2.0 * size[0] / (1.0 - rate), 2.0);
+        }
         if (march.failed) distance = 2.0;
-        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) return mu_steady_of(&march, distance);
+        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed)
+            return mu_steady_of(&march, mu_min(distance + curved, 2.0));
         f[0] = march.f[0];
         f[1] = march.f[1];
+        /* many equal periods at once: half of what is left, and no more than a straight way that errs little */
+        leap = size[1] / size[2] > 0.8 && rate < 1.0 ? mu_min(0.5 * size[0] / (1.0 - rate), sqrt(0.2 * goal)) : 0.0;
+        if (leap > 2.0 * size[0] && fabs(size[0] / size[1] - size[1] / size[2]) < 0.2 * (1.0 - rate)) {
+            f[0] += leap * (moved[0] / size[0]);
+            f[1] += leap * (moved[1] / size[0]);
+            curved += 0.5 * leap * leap;
+            size[0] = size[1] = HUGE_VAL;
+        }
     }
 }
 
@@ -833,7 +849,9 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.1 * tolerance, f);
         out.level = level;
         out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
-        if (out.error <= tolerance || level == levels || !mu_halve(steps, grid)) return out;
+        /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
+        if (out.error <= tolerance || level == levels || out.distance > tolerance || !mu_halve(steps, grid)) return out;
+        if (level > 1 && m->drag == 0.0 && out.error > 0.5 * last.error) return out;
         last = out;
         of_step *= 0.06;
     }
