@@ -847,11 +847,18 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
     for (int level = 0;; ++level) {
         mu_keep_below(limit, f);
         out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.1 * tolerance, f);
+        for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) { /* steps too large to be followed */
+            f[0] = m->drag > 0.0 ? limit : 0.0;
+            f[1] = 0.0;
+            of_step *= 0.06;
+            out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.1 * tolerance, f);
+        }
         out.level = level;
         out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
-        if (out.error <= tolerance || level == levels || out.distance > tolerance || !mu_halve(steps, grid)) return out;
-        if (level > 1 && m->drag == 0.0 && out.error > 0.5 * last.error) return out;
+        if (out.error <= tolerance || level == levels) return out;
+        if (m->drag == 0.0 && (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error))) return out;
+        if (!mu_halve(steps, grid)) return out;
         last = out;
         of_step *= 0.06;
     }
