@@ -27,7 +27,7 @@ SEARCHES = (
     ("spring", 1e-4, 5_000, 1e-8),
     ("spring", 1e-6, 10_000, 1e-9),
     ("spring", 1e-7, 5_000, 1e-9),
-    ("ball", 1e-6, 150, 1e-8),
+    ("ball", 1e-6, 300, 1e-7),
 )
 AGAINST_TABLES = (
     ("spring", "across", 20_000),

@@ -16,7 +16,7 @@
 
 enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
-#define MU_MOTION_ROUNDING 2e-10 /* of the mean force: sticks too short to be found */
+#define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
 #define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
@@ -840,21 +840,25 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
                                   double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
     double of_step = mu_cube_root_near(mu_min(0.1 * tolerance, 1e-3));
+    const double rounding = mu_max(MU_MOTION_ROUNDING, mu_min(0.05 * tolerance, 5e-9));
+    const double goal = m->drag > 0.0 ? 0.1 * tolerance : 0.01 * mu_min(tolerance, 1e-5);
     mu_steady last, out;
     of_step *= of_step;
     grid->n = mu_min(m->nodes, (double)grid->room);
     for (int i = 0; i < grid->n; ++i) grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
-    for (int level = 0;; ++level) {
+    for (int level = 0;; ++level) { /* at rest, the errors of the whole way to the cycle stay */
         mu_keep_below(limit, f);
-        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.1 * tolerance, f);
+        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, goal, f);
         for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) { /* steps too large to be followed */
             f[0] = m->drag > 0.0 ? limit : 0.0;
             f[1] = 0.0;
             of_step *= 0.06;
-            out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.1 * tolerance, f);
+            out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, goal, f);
         }
         out.level = level;
-        out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
+        out.error = 2.0 * limit;
+        if (level > 0)
+            out.error = (m->drag > 0.0 ? 2.0 : 6.0) * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + rounding;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
         if (out.error <= tolerance || level == levels) return out;
         if (m->drag == 0.0 && (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error))) return out;
