@@ -226,6 +226,82 @@ def test_slip_that_hardly_begins_does_not_stop_the_search() -> None:
     assert 0.0 < found.mu_macro < 0.3
 
 
+def test_a_kink_of_a_ball_close_to_an_end_is_seen() -> None:
+    """Along, where one panel of springs ends next to it: the estimate was too small."""
+    table = Surrogate.open()
+    for v, y in ((0.00382, 0.66671), (0.0038, 0.6667), (0.01, 0.66)):
+        case = {**CASE, "v0": v * L0 * CASE["omega"]}
+        found = motion(**case, x=y * L0, contact="ball")
+        there = table.evaluate(**case, y0=y * L0, contact="ball", direction="along")
+        assert abs(found.mu_macro - there.mu_macro) <= found.error_estimate + there.error_bound
+
+
+def test_small_differences_of_two_lengths_of_step_do_not_hide_an_error() -> None:
+    """Extrapolation by an order that events break said 25 times too little."""
+    table = Surrogate.open()
+    case = {**CASE, "v0": 0.02704 * L0 * CASE["omega"]}
+    for size in (1.2727, 1.272, 1.273):
+        found, there = motion(**case, y=size * L0), table.evaluate(**case, y0=size * L0)
+        assert abs(found.mu_macro - there.mu_macro) <= found.error_estimate + there.error_bound
+
+
+def in_tau(drag: float, *parts: list[tuple[int, float, float]]) -> dict[str, Any]:
+    """A motion with lengths in units of mu0 Fz / k and phases in radians."""
+    units = {"x": L0, "y": L0, "normal": CASE["Fz"]}
+    case = {**CASE, "v0": drag * L0 * CASE["omega"]}
+    for (name, unit), part in zip(units.items(), parts, strict=False):
+        case[name] = [(n, size * unit, math.degrees(phase)) for n, size, phase in part]
+    return case
+
+
+AT_REST = in_tau(
+    0.0,
+    [(1, 0.14040457, 3.14159265)],
+    [(4, 0.15711736, 3.17451749), (2, 0.14317141, 2.56134344)],
+    [(3, 0.18380292, 3.14159265), (1, 0.72276112, 4.14043826)],
+)
+AT_REST_LONG = in_tau(
+    0.0,
+    [(1, 0.04164505, 5.61897021), (4, 0.03650346, 4.25775166)],
+    [(3, 0.06734523, 1.57079633)],
+    [(1, 0.96742228, 0.30451824)],
+)
+
+
+@pytest.mark.parametrize(
+    ("case", "tolerance"), [(AT_REST, 1e-6), (AT_REST_LONG, 1e-4), (AT_REST_LONG, 1e-3)]
+)
+def test_the_way_to_a_cycle_that_sticks_counts_in_the_estimate(
+    case: dict[str, Any], tolerance: float
+) -> None:
+    """At rest the errors of all periods before stay; the estimate saw those of the last."""
+    found, finer = motion(**case, tolerance=tolerance), motion(**case, tolerance=1e-9)
+    off = math.hypot(found.mu_macro - finer.mu_macro, found.mu_lateral - finer.mu_lateral)
+    assert off <= found.error_estimate + 1e-9 * CASE["mu0"]
+    assert found.error_estimate <= tolerance * CASE["mu0"]
+
+
+def test_springs_at_the_rim_that_large_steps_cannot_follow() -> None:
+    """The first steps of springs with little load failed, and their halves were not tried."""
+    case = in_tau(
+        1.81657468,
+        [(3, 53.0443409, 3.93149217), (1, 26.9158905, 3.80594382), (1, 52.6787117, 4.7490568)],
+        [(1, 7.21927714, 3.04738354), (1, 3.08669959, 5.09255859), (1, 9.72855129, 0.0461786133)],
+    )
+    found = motion(**case, contact="ball")
+    finer = motion(**case, contact="ball", tolerance=1e-8)
+    assert found.error_estimate <= 1e-6 * CASE["mu0"]
+    off = math.hypot(found.mu_macro - finer.mu_macro, found.mu_lateral - finer.mu_lateral)
+    assert off <= found.error_estimate
+
+
+def test_a_ball_at_rest_that_hardly_comes_to_stick_has_an_answer() -> None:
+    """Some of its springs move by a thousandth less in each period: it took minutes."""
+    rest = [case for case in random_motions(40, ball=True, seed=5) if not case["v0"]][0]
+    found = motion(**rest, contact="ball")
+    assert found.error_estimate <= 1e-6 * CASE["mu0"]
+
+
 def test_far_and_near_ends_have_answers(surrogate: Surrogate) -> None:
     for y in (1e-9, 1e-3, 1e3, 1e9):
         for v in (1e-9, 1e-3, 1e3, 1e9):
