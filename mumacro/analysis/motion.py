@@ -234,7 +234,7 @@ def motion(
 
     >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, f=20e3, v0=0.02)
     >>> motion(**case, x=2e-6, y=2e-6)
-    <Motion of a spring: mu_macro 0.130052, mu_lateral -0.105596, error_estimate 1.2e-08>
+    <Motion of a spring: mu_macro 0.130052, mu_lateral -0.105596, error_estimate 2.8e-08>
     """
     kind = kind_of(contact)
     terms = tuple(
