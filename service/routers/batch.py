@@ -210,14 +210,15 @@ async def _next_line(receive: Receive, text: bytearray) -> bool:
 
 def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
     """The same bytes in larger pieces."""
-    gathered = bytearray()
+    gathered, size = list[bytes](), 0
     for piece in pieces:
-        gathered += piece
-        if len(gathered) >= _PIECE:
-            yield bytes(gathered)
-            gathered.clear()
-    if gathered:
-        yield bytes(gathered)
+        gathered.append(piece)
+        size += len(piece)
+        if size >= _PIECE:
+            yield b"".join(gathered)
+            gathered, size = [], 0
+    if size:
+        yield b"".join(gathered)
 
 
 _BODIES = {form.media_type: form.body for form in ALL}
