@@ -164,7 +164,7 @@ def _quick_rows(text: bytearray, at: int, max_batch: int, kind: Kind) -> Body | 
 def _names_of(row: dict[str, Any], kind: Kind) -> tuple[str, ...]:
     """The names of a row, if they make a case; else InputError."""
     columns_of(_with_k(by_name(None, dict.fromkeys(row, 1.0), kind)), kind)
-    if unknown := row.keys() - {*kind.columns, *ENDS}:
+    if unknown := {*row} - {*kind.columns, *ENDS}:
         raise InputError(min(unknown), None, "the name of an input")
     return tuple(row)
 
