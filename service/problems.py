@@ -173,6 +173,8 @@ def _reason(error: Any, name: str, known: Iterable[str]) -> str:
         return f"must have at least {least} entries" if most is None else (
             f"may have up to {most} entries"
         )  # fmt: skip
+    if kind == "list_type":
+        return "must be a list"
     message: str = error["msg"]
     return message.replace("Input should be", "must be").replace("Input should", "must")
 

@@ -19,7 +19,16 @@ from mumacro.errors import InputError
 from mumacro.inputs.kind import ContactName
 
 from .answers import Number, Numbers, quantity
-from .inputs import EXAMPLE, Hertz, NotNegative, Positive, Stiffness, Strict, optional
+from .inputs import (
+    EXAMPLE,
+    ONE_FREQUENCY,
+    Hertz,
+    NotNegative,
+    Positive,
+    Stiffness,
+    Strict,
+    optional,
+)
 
 MAX_TERMS = 10  # of one part of the motion
 # of a ball, whose hundreds of springs each follow every turn of the motion
@@ -84,7 +93,8 @@ class MotionRequest(Strict):
                     "x": [1e-6, 90.0],
                     "y": 2e-6,
                 }
-            ]
+            ],
+            "allOf": [ONE_FREQUENCY],
         }
     )
 

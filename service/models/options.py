@@ -9,6 +9,7 @@ from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import AMPLITUDE, ContactName, DirectionName, Kind, kind_of
 
 from .inputs import (
+    ALTERNATIVES,
     EXAMPLE,
     OR_RIGID,
     Case,
@@ -119,7 +120,8 @@ class CaseColumns(Options, InputColumns):
 
     model_config = ConfigDict(
         json_schema_extra={
-            "examples": [{**EXAMPLE, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}]
+            "examples": [{**EXAMPLE, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}],
+            **ALTERNATIVES,
         }
     )
 

@@ -27,6 +27,7 @@ from mumacro.inputs.units import number_hint
 
 from .inputs import (
     EXAMPLE,
+    NOT_BOTH,
     OR_RIGID,
     Name,
     NotNegative,
@@ -77,7 +78,10 @@ class LawRequest(Options, Sweep, OtherInputs):
     """mu_macro over a range of one input."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{**_five, "start": 1e-4, "stop": 10.0, "points": 5}]}
+        json_schema_extra={
+            "examples": [{**_five, "start": 1e-4, "stop": 10.0, "points": 5}],
+            **NOT_BOTH,
+        }
     )
 
     k_range: Pair | None = optional(f"In place of k: {BOUND}")
@@ -102,7 +106,10 @@ class SolveForRequest(Options, OtherInputs):
     """Which value of one input gives a wanted mu_macro."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{**_without_y0, "unknown": "y0", "target": 0.15}]}
+        json_schema_extra={
+            "examples": [{**_without_y0, "unknown": "y0", "target": 0.15}],
+            **NOT_BOTH,
+        }
     )
 
     k_range: Pair | None = optional(f"In place of k: {BOUND}")
