@@ -205,14 +205,14 @@ def settling(cases: Answered) -> Outputs:
     }
 
 
-# --- what is asked --------------------------------------------------------------------------------
+# --- what is computed -----------------------------------------------------------------------------
 
 # in times of one spring, across, at one k
 _COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
 _INTERVAL = frozenset(("k_range", "k_low", "k_high"))
 
 
-class Asked(NamedTuple):
+class Plan(NamedTuple):
     """What is asked of cases: their kind, the quantities beside the default outputs, and deviations
     for ``std``."""
 
@@ -222,7 +222,7 @@ class Asked(NamedTuple):
     std: Mapping[str, float] = {}
 
     @classmethod
-    def of(cls, options: Any, inputs: Mapping[str, Any]) -> "Asked":
+    def of(cls, options: Any, inputs: Mapping[str, Any]) -> "Plan":
         """What options ask of such inputs; InputError where the cases do not have it."""
         kind, interval = options.kind, not _INTERVAL.isdisjoint(inputs)
         if not options.include:
@@ -245,13 +245,11 @@ class Asked(NamedTuple):
         return cost * math.prod(_COSTS.get(word, 1.0) for word in words)
 
 
-def answer_case(
-    surrogate: Surrogate, inputs: Mapping[str, Any], asked: Asked
-) -> tuple[Outputs, int]:
+def answer_case(surrogate: Surrogate, inputs: Mapping[str, Any], plan: Plan) -> tuple[Outputs, int]:
     """The answer to one case in plain numbers as JSON nests it, and the code of its source;
     InputError where the case is not legal."""
-    if not (asked.include or asked.interval):
-        answer: Any = surrogate.evaluate(**inputs, **asked.kind.names)
+    if not (plan.include or plan.interval):
+        answer: Any = surrogate.evaluate(**inputs, **plan.kind.names)
         code = answer.source_code
         return {
             "mu_macro": answer.mu_macro,
@@ -260,7 +258,7 @@ def answer_case(
             "error_bound": answer.error_bound,
             "source": SOURCES[code],
         }, code
-    outputs, codes = _answer(surrogate, inputs, asked)
+    outputs, codes = _answer(surrogate, inputs, plan)
     code = int(codes)
     outputs |= {"regime": REGIME_OF[code], "source": SOURCES[code]}
     return nested(
@@ -269,12 +267,12 @@ def answer_case(
 
 
 def answer_columns(
-    surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked
+    surrogate: Surrogate, columns: Mapping[str, Any], plan: Plan
 ) -> tuple[Outputs, Codes]:
     """The outputs of many cases by path, and their source codes: NaN and -1 for a case that is not
     legal.  Regime and source are codes, too."""
     with np.errstate(all="ignore"):
-        outputs, codes = _answer(surrogate, columns, asked)
+        outputs, codes = _answer(surrogate, columns, plan)
     legal = codes >= 0
     for path, column in outputs.items():
         if path not in ("regime", "source"):
@@ -282,8 +280,8 @@ def answer_columns(
     return outputs, codes
 
 
-def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> tuple[Outputs, Any]:
-    kind, include = asked.kind, asked.include
+def _answer(surrogate: Surrogate, columns: Mapping[str, Any], plan: Plan) -> tuple[Outputs, Any]:
+    kind, include = plan.kind, plan.include
     slopes = any(QUANTITIES[name].slopes for name in include)
     answer: Any = surrogate.evaluate(**columns, **kind.names, gradient=slopes, groups=bool(include))
     codes = answer.source_code
@@ -294,12 +292,12 @@ def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> t
         "error_bound": answer.error_bound,
         "source": codes,
     }
-    if asked.interval:
+    if plan.interval:
         outputs |= {"mu_macro_low": answer.mu_macro_low, "mu_macro_high": answer.mu_macro_high}
     if include:
-        if asked.interval or "f" in columns:
+        if plan.interval or "f" in columns:
             columns = Cases.of(by_name(None, columns, kind), kind).columns
-        answered = Answered(surrogate, kind, columns, answer, asked.std)
+        answered = Answered(surrogate, kind, columns, answer, plan.std)
         for name in include:
             outputs |= QUANTITIES[name].compute(answered)
     return outputs, codes

@@ -245,10 +245,12 @@ def _write_columns(batch: Batch) -> Iterator[bytes]:
 
 
 def _write_rows(batch: Batch) -> Iterator[bytes]:
-    opening, patterns = b'{"results":[', list[bytes]()
+    opening, patterns = b'{"results":[', {-1: b"null"}  # by code
     for outputs, codes, _ in batch.slices(_ROWS):
-        patterns = patterns or [_pattern(outputs, code) for code in range(len(SOURCES))] + [b"null"]
-        pattern = b",".join(map(patterns.__getitem__, codes.tolist()))
+        sources = codes.tolist()
+        for code in {*sources} - patterns.keys():
+            patterns[code] = _pattern(outputs, code)
+        pattern = b",".join(map(patterns.__getitem__, sources))
         columns = [column for path, column in outputs.items() if path not in _WORDS]
         numbers = np.column_stack(columns)[codes >= 0].ravel()
         yield opening

@@ -147,9 +147,9 @@ class MotionRequest(Strict):
         """Time of the answer, in times of a plain case: each term is followed through every turn
         of the highest harmonic."""
         parts = (self.x, self.y, self.normal)
-        terms = [term for part in parts if isinstance(part, list) for term in part]
+        terms: list[Any] = [x for part in parts if isinstance(part, list) for x in part]
         plain = sum(isinstance(part, (float, tuple)) for part in parts)
-        highest = max([1, *(harmonic for harmonic, *_ in terms)])
+        highest: int = max([1, *(harmonic for harmonic, *_ in terms)])
         cost = _COST + _COST_OF_A_TERM * highest * (1 + plain + len(terms))
         return cost * (_SPRINGS_OF_A_BALL if self.contact == "ball" else 1.0)
 

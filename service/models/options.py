@@ -104,7 +104,7 @@ class Options(Choice):
     std: InputStd | None = optional("Standard deviations of the inputs, for include=std")
 
     @model_validator(mode="after")
-    def _std_where_asked(self) -> Self:
+    def _std_beside_include(self) -> Self:
         if self.include or self.std is not None:
             check_std(self.std, self.include, self.direction)
         return self
@@ -164,7 +164,7 @@ class QueryOptions(Deviations, Choice):
     )
 
     @model_validator(mode="after")
-    def _std_where_asked(self) -> Self:
+    def _std_beside_include(self) -> Self:
         std = self.std
         if self.include or std is not None:
             check_std(std, self.include, self.direction)
