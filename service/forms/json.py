@@ -157,7 +157,9 @@ def _quick_rows(text: bytearray, at: int, max_batch: int, kind: Kind) -> Body | 
         if size > max_batch:
             raise too_large(max_batch)
         at = cut.end() if cut else len(text)
-    columns = np.concatenate(blocks).T
+    if not blocks:
+        return None
+    columns = np.concatenate(blocks).T.copy()  # each as one piece of memory
     return Body(dict(zip(names, columns, strict=True)), rows=True)
 
 

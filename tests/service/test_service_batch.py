@@ -127,6 +127,13 @@ def test_an_odd_row_is_seen_in_every_place(client: Any, odd: str, field: Any, be
         assert answer["results"][before] == expected
 
 
+@pytest.mark.parametrize("text", ["[", " [", "[\n", "[ ", "[,", "[{", "[[", "[]]", "[ ] ["])
+def test_half_a_list_is_no_json(client: Any, problem: Any, text: str) -> None:
+    assert problem(client.post(BATCH, content=text), 400)["type"].endswith("malformed-body")
+    half, good = read("ndjson", posted(client, "ndjson", text.strip() + "\n" + GOOD + "\n"))
+    assert (half["status"], good["source"]) == (400, "stick_slip_low")
+
+
 def test_rows_may_stand_far_apart(client: Any) -> None:
     answer = client.post(BATCH, content=f"[{GOOD},{' ' * 2_000_000}{GOOD}]").json()
     assert answer["n_errors"] == 0
