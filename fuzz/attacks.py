@@ -73,7 +73,7 @@ def idle_streams(server: Server, share: float) -> None:
 
 
 def motions(server: Server, share: float) -> None:
-    """Many motions of a ball with high harmonics; the question of a person is answered beside them."""
+    """Many motions of a ball with high harmonics; a law is answered beside them."""
     terms = [
         {"harmonic": n, "amplitude": 3e-7 * (n % 5 + 1), "phase": 70 * n} for n in range(11, 21)
     ]
@@ -143,7 +143,7 @@ ATTACKS: dict[str, Attack] = {
     "Columns of words and of nulls, which Python reads one by one": strange_words,
     "Streams without a line; the question of a person is answered beside them": idle_streams,
     "Many at once ask for /openapi.json for the first time": descriptions,
-    "Motions of a ball with high harmonics; the question of a person is answered beside them": motions,
+    "Motions of a ball with high harmonics; a law is answered beside them": motions,
 }
 
 
