@@ -29,7 +29,7 @@ try:
 except ModuleNotFoundError as error:
     # Without mumacro.errors.missing: perhaps no package is installed here.
     raise SystemExit(
-        f"python -m service: {error.name} is not installed: pip install 'mumacro[service]' "
+        f"{'python -m service' if __name__ == '__main__' else 'mumacro serve'}: {error.name} is not installed: pip install 'mumacro[service]' "
         "(in a checkout: pip install -e '.[service]')"
     ) from None
 

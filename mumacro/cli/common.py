@@ -206,10 +206,11 @@ def read_case(
     1000000.0
     """
     case: dict[str, Any] = {}
-    faults = []
+    faults: list[str] = []
+    strange: list[str] = []
     for name, text in _pairs(words):
         if text is None:
-            faults.append(f"{name!r} is no name=value such as Fz=10")
+            strange.append(repr(name))
             continue
         if name not in kind.columns:
             meant = suggestion(name)
@@ -223,6 +224,9 @@ def read_case(
             case[name] = _read(name, text, one_k)
         except ValueError as error:
             faults.append(str(error))
+    if strange:
+        verb = "is" if len(strange) == 1 else "are"
+        faults.insert(0, f"{', '.join(strange)} {verb} no name=value such as Fz=10")
     absent = {*optional} - case.keys()
     faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
@@ -275,9 +279,9 @@ def _faults_of_names(
 ) -> list[str]:
     frequencies = {"f", "omega"}
     left_out = {*without} | (frequencies if frequencies & {*without} else set())
-    names = " and ".join(without)
-    told = f"{names} {'is' if len(without) == 1 else 'are'} the unknown or the swept input"
-    faults = [f"leave {name} out: {told}" for name in case if name in left_out]
+    faults = [
+        f"leave {name} out: it varies here or is computed" for name in case if name in left_out
+    ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
     given = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
@@ -366,7 +370,7 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
 
 def model_lines(rows: Sequence[Row]) -> list[str]:
     """What is said about the model, below a result."""
-    return [in_columns([("model", f"{row['row']}: {row['text']}")]) for row in rows]
+    return [in_columns([("assumes", f"{row['row']}: {row['text']}")]) for row in rows]
 
 
 def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:
