@@ -54,7 +54,7 @@ _MARKS = "osD^vPX"  # of groups of cases: they differ without colour, too
 _MOST_LABELS = 8  # of curves in a legend
 _SIDE = 0.05  # of the map, where no label stands
 #: places where the map names the regime, in shares of its width and height
-AREAS = ((0.14, 0.9), (0.8, 0.12))
+AREAS = ((0.14, 0.735), (0.8, 0.12))
 
 
 class Curve(NamedTuple):

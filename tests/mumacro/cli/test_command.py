@@ -170,10 +170,15 @@ def ended(capsys: Capture, code: int, *words: str) -> str:
 
 
 @pytest.mark.parametrize("word", [*COMMANDS, ""])
-def test_every_command_explains_itself(capsys: Capture, word: Any) -> None:
+def test_every_command_explains_itself_on_one_screen(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, word: Any
+) -> None:
     if word == "serve":
         pytest.importorskip("uvicorn")
+    monkeypatch.setenv("COLUMNS", "100")
     text = ended(capsys, 0, *word.split(), "--help")
+    assert len(text.splitlines()) <= 40
+    assert max(map(len, text.splitlines())) <= 100
     assert "usage: " in text
     assert word == "serve" or f"mumacro {word}" in text
     assert word not in ("", "law", "solve-for", "map") or all(
