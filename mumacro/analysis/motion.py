@@ -207,8 +207,8 @@ def motion(
     x, y, normal : array_like, tuple or list
         Oscillations along [m], across [m] and of the normal force [N].  Each is an amplitude (half
         of peak to peak), a pair (amplitude, phase in degrees), or a list of triples (harmonic,
-        amplitude, phase), that is amplitude sin(harmonic omega t + phase).  Harmonics are whole numbers from 1 to 1000.
-        Phases beyond 360 count as what is left of them.
+        amplitude, phase), that is amplitude sin(harmonic omega t + phase).  Harmonics are whole
+        numbers from 1 to 1000.  Phases beyond 360 count as what is left of them.
     contact : str
         "spring", or "ball" under a constant normal force.
     tolerance : float
