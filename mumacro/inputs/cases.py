@@ -317,11 +317,16 @@ def columns_of(inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
         value = inputs.get(source, ABSENT)
         if type(value) is not float:
             value = _column(source, value)
-        if source == "f":
-            with np.errstate(over="ignore"):  # an infinite omega, refused as a value of f
-                value = value * RAD_PER_CYCLE
-        columns[name] = value
+        columns[name] = _angular(value) if source == "f" else value
     return columns
+
+
+def _angular(frequency: float | Array) -> float | Array:
+    """omega [rad/s] of f [Hz]; beyond double range infinite, which is refused as a value of f."""
+    if isinstance(frequency, float):
+        return frequency * RAD_PER_CYCLE
+    with np.errstate(over="ignore"):
+        return frequency * RAD_PER_CYCLE
 
 
 def _frequency_in(inputs: Mapping[str, Any]) -> str:

@@ -19,8 +19,12 @@ DirectionName = Literal["across", "along", "normal"]
 CONTACTS: tuple[ContactName, ...] = ("spring", "ball")
 DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
-# the fields of direction normal
-_FORCED = tuple(AMPLITUDE if name == "y0" else name for name in FIELDS)
+# by code of the direction
+_FIELDS = (
+    FIELDS,
+    FIELDS,
+    tuple(AMPLITUDE if name == "y0" else name for name in FIELDS),
+)
 LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of that amplitude
 
 
@@ -39,7 +43,7 @@ class Kind(NamedTuple):
     def fields(self) -> tuple[str, ...]:
         """The six inputs by name, :data:`mumacro.inputs.fields.FIELDS` with Fz_amplitude in place
         of y0 for normal."""
-        return _FORCED if self.normal else FIELDS
+        return _FIELDS[self.direction]
 
     @property
     def names(self) -> dict[str, Any]:
