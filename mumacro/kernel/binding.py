@@ -17,9 +17,6 @@ from cffi import FFI
 
 from mumacro.kernel.arrays import Array, Codes
 
-#: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
-BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
-
 MOST_STEPS = 200_000  # of a period of a motion
 
 _HERE = Path(__file__).resolve().parent.parent
@@ -68,6 +65,24 @@ def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
             arrays[i] = _from_buffer(_NUMBERS, column) + start
     return of_kernel
 
+
+def _record(enum: str, prefix: str, end: str) -> np.dtype[np.void]:
+    """A row of doubles with the names of an enum, in which ``end`` counts all columns."""
+    places = dict(_FFI.typeof(f"enum {enum}").relements)
+    columns = places.pop(end)
+    return np.dtype(
+        {
+            "names": [name.removeprefix(prefix).lower() for name in places],
+            "formats": [np.float64] * len(places),
+            "offsets": [8 * place for place in places.values()],
+            "itemsize": 8 * columns,
+        }
+    )
+
+
+#: rows of :class:`Data`'s blocks and pieces of the border, see ``kernel/data.h``
+BLOCK_ROW = _record("mumacro_block_column", "MU_", "MU_BLOCK_COLUMNS")
+PIECE_ROW = _record("mumacro_piece_column", "MU_PIECE_", "MU_PIECE_COLUMNS")
 
 _ROW = _FFI.typeof("enum mumacro_row").relements
 _SLOPE_ROWS = _FFI.typeof("enum mumacro_slope_row").relements["MU_SLOPE_ROWS"]
@@ -162,9 +177,8 @@ class Data:
     """A table as the kernel reads it.
 
     ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3,
-    PIECE_COLUMNS): first cell, offset, step, relative error.  ``blocks`` (sources + 1,
-    BLOCK_COLUMNS): first cell, cells along b, offset and step along a, along b; zero where no
-    cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
+    columns): rows of ``PIECE_ROW``.  ``blocks`` (sources + 1, columns): rows of ``BLOCK_ROW``,
+    zero where no cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
     """
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
