@@ -130,16 +130,16 @@ def k_effect(
     case: Mapping[str, Any],
     contact: str = "spring",
     direction: str = "across",
-    known: float = K_UNCERTAINTY,
+    uncertainty: float = K_UNCERTAINTY,
 ) -> float:
-    """By how much, relatively, mu_macro may differ [-] where k may by the factor 1 + ``known`` up
-    or down; 0 if rigid.
+    """By how much, relatively, mu_macro may differ [-] where k may by the factor 1 +
+    ``uncertainty`` up or down; 0 if rigid.
 
     The largest of seven values of k, since mu_macro is no straight line in k.  Over an interval of
     k half the width.
     """
-    if not 0.0 < known < math.inf:
-        raise InputError("known", known, "finite and > 0")
+    if not 0.0 < uncertainty < math.inf:
+        raise InputError("uncertainty", uncertainty, "finite and > 0")
     words = kind_of(contact, direction).names
     middle_case, ends = without_interval(case)
     k = _six_inputs(middle_case, kind_of(contact, direction))["k"]
@@ -149,7 +149,9 @@ def k_effect(
         band = surrogate.evaluate(**case, **words)
         middle_mu, half_width = band.mu_macro, 0.5 * (band.mu_macro_high - band.mu_macro_low)
     else:
-        stiffnesses = k * np.geomspace(1.0 / (1.0 + known), 1.0 + known, 7)  # the middle one is k
+        stiffnesses = k * np.geomspace(
+            1.0 / (1.0 + uncertainty), 1.0 + uncertainty, 7
+        )  # the middle one is k
         samples = surrogate.evaluate(**{**case, "k": stiffnesses}, **words).mu_macro
         middle_mu, half_width = float(samples[3]), float(np.abs(samples - samples[3]).max())
     return 0.0 if half_width == 0.0 else half_width / middle_mu if middle_mu > 0.0 else math.inf

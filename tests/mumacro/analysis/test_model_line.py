@@ -37,7 +37,7 @@ def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) ->
     text, effect = rows(surrogate)["k is known"]
     assert effect == close(max(off), rel=1e-9)
     assert f"{100.0 * effect:.2g} %" in text
-    assert k_effect(surrogate, CASE, known=1e-4) == close(
+    assert k_effect(surrogate, CASE, uncertainty=1e-4) == close(
         1e-4 * abs(surrogate.evaluate(**CASE, gradient=True).gradient["k"]) * 1e6 / mu, rel=1e-3
     )
     # at a maximum over k the slope is zero, and the effect is not
@@ -129,4 +129,4 @@ def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> N
     with pytest.raises((InputError, TypeError), match=said):
         model_rows(surrogate, {**CASE, **changed})
     with pytest.raises(InputError, match="known must be finite and > 0"):
-        k_effect(surrogate, CASE, known=0.0)
+        k_effect(surrogate, CASE, uncertainty=0.0)
