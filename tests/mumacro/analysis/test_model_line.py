@@ -130,5 +130,5 @@ def test_digits_are_those_that_the_uncertainty_leaves() -> None:
 def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> None:
     with pytest.raises((InputError, TypeError), match=said):
         model_rows(surrogate, {**CASE, **changed})
-    with pytest.raises(InputError, match="known must be finite and > 0"):
+    with pytest.raises(InputError, match="uncertainty must be finite and > 0"):
         k_effect(surrogate, CASE, uncertainty=0.0)
