@@ -12,13 +12,13 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from mumacro.analysis.load import EXPONENTS, ROUGH, Stiffening
+from mumacro.analysis.load import ROUGH, Stiffening
 from mumacro.analysis.measured_points import HARDLY
 from mumacro.analysis.settling import settling
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name, without_interval
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
-from mumacro.inputs.kind import Kind, kind_of
+from mumacro.inputs.kind import SPRINGS_OF, Kind, kind_of
 from mumacro.surrogate import Surrogate
 
 #: names of the rows, as in the table of docs/validity.md
@@ -116,7 +116,7 @@ def load_rows(
             f"k grows as Fz^{stiffening.exponent:.3g} from its value at Fz = {stiffening.load:g} N"
         )
     else:
-        advice = "" if EXPONENTS[contact] else ", and a stiffness exponent"
+        advice = "" if SPRINGS_OF[contact].exponent else ", and a stiffness exponent"
         text = (
             "constant over Fz here; with the load k grows, as Fz^(1/3) for a ball, as "
             f"Fz^{ROUGH[0]:g} to Fz^{ROUGH[1]:g} for rough surfaces: give Fz at which k "

@@ -18,6 +18,21 @@ DirectionName = Literal["across", "along", "normal"]
 #: in the order of the kernel's codes
 CONTACTS: tuple[ContactName, ...] = ("spring", "ball")
 DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
+
+
+class Springs(NamedTuple):
+    """What is known of a contact's springs without an evaluation."""
+
+    meaning: str
+    exponent: float  #: k grows with this power of the load
+    middle_load: float  #: load of the middle spring over the mean
+
+
+#: by contact
+SPRINGS_OF: dict[str, Springs] = {
+    "spring": Springs("one spring of stiffness k", 0.0, 1.0),
+    "ball": Springs("a ball (Hertz) with the initial stiffness k", 1.0 / 3.0, 1.5),
+}
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
 # by code of the direction
 _FIELDS = (
