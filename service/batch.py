@@ -16,10 +16,10 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
 from mumacro.kernel.arrays import Codes
 
+from .included import Asked, Outputs, answer_columns
 from .models.inputs import MAX_REASONS, Column
 from .models.options import MODEL, BatchOptions, CaseColumns
 from .problems import FieldFault, Kind, RequestError, reason_of, refuse
-from .quantities import Asked, Outputs, answer_columns
 from .reading import of_members
 from .tables import LoadedTable, Tables
 

@@ -19,12 +19,12 @@ from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
 from mumacro.kernel.arrays import Array
 
+from ..included import Asked, answer_columns, listed, nested
 from ..limits import Working
 from ..models import answers
 from ..models.answers import LawAnswer, SolveForAnswer
 from ..models.options import MODEL
 from ..models.questions import LawQuery, LawRequest, SolveForRequest
-from ..quantities import Asked, answer_columns, listed, nested
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
 from . import ASKED, POSTED, router_of
