@@ -1,8 +1,8 @@
 """The answer to cases: the default outputs, and what ``include`` can add.
 
-Each of that is one function here, a member of ``models/answers.py`` with its unit and meaning, and a
-name in ``models/options.py``.  It takes one case in plain numbers, or many in columns, and gives
-its outputs by path: ``power.saved`` is ``saved`` within ``power``.  Equation numbers are those of
+Each is one function here, a member of ``models/answers.py`` with its unit and meaning, and a name
+in ``models/options.py``.  It takes one case in plain numbers, or many in columns, and gives its
+outputs by path: ``power.saved`` is ``saved`` within ``power``.  Equation numbers are those of
 Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations" (Friction,
 2018).
 """
@@ -213,8 +213,8 @@ _INTERVAL = frozenset(("k_range", "k_low", "k_high"))
 
 
 class Asked(NamedTuple):
-    """What is asked of cases: their kind, what is included beside the default outputs, and deviations
-    for ``std``."""
+    """What is asked of cases: their kind, what is included beside the default outputs, and
+    deviations for ``std``."""
 
     kind: Kind = SPRING
     interval: bool = False  # whether k is one
