@@ -12,9 +12,9 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from mumacro.analysis.load import ROUGH, Stiffening
 from mumacro.analysis.measured_points import HARDLY
 from mumacro.analysis.settling import settling
+from mumacro.analysis.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name, without_interval
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID

@@ -12,8 +12,8 @@ from fastapi import Query, Response
 
 import mumacro
 from mumacro.analysis.law import Law
-from mumacro.analysis.load import Stiffening
 from mumacro.analysis.solve_for import Solution
+from mumacro.analysis.stiffening import Stiffening
 from mumacro.analysis.validity import load_rows
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of

@@ -16,8 +16,8 @@ from mumacro import InputError, Surrogate
 from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.borders import border_crossings
 from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.load import Stiffening
 from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.stiffening import Stiffening
 from mumacro.analysis.validity import load_rows
 from mumacro.cli.main import main
 from tests.support.cases import CASE, PAIRS, Case, as_kind, without
