@@ -65,15 +65,15 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault, with the choice that may have been meant."""
         if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
-            known = [word.strip(" '") for word in wrong[3].split(",")]
-            near = difflib.get_close_matches(wrong[2].lower(), known, n=1)
+            choices = [word.strip(" '") for word in wrong[3].split(",")]
+            near = difflib.get_close_matches(wrong[2].lower(), choices, n=1)
             message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
 
 
 def question(
     name: str,
-    told: str,
+    description: str,
     epilog: str,
     words: str,
     least: str = "+",
@@ -81,7 +81,7 @@ def question(
 ) -> OneLineParser:
     """The parser of a command that is given a case and has ``-o``; ``first`` is an argument that
     stands before it."""
-    parser = OneLineParser(prog=f"mumacro {name}", description=told, epilog=epilog)
+    parser = OneLineParser(prog=f"mumacro {name}", description=description, epilog=epilog)
     if first:
         parser.add_argument(first[0], **first[1])
     add_case(parser, words, least)
@@ -149,16 +149,16 @@ def add_form(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--digits", type=int, choices=range(1, 18), metavar="N", help=text)
 
 
-def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
+def run(title: str, command: Callable[[Any], int | str], arguments: Any) -> int:
     """Run a command, print the text that it returns, and return the exit code; an error is one line
     on stderr."""
     try:
-        found = command(given)
-        if isinstance(found, str):
-            print(found, flush=True)
+        output = command(arguments)
+        if isinstance(output, str):
+            print(output, flush=True)
             return 0
         sys.stdout.flush()
-        return found
+        return output
     except BrokenPipeError:  # the reader, such as head, has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -254,17 +254,17 @@ def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
 
 def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
     """Name and value of each ``name=value``; a unit may stand apart; other words have no value."""
-    found: list[tuple[str, str | None]] = []
+    pairs: list[tuple[str, str | None]] = []
     for word in re.sub(r"\s*=\s*", "=", " ".join(words)).split():
         name, equals, text = word.strip(",;").partition("=")
-        last, value = found[-1] if found else ("", None)
+        last, value = pairs[-1] if pairs else ("", None)
         if equals:
-            found.append((name, text))
+            pairs.append((name, text))
         elif value is not None and last in (*NAMES, *LIKE) and scale_of(last, name):
-            found[-1] = last, f"{value} {name}"
+            pairs[-1] = last, f"{value} {name}"
         else:
-            found.append((name, None))
-    return found
+            pairs.append((name, None))
+    return pairs
 
 
 def _faults_of_names(
@@ -277,10 +277,10 @@ def _faults_of_names(
     ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
-    given = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
+    complete = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
     hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
     absent = [
-        hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in given
+        hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in complete
     ]
     return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
 
@@ -293,8 +293,8 @@ def without_or_load(unknown: str) -> dict[str, Any]:
 
 def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
     """A case with the geometric middle in place of an interval of k."""
-    found, _ = without_interval(case)
-    return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in found.items()}
+    one_k, _ = without_interval(case)
+    return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
 
 
 def in_words(text: str, case: Mapping[str, Any]) -> str:
@@ -316,12 +316,12 @@ def format_for(
 
 
 def read_values(
-    given: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
+    pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
 ) -> list[Any]:
     """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
     are none."""
     values, faults = [], []
-    for name, text in given:
+    for name, text in pairs:
         try:
             values.append(read(name, text))
         except ValueError as error:

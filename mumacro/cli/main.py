@@ -39,7 +39,7 @@ _TASKS = {
 }
 OVERVIEW = (
     "Friction of a shaken contact.  Each command has its own help: mumacro eval --help.\n\n"
-    + "".join(f"  {words:68}  {told}\n" for words, told in _TASKS.items())
+    + "".join(f"  {words:68}  {description}\n" for words, description in _TASKS.items())
     + "\n"
 )
 

@@ -320,10 +320,7 @@ def columns_of(inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
             if value is ABSENT:
                 raise _missing(inputs, kind)
             value = _column(source, value)
-        if source == "f":
-            with np.errstate(over="ignore"):  # an infinite omega, refused as a value of f
-                value = value * RAD_PER_CYCLE
-        columns[name] = value
+        columns[name] = _angular(value) if source == "f" else value
     return columns
 
 
@@ -341,6 +338,14 @@ def _missing(inputs: Mapping[str, Any], kind: Kind) -> InputError:
     }
     others = ", ".join(in_words[name] for name in absent[1:])
     return InputError(absent[0], None, bounds[absent[0]] + (others and f"; so must {others}"))
+
+
+def _angular(frequency: float | Array) -> float | Array:
+    """omega [rad/s] of f [Hz]; beyond double range infinite, which is refused as a value of f."""
+    if isinstance(frequency, float):
+        return frequency * RAD_PER_CYCLE
+    with np.errstate(over="ignore"):
+        return frequency * RAD_PER_CYCLE
 
 
 def _frequency_in(inputs: Mapping[str, Any], kind: Kind) -> str:
