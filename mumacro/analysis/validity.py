@@ -68,7 +68,7 @@ def model_rows(
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
     >>> [k_row] = [row for row in model_rows(Surrogate.open(), case) if row["row"] == "k is known"]
     >>> k_row["text"]
-    'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
+    '10 % more or less of k changes mu_macro by 6 %: give k_range, or fit k'
     """
     case, ends = without_interval(case)
     kind = kind_of(contact, direction)
@@ -213,7 +213,7 @@ def _stiffness(
     effect = k_effect(surrogate, case, contact, direction)
     margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{100.0 * effect:.2g} %"
     if effect >= 1e-3:
-        text = f"k known to {margin} leaves mu_macro uncertain by {change}: give k_range, or fit k"
+        text = f"{margin} more or less of k changes mu_macro by {change}: give k_range, or fit k"
     elif y > HARDLY:
         text = (
             f"y~ = {y:.3g}, above {HARDLY:g}: k off by {margin} moves mu_macro by {change}; "

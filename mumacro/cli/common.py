@@ -32,9 +32,8 @@ inputs, each as name=value, in SI units or with a unit as in y0=2um:
   mu0    Coulomb friction coefficient [-], > 0
   Fz     normal force [N], > 0
   k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
-  y0     amplitude of the oscillation [m], half of peak to peak, >= 0; with --direction normal
-         that of the force, Fz_amplitude [N], < Fz
-  omega  its angular frequency [rad/s], or f, its frequency [Hz], >= 0
+  y0     amplitude [m], half of peak to peak; with --direction normal Fz_amplitude [N], below Fz
+  omega  angular frequency [rad/s], or f, frequency [Hz], >= 0
   v0     sliding speed [m/s], >= 0
 """
 
@@ -107,10 +106,7 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
     """The options for the contact and the direction of its oscillation; :func:`kind_in` reads
     them."""
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
-    text = (
-        "of the oscillation to the sliding direction; normal: the normal force oscillates; "
-        "default: across"
-    )
+    text = "of the oscillation; normal: of the normal force; default: across"
     parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
 
 
@@ -122,10 +118,7 @@ def kind_in(chosen: argparse.Namespace) -> Kind:
 
 def add_table(parser: OneLineParser) -> None:
     """The options of all commands that read a table and answer."""
-    text = (
-        "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: "
-        "the tightest one"
-    )
+    text = "a file, or the largest error; default: the tightest bundled one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
 
@@ -143,8 +136,8 @@ def add_format(parser: OneLineParser) -> None:
 def add_exponent(parser: OneLineParser) -> None:
     """The option for a stiffness that grows with the load."""
     text = (
-        "where Fz is swept or the unknown: k grows as Fz^M, 0 to 1, and Fz= in the case is the "
-        "load at which k holds; default with Fz=: 1/3 for a ball"
+        "with Fz as the input: k grows as Fz^M, M from 0 to 1, from its value at the Fz= of the "
+        "case; default for a ball: 1/3"
     )
     parser.add_argument("--stiffness-exponent", type=float, metavar="M", help=text)
 
@@ -206,10 +199,11 @@ def read_case(
     1000000.0
     """
     case: dict[str, Any] = {}
-    faults = []
+    faults: list[str] = []
+    strange: list[str] = []
     for name, text in _pairs(words):
         if text is None:
-            faults.append(f"{name!r} is no name=value such as Fz=10")
+            strange.append(repr(name))
             continue
         if name not in kind.columns:
             meant = suggestion(name)
@@ -223,6 +217,9 @@ def read_case(
             case[name] = _read(name, text, one_k)
         except ValueError as error:
             faults.append(str(error))
+    if strange:
+        verb = "is" if len(strange) == 1 else "are"
+        faults.insert(0, f"{', '.join(strange)} {verb} no name=value such as Fz=10")
     absent = {*optional} - case.keys()
     faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
@@ -275,9 +272,9 @@ def _faults_of_names(
 ) -> list[str]:
     frequencies = {"f", "omega"}
     left_out = {*without} | (frequencies if frequencies & {*without} else set())
-    names = " and ".join(without)
-    role = f"{names} {'is' if len(without) == 1 else 'are'} the unknown or the swept input"
-    faults = [f"leave {name} out: {role}" for name in case if name in left_out]
+    faults = [
+        f"leave {name} out: it varies here or is computed" for name in case if name in left_out
+    ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
     complete = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
@@ -366,7 +363,7 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
 
 def model_lines(rows: Sequence[Row]) -> list[str]:
     """What is said about the model, below a result."""
-    return [in_columns([("model", f"{row['row']}: {row['text']}")]) for row in rows]
+    return [in_columns([("assumes", f"{row['row']}: {row['text']}")]) for row in rows]
 
 
 def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:

@@ -85,7 +85,10 @@ _Y0 = (
     "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding "
     "direction; required, unless the direction is normal"
 )
-_AMPLITUDE = "Amplitude of the normal force [N], below Fz: for direction normal in place of y0"
+_AMPLITUDE = (
+    "Amplitude of the normal force [N], half of peak to peak, below Fz: for direction normal in "
+    "place of y0"
+)
 Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 
 
@@ -239,9 +242,7 @@ class InputColumns(Strict):
     omega: NotNegativeColumn = Field(None, description="Angular frequency [rad/s]; or f")
     f: HertzColumn = Field(None, description="Frequency [Hz], in place of omega")
     v0: NotNegativeColumn = Field(description=_V0)
-    Fz_amplitude: NotNegativeColumn = Field(
-        None, description="Amplitude of the normal force [N], for direction normal in place of y0"
-    )
+    Fz_amplitude: NotNegativeColumn = Field(None, description=_AMPLITUDE)
     k_low: PositiveColumn = Field(None, description=_LOW)
     k_high: PositiveColumn = Field(None, description=_HIGH)
     k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")
