@@ -1,8 +1,8 @@
 """Many cases at once: one model of columns for every form of a body, answered slice by slice.
 
-A form decodes a body to numbers, lists and arrays by name (``forms/``); :class:`CaseColumns` checks
-them; :class:`Batch` evaluates slices, so that memory stays small and other threads run between
-them; the form writes the slices.  A bad case spoils only itself.
+A form (``batch_forms/``) decodes a body to numbers, lists and arrays by name; :class:`CaseColumns`
+checks them; :class:`Batch` evaluates slices, so that memory stays small and other threads run
+between them; the form writes the slices.  A bad case spoils only itself.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,10 +16,10 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
 from mumacro.kernel.arrays import Codes
 
+from .included import Outputs, Plan, answer_columns
 from .models.inputs import MAX_REASONS, Column
 from .models.options import MODEL, BatchOptions, CaseColumns
 from .problems import FieldFault, Kind, RequestError, reason_of, refuse
-from .quantities import Outputs, Plan, answer_columns
 from .reading import of_members
 from .tables import LoadedTable, Tables
 

@@ -86,7 +86,10 @@ _Y0 = (
     "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding "
     "direction; required, unless the direction is normal"
 )
-_AMPLITUDE = "Amplitude of the normal force [N], below Fz: for direction normal in place of y0"
+_AMPLITUDE = (
+    "Amplitude of the normal force [N], half of peak to peak, below Fz: for direction normal in "
+    "place of y0"
+)
 
 
 def one_of(*names: str) -> dict[str, Any]:
@@ -263,9 +266,7 @@ class InputColumns(Strict):
     omega: NotNegativeColumn = either("Angular frequency [rad/s]; or f")
     f: HertzColumn = either("Frequency [Hz], in place of omega")
     v0: NotNegativeColumn = Field(description=_V0)
-    Fz_amplitude: NotNegativeColumn = either(
-        "Amplitude of the normal force [N], for direction normal in place of y0"
-    )
+    Fz_amplitude: NotNegativeColumn = either(_AMPLITUDE)
     k_low: PositiveColumn = either(_LOW)
     k_high: PositiveColumn = either(_HIGH)
     k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")

@@ -2,7 +2,7 @@
 
 import math
 import sys
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -146,6 +146,10 @@ class SolveForRequest(Options, OtherInputs):
 
 _Modulus = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
 _Poisson = Annotated[float, Field(gt=-1, le=0.5, allow_inf_nan=False)]
+if TYPE_CHECKING:
+    _Geometry = str
+else:
+    _Geometry = Literal[tuple(GEOMETRIES)]
 _GEOMETRIES = "; ".join(f"{name}: {one.meaning}" for name, one in GEOMETRIES.items())
 
 
@@ -158,7 +162,7 @@ class StiffnessRequest(Strict):
         }
     )
 
-    geometry: Literal["ball", "flat", "cylinder"] = Field(description=_GEOMETRIES)
+    geometry: _Geometry = Field(description=_GEOMETRIES)
     radius: Positive | None = optional("Radius of the ball, pin or cylinder [m]")
     length: Positive | None = optional("Length of the cylinder [m]; of: cylinder")
     Fz: Positive | None = optional("Normal force [N]")

@@ -17,11 +17,11 @@ from starlette.types import Receive, Scope, Send
 from mumacro.errors import MumacroError
 
 from ..batch import Batch, Body, Form, both
-from ..forms import ALL, FORMS
+from ..batch_forms import ALL, FORMS
+from ..included import Plan, answer_case
 from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body, within
 from ..models.options import BatchOptions, CaseRequest
 from ..problems import FieldFault, Kind, RequestError, document_of, meaning, refuse
-from ..quantities import Plan, answer_case
 from ..reading import DirectRoute, decode, dump, of_members, validated
 from . import POSTED, router_of
 

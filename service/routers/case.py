@@ -8,9 +8,9 @@ from starlette.responses import PlainTextResponse
 from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 
+from ..included import Plan, answer_case
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
-from ..quantities import Plan, answer_case
 from ..reading import DirectRoute, Json, dump
 from . import ASKED, POSTED, router_of
 

@@ -12,19 +12,19 @@ from fastapi import Query, Response
 
 import mumacro
 from mumacro.analysis.law import Law
-from mumacro.analysis.load import Stiffening
 from mumacro.analysis.solve_for import Solution
+from mumacro.analysis.stiffening import Stiffening
 from mumacro.analysis.validity import load_rows
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
 from mumacro.kernel.arrays import Array
 
+from ..included import Plan, answer_columns, listed, nested
 from ..limits import Working
 from ..models import answers
 from ..models.answers import LawAnswer, SolveForAnswer
 from ..models.options import MODEL
 from ..models.questions import LawQuery, LawRequest, SolveForRequest
-from ..quantities import Plan, answer_columns, listed, nested
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
 from . import ASKED, POSTED, router_of

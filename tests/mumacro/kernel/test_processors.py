@@ -67,8 +67,8 @@ def at_level(processor: str, module: str, *words: str) -> str:
 
 def on(processor: str, *words: str) -> str:
     """What ``python`` with these words prints there; it must end well."""
-    known = importlib.import_module("numpy._core._multiarray_umath").__cpu_dispatch__
-    off = [name for name in known if name.startswith(PROCESSORS[processor])]
+    features = importlib.import_module("numpy._core._multiarray_umath").__cpu_dispatch__
+    off = [name for name in features if name.startswith(PROCESSORS[processor])]
     switches = {
         "NPY_DISABLE_CPU_FEATURES": " ".join(off),
         "NUMBA_CPU_FEATURES": "",
