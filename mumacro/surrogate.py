@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from mumacro import closed_forms, plotting
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
-from mumacro.contacts.quadrature import put_rules
+from mumacro.contacts.quadrature import put_driven
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import ABSENT, NUMBERS, NUMBERS_AND_ARRAYS, Cases, by_name, labelled, real
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import (
+    BALL,
     SPRING,
     ContactName,
     DirectionName,
@@ -74,6 +75,8 @@ class Surrogate:
         _check_border(table.border, self.path)
         self._data = Data(*self.border.arrays, block_rows(table.blocks), outer_cells())
         self._data.put(atlas.MU, *quantity_cells(table.blocks, atlas.MU))
+        #: what the kernel reads of a ball that is shaken across; made on first use
+        self._ball: Data | None = None
         self._pointer = self._data.pointer
 
     @classmethod
@@ -393,7 +396,7 @@ class Surrogate:
             )
         v, y, shape = _points(v_tilde, y_tilde)
         value, bound, source = slices.values(
-            _CODES[name], self._data_of(kind), v, y, self.threads, kind
+            _CODES[name], self._data_of(kind, _CODES[name]), v, y, self.threads, kind
         )
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
@@ -762,11 +765,27 @@ class Surrogate:
         )
         return mu_macro, mu_ratio, bound, int(source)
 
-    def _data_of(self, kind: Kind) -> Data:
-        """What the kernel reads; a ball needs rules of quadrature."""
-        if kind.contact:
-            put_rules(self._data, self.tolerance)
-        return self._data
+    def _data_of(self, kind: Kind, quantity: int = atlas.MU) -> Data:
+        """What the kernel reads of a kind; cells are cut on first use."""
+        if kind != BALL:
+            if kind.contact:
+                put_driven(self._data)
+            return self._data
+        if not self.table.ball:
+            raise InputError(
+                "contact",
+                "ball",
+                f"spring: the table {self.path.name} has no ball, which a table of this program's "
+                "builder has; python -m builder build makes one",
+            )
+        found = self._ball
+        if found is None:
+            rows = block_rows(self.table.ball, atlas.BALL_CHARTS)
+            found = self._ball = Data(*self.border.arrays, rows, outer_cells())
+        if quantity not in found.quantities:
+            cells = quantity_cells(self.table.ball, quantity, atlas.BALL_CHARTS)
+            found.put(quantity, *cells)
+        return found
 
     def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
         """Whether v~ is further from v~crit than that is known, and than rounding may move v~ and

@@ -53,7 +53,7 @@ class Kind(NamedTuple):
         return (*self.fields, "f")
 
 
-SPRING = Kind(0, 0)
+SPRING, BALL = Kind(0, 0), Kind(1, 0)  # across
 _KINDS: dict[tuple[str, str], Kind] = {
     (word, way): Kind(i, j) for i, word in enumerate(CONTACTS) for j, way in enumerate(DIRECTIONS)
 }

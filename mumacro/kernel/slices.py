@@ -14,9 +14,16 @@ from mumacro.kernel.binding import Data, kernels
 
 SLICE = 16_384  # points of a slice: its arrays stay in the second cache
 FEW = 65_536  # points that one thread evaluates before a second one has started
-COST = 64  # of a ball, about, in springs
+COST = 64  # of a ball that is shaken along, about, in springs
 INTERVAL = 64  # of an interval of k, about, in cases
 _KERNEL = kernels[-1]
+
+
+def _cost(kind: tuple[int, int]) -> int:
+    """Of a point of a kind, about, in springs that are shaken across."""
+    contact, direction = kind
+    return COST if direction else 1 + contact
+
 
 
 def share_out(n: int, threads: int, work: Callable[[slice], None], cost: int = 1) -> None:
@@ -51,7 +58,7 @@ def values(
             data, quantity, v[part], y[part], value[part], bound[part], source[part], kind
         )
 
-    share_out(v.size, threads, work, COST if any(kind) else 1)
+    share_out(v.size, threads, work, _cost(kind))
     return value, bound, source
 
 
@@ -88,7 +95,7 @@ def cases(
     """Answers to n cases, see :meth:`mumacro.kernel.binding.Kernel.cases`: rows (3, 5 or 17, n),
     and sources (n,)."""
     out, source = np.empty((rows, n)), np.empty(n, np.int8)
-    cost = COST if any(kind) else 1
+    cost = _cost(kind)
     if n <= SLICE // cost:  # most calls; the shorter way
         _KERNEL.cases(data, n, columns, out, source, 0, kind)
         return out, source
@@ -116,5 +123,5 @@ def intervals(
         six = _slice(columns, part)
         _KERNEL.intervals(data, part.stop - part.start, six, high[part], out, part.start, kind)
 
-    share_out(high.size, threads, work, INTERVAL * (COST if any(kind) else 1))
+    share_out(high.size, threads, work, INTERVAL * _cost(kind))
     return out

@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import BLOCK_COLUMNS, PIECE_COLUMNS, Data, kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import Axis
+from mumacro.table.atlas import Axis, Chart
 from mumacro.table.blocks import Block, BorderPiece
 
 WIDTH = 8  # coefficients of a cell along each coordinate: one vector
@@ -158,22 +158,24 @@ def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
     return np.concatenate(coefficients), rows
 
 
-def block_rows(blocks: Sequence[Block]) -> Array:
+def block_rows(blocks: Sequence[Block], charts: Sequence[Chart] = atlas.CHARTS) -> Array:
     """The geometry of the blocks for evaluation, (sources + 1, BLOCK_COLUMNS)."""
     rows, first = np.zeros((len(atlas.SOURCES) + 1, BLOCK_COLUMNS)), 0
-    for row, chart, block in zip(rows, atlas.CHARTS, blocks, strict=False):
+    for row, chart, block in zip(rows, charts, blocks, strict=False):
         na, nb = block.cells
         row[:6] = first, nb, *_count(chart.a, na), *_count(chart.b, nb)
         first += na * nb
     return rows
 
 
-def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
+def quantity_cells(
+    blocks: Sequence[Block], quantity: int, charts: Sequence[Chart] = atlas.CHARTS
+) -> tuple[Array, Array, Array]:
     """What :meth:`mumacro.kernel.binding.Data.put` wants of a quantity: polynomials, errors, errors
     in every cell."""
     name, errors = atlas.QUANTITY_NAMES[quantity], np.zeros((len(atlas.SOURCES) + 1, 2))
     patches, in_cells = [], []
-    for error, chart, block in zip(errors, atlas.CHARTS, blocks, strict=False):
+    for error, chart, block in zip(errors, charts, blocks, strict=False):
         cells = block.cells[0] * block.cells[1]
         nodes = block.nodes.get(name)
         patches.append(
