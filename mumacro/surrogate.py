@@ -765,6 +765,10 @@ class Surrogate:
         )
         return mu_macro, mu_ratio, bound, int(source)
 
+    def cells(self, name: str, kind: Kind = SPRING) -> Data:
+        """What the kernel reads of a quantity of a kind, for callers of the kernel itself."""
+        return self._data_of(kind, _CODES[name]) if kind == BALL else self._with(name)
+
     def _data_of(self, kind: Kind, quantity: int = atlas.MU) -> Data:
         """What the kernel reads of a kind; cells are cut on first use."""
         if kind != BALL:

@@ -21,12 +21,12 @@ from mumacro import Surrogate
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
+from mumacro.table.atlas import MIDDLE, STEEPEST, STEEPEST_Y
 from mumacro.table.polynomials import quantity_cells
 
 from .compiled import solver_kernel
 
 CORNER = atlas.NAMES.index("corner")
-MIDDLE = 1.5  # load of the middle spring over the mean
 POINTS = 73  # on either side of the middle of a piece
 LAST = 3.3  # of the rule's variable: beyond, weights are below 1e-17
 BISECTIONS = 62  # of an interval of less than e^64 to its last digit
@@ -169,12 +169,13 @@ class Ball:
         last = np.where(cuts, outer, np.maximum(v, y))
         width = np.minimum(3.0 * np.cbrt(ratio * ratio), 0.5)
         steps = (inner, y / (1.0 - width), y, y / (1.0 + width), last)
-        edges = [np.ones(v.shape), *(np.minimum(x, 1.0) for x in steps)]
+        edges = np.minimum.accumulate([np.ones(v.shape), *steps])
         decades = [edges[0]]
         for above, below in itertools.pairwise(edges):
-            below = np.minimum(above, below)
-            parts = max(1, math.ceil(float(np.log(above / below).max()) / LONGEST))
-            decades += [above * (below / above) ** (i / parts) for i in range(1, parts)] + [below]
+            parts = math.ceil(float(np.log(above / below).max()) / LONGEST)
+            decades += [
+                np.maximum(above * math.exp(-LONGEST * i), below) for i in range(1, parts)
+            ] + [below]
         return np.stack([*decades, np.zeros(v.shape)], axis=1)
 
     def solve(self, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
@@ -226,5 +227,3 @@ class Ball:
 
 
 NAMES = ("mu_ratio", "deficit", "power", "stick_fraction")
-#: the ray that touches the border: v~crit/y~ has its largest value there
-STEEPEST, STEEPEST_Y = 0.33516779066085, 1.29079076185

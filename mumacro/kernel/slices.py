@@ -73,13 +73,15 @@ def alone(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
     return value
 
 
-def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
+def slopes(
+    quantity: int, data: Data, v: Array, y: Array, threads: int, contact: int = 0
+) -> Array:
     """Value, both logarithmic slopes and their bounds, rows (5, n), of any quantity."""
     rows = np.empty((5, v.size))
     share_out(
         v.size,
         threads,
-        lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start),
+        lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start, contact),
     )
     return rows
 

@@ -1,0 +1,110 @@
+"""A contact as the builder sees it: its charts, its solver, and what that may be wrong by.
+
+``v`` and ``y`` are those of the charts everywhere: v~ and y~ of one spring, v~/1.5 and y~/1.5, those
+of its middle spring, of a ball.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from mumacro import Surrogate
+from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.kernel import slices
+from mumacro.kernel.arrays import Array
+from mumacro.table import atlas
+from mumacro.table.atlas import MIDDLE, Chart, Quantity
+from mumacro.table.blocks import Block, BorderPiece, Table
+
+from ..solver.ball import Ball, Springs
+from ..solver.sweep import Sweep
+from .quantities import Sliding, solver_noise
+
+#: tolerance of the springs that a ball is integrated over, whatever that of its table
+FINE = 1e-13
+#: what a quadrature over such springs may be wrong by: of mu~ and of the stick fraction, absolute
+#: and relative; of the power, relative
+BALL_NOISE = 4e-14
+
+
+class Solve(Protocol):
+    """Solves points of the charts' groups; ``continuous``: the orbit that slides all the time."""
+
+    def __call__(
+        self, v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
+    ) -> dict[str, Array]: ...
+
+
+class Contact(NamedTuple):
+    """One contact; ``noise`` as :func:`.quantities.solver_noise`."""
+
+    kind: Kind
+    charts: Sequence[Chart]
+    solve: Solve
+    noise: Callable[[str, Array, Array, dict[str, Array], Sliding], Array]
+    #: times those of the charts: v~ and y~ of the contact as a whole
+    scale: float
+
+    def blocks(self, table: Table) -> list[Block]:
+        """Its blocks in a table."""
+        return table.ball if self.kind == BALL else table.blocks
+
+    def quantity(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Any:
+        """Value, bound and source of a table."""
+        return surrogate.quantity(name, self.scale * v, self.scale * y, **self.kind.names)
+
+    def slopes(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Array:
+        """Value, slopes and their bounds, rows (5, n)."""
+        code = atlas.QUANTITY_NAMES.index(name)
+        data = surrogate.cells(name, self.kind)
+        return slices.slopes(
+            code, data, self.scale * v, self.scale * y, surrogate.threads, self.kind.contact
+        )
+
+    def held(self, chart: Chart) -> list[Quantity]:
+        """The quantities that a block tabulates."""
+        return [quantity for quantity in atlas.QUANTITIES if chart.holds(quantity)]
+
+
+def spring(sweep: Sweep) -> Contact:
+    """One spring, solved anew at every point."""
+
+    def solve(
+        v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
+    ) -> dict[str, Array]:
+        return sweep.solve("continuous" if continuous else "full", v, y, eta)
+
+    return Contact(SPRING, atlas.CHARTS, solve, solver_noise, 1.0)
+
+
+def ball(springs: Springs) -> Contact:
+    """A ball, integrated over springs."""
+    integral = Ball(springs)
+
+    def solve(
+        v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
+    ) -> dict[str, Array]:
+        del continuous  # no block of a ball reaches over the border
+        return integral.solve(v, y, eta)
+
+    return Contact(BALL, atlas.BALL_CHARTS, solve, _ball_noise, MIDDLE)
+
+
+def _ball_noise(
+    name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding
+) -> Array:
+    del v, y, sliding
+    value = solved[name]
+    if name == "mu_ratio":
+        return BALL_NOISE * np.minimum(1.0, 4.0 * value)
+    # next to the border a spring's own stick fraction has half of its digits
+    return BALL_NOISE * value if name == "power" else np.full(value.shape, 25.0 * BALL_NOISE)
+
+
+def fine_springs(pieces: list[BorderPiece], blocks: list[Block]) -> Springs:
+    """What a ball is integrated over, from a border and blocks of the tolerance :data:`FINE`."""
+    none = np.empty(0)
+    table = Table(pieces, blocks, none, none, none, none, none, none)
+    table.attributes = {"tolerance": FINE, "quantities": " ".join(atlas.QUANTITY_NAMES)}
+    return Springs(Surrogate(table, "fine springs"))
