@@ -33,6 +33,7 @@ from mumacro.kernel.threads import default_threads
 from mumacro.table import atlas
 from mumacro.table.blocks import BorderPiece, Table
 from mumacro.table.bundled import bundled_tables
+from mumacro.table.netcdf import BALL as BALL_ATTRIBUTES
 from mumacro.table.netcdf import error_distribution, json_attributes, parse_table, read_image
 from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
 
@@ -196,8 +197,14 @@ class Surrogate:
         return error_distribution(self.table)
 
     @property
+    def ball_error_distribution(self) -> dict[str, dict[str, float]]:
+        """The same of a ball that is shaken across, without the border; empty for a table without
+        a ball."""
+        return error_distribution(self.table, BALL_ATTRIBUTES)
+
+    @property
     def memory(self) -> int:
-        """Bytes of the cells that an evaluation of mu~ reads."""
+        """Bytes of the cells that an evaluation of mu~ of one spring reads."""
         data = self._data
         return sum(
             array.nbytes

@@ -14,6 +14,7 @@ table that is finer than the one to be built, with 1 - mu~ known to its own digi
 
 import itertools
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -28,11 +29,13 @@ from .compiled import solver_kernel
 
 CORNER = atlas.NAMES.index("corner")
 POINTS = 73  # on either side of the middle of a piece
+#: tolerance from which as many are enough
+FEWER_POINTS = {1e-5: 34, 1e-8: 46, 1e-11: 60}
 LAST = 3.3  # of the rule's variable: beyond, weights are below 1e-17
 BISECTIONS = 62  # of an interval of less than e^64 to its last digit
 LONGEST = 4.0  # piece, in ln s
 #: springs that are evaluated together
-TOGETHER = 400_000
+TOGETHER = 100_000
 
 
 def _rule(points: int) -> tuple[Array, Array]:
@@ -42,6 +45,11 @@ def _rule(points: int) -> tuple[Array, Array]:
     share = 1.0 / (1.0 + np.exp(-turn))
     weight = math.pi * np.cosh(t) * share / (1.0 + np.exp(turn)) * (t[1] - t[0])
     return share, weight
+
+
+def points_for(tolerance: float) -> int:
+    """Points on either side with which a quadrature errs by far less than ``tolerance``."""
+    return next((few for least, few in FEWER_POINTS.items() if tolerance >= least), POINTS)
 
 
 class Springs:
@@ -120,7 +128,7 @@ def _cell_values(cells: Array, row: Array, a: Array, b: Array, out: Array) -> No
 def _fast_deficit(v: Array, y: Array) -> Array:
     """1 - mu~ for large v~, with the digits that it has."""
     share = 1.0 / (1.0 + v * v)
-    n = y * y * share
+    n = np.minimum(y * y * share, 1.0)
     terms, total = np.ones_like(n), np.zeros_like(n)
     for k in range(1, 24):  # (2/pi) K(i r) in powers of r^2
         terms = terms * -n * ((2 * k - 1) / (2 * k)) ** 2
@@ -138,8 +146,9 @@ def _mu_fast(found: Array, share: Array) -> Array:
 class Ball:
     """Solves the ball at many points (V, Y) of its middle spring."""
 
-    def __init__(self, springs: Springs, points: int = POINTS) -> None:
+    def __init__(self, springs: Springs, points: int = POINTS, workers: int = 1) -> None:
         self.springs = springs
+        self._pool = ThreadPoolExecutor(max_workers=workers)
         self._share, self._weight = _rule(points)
 
     def crossings(self, ratio: Array) -> tuple[Array, Array]:
@@ -168,7 +177,10 @@ class Ball:
         inner, outer = (np.where(cuts, y / at, 1.0) for at in (entry, leave))
         last = np.where(cuts, outer, np.maximum(v, y))
         width = np.minimum(3.0 * np.cbrt(ratio * ratio), 0.5)
-        steps = (inner, y / (1.0 - width), y, y / (1.0 + width), last)
+        beyond = np.minimum(np.maximum(width, 3.0 * np.abs(y - 1.0)), 0.5)
+        steps = (
+            inner, y / (1.0 - width), y, y / (1.0 + width), y / (1.0 + beyond), last
+        )
         edges = np.minimum.accumulate([np.ones(v.shape), *steps])
         decades = [edges[0]]
         for above, below in itertools.pairwise(edges):
@@ -186,11 +198,11 @@ class Ball:
         eta = y - 1.0 if eta is None else np.broadcast_to(eta, shape)
         v, y, eta = (np.ascontiguousarray(x, np.float64).ravel() for x in (v, y, eta))
         step = max(1, TOGETHER // (4 * self._share.size))
-        parts = [
-            self._solve(v[i : i + step], y[i : i + step], eta[i : i + step])
-            for i in range(0, v.size, step)
-        ]
-        rows = np.concatenate(parts, axis=1)
+        parts = self._pool.map(
+            lambda i: self._solve(v[i : i + step], y[i : i + step], eta[i : i + step]),
+            range(0, v.size, step),
+        )
+        rows = np.concatenate([np.empty((len(NAMES), 0)), *parts], axis=1)
         return {name: row.reshape(shape) for name, row in zip(NAMES, rows, strict=True)}
 
     def _solve(self, v: Array, y: Array, eta: Array) -> Array:

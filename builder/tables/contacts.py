@@ -4,6 +4,7 @@
 of its middle spring, of a ball.
 """
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -12,12 +13,13 @@ import numpy as np
 from mumacro import Surrogate
 from mumacro.inputs.kind import BALL, SPRING, Kind
 from mumacro.kernel import slices
-from mumacro.kernel.arrays import Array
+from mumacro.kernel.arrays import Array, Codes
+from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import MIDDLE, Chart, Quantity
+from mumacro.table.atlas import MIDDLE, Chart
 from mumacro.table.blocks import Block, BorderPiece, Table
 
-from ..solver.ball import Ball, Springs
+from ..solver.ball import Ball, Springs, points_for
 from ..solver.sweep import Sweep
 from .quantities import Sliding, solver_noise
 
@@ -43,12 +45,30 @@ class Contact(NamedTuple):
     charts: Sequence[Chart]
     solve: Solve
     noise: Callable[[str, Array, Array, dict[str, Array], Sliding], Array]
+    #: quantities whose slopes a table gives
+    sloped: tuple[str, ...]
     #: times those of the charts: v~ and y~ of the contact as a whole
     scale: float
 
     def blocks(self, table: Table) -> list[Block]:
         """Its blocks in a table."""
         return table.ball if self.kind == BALL else table.blocks
+
+    def with_blocks(self, table: Table, blocks: list[Block]) -> Table:
+        """The table with other blocks of this contact."""
+        if self.kind == BALL:
+            return dataclasses.replace(table, ball=blocks)
+        return dataclasses.replace(table, blocks=blocks)
+
+    def as_asked(self, v: Array, y: Array) -> tuple[Array, Array]:
+        """The groups that evaluation makes of those of the contact as a whole, to the last digit,
+        which counts in the corner."""
+        return self.scale * v / self.scale, self.scale * y / self.scale
+
+    def places(self, surrogate: Surrogate, v: Array, y: Array) -> Codes:
+        """The blocks of points (n,), their number where a closed form answers."""
+        data = surrogate.cells("mu_ratio", self.kind)
+        return kernels[-1].places(data, v, y, self.kind.contact)[0]
 
     def quantity(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Any:
         """Value, bound and source of a table."""
@@ -62,10 +82,6 @@ class Contact(NamedTuple):
             code, data, self.scale * v, self.scale * y, surrogate.threads, self.kind.contact
         )
 
-    def held(self, chart: Chart) -> list[Quantity]:
-        """The quantities that a block tabulates."""
-        return [quantity for quantity in atlas.QUANTITIES if chart.holds(quantity)]
-
 
 def spring(sweep: Sweep) -> Contact:
     """One spring, solved anew at every point."""
@@ -75,12 +91,12 @@ def spring(sweep: Sweep) -> Contact:
     ) -> dict[str, Array]:
         return sweep.solve("continuous" if continuous else "full", v, y, eta)
 
-    return Contact(SPRING, atlas.CHARTS, solve, solver_noise, 1.0)
+    return Contact(SPRING, atlas.CHARTS, solve, solver_noise, atlas.QUANTITY_NAMES, 1.0)
 
 
-def ball(springs: Springs) -> Contact:
-    """A ball, integrated over springs."""
-    integral = Ball(springs)
+def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> Contact:
+    """A ball, integrated over springs well below ``tolerance``."""
+    integral = Ball(springs, points_for(tolerance), workers)
 
     def solve(
         v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
@@ -88,7 +104,7 @@ def ball(springs: Springs) -> Contact:
         del continuous  # no block of a ball reaches over the border
         return integral.solve(v, y, eta)
 
-    return Contact(BALL, atlas.BALL_CHARTS, solve, _ball_noise, MIDDLE)
+    return Contact(BALL, atlas.BALL_CHARTS, solve, _ball_noise, ("mu_ratio",), MIDDLE)
 
 
 def _ball_noise(
@@ -99,7 +115,7 @@ def _ball_noise(
     if name == "mu_ratio":
         return BALL_NOISE * np.minimum(1.0, 4.0 * value)
     # next to the border a spring's own stick fraction has half of its digits
-    return BALL_NOISE * value if name == "power" else np.full(value.shape, 25.0 * BALL_NOISE)
+    return 8.0 * BALL_NOISE * value if name == "power" else np.full(value.shape, 25.0 * BALL_NOISE)
 
 
 def fine_springs(pieces: list[BorderPiece], blocks: list[Block]) -> Springs:

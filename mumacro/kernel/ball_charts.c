@@ -40,7 +40,7 @@ static double mu_entry_slope(double t, double root, double *of_root) {
         return along;
     }
     *of_root = 2.0 * MU_SQRT2 * slope - 2.0 * root / t;
-    return -0.5 * t / root * *of_root;
+    return root > 0.0 ? -0.5 * t / root * *of_root : HUGE_VAL;
 }
 
 /* x^(1/6), then 2 MU_FOLD_KNOT - MU_FOLD_SCALE sqrt(1 - x) from x = 1/2 on: from the root of x or of 1 - x. */
@@ -143,12 +143,11 @@ static mu_turn mu_turn_of_ring(const mu_place *at) {
 
 static mu_turn mu_turn_of_ball_corner(const mu_place *at) {
     mu_turn out = mu_turn_corner(at); /* whose b is that of one spring at b = 0; only R and phi are taken */
-    const double phi = at->phi, root = sqrt(2.0 * MU_PI * at->v / phi), half = 0.5 * root;
+    const double phi = at->phi, root = sqrt(2.0 * MU_PI * at->v / phi);
     /* tan((pi/2 - psi)/2) = p^3: its slope is -(1 + p^6)/2 d psi, with tan psi = 2 phi / s0 */
     const double cube = root / (MU_SQRT2 * at->a + 2.0 * phi), share = 0.5 * phi * root / (at->a * at->a);
     const double turn_v = share * (1.5 * out.phi_v - 0.5), turn_y = share * 1.5 * out.phi_y;
     const double of_b = -(1.0 + cube * cube) / (6.0 * at->b * at->b);
-    (void)half;
     out.b_v = of_b * 2.0 * turn_v;
     out.b_y = of_b * 2.0 * turn_y;
     return out;

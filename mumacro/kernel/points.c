@@ -61,6 +61,39 @@ MU_INLINE double mu_without_edge(const double *cell, mu_spot spot, double left, 
     return -2.0 * step * step * (1.0 - root * root) * mu_cell_bend(cell, spot.u, spot.w) * (turn->scale * turn->scale);
 }
 
+/* A slope of q along ln v~ at fixed y~, across the rays, and what errors along a and b are multiplied by. */
+typedef struct {
+    double slope, reach_a, reach_b;
+} mu_across;
+
+/* In the ring next to the steepest ray: q is smooth in root = sqrt(1 - t) without a linear term at fixed y~, so the
+ * derivative along root at the steepest ray, which the interpolant has by its error, is taken out, as at the border.
+ * per_z: d q / d ln z. */
+static mu_across mu_across_rays(const mumacro_cells *cells, const double *block, const mu_place *at, double q_a,
+                                double per_z) {
+    const double end = 2.0 * MU_FOLD_KNOT, root = mu_max((end - at->a) / MU_FOLD_SCALE, 1e-9), t = 1.0 - root * root;
+    const double z = mu_min(at->y / MU_STEEPEST_Y, 1.0);
+    const mu_mask half = z < 0.5 ? mu_all_whole(-1) : mu_all_whole(0);
+    const double b = mu_first(mu_folded(half, mu_all(sqrt(z < 0.5 ? z : 1.0 - z))));
+    const mu_spot spot = mu_find(block, cells->first, cells->cells, end, b);
+    const double *cell = cells->polynomials + 64 * spot.cell, step = block[MU_STEP_B];
+    const mu_slope slope = mu_cell_slopes(cell, spot.u, spot.w);
+    const mu_turn turn = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, end, MU_FOLD_SCALE};
+    const double last = (double)mu_whole_of(mu_fma1(end, step, block[MU_OFFSET_B]));
+    const double at_edge = mu_fma1(b, step, block[MU_OFFSET_B]) >= last
+                               ? mu_without_edge(cell, spot, end - b, step, &turn)
+                               : mu_fold_slope(b) * slope.q_b * 2.0 * step;
+    const double q_a_edge = slope.q_a * 2.0 * block[MU_STEP_A];
+    double of_root, of_edge;
+    mu_across out;
+    (void)mu_entry_slope(t, root, &of_root);
+    (void)mu_entry_slope(1.0, 0.0, &of_edge);
+    out.slope = 0.5 * t / root * (MU_FOLD_SCALE * (q_a - q_a_edge) + of_root * per_z - of_edge * at_edge);
+    out.reach_a = mu_min(0.5 * MU_FOLD_SCALE * t / root, 0.5 * block[MU_STEP_A]);
+    out.reach_b = 2.0 * fabs(of_root) * mu_min(0.5 * t / root, block[MU_STEP_A]);
+    return out;
+}
+
 /* The slopes in a block, from the place, its spot in a cell, q there, and base and factor. */
 MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, const mu_place *at, mu_spot spot,
                                        mu_slope slope, double base, double factor) {
@@ -74,7 +107,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 3 * spot.cell;
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
     const double q_b = slope.q_b * 2.0 * block[MU_STEP_B];
-    double reach = fold, ratio, noise, along_a, along_a_y;
+    double reach = fold, ratio, noise, along_a, along_a_y, more = 0.0;
     double share_a = mu_edge_share(spot.u), share_b = mu_edge_share(spot.w);
     /* that near to the border a point may lie beyond it, where a slope changes with the distance in another way */
     const double inside = 1.0 - at->v / at->crit, off = mu_border_error(data);
@@ -96,15 +129,32 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     }
     along_a = turn.a_v * q_a;
     along_a_y = turn.a_y * q_a;
+    if (at->block == MU_B_RING) {
+        const double per_z = along_b_y / turn.edge_y, last = (double)mu_whole_of(
+            mu_fma1(turn.end, block[MU_STEP_A], block[MU_OFFSET_A]));
+        if (mu_fma1(at->a, block[MU_STEP_A], block[MU_OFFSET_A]) >= last) {
+            const mu_across found = mu_across_rays(cells, block, at, q_a, per_z);
+            along_a = found.slope;
+            along_a_y = -found.slope;
+            along_b = 0.0;
+            along_b_y = per_z;
+            share_a = mu_border_share(spot.u);
+            more = scale * (errors[1] * share_a * found.reach_a + errors[2] * share_b * reach * found.reach_b);
+        }
+    }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
     out.along_v = form.base_v + factor * (form.factor_v * slope.q + along_a + along_b);
     out.along_y = form.base_y + factor * (form.factor_y * slope.q + along_a_y + along_b_y);
     noise = 8.0 * MU_ROUNDING * (fabs(form.base_v) + fabs(form.base_y)) + MU_DENORMAL +
             8.0 * unknown * scale * (1.0 + fabs(form.factor_v) + fabs(form.factor_y) + reach);
-    out.bound_v = scale * mu_slope_error(errors, form.factor_v, share_a * turn.a_v, share_b * reach * turn.edge_v) + noise;
+    out.bound_v = more > 0.0 ? scale * errors[0] * fabs(form.factor_v) + more + noise
+                             : scale * mu_slope_error(errors, form.factor_v, share_a * turn.a_v,
+                                                      share_b * reach * turn.edge_v) + noise;
     /* along y~ what is removed from the last cell also depends on the border's slope */
     ratio = fold != 0.0 ? reach / fold : 1.0;
-    out.bound_y = scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y, share_b * turn.b_y * ratio) + noise;
+    out.bound_y = more > 0.0 ? scale * (errors[0] * fabs(form.factor_y) + errors[2] * share_b * reach) + more + noise
+                             : scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y,
+                                                      share_b * turn.b_y * ratio) + noise;
     out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (!about->about.smooth_at_border && mu_has_edge(at->block)) {
         /* a root of the distance to the border: |1/sqrt(1 - d) - 1| <= d / (1 - d) for the error d of that distance */

@@ -1,14 +1,16 @@
-"""The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, checked on
+"""The table file, format 4: netCDF-4 with CF-1.11 conventions; written atomically, checked on
 reading.
 
 docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
-the blocks inside. The netCDF library writes, and is not thread-safe: a lock is held while it works.
+the blocks inside, those of a ball in ``border/ball``, which a file of format 3 has not. The netCDF
+library writes, and is not thread-safe: a lock is held while it works.
 For reading see ``mumacro.table.hdf5``.
 """
 
 import hashlib
 import json
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +23,14 @@ from mumacro.table.atomic import write_whole
 from mumacro.table.blocks import BY_NAME, Block, BorderPiece, Table, names_in
 from mumacro.table.polynomials import nodes
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
+WITHOUT_BALL = 3  # the version of a file that has no ball
 # More is refused before memory is taken; of the largest table that the builder makes:
 MOST_BYTES = 16 * 2**20  # of a file: 425 kB
 MOST_NUMBERS = 200_000  # of a variable: 14,641
 MOST_NODES = 1024  # along an axis: 91; preparing cells takes matrices of its square
 MOST_CELLS = 1024  # along an axis: 156
-MOST_PATCHES = 8192  # cells of a block: 646, of 512 bytes each and quantity
+MOST_PATCHES = 8192  # cells of a block: 1833, of 512 bytes each and quantity
 
 _one_at_a_time = threading.Lock()
 
@@ -49,9 +52,22 @@ _PLAIN = {
     ),
 }
 #: what is told of bound over error in the attribute ``verified_bound_over_error``
+BALL = "ball_"  # before the names of attributes at the root that tell of a ball
 RATIOS = ("least", "median", "largest")
+#: quantities of a ball whose slopes a table gives
+BALL_SLOPES = ("mu_ratio",)
 CELL_AXES = ("quantity", "cell", "derivative")
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
+
+
+def _version(table: Table) -> int:
+    return FORMAT_VERSION if table.ball else WITHOUT_BALL
+
+
+def _contacts(table: Table) -> list[tuple[Sequence[atlas.Chart], list[Block]]]:
+    """The charts and blocks of every contact that a table has."""
+    found: list[tuple[Sequence[atlas.Chart], list[Block]]] = [(atlas.CHARTS, table.blocks)]
+    return [*found, (atlas.BALL_CHARTS, table.ball)] if table.ball else found
 
 
 def _digest(table: Table) -> str:
@@ -68,21 +84,22 @@ def _digest(table: Table) -> str:
                 else repr(part).encode()
             )
 
-    put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
+    put("mumacro", _version(table), float(table.attributes["tolerance"]))
     put(*(getattr(table, name) for name in _PLAIN))
     for geometry, piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
         put(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
-    for chart, block in zip(atlas.CHARTS, table.blocks, strict=True):
-        put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
-        put(*(block.errors[name] for name in table.quantities), block.a, block.b)
-        put(
-            *(
-                part[name]
-                for part in (block.nodes, block.cell_errors)
-                for name in table.quantities
-                if name in part
+    for charts, blocks in _contacts(table):
+        for chart, block in zip(charts, blocks, strict=True):
+            put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
+            put(*(block.errors[name] for name in table.quantities), block.a, block.b)
+            put(
+                *(
+                    part[name]
+                    for part in (block.nodes, block.cell_errors)
+                    for name in table.quantities
+                    if name in part
+                )
             )
-        )
     return h.hexdigest()
 
 
@@ -107,19 +124,19 @@ def _put(
     variable[...] = data
 
 
-def _put_cell_errors(group: Any, table: Table) -> None:
+def _put_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> None:
     """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and
     a dimension too."""
 
     def rows(block: Block, name: str) -> Array:
         return (
             block.cell_errors[name]
-            if name in block.nodes
+            if name in block.cell_errors
             else np.zeros((block.cells[0] * block.cells[1], 3))
         )
 
     errors = np.stack(
-        [np.concatenate([rows(block, name) for block in table.blocks]) for name in table.quantities]
+        [np.concatenate([rows(block, name) for block in blocks]) for name in names]
     )
     for axis, size in zip(CELL_AXES, errors.shape, strict=True):
         group.createDimension(axis, size)
@@ -158,23 +175,37 @@ def _fill(root: Any, table: Table) -> None:
         )
     # inside the border, which they are fitted to: with a second group at the root the CF checker
     # looks for "time"
-    blocks = border.createGroup("blocks")
-    if any(block.cell_errors for block in table.blocks):
-        _put_cell_errors(blocks, table)
-    for chart, block in zip(atlas.CHARTS, table.blocks, strict=True):
-        group = blocks.createGroup(chart.name)
+    _fill_blocks(border.createGroup("blocks"), table, atlas.CHARTS, table.blocks, table.quantities)
+    if table.ball:
+        _fill_blocks(
+            border.createGroup("ball"), table, atlas.BALL_CHARTS, table.ball, BALL_SLOPES
+        )
+
+
+def _fill_blocks(
+    group: Any,
+    table: Table,
+    charts: Sequence[atlas.Chart],
+    blocks: list[Block],
+    sloped: Sequence[str],
+) -> None:
+    """The blocks of one contact, with errors in every cell of the quantities that are ``sloped``."""
+    if any(block.cell_errors for block in blocks):
+        _put_cell_errors(group, blocks, sloped)
+    for chart, block in zip(charts, blocks, strict=True):
+        one = group.createGroup(chart.name)
         axes = (chart.a.name, chart.b.name)
-        _put(group, axes[0], block.a, atlas.COORDINATES[axes[0]])
-        _put(group, axes[1], block.b, atlas.COORDINATES[axes[1]])
+        _put(one, axes[0], block.a, atlas.COORDINATES[axes[0]])
+        _put(one, axes[1], block.b, atlas.COORDINATES[axes[1]])
         for about in table.held(chart):
             meaning = (
                 chart.quantity
                 if about.name == "mu_ratio"
                 else f"{about.meaning}, scaled for this block"
             )
-            _put(group, about.variable, block.nodes[about.name], meaning, axes)
+            _put(one, about.variable, block.nodes[about.name], meaning, axes)
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
-        group.setncatts(
+        one.setncatts(
             {
                 **_geometry(chart),
                 "cells": np.array(block.cells, dtype=np.int32),
@@ -195,7 +226,7 @@ def write_table(table: Table, path: str | Path) -> str:
     import tempfile  # only writing needs it: reading a table starts sooner without
 
     path = Path(path)
-    table.attributes["format_version"] = np.int32(FORMAT_VERSION)
+    table.attributes["format_version"] = np.int32(_version(table))
     table.attributes["content_sha256"] = _digest(table)
     try:
         image = _image(table)
@@ -274,14 +305,15 @@ def _check_same(group: hdf5.Group, name: str, wanted: Any) -> None:
         raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {told!r}")
 
 
-def _check_distribution(root: hdf5.Group, found: dict[str, Any]) -> None:
+def _check_distribution(root: hdf5.Group, found: dict[str, Any], of: str) -> None:
     """Refuse a distribution of errors that is not one; an older table has none."""
-    if "verified_quantities" not in found:
+    if f"{of}verified_quantities" not in found:
         return
-    shares, names = root.attribute("verified_quantiles"), str(found["verified_quantities"]).split()
+    shares = root.attribute(f"{of}verified_quantiles")
+    names = str(found[f"{of}verified_quantities"]).split()
     for name, each in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
-        if np.any(root.numbers(f"verified_{name}", each * len(names)) < 0.0):
-            raise root.refuse(f"attribute 'verified_{name}' has a negative number")
+        if np.any(root.numbers(f"{of}verified_{name}", each * len(names)) < 0.0):
+            raise root.refuse(f"attribute '{of}verified_{name}' has a negative number")
 
 
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
@@ -291,13 +323,19 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
             "not a mumacro table: format_version, tolerance or content_sha256 is missing"
         )
     version = root.attribute("format_version")
-    if not np.array_equal(version, FORMAT_VERSION):
-        raise root.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
+    if not any(np.array_equal(version, known) for known in (WITHOUT_BALL, FORMAT_VERSION)):
+        raise root.refuse(
+            f"format version {version}, this program reads {WITHOUT_BALL} and {FORMAT_VERSION}"
+        )
     found = root.attributes()
-    for name in ("tolerance", *(key for key in found if key.startswith("verified_max_"))):
+    for name in (
+        "tolerance",
+        *(key for key in found if key.removeprefix(BALL).startswith("verified_max_")),
+    ):
         if not root.numbers(name, 1)[0] > 0.0:
             raise root.refuse(f"attribute {name!r} must be > 0, got {found[name]!r}")
-    _check_distribution(root, found)
+    for of in ("", BALL):
+        _check_distribution(root, found, of)
     if not isinstance(found["content_sha256"], str):
         raise root.refuse("attribute 'content_sha256' is no text")
     try:
@@ -339,7 +377,7 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
     return block
 
 
-def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: list[str]) -> None:
+def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str]) -> None:
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
     found = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
     for name, errors in zip(names, _errors(group, "cell_errors", found), strict=True):
@@ -358,13 +396,18 @@ def _read(root: hdf5.Group) -> Table:
     ]
     blocks = [_block(below_blocks.group(chart.name), chart, names) for chart in atlas.CHARTS]
     _add_cell_errors(below_blocks, blocks, names)
+    ball = []
+    if np.array_equal(attributes["format_version"], FORMAT_VERSION):
+        below_ball = below_border.group("ball")
+        ball = [_block(below_ball.group(chart.name), chart, names) for chart in atlas.BALL_CHARTS]
+        _add_cell_errors(below_ball, ball, BALL_SLOPES)
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         shape = tuple(plain[axis].size for axis in axes) if axes else None
         plain[name] = root.array(name, MOST_NUMBERS, shape)
         if not axes and plain[name].ndim != 1:
             raise root.refuse(f"variable {name!r} in / is no axis")
-    return Table(border=border, blocks=blocks, attributes=attributes, **plain)
+    return Table(border=border, blocks=blocks, attributes=attributes, ball=ball, **plain)
 
 
 def read_table(path: str | Path) -> Table:
@@ -414,16 +457,19 @@ def read_image(path: str | Path) -> bytes:
         raise TableError(path, f"cannot be read: {error.strerror or error}") from error
 
 
-def error_distribution(table: Table) -> dict[str, dict[str, float]]:
+def error_distribution(table: Table, of: str = "") -> dict[str, dict[str, float]]:
     """By quantity: the error that a share of the verified points does not exceed ("0.5" to "1"),
-    and the :data:`RATIOS` of bound over error; empty for a table that does not state them."""
+    and the :data:`RATIOS` of bound over error; empty for a table that does not state them.
+
+    ``of``: :data:`BALL` for those of a ball.
+    """
     told = table.attributes
-    names = str(told.get("verified_quantities", "")).split()
+    names = str(told.get(f"{of}verified_quantities", "")).split()
     if not names:
         return {}
-    heads = [f"{share:g}" for share in told["verified_quantiles"]]
-    errors = np.reshape(told["verified_error_quantiles"], (len(names), -1)).tolist()
-    over = np.reshape(told["verified_bound_over_error"], (len(names), -1)).tolist()
+    heads = [f"{share:g}" for share in told[f"{of}verified_quantiles"]]
+    errors = np.reshape(told[f"{of}verified_error_quantiles"], (len(names), -1)).tolist()
+    over = np.reshape(told[f"{of}verified_bound_over_error"], (len(names), -1)).tolist()
     return {
         name: dict(zip(heads, error, strict=True)) | dict(zip(RATIOS, ratio, strict=True))
         for name, error, ratio in zip(names, errors, over, strict=True)
