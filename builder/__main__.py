@@ -92,7 +92,7 @@ def _ball(chosen: Namespace) -> str:
     return as_json(
         {
             "table": str(out),
-            "tolerance": surrogate.tolerance,
+            "ball_tolerance": found["ball_tolerance"],
             "ball_verified_max_abs_error": found["ball_verified_max_abs_error"],
             "ball_verified_max_rel_error": found["ball_verified_max_rel_error"],
             "bytes": out.stat().st_size,
@@ -125,9 +125,9 @@ def _verify(chosen: Namespace) -> int:
         report = verify(surrogate, sweep, chosen.points, chosen.seed)
         whole = holds(report, tolerance)
         if surrogate.table.ball:
-            of = ball(solved_springs(sweep), tolerance, chosen.workers)
+            of = ball(solved_springs(sweep), surrogate.ball_tolerance, chosen.workers)
             report["ball"] = verify_ball(surrogate, of, chosen.points, chosen.seed)
-            whole = whole and holds(report["ball"], tolerance)
+            whole = whole and holds(report["ball"], surrogate.ball_tolerance)
     report |= {"tolerance": tolerance, "holds": whole}
     print(as_json(report))
     if not report["holds"]:

@@ -197,6 +197,12 @@ class Surrogate:
         return error_distribution(self.table)
 
     @property
+    def ball_tolerance(self) -> float:
+        """The tolerance of mu~ of a ball that is shaken across [-]; NaN for a table without a
+        ball."""
+        return float(self.table.attributes.get(f"{BALL_ATTRIBUTES}tolerance", math.nan))
+
+    @property
     def ball_error_distribution(self) -> dict[str, dict[str, float]]:
         """The same of a ball that is shaken across, without the border; empty for a table without
         a ball."""
@@ -774,7 +780,7 @@ class Surrogate:
 
     def cells(self, name: str, kind: Kind = SPRING) -> Data:
         """What the kernel reads of a quantity of a kind, for callers of the kernel itself."""
-        return self._data_of(kind, _CODES[name]) if kind == BALL else self._with(name)
+        return self._data_of(kind, _CODES[name]) if kind.contact else self._with(name)
 
     def _data_of(self, kind: Kind, quantity: int = atlas.MU) -> Data:
         """What the kernel reads of a kind; cells are cut on first use."""

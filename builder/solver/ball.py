@@ -78,9 +78,7 @@ class Springs:
             at = np.flatnonzero(block == index)
             vs, ys = v[at], y[at]
             if index >= len(atlas.CHARTS):
-                values = [
-                    self.fine.quantity(name, vs, ys)[0] for name in atlas.QUANTITY_NAMES
-                ]
+                values = [self.fine.quantity(name, vs, ys)[0] for name in atlas.QUANTITY_NAMES]
                 for found, value in zip(out, values, strict=True):
                     found[at] = value
                 deficit[at] = _fast_deficit(vs, ys)
@@ -178,9 +176,7 @@ class Ball:
         last = np.where(cuts, outer, np.maximum(v, y))
         width = np.minimum(3.0 * np.cbrt(ratio * ratio), 0.5)
         beyond = np.minimum(np.maximum(width, 3.0 * np.abs(y - 1.0)), 0.5)
-        steps = (
-            inner, y / (1.0 - width), y, y / (1.0 + width), y / (1.0 + beyond), last
-        )
+        steps = (inner, y / (1.0 - width), y, y / (1.0 + width), y / (1.0 + beyond), last)
         edges = np.minimum.accumulate([np.ones(v.shape), *steps])
         decades = [edges[0]]
         for above, below in itertools.pairwise(edges):
@@ -216,7 +212,11 @@ class Ball:
             at = np.flatnonzero(edges[:, piece] > edges[:, piece + 1])
             if not at.size:
                 continue
-            left, right, last = xi_of[at, piece, None], xi_of[at, piece + 1, None], rest_of[at, piece + 1, None]
+            left, right, last = (
+                xi_of[at, piece, None],
+                xi_of[at, piece + 1, None],
+                rest_of[at, piece + 1, None],
+            )
             length = np.where(left > 0.5, rest_of[at, piece, None] - last, right - left)
             before, behind = length * self._share, length * self._share[::-1]
             first_half = self._share < 0.5

@@ -61,9 +61,7 @@ def solve_nodes(
     return a, b, found, cancelled
 
 
-def _small_rest(
-    chart: Chart, v: Array, y: Array, solved: dict[str, Array], rest: Array
-) -> Array:
+def _small_rest(chart: Chart, v: Array, y: Array, solved: dict[str, Array], rest: Array) -> Array:
     """mu~ less a base of 1 and a logarithm, by 1 - mu~, whose digits are left where y~ is small."""
     if chart.a.name == "y_root":
         return np.asarray(-solved["deficit"] - 0.375 * y * y * np.log(y))

@@ -22,8 +22,8 @@ from mumacro.version import __version__
 from ..solver.ball import Springs
 from ..solver.sweep import Sweep
 from .blocks import build_block, build_border
-from .measure import block_errors, border_errors
 from .contacts import FINE, Contact, ball, fine_springs, spring
+from .measure import block_errors, border_errors
 from .quantities import ABS_TO_REL, SOLVED
 from .verify import QUANTILES, holds, uncovered, verify, verify_ball
 
@@ -36,6 +36,8 @@ CELL_SAFETY = 1.5
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 ATTEMPTS = 4
+#: the least tolerance of a ball, whatever that of its table: at 1e-12 its cells would take 11 MB
+BALL_TOLERANCE = 1e-11
 #: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to
 #: rounding
 STEPS = 256
@@ -161,7 +163,7 @@ def build_table(
     for attempt in range(ATTEMPTS):
         table = Table(pieces, blocks, **grid)
         table.attributes = {"tolerance": tolerance, "quantities": " ".join(QUANTITY_NAMES)}
-        late = _state_errors(table, out, one, attempt)
+        late = _state_errors(table, out, one, attempt, tolerance)
         if not late or attempt == ATTEMPTS - 1:
             break
         for i in late:
@@ -177,7 +179,8 @@ def add_ball(
     sweep: Sweep,
     progress: Callable[[str, bool], None] = lambda _text, _done: None,
 ) -> Table:
-    """The table with a ball of its tolerance, verified; its springs are the same.
+    """The table with a ball of its tolerance, but not below :data:`BALL_TOLERANCE`, verified; its
+    springs are the same.
 
     A ball is integrated over springs of the tolerance :data:`.contacts.FINE`, which are solved for
     that first.
@@ -187,7 +190,7 @@ def add_ball(
     BuildError
         When the verified error does not come below the tolerance.
     """
-    tolerance = float(table.attributes["tolerance"])
+    tolerance = max(float(table.attributes["tolerance"]), BALL_TOLERANCE)
     of = ball(solved_springs(sweep, progress), tolerance, sweep.workers)
     border, targets = Border(table.border), [tolerance] * len(BALL_CHARTS)
 
@@ -203,7 +206,7 @@ def add_ball(
         progress(f"ball {chart.name}", True)
     for attempt in range(ATTEMPTS):
         table = dataclasses.replace(table, ball=blocks)
-        late = _state_errors(table, out, of, attempt)
+        late = _state_errors(table, out, of, attempt, tolerance)
         if not late or attempt == ATTEMPTS - 1:
             break
         for i in late:
@@ -215,7 +218,11 @@ def add_ball(
     if not holds(report, tolerance):
         raise _missed(report, tolerance)
     stated = verified_attributes(report, table.quantities)
-    table.attributes = table.attributes | {f"{BALL}{name}": x for name, x in stated.items()}
+    table.attributes = (
+        table.attributes
+        | {f"{BALL}tolerance": tolerance}
+        | {f"{BALL}{name}": x for name, x in stated.items()}
+    )
     return table
 
 
@@ -230,7 +237,9 @@ def solved_springs(
     blocks = []
     for i, chart in enumerate(CHARTS):
         blocks.append(
-            build_block(spring(sweep), i, border, FINE, lambda text: progress(f"fine {text}", False))
+            build_block(
+                spring(sweep), i, border, FINE, lambda text: progress(f"fine {text}", False)
+            )
         )
         progress(f"fine {chart.name}", True)
     return fine_springs(pieces, blocks)
@@ -245,10 +254,9 @@ def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
     )
 
 
-def _state_errors(table: Table, out: Path, of: Contact, seed: int) -> list[int]:
+def _state_errors(table: Table, out: Path, of: Contact, seed: int, tolerance: float) -> list[int]:
     """Measure the errors of the blocks and write them into the table; the blocks that miss its
     tolerance."""
-    tolerance = float(table.attributes["tolerance"])
     late = []
     for i, found in enumerate(block_errors(Surrogate(table, out), of, BLOCK_POINTS, seed)):
         block = of.blocks(table)[i]

@@ -1,7 +1,7 @@
 """A contact as the builder sees it: its charts, its solver, and what that may be wrong by.
 
-``v`` and ``y`` are those of the charts everywhere: v~ and y~ of one spring, v~/1.5 and y~/1.5, those
-of its middle spring, of a ball.
+``v`` and ``y`` are those of the charts everywhere: v~ and y~ of one spring; of a ball v~/1.5 and
+y~/1.5, those of its middle spring.
 """
 
 import dataclasses
@@ -31,11 +31,14 @@ BALL_NOISE = 4e-14
 
 
 class Solve(Protocol):
-    """Solves points of the charts' groups; ``continuous``: the orbit that slides all the time."""
+    """What solves a contact."""
 
     def __call__(
         self, v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
-    ) -> dict[str, Array]: ...
+    ) -> dict[str, Array]:
+        """Results by name at points of the charts' groups; ``continuous``: of the orbit that slides
+        all the time."""
+        ...
 
 
 class Contact(NamedTuple):
@@ -76,11 +79,22 @@ class Contact(NamedTuple):
 
     def slopes(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Array:
         """Value, slopes and their bounds, rows (5, n)."""
-        code = atlas.QUANTITY_NAMES.index(name)
-        data = surrogate.cells(name, self.kind)
-        return slices.slopes(
-            code, data, self.scale * v, self.scale * y, surrogate.threads, self.kind.contact
-        )
+        return slopes_of(surrogate, self.kind, name, v, y)
+
+
+def ratio_of(surrogate: Surrogate, kind: Kind, v: Array, y: Array) -> Array:
+    """mu~ of a table at points of the charts' groups."""
+    if kind == SPRING:
+        return np.asarray(surrogate.mu_ratio(v, y))
+    return np.asarray(surrogate.quantity("mu_ratio", MIDDLE * v, MIDDLE * y, **kind.names)[0])
+
+
+def slopes_of(surrogate: Surrogate, kind: Kind, name: str, v: Array, y: Array) -> Array:
+    """Value, slopes and their bounds there, rows (5, n)."""
+    if kind == SPRING:
+        return np.array(surrogate.slopes(v, y, name, bounds=True))
+    code, data = atlas.QUANTITY_NAMES.index(name), surrogate.cells(name, kind)
+    return slices.slopes(code, data, MIDDLE * v, MIDDLE * y, surrogate.threads, kind.contact)
 
 
 def spring(sweep: Sweep) -> Contact:
@@ -107,9 +121,7 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> Contact
     return Contact(BALL, atlas.BALL_CHARTS, solve, _ball_noise, ("mu_ratio",), MIDDLE)
 
 
-def _ball_noise(
-    name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding
-) -> Array:
+def _ball_noise(name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding) -> Array:
     del v, y, sliding
     value = solved[name]
     if name == "mu_ratio":

@@ -162,9 +162,7 @@ def _value_errors(
         scale, beside, rounding = (of.quantity(table, name, v, y)[1] for table in stating)
         # what the bound allows anyway: half of rounding, and what the border's error does, of which
         # it states twice
-        noise = (
-            of.noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
-        )
+        noise = of.noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
         errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
     return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
 

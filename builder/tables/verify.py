@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL
+from mumacro.inputs.kind import BALL, SPRING, Kind
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas
 from mumacro.table.atlas import (
@@ -22,7 +22,7 @@ from mumacro.table.atlas import (
 )
 
 from ..solver.sweep import Sweep
-from .contacts import Contact, spring
+from .contacts import Contact, ratio_of, slopes_of, spring
 from .measure import BALL_SEAMS, SEAMS, border_errors, fast_from, near_ball_seams, near_seams
 from .measure import log_uniform as _log
 from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE
@@ -140,33 +140,35 @@ def _both_sides_of_ball(
 
 
 def _sides(
-    surrogate: Surrogate, of: Contact, n: int, seed: int
+    surrogate: Surrogate, n: int, seed: int, kind: Kind
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
-    return (_both_sides_of_ball if of.kind == BALL else _both_sides)(surrogate, n, seed)
+    return (_both_sides_of_ball if kind == BALL else _both_sides)(surrogate, n, seed)
 
 
-def seam_jumps(surrogate: Surrogate, of: Contact, n: int = 2000, seed: int = 7) -> float:
+def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING) -> float:
     """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13
     apart."""
     sides = (
-        [of.quantity(surrogate, "mu_ratio", v, y)[0] for v, y in ((v1, y1), (v2, y2))]
-        for v1, v2, y1, y2 in _sides(surrogate, of, n, seed)
+        (ratio_of(surrogate, kind, v1, y1), ratio_of(surrogate, kind, v2, y2))
+        for v1, v2, y1, y2 in _sides(surrogate, n, seed, kind)
     )
     return max(float((np.abs(one - two) / np.maximum(one, two)).max()) for one, two in sides)
 
 
-def seam_slope_jumps(surrogate: Surrogate, of: Contact, n: int = 2000, seed: int = 7) -> float:
+def seam_slope_jumps(
+    surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING
+) -> float:
     """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are
     continuous, too."""
     sides = (
-        [of.slopes(surrogate, "mu_ratio", v, y)[1:3] for v, y in ((v1, y1), (v2, y2))]
-        for v1, v2, y1, y2 in _sides(surrogate, of, n, seed)
+        [slopes_of(surrogate, kind, "mu_ratio", v, y)[1:3] for v, y in ((v1, y1), (v2, y2))]
+        for v1, v2, y1, y2 in _sides(surrogate, n, seed, kind)
     )
     return max(float(np.abs(one - two).max()) for one, two in sides)
 
 
 def monotony(
-    surrogate: Surrogate, of: Contact, n: int = 3000, lines: int = 200, seed: int = 11
+    surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11, kind: Kind = SPRING
 ) -> float:
     """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across
     all seams [-]."""
@@ -174,7 +176,7 @@ def monotony(
     for fixed in _log(np.random.default_rng(seed), 1e-4, 1e6, lines):
         line = np.full(n, fixed)
         along_v, along_y = (
-            of.quantity(surrogate, "mu_ratio", v, y)[0] for v, y in ((rise, line), (line, rise))
+            ratio_of(surrogate, kind, v, y) for v, y in ((rise, line), (line, rise))
         )
         worst = max(worst, float(np.max([-np.diff(along_v), np.diff(along_y)])))
     return worst
@@ -344,8 +346,11 @@ def _border_found(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) 
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
     """Of the report of :func:`verify`: how many values and slopes of each quantity, and
     speeds of the border, miss their bound."""
-    found = {name: report.get(name, report)["not_covered"] for name in report["distribution"]
-             if name in QUANTITY_NAMES}
+    found = {
+        name: report.get(name, report)["not_covered"]
+        for name in report["distribution"]
+        if name in QUANTITY_NAMES
+    }
     if "border" in report:
         found["border"] = report["border"]["not_covered"]
     return found | {
@@ -378,9 +383,7 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     return _verify(surrogate, spring(sweep), CASES, points, seed, border)
 
 
-def verify_ball(
-    surrogate: Surrogate, of: Contact, points: int, seed: int = 2018
-) -> dict[str, Any]:
+def verify_ball(surrogate: Surrogate, of: Contact, points: int, seed: int = 2018) -> dict[str, Any]:
     """The same of a ball with fresh quadratures, drawn as in :data:`BALL_CASES`; no border."""
     return _verify(surrogate, of, BALL_CASES, points, seed, None)
 
@@ -413,7 +416,7 @@ def _verify(
         "slopes": {name: _report(parts) for name, parts in slopes.items()},
         **({} if border is None else {"border": _said(border)}),
         "distribution": _distributions(values, slopes["mu_ratio"], border),
-        "seam_jump": seam_jumps(surrogate, of),
-        "seam_slope_jump": seam_slope_jumps(surrogate, of),
-        "monotony": monotony(surrogate, of),
+        "seam_jump": seam_jumps(surrogate, kind=of.kind),
+        "seam_slope_jump": seam_slope_jumps(surrogate, kind=of.kind),
+        "monotony": monotony(surrogate, kind=of.kind),
     }

@@ -1,5 +1,6 @@
-"""The rule of quadrature over the springs of a ball that slip backwards under oscillation along; the
-integral is in ``kernel/contact.c``.  Its error is near rounding, and is estimated at the point.
+"""The rule of quadrature over the springs of a ball that slip backwards under oscillation along.
+
+The integral is in ``kernel/contact.c``.  Its error is near rounding, and is estimated at the point.
 """
 
 import numpy as np
@@ -36,9 +37,7 @@ def driven_rule() -> Array:
     x, _ = np.polynomial.legendre.leggauss(DRIVEN_NODES)
     degrees = np.arange(DRIVEN_NODES - 3, DRIVEN_NODES)
     nulls = np.polynomial.legendre.legvander(x, DRIVEN_NODES)[:, degrees] * (2 * degrees + 1)
-    return np.ascontiguousarray(
-        np.concatenate([points(DRIVEN_NODES), nulls], axis=1)
-    )
+    return np.ascontiguousarray(np.concatenate([points(DRIVEN_NODES), nulls], axis=1))
 
 
 def put_driven(data: Data) -> None:

@@ -25,7 +25,6 @@ def _cost(kind: tuple[int, int]) -> int:
     return COST if direction else 1 + contact
 
 
-
 def share_out(n: int, threads: int, work: Callable[[slice], None], cost: int = 1) -> None:
     """Call ``work`` with every slice of n points, which cost about ``cost`` times as much as those
     of one spring."""
@@ -73,9 +72,7 @@ def alone(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
     return value
 
 
-def slopes(
-    quantity: int, data: Data, v: Array, y: Array, threads: int, contact: int = 0
-) -> Array:
+def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int, contact: int = 0) -> Array:
     """Value, both logarithmic slopes and their bounds, rows (5, n), of any quantity."""
     rows = np.empty((5, v.size))
     share_out(

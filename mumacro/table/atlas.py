@@ -1,8 +1,8 @@
 """The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of each.
 
 The list of blocks, of pieces of the border and of quantities is in ``kernel/atlas.c``,
-``kernel/ball_atlas.c`` and ``kernel/records.c``; this module reads it.  What a table file calls a coordinate is defined here,
-with both ways between a chart and (v~, y~).
+``kernel/ball_atlas.c`` and ``kernel/records.c``; this module reads it.  What a table file calls a
+coordinate is defined here, with both ways between a chart and (v~, y~).
 
 Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the
 drive is v~ mu~. The stick fraction f is the share of the period during which the contact sticks.
@@ -225,7 +225,9 @@ def _quantity(q: Any) -> Quantity:
 
 def _charts(listed: Any, count: int) -> tuple[Chart, ...]:
     return tuple(
-        Chart(_text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding)
+        Chart(
+            _text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding
+        )
         for c in (listed[i] for i in range(count))
     )
 

@@ -135,9 +135,7 @@ def _put_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> N
             else np.zeros((block.cells[0] * block.cells[1], 3))
         )
 
-    errors = np.stack(
-        [np.concatenate([rows(block, name) for block in blocks]) for name in names]
-    )
+    errors = np.stack([np.concatenate([rows(block, name) for block in blocks]) for name in names])
     for axis, size in zip(CELL_AXES, errors.shape, strict=True):
         group.createDimension(axis, size)
     long_name = (
@@ -177,9 +175,7 @@ def _fill(root: Any, table: Table) -> None:
     # looks for "time"
     _fill_blocks(border.createGroup("blocks"), table, atlas.CHARTS, table.blocks, table.quantities)
     if table.ball:
-        _fill_blocks(
-            border.createGroup("ball"), table, atlas.BALL_CHARTS, table.ball, BALL_SLOPES
-        )
+        _fill_blocks(border.createGroup("ball"), table, atlas.BALL_CHARTS, table.ball, BALL_SLOPES)
 
 
 def _fill_blocks(
@@ -189,7 +185,7 @@ def _fill_blocks(
     blocks: list[Block],
     sloped: Sequence[str],
 ) -> None:
-    """The blocks of one contact, with errors in every cell of the quantities that are ``sloped``."""
+    """The blocks of a contact, with errors in every cell of the quantities that are ``sloped``."""
     if any(block.cell_errors for block in blocks):
         _put_cell_errors(group, blocks, sloped)
     for chart, block in zip(charts, blocks, strict=True):
@@ -330,6 +326,7 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
     found = root.attributes()
     for name in (
         "tolerance",
+        *([f"{BALL}tolerance"] if np.array_equal(version, FORMAT_VERSION) else []),
         *(key for key in found if key.removeprefix(BALL).startswith("verified_max_")),
     ):
         if not root.numbers(name, 1)[0] > 0.0:
