@@ -141,8 +141,9 @@ INTERVAL = (
 )
 _NAMES = tuple(part.path for part in DEFAULT)
 _six = itemgetter(*FIELDS)
-# in times of one spring, across, at one k
-_COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
+# in times of one spring, across, at one k; a ball along is a sum over springs
+_COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
+_BALL_ALONG = 5.0  # times both
 QUANTITIES: dict[str, Quantity] = {}
 _SLOPED = set[str]()  # those that need the gradient
 
@@ -185,7 +186,10 @@ class Wanted:
     def cost(self) -> float:
         """Time of a case, in times of a plain answer."""
         cost = 1.0 + sum(QUANTITIES[name].cost for name in self.include)
-        return cost * math.prod(_COSTS[word] for word in said(self.asked))
+        words = said(self.asked)
+        if {"ball", "along"} <= {*words}:
+            cost *= _BALL_ALONG
+        return cost * math.prod(_COSTS[word] for word in words)
 
 
 def of_amplitude(part: Part) -> Part:
