@@ -24,7 +24,7 @@ from ..solver.sweep import Sweep
 from .quantities import Sliding, solver_noise
 
 #: tolerance of the springs that a ball is integrated over, whatever that of its table
-FINE = 1e-13
+FINE = 1e-12
 #: what a quadrature over such springs may be wrong by: of mu~ and of the stick fraction, absolute
 #: and relative; of the power, relative
 BALL_NOISE = 4e-14

@@ -41,13 +41,20 @@ static mu_answer mu_ball_stick_limit(double v, double y) {
 /* Two terms as of one spring, (35) at y~ / sqrt(v~^2 + MU_SQUARE), which is exact to 1/v~^2; for small amplitudes what is
  * left of 1/v~^4 is known. */
 static mu_answer mu_ball_ratio_fast(const mumacro_data *data, double v, double y) {
-    const double speed = mu_hypot(v, 0.8280786712108251), r = y / speed; /* sqrt(MU_SQUARE) */
-    const mu_outer outer = mu_outer_expansion(r);
-    const double rest = MU_SQUARE * (outer.second + 0.5 * outer.first_slope) / speed / speed;
-    const double next = (r / outer.h) * (r / outer.h) * (0.25 * (MU_FOURTH - MU_SQUARE * MU_SQUARE)) / speed / speed;
-    const double value = outer.first + rest - next / speed / speed;
-    (void)data;
-    return mu_limit(mu_min(value, 1.0), 2.0 * MU_FAST_ROUNDING * outer.first, MU_B_FAST);
+    const int plain = mu_max(v, y) < 1e150;
+    const double share = plain ? 1.0 / (v * v + MU_SQUARE) : 1.0 / v / v, ratio = y / v;
+    const double square = plain ? y * y * share : ratio * ratio, t = 1.0 + square;
+    double first, rest, next;
+    if (t < MU_OUTER_MAX) {
+        mu_outer_terms(data->outer, t, &first, &rest);
+    } else {
+        const mu_outer outer = mu_outer_expansion(y / mu_hypot(v, 0.8280786712108251)); /* sqrt(MU_SQUARE) */
+        first = outer.first;
+        rest = outer.second + 0.5 * outer.first_slope;
+    }
+    next = 0.25 * (MU_FOURTH - MU_SQUARE * MU_SQUARE) * (t < HUGE_VAL ? square / t : 1.0);
+    return mu_limit(mu_min(first + (MU_SQUARE * rest - next * share) * share, 1.0), 2.0 * MU_FAST_ROUNDING * first,
+                    MU_B_FAST);
 }
 
 static mu_slopes mu_ball_ratio_fast_slopes(const mumacro_data *data, double v, double y) {
