@@ -126,12 +126,13 @@ def _cell_values(cells: Array, row: Array, a: Array, b: Array, out: Array) -> No
 def _fast_deficit(v: Array, y: Array) -> Array:
     """1 - mu~ for large v~, with the digits that it has."""
     share = 1.0 / (1.0 + v * v)
-    n = np.minimum(y * y * share, 1.0)
+    r = y / np.hypot(1.0, v)
+    n = np.square(np.minimum(r, 1.0))
     terms, total = np.ones_like(n), np.zeros_like(n)
     for k in range(1, 24):  # (2/pi) K(i r) in powers of r^2
         terms = terms * -n * ((2 * k - 1) / (2 * k)) ** 2
         total = total - terms
-    found = kernels[-1].outer_expansion(np.sqrt(n))
+    found = kernels[-1].outer_expansion(r)
     return np.where(
         n < 0.1, total - (found[:, 1] + 0.5 * found[:, 2]) * share, 1.0 - _mu_fast(found, share)
     )
@@ -176,7 +177,9 @@ class Ball:
         last = np.where(cuts, outer, np.maximum(v, y))
         width = np.minimum(3.0 * np.cbrt(ratio * ratio), 0.5)
         beyond = np.minimum(np.maximum(width, 3.0 * np.abs(y - 1.0)), 0.5)
-        steps = (inner, y / (1.0 - width), y, y / (1.0 + width), y / (1.0 + beyond), last)
+        # beyond the corner xi grows by ten from piece to piece
+        rising = (y / (1.0 + np.minimum(beyond * 100.0**i, 0.5)) for i in range(5))
+        steps = (inner, y / (1.0 - width), y, y / (1.0 + width), *rising, last)
         edges = np.minimum.accumulate([np.ones(v.shape), *steps])
         decades = [edges[0]]
         for above, below in itertools.pairwise(edges):

@@ -85,9 +85,9 @@ def near_ball_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Arr
     """The same of a ball: v~ and y~ of its middle spring."""
     y, v = log_uniform(rng, 1e-3, 1e6, n), log_uniform(rng, 1e-6, 1e4, n)
     off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
-    which = rng.integers(0, 7, n)
+    which = rng.integers(0, 8, n)
     y = np.where(which < 2, rng.choice(BALL_SEAMS, n) * off, y)
-    cut, fast, ray, slow, border = (which == i for i in range(2, 7))
+    cut, fast, ray, slow, border, ridge = (which == i for i in range(2, 8))
     y[cut] = rng.uniform(atlas.Y_STICK_LO, STEEPEST_Y, int(cut.sum()))
     v[cut] = s.v_tilde_crit(y[cut]) * atlas.SIGMA_CUT**2 * off[cut]
     y[fast] = log_uniform(rng, STEEPEST_Y, 1e6, int(fast.sum()))
@@ -97,6 +97,10 @@ def near_ball_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Arr
     y[slow] = log_uniform(rng, 1e-3, STEEPEST_Y, int(slow.sum()))
     v[slow] = atlas.SLOW * off[slow]
     v[border] = s.v_tilde_crit(y[border]) * off[border]
+    # the ridge, where the steepest ray touches the border
+    other = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 0.2, n)
+    y[ridge] = STEEPEST_Y * other[ridge]
+    v[ridge] = atlas.SLOW * (1.0 + rng.uniform(-2.0, 2.0, n) * (other - 1.0))[ridge]
     return v, y
 
 
