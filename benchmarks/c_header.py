@@ -20,7 +20,7 @@ import numpy as np
 from builder.export.c import write_c
 from mumacro import Surrogate
 
-DRIVER = ROOT / "tests" / "c" / "driver.c"
+DRIVER = ROOT / "tests" / "builder" / "export" / "c" / "driver.c"
 OPTIONS = ("-O2", "-O3 -march=native", "-O3 -march=native -ffp-contract=off")
 
 

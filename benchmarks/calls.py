@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ellipk
 
 import mumacro
-from tests.serving import CASE
+from benchmarks.support.serving import CASE
 
 SCALARS = {
     "scipy.special.ellipk(m), for comparison": "ellipk(0.5)",

@@ -11,12 +11,15 @@ import timeit
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mumacro import Surrogate
 from mumacro.inputs.kind import Kind
-from mumacro.kernel import slices
-from tests.cases import TOLERANCES, Array, opened
+from mumacro.kernel import threads as shared_out
 
+Array = NDArray[np.float64]
+TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
+opened = functools.cache(Surrogate.open)
 KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
 
 
@@ -30,7 +33,7 @@ def costs() -> str:
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
             data = s.cells("mu_ratio", Kind(*kind))
-            ask = functools.partial(slices.values, 0, data, v, amplitude, threads=1, kind=kind)
+            ask = functools.partial(shared_out.values, 0, data, v, amplitude, threads=1, kind=kind)
             each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
             spring = spring or each
             rows.append((name, f"{tolerance:g}", f"{1e9 * each:.0f}", f"{each / spring:.1f}"))

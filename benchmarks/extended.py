@@ -2,7 +2,7 @@
 kernel.
 
 The formulas are those of ``mumacro/kernel/directions.c``, checked against a play operator in
-``tests/test_contact_directions.py``; here they are evaluated with the 64 bits of
+``tests/mumacro/contacts/test_contact_directions.py``; here they are evaluated with the 64 bits of
 ``numpy.longdouble`` (x86), by bisection and Newton's method to the last digit, and a ball by rules
 of many nodes.
 Arrays broadcast; rows come in the order of :data:`ROWS`.
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.contacts.quadrature import points
+from mumacro.contacts.quadrature import piece_rule
 
 Long = np.longdouble
 #: mu~, power, stick fraction, slopes along ln v~ and ln y~
@@ -186,7 +186,7 @@ def reversing(at: Turning, v: Any, a: Any) -> Any:
 def shares(nodes: int, panels: int) -> Any:
     """The rule over the springs that slip backwards: in panels that halve towards the last one, (n,
     2)."""
-    rule = points(nodes).astype(Long)
+    rule = piece_rule(nodes).astype(Long)
     parts = [(Long(0.0), Long(0.5))] + [
         (1.0 - Long(0.5) ** k, Long(0.5) ** (k + 1)) for k in range(1, panels)
     ]

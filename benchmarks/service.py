@@ -28,8 +28,8 @@ import numpy as np
 import orjson
 import pyarrow as pa
 
-from tests.forms import BATCH, TYPES, as_csv, stream_of
-from tests.serving import CASE, Server, asking, connect, head, running, serving
+from benchmarks.support.forms import BATCH, TYPES, as_csv, stream_of
+from benchmarks.support.serving import CASE, Server, asking, connect, head, running, serving
 
 FIRST, CLIENT = ("taskset", "-c", "0"), {1}  # the processors of the servers and of the client
 ROUNDS, REQUESTS, CLIENTS = 5, 800, 16

@@ -13,6 +13,7 @@ import numpy as np
 from mumacro import Surrogate
 from mumacro.analysis.settling import settling
 from mumacro.contacts.stiffness import Material, ball_on_flat, flat_punch
+from mumacro.plotting import INK
 
 STEEL = Material(E=210e9, nu=0.3)
 RANGES = (
@@ -53,19 +54,9 @@ def rigs() -> str:
     from matplotlib.figure import Figure
 
     s, rows = Surrogate.open(FINEST), []
-    v, y = np.geomspace(0.02, 200.0, 241), np.geomspace(0.05, 200.0, 241)
-    figure = Figure(figsize=(8.0, 5.6), layout="constrained")
+    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     axes = figure.subplots()
-    axes.set(xscale="log", yscale="log", xlim=(v[0], v[-1]), ylim=(y[0], y[-1]))
-    axes.set(
-        xlabel=r"$\tilde v = v_0 k/(\mu_0 F_z \omega)$", ylabel=r"$\tilde y = y_0 k/(\mu_0 F_z)$"
-    )
-    levels = (0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99)
-    lines = axes.contour(
-        v, y, s.mu_ratio(v, y[:, None]), levels=levels, colors="#8c959f", linewidths=0.8
-    )
-    axes.clabel(lines, fmt="%g", fontsize=9)
-    axes.plot(s.v_tilde_crit(y), y, color="#c1272d", lw=2.4, label="border of continuous sliding")
+    s.plot(axes)
     for (name, (force, contact)), shape in zip(CONTACTS.items(), "osD^", strict=True):
         places = []
         for y0, v0 in ((0.1e-6, 0.01), (5e-6, 0.01), (5e-6, 0.5)):
@@ -92,8 +83,9 @@ def rigs() -> str:
                 answer.regime,
             ]
             rows.append([name, *cells, *groups, f"{found.periods:.2g}"])
-        axes.plot(*zip(*places, strict=True), shape, color="#1f6fb4", ms=8, label=name)
-    axes.legend(loc="lower right", fontsize=9)
+        axes.plot(*zip(*places, strict=True), shape, color=INK, mec="white", ms=9, label=name)
+    axes.get_legend().remove()
+    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     figure.savefig(IMAGES / "contacts.png", dpi=100, metadata={"Software": None})
     header = (
         "contact",

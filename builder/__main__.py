@@ -11,7 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from mumacro import InputError, Surrogate
-from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
+from mumacro.cli.common import (
+    ImpossibleError,
+    OneLineParser,
+    UsageError,
+    as_json,
+    in_columns,
+    open_table,
+    run,
+)
 from mumacro.errors import missing
 from mumacro.kernel.threads import processors
 from mumacro.table.atomic import alone_in
@@ -146,7 +154,7 @@ def _export(chosen: Namespace) -> str:
 
         surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
         written = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
-        return as_json({"table": str(surrogate.path), "format": kind, "out": written})
+        return _told(chosen, {"table": str(surrogate.path), "format": kind, "out": written})
     from .export.c import ExportError
     from .export.grid import FORMATS, check_format, export_table
 
@@ -159,7 +167,15 @@ def _export(chosen: Namespace) -> str:
     if out.is_dir():
         raise UsageError(f"--out {out} is a folder")
     shape = export_table(path, kind, out).mu_ratio.shape
-    return as_json({"table": str(path), "format": kind, "out": str(out), "shape": shape})
+    return _told(chosen, {"table": str(path), "format": kind, "out": str(out), "shape": shape})
+
+
+def _told(chosen: Namespace, about: dict[str, Any]) -> str:
+    """What was written, as JSON or in columns, as ``mumacro table``."""
+    if chosen.json:
+        return as_json(about)
+    texts = {name: x if isinstance(x, str) else " ".join(map(str, x)) for name, x in about.items()}
+    return in_columns(list(texts.items()))
 
 
 def _figures(chosen: Namespace) -> str:
@@ -235,7 +251,7 @@ def _parser(prog: str) -> OneLineParser:
     text = "store the errors in the table's attributes, as a build does with --seed 2018"
     one.add_argument("--write", action="store_true", help=text)
     one.add_argument("--workers", **workers)
-    one = command(_export, "Write a table for other tools; print what was written as JSON.")
+    one = command(_export, "Write a table for other tools; print what was written.")
     one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")
     text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"
     one.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
@@ -245,6 +261,7 @@ def _parser(prog: str) -> OneLineParser:
         "the name of the table"
     )
     one.add_argument("--out", type=Path, help=text)
+    one.add_argument("--json", action="store_true", help="print JSON")
     one = command(_figures, "Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG.")
     one.add_argument(
         "--out",

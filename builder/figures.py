@@ -1,11 +1,11 @@
 """The figures of Benad, Nakano, Popov, Popov (2018), Fig. 4 to 11, from this project's solver and a
 table.
 
-Axes are the paper's: v~ over y~ in Fig. 4 to 7, mu~ over v~ in Fig. 8, the normalised rise over
-v~/v~crit in Fig. 9, mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11.  Lines come from the
-table, dots from fresh solves, crosses and dashed lines from the paper's formulas.  A figure is a
-function of a table that returns what is drawn; one function draws them all.  Needs matplotlib, the
-extra ``figures``.
+Axes are the paper's: v~ over y~ in Fig. 4 to 6, mu~ over v~ in Fig. 8, the normalised rise over
+v~/v~crit in Fig. 9, mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11; but Fig. 7 is turned as
+every map here, y~ over v~.  Lines come from the table, dots from fresh solves, crosses and dashed
+lines from the paper's formulas.  A figure is a function of a table that returns what is drawn, and
+its first line is the title; one function draws them all.  Needs matplotlib, the extra ``figures``.
 """
 
 import math
@@ -16,14 +16,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import MumacroError, Surrogate, closed_forms
+from mumacro import MumacroError, Surrogate, closed_forms, plotting
 from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.law import law as friction_law
 from mumacro.kernel.arrays import Array
 
 from .solver.steady import border
 
-SIZE, DPI = (7.2, 4.6), 110
+SIZE, DPI = (7.2, 4.8), 110
+# blue, orange, green, vermilion and grey that the colour-blind can tell apart (Okabe and Ito)
+COLOURS = ["#0072b2", "#e69f00", "#009e73", "#d55e00", *["#6b7683"] * 4]
 V, Y, MU = (
     r"$\tilde v_0 = v_0/(l_0\omega)$",
     r"$\tilde y_0 = y_0/l_0$",
@@ -61,7 +63,7 @@ class Panel(NamedTuple):
     settings: dict[str, Any] = {}  # noqa: RUF012
 
 
-def _solved(y: NDArray[Any]) -> Array:
+def _solve_border(y: NDArray[Any]) -> Array:
     """v~crit and mu~ there at each amplitude (2, n), each a solve of the full model."""
     return np.array([border(float(value)) for value in y]).T
 
@@ -120,13 +122,12 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
 
 
 def _cycle(_: Surrogate) -> list[Panel]:
-    """One cycle of each regime: the path of the spring's end in the friction circle, above its two
-    components."""
+    """One cycle of each regime: the force in the friction circle, and its components."""
     discs, traces, turn = [], [], np.linspace(0.0, 2.0 * np.pi, 361)
     for (v, y), title in CASES.items():
         tau, u, sticks = steady_cycle(v, y)
         (slip_x, slip_y), (stick_x, stick_y) = (
-            np.where(at[:, None], u, np.nan).T for at in (~sticks, sticks)
+            np.where(mask[:, None], u, np.nan).T for mask in (~sticks, sticks)
         )
         mean = float(u[:, 0].mean())
         disc = [
@@ -139,10 +140,10 @@ def _cycle(_: Surrogate) -> list[Panel]:
         trace = [
             Curve(tau, u[:, 0], "C0-", "$u_x$, along"),
             Curve(tau, u[:, 1], "C1-", "$u_y$, across"),
-            Curve(tau, np.where(sticks, -1.05, np.nan), "C3-", "stick"),
+            Curve(tau, np.where(sticks, -1.05, np.nan), "C3-", "stick, below"),
         ]
-        axes, fixed = ("$u_x$, along", -1.1, 1.1), {"aspect": "equal", "title": title}
-        discs.append(Panel(axes, ("$u_y$, across", -1.1, 1.1), disc, {}, fixed))
+        axes, settings = ("$u_x$, along", -1.1, 1.1), {"aspect": "equal", "title": title}
+        discs.append(Panel(axes, ("$u_y$, across", -1.1, 1.1), disc, {}, settings))
         traces.append(Panel((r"$\tau = \omega t$", 0.0, 6.2832), ("", -1.1, 1.1), trace))
     return discs + traces
 
@@ -170,7 +171,7 @@ def _small_border(_: Surrogate) -> list[Panel]:
     curves = [
         Curve(y, closed_forms.border_24(y), "C0-", "(24)"),
         Curve(y, closed_forms.border_23(y), "C2--", "(23), of which (24) is an expansion"),
-        Curve(dots, _solved(dots)[0], "ko", "exact, solved"),
+        Curve(dots, _solve_border(dots)[0], "ko", "exact, solved"),
     ]
     return [Panel((Y, 0.0, 1.02), (V, 0.0, 0.4), curves)]
 
@@ -182,10 +183,10 @@ def _whole_border(_: Surrogate) -> list[Panel]:
         np.linspace(0.4, 10.0, 25),
         np.geomspace(0.03, 1e4, 401),
     )
-    exact = _solved(wide)[0]
+    exact = _solve_border(wide)[0]
     formulas = ((closed_forms.border_26, "C3--", "(26)"), (closed_forms.border_27, "C0-", "(27)"))
     curves = [Curve(y, formula(y), look, label) for formula, look, label in formulas]
-    off = [
+    deviations = [
         Curve(wide, 100.0 * (formula(wide) / exact - 1.0), look, label)
         for formula, look, label in formulas
     ]
@@ -193,12 +194,12 @@ def _whole_border(_: Surrogate) -> list[Panel]:
         Panel(
             (Y, 0.0, 10.2),
             (V, 0.0, 1.7),
-            [*curves, Curve(dots, _solved(dots)[0], "ko", "exact, solved")],
+            [*curves, Curve(dots, _solve_border(dots)[0], "ko", "exact, solved")],
         ),
         Panel(
             (Y, 0.03, 1e4),
             ("formula over exact, less 1 [%]", -6.0, 6.0),
-            off,
+            deviations,
             {},
             {"xscale": "log"},
         ),
@@ -209,10 +210,10 @@ def _surface(s: Surrogate) -> list[Panel]:
     """Fig. 7: mu~ over the plane."""
     y, v = np.linspace(0.0, 2.0, 241), np.linspace(0.0, 1.5, 181)
     curves = [
-        Curve(y, v, "", MU, s.mu_ratio(v[:, None], y)),
-        Curve(y, s.v_tilde_crit(y), "C3-", "border"),
+        Curve(v, y, "", MU, s.mu_ratio(v, y[:, None])),
+        Curve(s.v_tilde_crit(y), y, "C3--", "border of continuous sliding"),
     ]
-    return [Panel((Y, 0.0, 2.0), (V, 0.0, 1.5), curves)]
+    return [Panel((V, 0.0, 1.5), (Y, 0.0, 2.0), curves)]
 
 
 def _cuts(s: Surrogate) -> list[Panel]:
@@ -220,14 +221,14 @@ def _cuts(s: Surrogate) -> list[Panel]:
     v, amplitudes = np.linspace(0.0, 1.0, 801) ** 2 * 2.0, np.arange(21) * 0.1
     looks = ["k-" if i == 10 else "C0-" for i in range(21)]
     curves = [Curve(v, s.mu_ratio(v, y), look) for y, look in zip(amplitudes, looks, strict=True)]
-    curves[10] = curves[10]._replace(label=r"$\tilde y = 1$")
-    crit, top = _solved(amplitudes[1:])
+    curves[0] = curves[0]._replace(label=r"exact, $\tilde y$ = 0 (top), 0.1, ..., 2 (bottom)")
+    curves[10] = curves[10]._replace(label=r"exact, $\tilde y = 1$")
+    crit, top = _solve_border(amplitudes[1:])
     curves.append(Curve(crit, top, "C3o", r"border: $\tilde\mu(\tilde v_\mathrm{crit})$, solved"))
     curves.append(
         Curve(np.zeros(11), closed_forms.static_limit(amplitudes[:11]), "C2s", "static value (16)")
     )
-    notes = {(1.95, float(s.mu_ratio(2.0, y))): f"{y:g}" for y in (0.5, 1.0, 1.5, 2.0)}
-    return [Panel((V, 0.0, 2.0), (MU, 0.0, 1.03), curves, notes)]
+    return [Panel((V, 0.0, 2.0), (MU, 0.0, 1.03), curves)]
 
 
 def _master_curve(s: Surrogate) -> list[Panel]:
@@ -264,22 +265,18 @@ def _large_amplitudes(s: Surrogate) -> list[Panel]:
         0.8 * np.array([1, 2, 3, 4, 6, 8, 12, 16, 25, 50, 100]),
     )
     curves = [Curve(x, s.mu_ratio(x * y, y), "C0-") for y in 0.8 * np.arange(1, 101)]
+    curves[0] = curves[0]._replace(label=r"exact, $\tilde y$ = 0.8 (top), 1.6, ..., 80 (bottom)")
     crosses, (crit, top) = (
         np.concatenate([[0.01, 0.03, 0.06], np.arange(0.1, 2.01, 0.1)]),
-        _solved(dots),
+        _solve_border(dots),
     )
     curves.append(Curve(crit / dots, top, "ko", "border, solved"))
     curves.append(Curve(crosses, closed_forms.outer(1.0 / crosses), "C3x", "(35)"))
-    notes = {
-        (x, float(s.mu_ratio(x * y, y))): f"{y:g}"
-        for x, y in ((0.9, 0.8), (0.9, 1.6), (0.75, 80.0))
-    }
     return [
         Panel(
             (r"$\tilde v_0/\tilde y_0 = v_0/(\omega y_0)$", 0.0, 2.0),
             (MU, 0.0, 1.03),
             curves,
-            notes,
         )
     ]
 
@@ -331,30 +328,40 @@ FIGURES: dict[str, Callable[[Surrogate], list[Panel]]] = {
 def _draw(panel: Panel, axes: Any) -> None:
     for curve in panel.curves:
         if curve.z is None:
-            axes.plot(curve.x, curve.y, curve.look, label=curve.label or None, ms=5, lw=1.2)
+            axes.plot(curve.x, curve.y, curve.look, label=curve.label or None, ms=5, lw=1.4)
         else:
-            shown = axes.contourf(
-                curve.x, curve.y, curve.z, levels=np.linspace(0.0, 1.0, 41), cmap="YlGnBu_r"
+            levels = [0.0, *plotting.LEVELS, 1.0]
+            axes.contourf(curve.x, curve.y, curve.z, levels, colors=plotting.band_colours())
+            lines = axes.contour(
+                curve.x, curve.y, curve.z, plotting.LEVELS, colors=plotting.INK, linewidths=0.6
             )
-            axes.contour(
-                curve.x,
-                curve.y,
-                curve.z,
-                levels=np.arange(0.1, 1.0, 0.1),
-                colors="k",
-                linewidths=0.7,
-            )
-            axes.figure.colorbar(shown, label=curve.label, ticks=np.linspace(0.0, 1.0, 11))
+            axes.clabel(lines, fmt="%g", fontsize="small")
     for (x, y), text in panel.notes.items():
         axes.text(x, y, text, ha="center", va="bottom")
     (x_name, *x_ends), (y_name, *y_ends) = panel.x, panel.y
     axes.set(xlabel=x_name, ylabel=y_name, xlim=x_ends, ylim=y_ends, **panel.settings)
     axes.title.set_fontsize("small")
-    axes.legend(fontsize="small")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _legend(figure: Any) -> None:
+    """One legend for all panels, below them: it covers no curve."""
+    handles: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(
+        list(handles.values()),
+        list(handles),
+        loc="outside lower center",
+        ncols=3,
+        frameon=False,
+        fontsize="small",
+    )
 
 
 def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
-    """Write every figure of :data:`FIGURES` to the existing ``folder`` as PNG, 792 x 506 pixels;
+    """Write every figure of :data:`FIGURES` to the existing ``folder`` as PNG, 792 x 528 pixels;
     return the paths.
 
     ``surrogate`` is the table that the lines come from.  The same picture is the same bytes.
@@ -365,18 +372,24 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
         Without matplotlib.
     """
     try:
+        from cycler import cycler
+        from matplotlib import rc_context
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
         raise MumacroError(f"figures need the extra 'figures' (matplotlib): {error}") from error
-    written = []
-    for name, panels_of in FIGURES.items():
-        panels, figure = panels_of(surrogate), Figure(figsize=SIZE, layout="constrained")
-        FigureCanvasAgg(figure)
-        places = figure.subplots(-(-len(panels) // 3), min(len(panels), 3), squeeze=False)
-        for panel, axes in zip(panels, places.flat, strict=True):
-            _draw(panel, axes)
-        written.append(folder / f"{name}.png")
-        # no version of the drawing library in it
-        figure.savefig(written[-1], dpi=DPI, metadata={"Software": None})
-    return written
+    paths = []
+    with rc_context({"axes.prop_cycle": cycler(color=COLOURS)}):
+        for name, panels_of in FIGURES.items():
+            panels, figure = panels_of(surrogate), Figure(figsize=SIZE, layout="constrained")
+            FigureCanvasAgg(figure)
+            axes_grid = figure.subplots(-(-len(panels) // 3), min(len(panels), 3), squeeze=False)
+            for panel, axes in zip(panels, axes_grid.flat, strict=True):
+                _draw(panel, axes)
+            title = (panels_of.__doc__ or "").splitlines()[0].rstrip(".")
+            figure.suptitle(title, x=0.01, ha="left", fontsize="medium")
+            _legend(figure)
+            paths.append(folder / f"{name}.png")
+            # no version of the drawing library in it
+            figure.savefig(paths[-1], dpi=DPI, metadata={"Software": None})
+    return paths

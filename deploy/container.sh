@@ -19,7 +19,7 @@ BASE=${BASE:-docker.io/library/python:3.11-slim}
 LARGEST_MB=${LARGEST_MB:-140}   # over the base
 WORKER_MB=512                   # the rule of the manifests: memory for each worker
 LOAD_S=${LOAD_S:-5}             # of load for one worker and for four; its last answers take longer
-CASE='mu0=0.3&Fz=10&k=1e6&y0=2e-6&omega=1.3e5&v0=0.01'
+CASE='mu0=0.3&Fz=10&k=1e6&y0=2e-6&f=20e3&v0=0.01'
 ANSWER=0.24001211754819
 
 read -ra flags <<<"${BUILD_FLAGS:-}"
@@ -167,7 +167,7 @@ for pause in 0.2 1; do
 done
 passed "SIGTERM 0.2 and 1 s after the start"
 python3 -c 'import json
-case = {"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
+case = {"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "f": 20e3}
 print(json.dumps({**case, "v0": [1e-3 + 1e-7 * i for i in range(100_000)]}))' >"$work/batch.json"
 for workers in 1 4; do
     start "$workers"

@@ -16,6 +16,12 @@ html_title = f"mumacro {__version__}"
 highlight_language = "none"
 smartquotes = False  # --help is no dash
 html_theme = "furo"
+# the accent of the service's page
+_LIGHT, _DARK = (
+    {"color-brand-primary": accent, "color-brand-content": accent}
+    for accent in ("#0b5cad", "#7db7f5")
+)
+html_theme_options = {"light_css_variables": _LIGHT, "dark_css_variables": _DARK}
 html_copy_source = False
 html_show_copyright = False
 html_math_renderer = "mathml"  # docs/_ext/mathml.py

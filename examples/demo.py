@@ -14,8 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import urlencode
 
-CASE = {"mu0": "0.3", "Fz": "10", "k": "1e6", "y0": "2e-6", "omega": "1.3e5", "v0": "0.01"}
-UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "omega": "rad/s", "v0": "m/s"}
+CASE = {"mu0": "0.3", "Fz": "10", "k": "1e6", "y0": "2e-6", "f": "20e3", "v0": "0.01"}
+UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "f": "Hz", "v0": "m/s"}
 WAIT_S = 60.0
 
 

@@ -16,7 +16,7 @@ from scipy.stats import norm, qmc
 
 BASE = sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:4242"
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
-MEAN = np.log10([0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01])
+MEAN = np.log10([0.3, 10.0, 1e6, 2e-6, 2e4 * 2 * math.pi, 0.01])
 SPREAD = np.log10([1.03, 1.02, 1.0, 1.05, 1.0, 1.0])  # one standard deviation: a factor
 
 model = umbridge.HTTPModel(BASE, "mu_macro_log10")

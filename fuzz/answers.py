@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from benchmarks import extended
 from benchmarks.measuring import main, markdown, quantity, sections
+from benchmarks.support.driven import answered, hard, ordinary
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
-from mumacro.kernel.binding import kernels
-from tests.test_driven_bounds import answered, hard, ordinary
+from mumacro.kernel.binding import CaseRows, kernels
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]
@@ -206,14 +206,15 @@ def on_any_processor(table: Surrogate, share: float) -> Count:
     for n, _, cases in pieces(N // 5, share):
         found = []
         for kernel in (kernels[-1], kernels[0]):
-            rows, source = np.empty((3, n)), np.empty(n, np.int8)
-            kernel.cases(table._data, n, list(cases.values()), rows, source)
-            found.append((rows, source))
-        (here, source), (there, other) = found
-        change, allowed = np.abs(here[0] - there[0]), here[2] + there[2]
+            answers = CaseRows.empty(n)
+            kernel.cases(table._data, n, list(cases.values()), answers)
+            found.append(answers)
+        here, there = found
+        change = np.abs(here.mu_macro - there.mu_macro)
+        allowed = here.error_bound + there.error_bound
         with np.errstate(all="ignore"):
             count.add(
-                (change > allowed) | (source != other),
+                (change > allowed) | (here.source != there.source),
                 np.where(change > 0.0, change / allowed, 0.0),
             )
     return count

@@ -16,7 +16,7 @@ from contextlib import ExitStack, suppress
 from http.client import HTTPException
 
 from benchmarks.measuring import main, markdown, sections
-from tests.serving import CASE, Server, asking, connect, head, serving
+from benchmarks.support.serving import CASE, Server, asking, connect, head, serving
 
 # the defaults; a few connections are left
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20

@@ -20,8 +20,8 @@ from urllib.parse import urlencode
 import numpy as np
 
 from benchmarks.measuring import ROOT, main, markdown, sections
-from tests.forms import BATCH, TYPES, WRITERS
-from tests.serving import CASE, Server, asking, serving
+from benchmarks.support.forms import BATCH, TYPES, WRITERS
+from benchmarks.support.serving import CASE, Server, asking, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
 CLIENTS, SERVERS = 8, 2

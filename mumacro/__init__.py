@@ -12,6 +12,7 @@ try:
     from mumacro.analysis import validity
     from mumacro.analysis.fit import Fit, fit
     from mumacro.analysis.law import law
+    from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.settling import settling
     from mumacro.analysis.solve_for import solve_for
     from mumacro.answer import Answer
@@ -36,6 +37,7 @@ __all__ = [
     "Element",
     "Fit",
     "InputError",
+    "Motion",
     "MumacroError",
     "Surrogate",
     "TableError",
@@ -43,6 +45,7 @@ __all__ = [
     "closed_forms",
     "fit",
     "law",
+    "motion",
     "open",
     "plotting",
     "settling",
@@ -57,5 +60,5 @@ _sys.meta_path.append(_moved.Signposts)
 
 
 def __dir__() -> list[str]:
-    """What users need; the folders and modules behind it are no part of the face."""
+    """The public names; folders and modules behind them are left out."""
     return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
-from mumacro import closed_forms, plotting
+from mumacro import plotting
 from mumacro.errors import MumacroError
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-#: float for one case; an array of float64 for many, or what holds labels in its place
+#: float for one case; for many an array of float64, or a labelled object in its place
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
@@ -51,12 +51,13 @@ class Answer(Generic[Number]):
     Examples
     --------
     >>> from mumacro import Surrogate
-    >>> a = Surrogate.open().evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> a = Surrogate.open().evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=0.01)
     >>> f"{a.mu_macro:.6f} {a.regime} {a.source}"
-    '0.240012 stick_slip stick_slip_low'
+    '0.240467 stick_slip stick_slip_low'
     """
 
     __slots__ = (
+        "_border",
         "_certain",
         "_groups",
         "_look_up",
@@ -80,6 +81,7 @@ class Answer(Generic[Number]):
         groups: tuple[Number, Number, Number] | None = None,
         certain: Callable[[Any, Any], Any] | None = None,
         look_up: Callable[[str, Any, Any], Any] | None = None,
+        border: Callable[..., Any] | None = None,
     ) -> None:
         self.mu_macro = mu_macro
         self.mu_ratio = mu_ratio
@@ -88,6 +90,7 @@ class Answer(Generic[Number]):
         self._groups = groups
         self._certain = certain
         self._look_up = look_up
+        self._border = border  # v~crit(y~) of this kind of contact
         self.gradient = self.gradient_bound = None
 
     def _group(self, place: int) -> Number:
@@ -154,11 +157,10 @@ class Answer(Generic[Number]):
             np.ravel(np.asarray(x)) for x in (self.v_tilde, self.y_tilde, self.regime_code)
         )
         regimes = {name: code == i for i, name in enumerate(REGIMES)}
-        # an answer has no table
-        return plotting.plot_cases(v, y, regimes, closed_forms.border_blend, axes)
+        return plotting.plot_cases(v, y, regimes, self._border, axes)
 
     def columns(self) -> dict[str, Any]:
-        """What is known of each case, by name: mu_macro first, then what was requested beside
+        """The results of each case by name: mu_macro first, then those that were requested beside
         it."""
         names = [
             "mu_macro",

@@ -16,7 +16,7 @@ class InputError(MumacroError, ValueError):
 
     def __init__(self, field: str, value: object, bound: str, index: int | None = None) -> None:
         self.field = field  #: name of the input, e.g. ``"mu0"``
-        self.value = value  #: as it was given
+        self.value = value  #: as it came in
         self.bound = bound  #: what the value must satisfy, e.g. ``"finite and > 0"``
         self.index = index  #: position in the flattened, broadcast input; None for a scalar call
         where = "" if index is None else f" at index {index}"

@@ -1,4 +1,4 @@
-"""Import paths of former versions, and what stands in their place."""
+"""Import paths of former versions, and their replacements."""
 
 MOVED = {
     "mumacro.inverse": "mumacro.solve_for(surrogate, unknown, target, **case)",
@@ -15,8 +15,8 @@ MOVED = {
 
 
 class Signposts:
-    """A finder of modules that finds none: where nothing else does either, it names what to use
-    instead."""
+    """A finder of modules that loads none; for an import path of a former version its error names
+    the replacement."""
 
     @staticmethod
     def find_spec(name: str, *_: object) -> None:

@@ -16,7 +16,15 @@ from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.contacts.quadrature import put_driven
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.frames import evaluate_labelled
-from mumacro.inputs.cases import ABSENT, NUMBERS, NUMBERS_AND_ARRAYS, Cases, by_name, labelled, real
+from mumacro.inputs.cases import (
+    ABSENT,
+    NUMBERS,
+    NUMBERS_AND_ARRAYS,
+    Cases,
+    by_name,
+    has_labels,
+    real,
+)
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import (
     BALL,
@@ -26,9 +34,9 @@ from mumacro.inputs.kind import (
     Kind,
     kind_of,
 )
-from mumacro.kernel import slices
+from mumacro.kernel import threads as shared_out
 from mumacro.kernel.arrays import Array, common_shape, flat
-from mumacro.kernel.binding import Data, kernels
+from mumacro.kernel.binding import Data, Detail, kernels
 from mumacro.kernel.threads import default_threads
 from mumacro.table import atlas
 from mumacro.table.blocks import BorderPiece, Table
@@ -38,8 +46,10 @@ from mumacro.table.netcdf import error_distribution, json_attributes, parse_tabl
 from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
 
 _KERNEL = kernels[-1]
-_ONE = kernels[:2][-1]  # a single point does not fill the widest registers; the bits are the same
-_RATIO = _ONE.ratio
+_SCALAR_KERNEL = kernels[:2][
+    -1
+]  # a single point does not fill the widest registers; the bits are the same
+_RATIO = _SCALAR_KERNEL.ratio
 _CODES = {name: code for code, name in enumerate(atlas.QUANTITY_NAMES)}
 _FLOAT = np.dtype(np.float64)
 #: effects of an illegal value in an array
@@ -55,15 +65,15 @@ class Surrogate:
     Examples
     --------
     >>> s = Surrogate.open()
-    >>> answer = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> answer = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=0.01)
     >>> round(answer.mu_macro, 6), answer.regime
-    (0.240012, 'stick_slip')
+    (0.240467, 'stick_slip')
     """
 
     def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
         if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
             raise InputError("threads", threads, "None or a whole number from 1 to 1024")
-        self._asked_threads = threads
+        self._thread_limit = threads
         self._image: bytes | None = None
         self.path = Path(path)
         self.table = table
@@ -106,14 +116,14 @@ class Surrogate:
         >>> Surrogate.open(1e-8).id
         'mumacro-1e-10'
         """
-        path = Path(table) if isinstance(table, (str, Path)) else _bundled(table)
+        path = Path(table) if isinstance(table, (str, Path)) else _bundled_table(table)
         return cls._of_image(read_image(path), path, threads)
 
     @classmethod
     def _of_image(cls, image: bytes, path: Path, threads: int | None) -> Self:
-        found = cls(parse_table(image, path), path, threads)
-        found._image = image
-        return found
+        surrogate = cls(parse_table(image, path), path, threads)
+        surrogate._image = image
+        return surrogate
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle small: a bundled table by name and checksum, valid on another machine, too;
@@ -124,7 +134,7 @@ class Surrogate:
             if bundled
             else (str(self.path), self._image or read_image(self.path))
         )
-        return _reopen, (path, self.checksum, self._asked_threads, image)
+        return _reopen, (path, self.checksum, self._thread_limit, image)
 
     def __repr__(self) -> str:
         return (
@@ -143,22 +153,43 @@ class Surrogate:
         """The map of mu~ with a ``point`` (v~, y~), see ``mumacro.plotting.plot_map``; needs
         matplotlib."""
         kind = kind_of(contact, direction)
-        v = np.geomspace(*plotting.V_RANGE, 281)
-        y = np.geomspace(*plotting.y_range(kind.normal), 201)
+        ratio, border = self.map_of(kind, 281, 201)
+        title = rf"$\mu_\mathrm{{macro}} / \mu_0$: {contact}, {direction}"
+        return plotting.plot_map(
+            ratio,
+            border,
+            axes,
+            point=point,
+            normal=kind.normal,
+            areas=self.regimes_on_map(kind),
+            title=title,
+        )
+
+    def map_of(self, kind: Kind, width: int, height: int) -> tuple[Array, Array]:
+        """mu~ (height, width) on the map of a kind of contact, rows from its foot, and v~crit of
+        each row (height,)."""
+        v, y = plotting.speeds(width), plotting.amplitudes(height, kind.normal)
         ratio = self.quantity("mu_ratio", v, y[:, None], **kind.names)[0]
-        border = self.v_tilde_crit(y, **kind.names)
-        return plotting.plot_map(v, y, ratio, border, axes, point=point, normal=kind.normal)
+        return ratio, self.v_tilde_crit(y, **kind.names)
+
+    def regimes_on_map(self, kind: Kind) -> list[str]:
+        """The regimes at ``plotting.AREAS`` of the map of a kind of contact."""
+        v, y = zip(*(plotting.place(*at, kind.normal) for at in plotting.AREAS), strict=True)
+        swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
+        # v~ = v0 and y~ = y0
+        cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v), **swing}
+        return [str(name) for name in self.evaluate(cases, **kind.names).regime]
 
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__, _asked_threads=1)
-        return other
+        copy = object.__new__(type(self))
+        copy.__dict__.update(self.__dict__, _thread_limit=1)
+        return copy
 
     @property
     def threads(self) -> int:
         """Threads that a call from here divides a large array among."""
-        return default_threads() if self._asked_threads is None else self._asked_threads
+        return default_threads() if self._thread_limit is None else self._thread_limit
 
     @property
     def id(self) -> str:
@@ -190,8 +221,8 @@ class Surrogate:
         "0.5" to "1", and bound over error, ``least``, ``median`` and ``largest``; empty for a
         table that does not state them.
 
-        >>> found = Surrogate.open(1e-7).error_distribution["mu_ratio"]
-        >>> found["0.5"] < found["0.95"] < found["0.99"] < found["1"] < 1e-7
+        >>> errors = Surrogate.open(1e-7).error_distribution["mu_ratio"]
+        >>> errors["0.5"] < errors["0.95"] < errors["0.99"] < errors["1"] < 1e-7
         True
         """
         return error_distribution(self.table)
@@ -263,11 +294,11 @@ class Surrogate:
                 mu = math.nan
             if mu == mu:
                 return mu
-        v, y, shape = _points(v_tilde, y_tilde)
-        found = slices.alone(atlas.MU, self._data, v, y, self.threads)
-        if not shape and math.isnan(found[0]):
+        v, y, shape = _flat_groups(v_tilde, y_tilde)
+        values = shared_out.alone(atlas.MU, self._data, v, y, self._thread_limit)
+        if not shape and math.isnan(values[0]):
             raise _illegal(v, y)
-        return _shaped(found, shape)
+        return _reshape(values, shape)
 
     def ratio_with_bound(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
@@ -294,11 +325,11 @@ class Surrogate:
         kind = kind_of(contact, direction)
         if type(y_tilde) is float and y_tilde >= 0.0 and kind == SPRING:
             return float(self.border(np.array((y_tilde,)))[0])
-        _, y, shape = _points(0.0, y_tilde)
-        found = _KERNEL.border(self._data, y, kind)
-        if not shape and math.isnan(found[0]):
+        _, y, shape = _flat_groups(0.0, y_tilde)
+        crit = _KERNEL.border(self._data, y, kind)
+        if not shape and math.isnan(crit[0]):
             raise InputError("y_tilde", float(y[0]), ">= 0 and < 1" if kind.normal else ">= 0")
-        return _shaped(found, shape)
+        return _reshape(crit, shape)
 
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
         """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
@@ -344,14 +375,14 @@ class Surrogate:
         >>> f"{along_y:.3e}"     # eq. (31): -y~^2 / (2 (1 + v~^2))
         '-1.000e-05'
         """
-        data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
-        rows = slices.slopes(_CODES[of], data, v, y, self.threads)
-        if not shape and math.isnan(rows[0, 0]):
+        data, (v, y, shape) = self._with(of, "of"), _flat_groups(v_tilde, y_tilde)
+        rows = shared_out.slopes(_CODES[of], data, v, y, self._thread_limit)
+        if not shape and math.isnan(rows.value[0]):
             raise _illegal(v, y)
-        return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
+        return tuple(_reshape(row, shape) for row in rows[: 5 if bounds else 3])
 
     def _with(self, quantity: str, argument: str = "name") -> Data:
-        """What the kernel reads, with the cells of a quantity; they are cut on first use."""
+        """The data that the kernel reads, with the cells of a quantity; made on first use."""
         code = _CODES[quantity] if quantity in atlas.QUANTITY_NAMES else None
         if code not in self._data.quantities:
             if code is None or quantity not in self.table.quantities:
@@ -364,7 +395,7 @@ class Surrogate:
         return self._data
 
     def derivatives(self, *_: object, **__: object) -> NoReturn:
-        """Gone; the error names what replaces it."""
+        """Removed; the error names what replaces it."""
         raise MumacroError(
             "Surrogate.derivatives is gone: slopes(v_tilde, y_tilde, of) gives v~ d/dv~ and y~ "
             "d/dy~, evaluate(..., gradient=True) the slopes by the six inputs"
@@ -396,9 +427,9 @@ class Surrogate:
         data, kind = self._with(name), kind_of(contact, direction)
         if kind == SPRING and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
             try:
-                one = _ONE.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
-                if one[2] >= 0:
-                    return one
+                scalar = _SCALAR_KERNEL.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+                if scalar[2] >= 0:
+                    return scalar
             except OverflowError:  # a whole number beyond double range
                 pass
         if kind.normal and name == "power":
@@ -407,14 +438,14 @@ class Surrogate:
                 direction,
                 "across or along for the power: the load's path is not modelled",
             )
-        v, y, shape = _points(v_tilde, y_tilde)
-        value, bound, source = slices.values(
-            _CODES[name], self._data_of(kind, _CODES[name]), v, y, self.threads, kind
+        v, y, shape = _flat_groups(v_tilde, y_tilde)
+        value, bound, source = shared_out.values(
+            _CODES[name], self._data_of(kind, _CODES[name]), v, y, self._thread_limit, kind
         )
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
             raise _illegal(v, y, ">= 0 and < 1" if kind.normal else finite)
-        return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
+        return _reshape(value, shape), _reshape(bound, shape), _reshape(source, shape)
 
     # --- dimensional ------------------------------------------------------------------------------
 
@@ -594,7 +625,8 @@ class Surrogate:
         k_low, k_high : array_like
             The same as two columns.
         y0 : array_like
-            Amplitude of the oscillation [m], >= 0, across or along the sliding direction.
+            Amplitude of the oscillation [m], half of peak to peak, >= 0, across or along the
+            sliding direction.
         Fz_amplitude : array_like
             Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction
             is "normal".
@@ -660,15 +692,15 @@ class Surrogate:
             and illegal in ILLEGAL
             and not unknown
         ):
-            # the usual kind in plain numbers and arrays takes a short way, which saves most of the
-            # time of a call: its names are those of the columns; what is refused goes the long one
+            # One spring across in plain numbers and arrays takes this short way, which saves most
+            # of the time of a call.  Illegal inputs go the long way, which has the messages.
             types = {*map(type, (mu0, Fz, k, y0, omega if f is ABSENT else f, v0))}
             if types <= NUMBERS:
                 with suppress(OverflowError):  # a whole number beyond double range
                     angular = omega if f is ABSENT else RAD_PER_CYCLE * float(f)
-                    one = self._one((mu0, Fz, k, y0, angular, v0), gradient)
-                    if one.source_code >= 0:
-                        return one
+                    answer = self._scalar_answer((mu0, Fz, k, y0, angular, v0), gradient)
+                    if answer.source_code >= 0:
+                        return answer
             elif types <= NUMBERS_AND_ARRAYS:
                 columns = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "v0": v0}
                 columns |= {"omega": omega} if f is ABSENT else {"f": f}
@@ -679,7 +711,7 @@ class Surrogate:
         if unknown:
             name = min(unknown)
             raise InputError(name, unknown[name], f"one of {', '.join(kind.fields)} or f")
-        said = {
+        keywords = {
             "mu0": mu0,
             "Fz": Fz,
             "k": k,
@@ -692,8 +724,8 @@ class Surrogate:
             "f": f,
             "v0": v0,
         }
-        inputs = by_name(cases, {name: x for name, x in said.items() if x is not ABSENT}, kind)
-        if labelled(cases, inputs):
+        inputs = by_name(cases, {name: x for name, x in keywords.items() if x is not ABSENT}, kind)
+        if has_labels(cases, inputs):
             options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
             return evaluate_labelled(
                 self.evaluate,
@@ -711,72 +743,59 @@ class Surrogate:
         """:meth:`evaluate` of cases in their one form."""
         kind, columns, shape = cases.kind, cases.columns, cases.shape or (1,)
         if not cases.shape and kind == SPRING and cases.ends is None:
-            return self._one([*columns.values()], gradient)
+            return self._scalar_answer([*columns.values()], gradient)
         groups = groups or gradient or not cases.shape
-        found, source = slices.cases(
-            self._data_of(kind),
-            [*columns.values()],
-            math.prod(shape),
-            self.threads,
-            17 if gradient else 5 if groups else 3,
-            kind,
-        )
-        rows, codes = found.reshape(len(found), *shape), source.reshape(shape)
-        answer: Answer[Any] = (
-            IntervalAnswer if cases.ends else AnswerWithGradient if gradient else Answer
-        )(rows[0], rows[1], rows[2], codes)
+        detail: Detail = "gradient" if gradient else "groups" if groups else "values"
+        six, n, data = [*columns.values()], math.prod(shape), self._data_of(kind)
+        rows = shared_out.cases(data, six, n, self._thread_limit, detail, kind).reshaped(shape)
+        answer: Answer[Any]
+        if cases.ends is not None:
+            low, high = cases.ends
+            six = [*{**columns, "k": low}.values()]
+            extremes = shared_out.intervals(data, six, high, self._thread_limit, kind)
+            answer = IntervalAnswer(
+                rows.mu_macro,
+                rows.mu_ratio,
+                np.maximum(rows.error_bound, extremes.error_bound.reshape(shape)),
+                rows.source,
+            )
+            answer.mu_macro_low = np.minimum(rows.mu_macro, extremes.low.reshape(shape))
+            answer.mu_macro_high = np.maximum(rows.mu_macro, extremes.high.reshape(shape))
+        else:
+            answer = (AnswerWithGradient if gradient else Answer)(
+                rows.mu_macro, rows.mu_ratio, rows.error_bound, rows.source
+            )
         if groups:
-            length = np.where(source == -1, np.nan, cases.length_scale()).reshape(shape)
-            answer._groups = rows[3], rows[4], length
+            answer._groups = rows.v_tilde, rows.y_tilde, rows.length_scale
             answer._certain = (
                 self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
             )
+            answer._border = functools.partial(self.v_tilde_crit, **kind.names)
         if gradient:
-            answer.gradient = dict(zip(kind.fields, rows[5:11], strict=True))
-            answer.gradient_bound = dict(zip(kind.fields, rows[11:], strict=True))
-        if isinstance(answer, IntervalAnswer):
-            self._add_extremes(answer, cases)
+            answer.gradient = dict(zip(kind.fields, rows.gradient, strict=True))
+            answer.gradient_bound = dict(zip(kind.fields, rows.gradient_bound, strict=True))
         return answer if cases.shape else single(answer)
 
-    def _one(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
-        """The answer to one case of the usual kind; NaN where it is illegal."""
-        row = _ONE.one(self._pointer, six, 19 if gradient else 7)
+    def _scalar_answer(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
+        """The answer to one case of one spring across; NaN where it is illegal."""
+        row = _SCALAR_KERNEL.one(self._pointer, six, gradient)
+        groups = (row.v_tilde, row.y_tilde, row.length_scale)
         answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
-            row[0], row[1], row[2], int(row[6]), (row[3], row[4], row[5]), self._certain
+            row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, self._certain
         )
+        answer._border = self.v_tilde_crit
         if gradient:
-            answer.gradient = dict(zip(FIELDS, row[7:13], strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, row[13:], strict=True))
+            answer.gradient = dict(zip(FIELDS, row.gradient, strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, row.gradient_bound, strict=True))
         return answer
-
-    def _add_extremes(self, answer: IntervalAnswer[Array], cases: Cases) -> None:
-        """Add to the answer for the middle of an interval of k the extremes over it."""
-        shape, legal = answer.mu_macro.shape, answer.source_code != -1
-        # NaN where they are no interval, so that the kernel has no answer either
-        first, last = (
-            np.where(np.isnan(cases.columns["k"]), np.nan, end) for end in cases.ends or ()
-        )
-        rows = slices.intervals(
-            self._data_of(cases.kind),
-            [*{**cases.columns, "k": first}.values()],
-            last,
-            self.threads,
-            cases.kind,
-        )
-        low, high, bound = (row.reshape(shape) for row in rows)
-        answer.error_bound = np.maximum(answer.error_bound, bound)
-        answer.mu_macro_low = np.where(legal, np.minimum(low, answer.mu_macro), np.nan)
-        answer.mu_macro_high = np.where(legal, np.maximum(high, answer.mu_macro), np.nan)
 
     def evaluate_case(
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
     ) -> tuple[float, float, float, int]:
         """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1
         if illegal."""
-        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(
-            self._pointer, (mu0, Fz, k, y0, omega, v0), 7
-        )
-        return mu_macro, mu_ratio, bound, int(source)
+        row = _SCALAR_KERNEL.one(self._pointer, (mu0, Fz, k, y0, omega, v0), False)
+        return row.mu_macro, row.mu_ratio, row.error_bound, row.source
 
     def cells(self, name: str, kind: Kind = SPRING) -> Data:
         """What the kernel reads of a quantity of a kind, for callers of the kernel itself."""
@@ -805,8 +824,8 @@ class Surrogate:
         return found
 
     def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
-        """Whether v~ is further from v~crit than that is known, and than rounding may move v~ and
-        y~."""
+        """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~
+        together."""
         v, y = np.asarray(v_tilde), np.asarray(y_tilde)
         crit = _KERNEL.border(
             self._data, np.atleast_1d(np.asarray(y, dtype=np.float64)), kind
@@ -820,14 +839,14 @@ class Surrogate:
 
 
 # mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits
-# (tests/test_surrogate.py solves them anew)
+# (tests/mumacro/test_surrogate.py solves them anew)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
-    """Refuse a stored border whose nodes are not near the formula for every y~: blocks are found
-    with it."""
+    """Refuse a stored border whose nodes are not near the formula for every y~, since it selects
+    the block of a case."""
     for index, ((name, axis, _), piece) in enumerate(zip(atlas.BORDER_PIECES, pieces, strict=True)):
         y = axis.amplitude(piece.nodes)
         crit = piece.values * _KERNEL.border_scales(index, y)[0]
@@ -835,7 +854,7 @@ def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
             raise TableError(path, f"the nodes of border/{name} are not v~crit(y~)")
 
 
-def _bundled(tolerance: float | None) -> Path:
+def _bundled_table(tolerance: float | None) -> Path:
     """The tightest bundled table, or the smallest that meets ``tolerance``."""
     tables = {float(path.stem.removeprefix("mumacro-")): path for path in bundled_tables()}
     if not tables:
@@ -848,14 +867,14 @@ def _bundled(tolerance: float | None) -> Path:
         or not tolerance > 0.0
     ):
         raise InputError("tolerance", tolerance, "a path, a tolerance > 0, or None")
-    fit = [found for found in tables if found <= tolerance]
-    if not fit:
+    sufficient = [candidate for candidate in tables if candidate <= tolerance]
+    if not sufficient:
         raise InputError(
             "tolerance",
             tolerance,
             f">= {min(tables):g}, the tightest bundled table, or the path of another",
         )
-    return tables[max(fit)]
+    return tables[max(sufficient)]
 
 
 @functools.cache  # a worker gets the same surrogate with every task
@@ -863,13 +882,15 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
     """Unpickle: from the bytes, or from the bundled table of that name."""
     if image is not None:
         return Surrogate._of_image(image, Path(path), threads)
-    found = Surrogate.open(
+    surrogate = Surrogate.open(
         next((table for table in bundled_tables() if table.name == path), path), threads
     )
-    if found.checksum != checksum:
-        told = f"holds {found.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"
-        raise TableError(found.path, f"{told}: install the same release on both sides")
-    return found
+    if surrogate.checksum != checksum:
+        mismatch = (
+            f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"
+        )
+        raise TableError(surrogate.path, f"{mismatch}: install the same release on both sides")
+    return surrogate
 
 
 def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
@@ -881,11 +902,11 @@ def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
     )
 
 
-def _shaped(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
+def _reshape(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
     return values.reshape(shape) if shape else values[0].item()
 
 
-def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
+def _flat_groups(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Both broadcast together, flat and contiguous, and their shape."""
     if type(v_tilde) is np.ndarray is type(y_tilde) and v_tilde.dtype == y_tilde.dtype == _FLOAT:
         v, y = v_tilde, y_tilde

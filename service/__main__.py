@@ -18,9 +18,11 @@ if __name__ == "__main__" and "healthcheck" not in sys.argv:
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
 
 import argparse
+import threading
+import time
 import urllib.request
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 
 try:
     from .settings import PREFIX, Settings, SettingsError, load_settings
@@ -34,10 +36,10 @@ except ModuleNotFoundError as error:
 _OPTIONS = ("host", "port", "tables", "workers", "log_level")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit code."""
+def main(arguments: Sequence[str] | None = None, prog: str = "python -m service") -> int:
+    """Run the command, of the name ``prog``; return the exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m service",
+        prog=prog,
         description="Serve macroscopic friction over HTTP.  Every option is also a setting "
         "MUMACRO_<OPTION>.",
         epilog="Files of cases need no server: mumacro eval --help.",
@@ -65,14 +67,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return _serve(settings) if chosen["command"] == "serve" else _check(settings)
 
 
-def _check(settings: Settings) -> int:
-    """Ask /readyz on this machine, without a proxy.  A container needs no other program for its
-    health check."""
+def _address(settings: Settings) -> str:
+    """Where this machine reaches the service."""
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)  # noqa: S104  (compared, never bound)
-    url = f"http://{f'[{host}]' if ':' in host else host}:{settings.port}/readyz"
+    return f"http://{f'[{host}]' if ':' in host else host}:{settings.port}"
+
+
+def _ask(url: str) -> None:
+    """Ask an address of this machine, without a proxy; OSError or ValueError where it is not
+    ready."""
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    opener.open(url, timeout=10.0).close()  # any other status raises
+
+
+def _announce(settings: Settings) -> None:
+    """Tell a person at a terminal what to open, once it can be opened."""
+    while True:
+        time.sleep(0.1)
+        with suppress(OSError, ValueError):
+            _ask(f"{_address(settings)}/readyz")
+            print(f"Open {_address(settings)}  (Ctrl+C stops the service)", flush=True)
+            return
+
+
+def _check(settings: Settings) -> int:
+    """Ask /readyz.  A container needs no other program for its health check."""
+    url = f"{_address(settings)}/readyz"
     try:
-        opener.open(url, timeout=10.0).close()  # any other status raises
+        _ask(url)
     except (OSError, ValueError) as error:
         print(f"{url}: {error}", file=sys.stderr)
         return 1
@@ -91,6 +113,8 @@ def _serve(settings: Settings) -> int:
     # The server shuts down gracefully, then raises the signal again, which by default would end the
     # process with the signal's exit status.  From here on there are things to clean up.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    if sys.stdout.isatty() and settings.port:  # 0: any free port, which the log names
+        threading.Thread(target=_announce, args=(settings,), daemon=True).start()
     try:
         with shared_counters() if settings.workers > 1 else nullcontext():
             # By name, so that only worker processes import it, and not their parent.  It reads the

@@ -15,7 +15,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
@@ -75,9 +75,27 @@ _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropp
 _WRITE_EVERY_S = 0.05
 _NO_SNIFF = (b"x-content-type-options", b"nosniff")
 
+_ESCAPED = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
+
 _log = logging.getLogger(__name__)
 _access = logging.getLogger("mumacro.access")
 _errors = logging.getLogger("mumacro.error")
+
+
+def for_people(line: Mapping[str, Any]) -> bytes:
+    """A line of the log as a person at a terminal reads it; control characters are escaped, so that
+    a client cannot forge a line or move the cursor."""
+    rest = {name: x for name, x in line.items() if name not in ("time", "level", "logger")}
+    raised = str(rest.pop("exception", "")).splitlines()
+    if "duration_ms" in rest:
+        words = [rest["method"], rest["path"], rest["status"], f"{rest['duration_ms']} ms"]
+    else:
+        words = [rest.pop("message", "")]
+        words += [f"{name}={x}" for name, x in rest.items() if isinstance(x, (str, int, float))]
+    level = "" if line["level"] in ("info", "debug") else f"{line['level']}: "
+    text = f"{line['time']:%H:%M:%S}  {level}{' '.join(map(str, words))}"
+    lines = [one.translate(_ESCAPED) for one in (text, *raised)]
+    return ("\n".join(lines) + "\n").encode("utf-8", "backslashreplace")
 
 
 class LogLines(logging.Handler):
@@ -123,7 +141,8 @@ class LogLines(logging.Handler):
 
         Line breaks within a line are escaped, so that a client cannot forge one.
         """
-        told, form = 0, partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
+        as_json = partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
+        told, form = 0, for_people if os.isatty(1) else as_json
         while True:
             time.sleep(_WRITE_EVERY_S)
             self._writes = True

@@ -22,11 +22,11 @@ from mumacro.table.blocks import Block, Table
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.version import __version__
 
-#: of the bundled table that is written if none is named: a C program holds it in its text
+#: picks the table that is exported by default: a C program holds all of its numbers as text
 DEFAULT_TOLERANCE = 1e-7
 _KERNEL = Path(mumacro.__file__).parent / "kernel"
 _BANNER = f"/* Written by mumacro {__version__}; do not edit.  {{}}. */\n"
-_DECLARED = """
+_DECLARATION = """
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -37,40 +37,40 @@ extern const mumacro_export mumacro_table;
 
 """
 _STATIC = "#ifndef MUMACRO_API\n#define MUMACRO_API static inline\n#endif\n"
-# names of the kernel's own, which a program may have, too; members of structs that have such a name
-# are public
+# Private names of the kernel, which a program may have, too, get a prefix; members of structs that
+# are named like this are public and keep their names.
 _PRIVATE = re.compile(r"\b(mu|MU)_(?!macro\b|ratio\b)(?=\w)")
 
 
 class ExportError(MumacroError):
-    """What cannot be exported, or not there; the message states why, a compiler's in its own
-    words."""
+    """A table cannot be exported, or not to that place; the message states why, with the words of
+    the compiler where that failed."""
 
 
 def header_text(table: Table) -> str:
     """All of it in one header, whose functions are static: it may be included in several files of a
     program."""
-    kernel = joined("kernel.c", set()) + table_text(table, "static ") + _file("interface.c")
-    private = _PRIVATE.sub(lambda found: f"mumacro_{found[1]}_", kernel)
-    about = _BANNER.format("Declarations, the kernel, the table, the interface")
+    kernel = join_includes("kernel.c", set()) + table_text(table, "static ") + _file("interface.c")
+    private = _PRIVATE.sub(lambda match: f"mumacro_{match[1]}_", kernel)
+    banner = _BANNER.format("Declarations, the kernel, the table, the interface")
     guard = "#ifndef MUMACRO_WHOLE_H\n#define MUMACRO_WHOLE_H\n"
-    return f"{about}{guard}{_STATIC}{_file('mumacro.h')}\n{private}#endif\n"
+    return f"{banner}{guard}{_STATIC}{_file('mumacro.h')}\n{private}#endif\n"
 
 
 def files(table: Table) -> dict[str, str]:
     """The texts of ``mumacro.h``, ``mumacro.c`` and ``mumacro_table.c``; the first two are the same
     for all tables."""
-    seen: set[str] = set()
+    included: set[str] = set()
     return {
         "mumacro.h": _BANNER.format("What mumacro.c defines") + _file("mumacro.h"),
         "mumacro.c": _BANNER.format("The evaluation")
         + '#include "mumacro.h"\n\n'
-        + joined("kernel.c", seen)
-        + _DECLARED
+        + join_includes("kernel.c", included)
+        + _DECLARATION
         + _file("interface.c"),
         "mumacro_table.c": _BANNER.format("The table")
-        + joined("data.h", set())
-        + _DECLARED
+        + join_includes("data.h", set())
+        + _DECLARATION
         + table_text(table, ""),
     }
 
@@ -104,16 +104,16 @@ def write_c(table: Table, out: Path) -> list[Path]:
     return list(texts)
 
 
-def joined(name: str, seen: set[str]) -> str:
+def join_includes(name: str, included: set[str]) -> str:
     """A file of the kernel with those that it includes, each once."""
-    seen.add(name)
+    included.add(name)
     lines = []
     for line in _file(name).splitlines(keepends=True):
-        found = re.fullmatch(r'#include "(.+)"\n', line)
-        if found is None:
+        match = re.fullmatch(r'#include "(.+)"\n', line)
+        if match is None:
             lines.append(line)
-        elif found[1] not in seen:
-            lines.append("\n" + joined(found[1], seen))
+        elif match[1] not in included:
+            lines.append("\n" + join_includes(match[1], included))
     return "".join(lines)
 
 
@@ -131,17 +131,20 @@ def table_text(table: Table, linkage: str) -> str:
     arrays["rule_driven"] = driven_rule()
     spring = _contact_text("", table, table.blocks, atlas.CHARTS, arrays)
     ball = _contact_text("ball_", table, table.ball, atlas.BALL_CHARTS, arrays)
-    about = table.attributes
-    text = f'{float(about["tolerance"])!r}, "{about["content_sha256"]}", "{__version__}"'
-    whole = (
+    attributes = table.attributes
+    text = f'{float(attributes["tolerance"])!r}, "{attributes["content_sha256"]}", "{__version__}"'
+    definition = (
         f"{linkage}const mumacro_export mumacro_table = {{\n    {spring},\n    {ball},\n"
         f"    {text}}};\n\n"
     )
-    return "".join(_array(f"mumacro_table_{name}", array) for name, array in arrays.items()) + whole
+    return (
+        "".join(_array(f"mumacro_table_{name}", array) for name, array in arrays.items())
+        + definition
+    )
 
 
 def _contact_text(
-    before: str,
+    prefix: str,
     table: Table,
     blocks: Sequence[Block],
     charts: Sequence[Chart],
@@ -149,9 +152,9 @@ def _contact_text(
 ) -> str:
     """The initializer of one contact's ``mumacro_data``, whose arrays are added; no cells where the
     table does not have it."""
-    arrays[f"{before}blocks"] = block_rows(blocks, charts)
+    arrays[f"{prefix}blocks"] = block_rows(blocks, charts)
     shared = _names("", ("border", "pieces"))
-    own, outer = _names(before, ("blocks",)), _names("", ("outer",))
+    own, outer = _names(prefix, ("blocks",)), _names("", ("outer",))
     rows = [f"{len(arrays['border'])}, {shared}, {own}, {outer}"]
     quantities = []
     for code, name in enumerate(atlas.QUANTITY_NAMES):
@@ -164,16 +167,16 @@ def _contact_text(
         # no slope is asked of a ball's power and stick fraction
         sloped = slope_errors[first:] if slope_errors.any() else np.zeros((1, 3))
         parts = {"cells": polynomials[first:], "errors": errors, "slope_errors": sloped}
-        arrays |= {f"{before}{name}_{part}": array for part, array in parts.items()}
-        names = _names(f"{before}{name}_", parts)
+        arrays |= {f"{prefix}{name}_{part}": array for part, array in parts.items()}
+        names = _names(f"{prefix}{name}_", parts)
         quantities.append(f"{{{first}, {len(polynomials) - first}, {names}}}")
     rows.append("{" + ",\n      ".join(quantities) + "}")
     rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")
     return f"{{{f',{chr(10)}     '.join(rows)}}}"
 
 
-def _names(before: str, parts: Iterable[str]) -> str:
-    return ", ".join(f"mumacro_table_{before}{part}" for part in parts)
+def _names(prefix: str, parts: Iterable[str]) -> str:
+    return ", ".join(f"mumacro_table_{prefix}{part}" for part in parts)
 
 
 def _array(name: str, values: Array) -> str:

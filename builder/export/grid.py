@@ -49,7 +49,7 @@ FORMATS: dict[str, tuple[str, Callable[[Table], bytes] | None]] = {
 }
 
 
-#: format that is gone -> what does its work
+#: removed format -> what does its work
 GONE = {
     "mat": "csv, or the netCDF file itself, which MATLAB and Octave read",
     "modelica": "fmu, or csv for a table of your own",
@@ -58,16 +58,16 @@ GONE = {
 }
 
 
-def check_format(kind: str) -> None:
-    """Raise ExportError for what is no format, in a line that names those that there are."""
-    if kind in GONE:
-        raise ExportError(f"format {kind!r} is gone: use {GONE[kind]}")
-    if kind not in FORMATS:
-        raise ExportError(f"format must be one of {', '.join(FORMATS)}, got {kind!r}")
+def check_format(name: str) -> None:
+    """ExportError with the list of formats where ``name`` is none of them."""
+    if name in GONE:
+        raise ExportError(f"format {name!r} is gone: use {GONE[name]}")
+    if name not in FORMATS:
+        raise ExportError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")
 
 
-def export_table(path: str | Path, kind: str, out: str | Path) -> Table:
-    """Write the table at ``path`` to ``out`` in the format ``kind``, one of :data:`FORMATS`.
+def export_table(path: str | Path, name: str, out: str | Path) -> Table:
+    """Write the table at ``path`` to ``out`` in the format ``name``, one of :data:`FORMATS`.
 
     Raises
     ------
@@ -77,13 +77,13 @@ def export_table(path: str | Path, kind: str, out: str | Path) -> Table:
     TableError
         The table cannot be read.
     OSError
-        ``out`` cannot be written; what was there before is still there.
+        ``out`` cannot be written; an older file of that name is unchanged.
     """
-    check_format(kind)
+    check_format(name)
     path, out = Path(path), Path(out)
     if path.resolve() == out.resolve():
         raise ExportError(f"{out} is the table itself")
-    table, content_of = read_table(path), FORMATS[kind][1]
+    table, content_of = read_table(path), FORMATS[name][1]
     if content_of is None:
         write_c(table, out)
     else:

@@ -27,7 +27,7 @@ from mumacro.table.polynomials import quantity_cells
 
 from .compiled import solver_kernel
 
-CORNER = atlas.NAMES.index("corner")
+CORNER = atlas.BLOCK_NAMES.index("corner")
 POINTS = 73  # on either side of the middle of a piece
 #: tolerance from which as many are enough
 FEWER_POINTS = {1e-5: 34, 1e-8: 46, 1e-11: 60}

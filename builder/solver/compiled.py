@@ -1,17 +1,17 @@
-"""How the solver is compiled, and the digest of everything that its results depend on."""
+"""How the solver is compiled and kept, and the digest of everything that its results depend on."""
 
 import hashlib
+import os
 import platform
+import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import ParamSpec, TypeVar
 
 import llvmlite
 import numba
 
 import mumacro
-
-#: Compiles a function at its first call in a process; it runs without the interpreter's lock and
-#: without fused multiply-add.  Nothing is stored: see docs/decisions.md.
-solver_kernel = numba.njit(error_model="numpy", nogil=True)
 
 _LIBRARY = Path(mumacro.__file__).resolve().parent
 SOURCES = (
@@ -37,3 +37,45 @@ def source_digest() -> str:
             h.update(source.relative_to(folder).as_posix().encode())
             h.update(source.read_bytes())
     return h.hexdigest()[:16]
+
+
+def _store() -> Path | None:
+    """Folder of the functions that these sources compile to; None where none can be written.
+
+    numba's own store does not see a change in a function that another one calls, so each digest of
+    the sources has a folder: in ``NUMBA_CACHE_DIR``, else in the user's folder for caches.
+    """
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        caches = Path(chosen)
+    elif sys.platform == "win32":
+        caches = Path(os.environ.get("LOCALAPPDATA") or Path.home()) / "mumacro"
+    else:
+        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mumacro"
+    folder = caches / source_digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
+_STORE = _store()
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def solver_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compiles a function at its first call, once for all processes where it can be kept.
+
+    It runs without the interpreter's lock and without fused multiply-add.
+    """
+    settings = vars(numba.config)
+    usual = settings["CACHE_DIR"]
+    settings["CACHE_DIR"] = str(_STORE or "")
+    try:
+        compiled: Callable[P, R] = numba.njit(
+            error_model="numpy", nogil=True, cache=_STORE is not None
+        )(function)
+    finally:
+        settings["CACHE_DIR"] = usual
+    return compiled

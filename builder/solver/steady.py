@@ -75,7 +75,8 @@ def error_estimate(mu: float, deficit: float) -> float:
     """Largest absolute error of mu~ [-] to be expected; mu~ and 1 - mu~ are solved for.
 
     No larger one was found to points in quadruple precision, between neighbouring doubles and to
-    the laws at the ends of the range: tests/test_steady.py and tests/test_extremes.py look.
+    the laws at the ends of the range: test_steady.py and test_extremes.py in tests/builder/solver
+    look.
     """
     return RELATIVE_ERROR * min(mu, deficit) + 2.3e-16 * mu + 5e-324
 

@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mumacro.inputs.kind import BALL
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table.atlas import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
@@ -51,23 +50,23 @@ def solve_nodes(
             rest, complement = solved[quantity.name] - base, SOLVED[quantity.name].complement
             if complement:  # next to 1 it has the digits
                 rest = np.where(base == 1.0, -solved[complement], rest)
-            if of.kind == BALL and quantity.name == "mu_ratio":
-                rest = _small_rest(chart, v, y, solved, rest)
+            exact = (base == 0.0) | (base == 1.0)
+            if chart.a.name in _LOGARITHMIC and quantity.name == "mu_ratio":
+                rest, exact = _small_rest(chart, v, y, solved), np.full(v.shape, True)
             found[quantity.name] = rest / factor
             noise = of.noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
-            cancelled[quantity.name] = np.where(
-                (base == 0.0) | (base == 1.0), 0.0, noise / np.abs(factor)
-            )
+            cancelled[quantity.name] = np.where(exact, 0.0, noise / np.abs(factor))
     return a, b, found, cancelled
 
 
-def _small_rest(chart: Chart, v: Array, y: Array, solved: dict[str, Array], rest: Array) -> Array:
+#: coordinates of blocks whose base is 1 and a logarithm
+_LOGARITHMIC = ("y_root", "v_root", "ray_root")
+
+
+def _small_rest(chart: Chart, v: Array, y: Array, solved: dict[str, Array]) -> Array:
     """mu~ less a base of 1 and a logarithm, by 1 - mu~, whose digits are left where y~ is small."""
-    if chart.a.name == "y_root":
-        return np.asarray(-solved["deficit"] - 0.375 * y * y * np.log(y))
-    if chart.a.name in ("v_root", "ray_root"):
-        return np.asarray(-solved["deficit"] - 0.1875 * y * y * np.log(v))
-    return rest
+    level = 0.375 * np.log(y) if chart.a.name == "y_root" else 0.1875 * np.log(v)
+    return np.asarray(-solved["deficit"] - y * y * level)
 
 
 def _next(n: int) -> int:

@@ -36,8 +36,8 @@ CELL_SAFETY = 1.5
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 ATTEMPTS = 4
-#: the least tolerance of a ball, whatever that of its table: at 1e-12 its cells would take 11 MB
-BALL_TOLERANCE = 1e-11
+#: the least tolerance of a ball, whatever that of its table: beside the ridge the ring misses 1e-11
+BALL_TOLERANCE = 1e-10
 #: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to
 #: rounding
 STEPS = 256

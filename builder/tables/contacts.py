@@ -12,7 +12,7 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.inputs.kind import BALL, SPRING, Kind
-from mumacro.kernel import slices
+from mumacro.kernel import threads as shared_out
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
@@ -94,7 +94,7 @@ def slopes_of(surrogate: Surrogate, kind: Kind, name: str, v: Array, y: Array) -
     if kind == SPRING:
         return np.array(surrogate.slopes(v, y, name, bounds=True))
     code, data = atlas.QUANTITY_NAMES.index(name), surrogate.cells(name, kind)
-    return slices.slopes(code, data, MIDDLE * v, MIDDLE * y, surrogate.threads, kind.contact)
+    return np.array(shared_out.slopes(code, data, MIDDLE * v, MIDDLE * y, None, kind.contact))
 
 
 def spring(sweep: Sweep) -> Contact:

@@ -13,7 +13,7 @@ from mumacro.inputs.kind import SPRING
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
-#: column -> what it is and where it is given; NaN elsewhere.  Without an equation number it is this
+#: column -> its formula and range; NaN elsewhere.  A formula without an equation number is this
 #: project's own.
 APPROXIMATIONS = {
     "static": "eqs. (16), (38), the limit v0 -> 0: mu0 sqrt(1 - y~^2), 0 for y~ >= 1",
@@ -33,7 +33,7 @@ APPROXIMATIONS = {
     "corner": "slow sliding near y~ = 1, root of mu~^3 + 2 (y~ - 1) mu~ = pi v~; given for |y~ - "
     "1| <= 0.5, mu~ <= 0.7",
 }
-#: v0 at which continuous sliding begins: column -> what it is and where it is given
+#: v0 at which continuous sliding begins: column -> its formula and range
 BORDERS = {
     "exact": "the table's border",
     "eq_23": "l0 omega v~, v~ the root of y~^2 = 2 v~ (1 + v~^2)(sqrt(1 + v~^2) + v~); given for "
@@ -65,19 +65,19 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
 
     InputError for a ball, and an oscillation along or normal: the article has one spring, across.
     """
-    inputs = _of_one_spring(law)
+    inputs = _spring_inputs(law)
     mu0, v, y = inputs["mu0"], law.answer.v_tilde, law.answer.y_tilde
     # rigid contact has no finite v~ and y~; eq. (37) is then the result
     elastic = np.isfinite(v) & np.isfinite(y)
-    low, slides = elastic & (y <= 1.0), elastic & (law.answer.regime == "continuous")
-    near = elastic & (np.abs(y - 1.0) <= _CORNER_REACH) & (v > 0.0) & (v < 1.0)
+    small_y, slides = elastic & (y <= 1.0), elastic & (law.answer.regime == "continuous")
+    near_corner = elastic & (np.abs(y - 1.0) <= _CORNER_REACH) & (v > 0.0) & (v < 1.0)
     # the tangent of mu_macro(v0) at v0 = 0; not finite where it is vertical (y~ = 1, rigid contact)
     at_rest = surrogate.evaluate({**inputs, "v0": np.zeros(law.values.shape)}, gradient=True)
     with np.errstate(all="ignore"):
         creep = law.mu_static + at_rest.gradient["v0"] * inputs["v0"]
         border, fit_border = surrogate.v_tilde_crit(y), closed_forms.border_27(y)
-        # without oscillation there is no border, and every speed but 0 is infinitely far above it
-        share, fit_share = (np.where(v > 0.0, v / at, 0.0) for at in (border, fit_border))
+        # without oscillation v~crit is 0, and v~/v~crit is infinite for every speed but 0
+        rho, fit_rho = (np.where(v > 0.0, v / crit, 0.0) for crit in (border, fit_border))
         static, critical, top = (
             closed_forms.static_limit(y),
             closed_forms.critical(y),
@@ -86,30 +86,35 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
         rigid = np.where(
             elastic, closed_forms.outer(np.where(v > 0.0, y / v, math.inf)), law.answer.mu_ratio
         )
-        corner, limit = closed_forms.corner_root(v, y - 1.0), closed_forms.master_curve_limit(share)
-        found = {
+        corner, limit = closed_forms.corner_root(v, y - 1.0), closed_forms.master_curve_limit(rho)
+        columns = {
             "static": (law.mu_static, True),
             "creep": (creep, creep <= mu0),
             "master_curve": (
-                mu0 * (static + (critical - static) * closed_forms.master_curve(fit_share)),
-                low,
+                mu0 * (static + (critical - static) * closed_forms.master_curve(fit_rho)),
+                small_y,
             ),
-            "master_curve_limit": (mu0 * (static + (top - static) * limit), low & (v <= border)),
-            "critical": (mu0 * critical, low),
-            "small_amplitude": (mu0 * closed_forms.small_amplitude(v, y), low & slides),
+            "master_curve_limit": (
+                mu0 * (static + (top - static) * limit),
+                small_y & (v <= border),
+            ),
+            "critical": (mu0 * critical, small_y),
+            "small_amplitude": (mu0 * closed_forms.small_amplitude(v, y), small_y & slides),
             "continuous": (mu0 * closed_forms.continuous(v, y), slides),
             "rigid": (mu0 * rigid, True),
-            "corner": (mu0 * corner, near & (corner <= _CORNER_TOP)),
+            "corner": (mu0 * corner, near_corner & (corner <= _CORNER_TOP)),
         }
-    return {name: np.where(given, column, np.nan) for name, (column, given) in found.items()}
+    return {
+        name: np.where(in_range, column, np.nan) for name, (column, in_range) in columns.items()
+    }
 
 
 def borders(y: Array) -> dict[str, Array]:
     """v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN outside the
     stated range.
 
-    >>> found = borders(np.array([0.5, 2.0]))
-    >>> found["eq_24"].round(4).tolist(), found["eq_26"].round(4).tolist()
+    >>> crit = borders(np.array([0.5, 2.0]))
+    >>> crit["eq_24"].round(4).tolist(), crit["eq_26"].round(4).tolist()
     ([0.1124, nan], [nan, 0.6667])
     """
     with np.errstate(over="ignore", invalid="ignore"):
@@ -119,11 +124,13 @@ def borders(y: Array) -> dict[str, Array]:
         }
 
 
-def _of_one_spring(law: Law) -> dict[str, Any]:
+def _spring_inputs(law: Law) -> dict[str, Any]:
     """The inputs of a law of one spring across."""
     if law.kind != SPRING:
-        told = " ".join(law.kind.names.values())
-        raise InputError("approximations", told, "left out: they are those of one spring, across")
+        kind_names = " ".join(law.kind.names.values())
+        raise InputError(
+            "approximations", kind_names, "left out: they are those of one spring, across"
+        )
     return law.inputs
 
 
@@ -134,10 +141,13 @@ def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     NaN where an approximation does not apply and where y~ is beyond double range; 0 for rigid
     contact and without oscillation, which never stick.  InputError as in :func:`approximations`.
     """
-    inputs = _of_one_spring(law)
+    inputs = _spring_inputs(law)
     y, omega = law.answer.y_tilde, inputs["omega"]
-    never = (inputs["y0"] == 0.0) | (omega == 0.0) | np.isinf(inputs["k"])
+    never_sticks = (inputs["y0"] == 0.0) | (omega == 0.0) | np.isinf(inputs["k"])
     with np.errstate(all="ignore"):
-        unit = np.where(np.isfinite(y), law.answer.length_scale * omega, np.nan)
-        found = {"exact": surrogate.v_tilde_crit(y), **borders(y)}
-        return {name: np.where(never, 0.0, unit * column) for name, column in found.items()}
+        speed_unit = np.where(np.isfinite(y), law.answer.length_scale * omega, np.nan)
+        columns = {"exact": surrogate.v_tilde_crit(y), **borders(y)}
+        return {
+            name: np.where(never_sticks, 0.0, speed_unit * column)
+            for name, column in columns.items()
+        }

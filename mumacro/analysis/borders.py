@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
 from mumacro.analysis.load import Stiffening
 from mumacro.analysis.rootfinding import TINY, last_double
-from mumacro.analysis.sweep import EVERYWHERE, Sweep
-from mumacro.inputs.cases import other_five
+from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
@@ -39,7 +39,7 @@ class Crossing:
     @property
     def name(self) -> str:
         """Which border it is."""
-        regime = next(one for one in ("continuous", "reverse_slip") if one in self.regimes)
+        regime = next(regime for regime in ("continuous", "reverse_slip") if regime in self.regimes)
         return BORDER_NAMES[regime]
 
 
@@ -62,24 +62,24 @@ def border_crossings(
     contact (never any stick) and without oscillation.
     """
     kind = kind_of(contact, direction)
-    sweep = Sweep(surrogate, other_five(case, along, kind), along, kind, stiffening)
-    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values() or sweep.proportional:
+    curve = InputCurve(surrogate, fixed_inputs(case, along, kind), along, kind, stiffening)
+    if curve.case.get("k") == math.inf or 0.0 in curve.case.values() or curve.proportional:
         return ()
     low = max(low, TINY)  # at 0 nothing oscillates or slides
-    middle = low if along in EVERYWHERE or direction != "across" else sweep.where(_Y_CLOSEST)
+    middle = low if along in EVERYWHERE or direction != "across" else curve.where(_Y_CLOSEST)
     edges = np.array([low, middle, high] if low < middle < high else [low, high])
-    found = []
+    pairs = []
     for regime in ("continuous", "reverse_slip"):
-        state = sweep.answer(edges).regime == regime
+        state = curve.answer(edges).regime == regime
         i = np.flatnonzero(state[1:] != state[:-1])
 
         def before(x: Array, regime: str = regime, states: Bools = state[i, None]) -> Bools:
-            same: Bools = (sweep.answer(x).regime == regime) == states
-            return same
+            agrees: Bools = (curve.answer(x).regime == regime) == states
+            return agrees
 
         cuts = last_double(before, edges[i], edges[i + 1])
-        found += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
-    below, first = np.array(sorted(set(found))).reshape(-1, 2).T
-    after = sweep.answer(first)
-    regimes = zip(sweep.answer(below).regime.tolist(), after.regime.tolist(), strict=True)
+        pairs += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
+    below, first = np.array(sorted(set(pairs))).reshape(-1, 2).T
+    after = curve.answer(first)
+    regimes = zip(curve.answer(below).regime.tolist(), after.regime.tolist(), strict=True)
     return tuple(map(Crossing, first.tolist(), after.mu_macro.tolist(), regimes))

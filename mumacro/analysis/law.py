@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from mumacro import plotting
 from mumacro.analysis.borders import Crossing, border_crossings
+from mumacro.analysis.input_curve import InputCurve
 from mumacro.analysis.load import Stiffening, stiffening_of
-from mumacro.analysis.sweep import Sweep
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
-from mumacro.inputs.cases import other_five, real, without_interval
+from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import FIELDS, POSITIVE
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array
@@ -58,9 +58,9 @@ class Law:
     def columns(self) -> dict[str, Any]:
         """The law as a table: column -> values (n,), the swept input first."""
         names = ["mu_macro", *(BAND if self.band else ()), "regime", "error_bound", "source"]
-        found = {name: getattr(self.answer, name) for name in names}
+        answer_columns = {name: getattr(self.answer, name) for name in names}
         k = {} if self.stiffening is None else {"k": self.inputs["k"]}
-        return {self.along: self.values, **k, **found, "mu_static": self.mu_static}
+        return {self.along: self.values, **k, **answer_columns, "mu_static": self.mu_static}
 
     def plot(
         self, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None
@@ -76,6 +76,7 @@ class Law:
             borders=[(crossing.value, crossing.name) for crossing in self.border],
             roots=roots,
             target=target,
+            title=plotting.in_words(self.case, self.kind.names),
         )
 
 
@@ -178,10 +179,10 @@ def law(
     Examples
     --------
     >>> import mumacro
-    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
-    >>> found = mumacro.law(mumacro.open(), start=1e-4, stop=1.0, points=3, **case)
-    >>> found.answer.mu_macro.round(4).tolist(), round(found.border[0].value, 5)
-    ([0.2238, 0.24, 0.2957], 0.07105)
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
+    >>> sweep = mumacro.law(mumacro.open(), start=1e-4, stop=1.0, points=3, **case)
+    >>> sweep.answer.mu_macro.round(4).tolist(), round(sweep.border[0].value, 5)
+    ([0.2238, 0.2405, 0.296], 0.06868)
     """
     if values is None:
         x = sweep_values(along, _end("start", start), _end("stop", stop), points, scale)
@@ -190,21 +191,21 @@ def law(
     else:
         raise InputError("values", "an array", "left out beside start and stop")
     kind = kind_of(contact, direction)
-    one_k, ends = without_interval(case, along)
-    one_k, stiffening = stiffening_of(one_k, along, kind, stiffness_exponent)
-    others = other_five(one_k, along, kind)
-    sweep = Sweep(surrogate, others, along, kind, stiffening)
+    middle_case, ends = without_interval(case, along)
+    middle_case, stiffening = stiffening_of(middle_case, along, kind, stiffness_exponent)
+    fixed = fixed_inputs(middle_case, along, kind)
+    curve = InputCurve(surrogate, fixed, along, kind, stiffening)
     ends_of_range = float(x[0]), float(x[-1])
     border = border_crossings(
-        surrogate, along, others, *ends_of_range, **kind.names, stiffening=stiffening
+        surrogate, along, fixed, *ends_of_range, **kind.names, stiffening=stiffening
     )
     if refine:
-        x = sweep.refined(np.union1d(x, [mark.value for mark in border]))
-    answer = sweep.answer(x, groups=True, strict=True)
+        x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
+    answer = curve.answer(x, groups=True, strict=True)
     if ends:
-        interval = {**{name: one for name, one in others.items() if name != "k"}, **ends}
-        over = Sweep(surrogate, interval, along, kind, stiffening)
-        answer = over.answer(x, groups=True, strict=True)
-    at_rest = sweep.answer(x, v0=0.0) if along != "v0" else sweep.answer(0.0)
+        interval = {**{name: value for name, value in fixed.items() if name != "k"}, **ends}
+        band_curve = InputCurve(surrogate, interval, along, kind, stiffening)
+        answer = band_curve.answer(x, groups=True, strict=True)
+    at_rest = curve.answer(x, v0=0.0) if along != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
-    return Law(along, x, answer, mu_static, border, others, kind, sweep.stiffening)
+    return Law(along, x, answer, mu_static, border, fixed, kind, curve.stiffening)

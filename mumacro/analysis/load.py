@@ -20,7 +20,7 @@ from mumacro.inputs.kind import CONTACTS, Kind
 from mumacro.kernel.arrays import Array
 
 EXPONENT = "stiffness_exponent"
-EXPONENTS = {"spring": 0.0, "ball": 1.0 / 3.0}  # by contact, where none is given
+EXPONENTS = {"spring": 0.0, "ball": 1.0 / 3.0}  # by contact, the default
 ROUGH = 0.5, 1.0  # of rough surfaces (docs/validity.md)
 _BOUND = "one number from 0 to 1: 1/3 for a ball, 0.5 to 1 for rough surfaces, 0 for constant k"
 _FAR = 1e300  # stiffnesses and loads beyond it, or below its inverse, are not searched
@@ -37,14 +37,16 @@ class Stiffening(NamedTuple):
         it is no double > 0."""
         loads = np.asarray(load, dtype=np.float64)
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            out = np.asarray(k * (loads**self.exponent / self.load**self.exponent))
+            stiffnesses = np.asarray(k * (loads**self.exponent / self.load**self.exponent))
         # a load that is out of bounds itself is refused by its own bound
-        bad = (loads > 0.0) & (loads < math.inf) & ~((out > 0.0) & (out < math.inf))
-        if bad.any() and k < math.inf:
-            i = int(np.flatnonzero(bad.ravel())[0])
+        illegal = (
+            (loads > 0.0) & (loads < math.inf) & ~((stiffnesses > 0.0) & (stiffnesses < math.inf))
+        )
+        if illegal.any() and k < math.inf:
+            i = int(np.flatnonzero(illegal.ravel())[0])
             bound = f"such that k = {k:g} N/m (Fz/{self.load:g} N)^{self.exponent:.3g} is a number"
             raise InputError("Fz", float(loads.flat[i]), bound, i if loads.ndim else None)
-        return out
+        return stiffnesses
 
     def scaled(self, case: Mapping[str, Any], load: ArrayLike) -> dict[str, Array]:
         """The stiffnesses of a case, k or the ends of its interval, at loads [N], (n,)."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import by_name, check, columns_of, picked, real
+from mumacro.inputs.cases import by_name, check, columns_of, real, select
 from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.units import unknown_name
@@ -17,14 +17,14 @@ from mumacro.surrogate import Surrogate
 UNKNOWNS = ("k", "mu0")
 HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
 STD = "std"  # the column of standard deviations
-#: how far a point may lie outside of what is possible: standard deviations; where they are not
-#: given, of mu0
+#: how far a point may lie outside of 0 <= mu_macro <= mu0: in standard deviations; where the
+#: points have none, as a share of mu0
 _SCATTER, _SHARE = 5.0, 0.05
 _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:
-    """What is fitted by default: k and mu0, or k alone where mu0 is a column."""
+    """The unknowns by default: k and mu0, or k alone where mu0 is a column."""
     return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
 
 
@@ -33,9 +33,8 @@ class Measured:
     :func:`mumacro.fit`.
 
     ``columns`` has the known inputs [SI], (n,), by the names that ``evaluate`` takes; ``mu`` is
-    mu_macro [-], ``std`` its standard deviations, None where not known, ``weight`` one over them,
-    or 1; ``amplitude`` is the input that says how far the contact is moved or unloaded: y0, or
-    Fz_amplitude.
+    mu_macro [-], ``std`` its standard deviations or None, ``weight`` one over them, or 1;
+    ``amplitude`` is the name of the oscillation's input: y0, or Fz_amplitude.
     """
 
     def __init__(
@@ -47,8 +46,8 @@ class Measured:
         surrogate: Surrogate,
         fixed: Mapping[str, Any],
     ) -> None:
-        both = picked("data", data, UNKNOWNS)
-        unknowns = tuple(unknowns_beside(both)) if unknowns is None else unknowns
+        unknown_columns = select("data", data, UNKNOWNS)
+        unknowns = tuple(unknowns_beside(unknown_columns)) if unknowns is None else unknowns
         if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
             raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
         self.unknowns, self.contact, self.direction, self.surrogate = (
@@ -59,16 +58,16 @@ class Measured:
         )
         self.kind = kind_of(contact, direction)
         self.amplitude = AMPLITUDE if direction == "normal" else "y0"
-        self._read(self._given(data, fixed))
+        self._read(self._inputs(data, fixed))
         self._check()
 
-    def _given(self, data: Any, fixed: Mapping[str, Any]) -> dict[str, Any]:
-        known = [
+    def _inputs(self, data: Any, fixed: Mapping[str, Any]) -> dict[str, Any]:
+        names = [
             name
             for name in NAMES
             if name not in self.unknowns and (name != "y0" or name == self.amplitude)
         ]
-        known += [self.amplitude] if self.amplitude not in known else []
+        names += [self.amplitude] if self.amplitude not in names else []
         for name in fixed:
             if name in self.unknowns:
                 raise InputError(
@@ -76,48 +75,52 @@ class Measured:
                     fixed[name],
                     f"left out, or taken from unknowns={self.unknowns}: it is fitted",
                 )
-            if name not in (*known, "mu_macro", STD):
+            if name not in (*names, "mu_macro", STD):
                 raise InputError(
-                    name, fixed[name], f"one of {', '.join(known)}; {unknown_name(name, known)}"
+                    name, fixed[name], f"one of {', '.join(names)}; {unknown_name(name, names)}"
                 )
-        columns = picked("data", data, [*known, "mu_macro", STD])
-        if twice := [name for name in picked("data", data, UNKNOWNS) if name in self.unknowns]:
+        columns = select("data", data, [*names, "mu_macro", STD])
+        if duplicates := [name for name in select("data", data, UNKNOWNS) if name in self.unknowns]:
             raise InputError(
-                twice[0],
+                duplicates[0],
                 "a column",
                 f"left out, or taken from unknowns={self.unknowns}: it is fitted",
             )
-        if twice := sorted(columns.keys() & fixed.keys()):
-            raise InputError(twice[0], fixed[twice[0]], "given once: as a column or as a keyword")
-        given = {**columns, **fixed}
+        if duplicates := sorted(columns.keys() & fixed.keys()):
+            raise InputError(
+                duplicates[0], fixed[duplicates[0]], "given once: as a column or as a keyword"
+            )
+        inputs = {**columns, **fixed}
         for name in ("mu_macro", "v0"):
-            if name not in given:
+            if name not in inputs:
                 raise InputError(
                     name, sorted(columns), f"a column of the data: {name} of each point"
                 )
-        return given
+        return inputs
 
-    def _read(self, given: dict[str, Any]) -> None:
+    def _read(self, data: dict[str, Any]) -> None:
         """Columns of one length, (n,), in SI."""
         measured = {
-            name: real(name, np.asarray(given.pop(name)))
+            name: real(name, np.asarray(data.pop(name)))
             for name in ("mu_macro", STD)
-            if name in given
+            if name in data
         }
-        # labels are not given back
-        values = {name: x if x is None else np.asarray(x) for name, x in given.items()}
+        # labels are dropped: a fit is not labelled
+        values = {name: x if x is None else np.asarray(x) for name, x in data.items()}
         inputs = by_name(None, {**values, **dict.fromkeys(self.unknowns, 1.0)}, self.kind)
         numbers = columns_of(inputs, self.kind)
         check(numbers, inputs.get("f"))
         columns = {name: np.asarray(x, np.float64) for name, x in numbers.items()}
-        whole = {**columns, **measured}
-        lengths = {name: x.shape for name, x in whole.items() if x.ndim}
-        if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in whole.values()):
+        all_columns = {**columns, **measured}
+        lengths = {name: x.shape for name, x in all_columns.items() if x.ndim}
+        if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in all_columns.values()):
             raise InputError("data", lengths, "columns of one length, or single values")
-        n = max((x.size for x in whole.values() if x.ndim), default=1)
-        whole = {name: np.ascontiguousarray(np.broadcast_to(x, n)) for name, x in whole.items()}
-        self.mu, self.std = whole.pop("mu_macro"), whole.pop(STD, None)
-        self.columns = {name: x for name, x in whole.items() if name not in self.unknowns}
+        n = max((x.size for x in all_columns.values() if x.ndim), default=1)
+        all_columns = {
+            name: np.ascontiguousarray(np.broadcast_to(x, n)) for name, x in all_columns.items()
+        }
+        self.mu, self.std = all_columns.pop("mu_macro"), all_columns.pop(STD, None)
+        self.columns = {name: x for name, x in all_columns.items() if name not in self.unknowns}
         self.n = n
 
     def _check(self) -> None:
@@ -128,14 +131,14 @@ class Measured:
             _refuse("std", self.std, (self.std >= _LEAST) & (self.std <= _MOST), bound)
         self.weight = np.ones(self.n) if self.std is None else 1.0 / self.std
         top = self.columns.get("mu0", np.full(self.n, np.fmax.reduce(np.abs(self.mu), initial=0.0)))
-        scatter, told = (
+        scatter, margin = (
             _SHARE * top,
             f"within {100.0 * _SHARE:g} %; give std where the points scatter more",
         )
         if self.std is not None:
-            scatter, told = _SCATTER * self.std, f"within {_SCATTER:g} standard deviations"
+            scatter, margin = _SCATTER * self.std, f"within {_SCATTER:g} standard deviations"
         legal = (self.mu <= _MOST) & (self.mu >= -scatter)
-        _refuse("mu_macro", self.mu, legal, f"finite and >= 0, <= {_MOST:g}, {told}")
+        _refuse("mu_macro", self.mu, legal, f"finite and >= 0, <= {_MOST:g}, {margin}")
         settings = len(np.unique(np.column_stack([*self.columns.values()]), axis=0))
         if settings < len(self.unknowns):
             raise InputError(
@@ -157,7 +160,7 @@ class Measured:
             )
         if "mu0" not in self.unknowns:
             bound = (
-                f"<= mu0, {told}: oscillation only lowers friction; or fit mu0, or look at "
+                f"<= mu0, {margin}: oscillation only lowers friction; or fit mu0, or look at "
                 "the units"
             )
             _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
@@ -169,19 +172,19 @@ class Measured:
     ) -> tuple[Array, dict[str, Array]]:
         """mu_macro, and its slopes along the unknowns."""
         inputs: dict[str, Any] = {**columns, **values, **self.kind.names}
-        found = self.surrogate.evaluate(**inputs, gradient=True)
+        answer = self.surrogate.evaluate(**inputs, gradient=True)
         slopes = {
-            name: np.nan_to_num(found.gradient[name], posinf=0.0, neginf=0.0)
+            name: np.nan_to_num(answer.gradient[name], posinf=0.0, neginf=0.0)
             for name in self.unknowns
         }
-        return found.mu_macro, slopes
+        return answer.mu_macro, slopes
 
     def chi2(self, model: Array) -> Array:
         """Sum of the squared residuals of rows of mu_macro (..., n), each over its variance."""
         return np.asarray(((self.weight * (self.mu - model)) ** 2).sum(axis=-1))
 
     def at(self, k: Array, mu0: Array) -> Array:
-        """mu_macro at rows of k and mu0, those that are unknown: (rows, points)."""
+        """mu_macro at rows of the unknowns among k and mu0: (rows, points)."""
         rows = {"k": k[:, None], "mu0": mu0[:, None]}
         inputs: dict[str, Any] = {
             **self.columns,
@@ -194,5 +197,5 @@ class Measured:
 def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:
     """An error for the first value that is not legal."""
     if not legal.all():
-        at = int(np.argmin(legal))
-        raise InputError(name, float(column[at]), bound, at)
+        index = int(np.argmin(legal))
+        raise InputError(name, float(column[index]), bound, index)

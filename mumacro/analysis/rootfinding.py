@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro.analysis.sweep import Sweep
+from mumacro.analysis.input_curve import InputCurve
 from mumacro.kernel.arrays import Array, Bools, Places
 
 TINY = 5e-324
@@ -23,48 +23,48 @@ _PER_CALL = 512
 _MAX_SAMPLES = 20_001
 
 
-class Curve:
-    """A piece of a sweep on which mu_macro is monotone: samples ``x`` (m,), ascending, and ``mu``
+class Branch:
+    """A branch of a curve on which mu_macro is monotone: samples ``x`` (m,), ascending, and ``mu``
     (m,) there."""
 
-    def __init__(self, sweep: Sweep, x: Array, mu: Array) -> None:
-        self.sweep, self.x, self.mu = sweep, x, mu
+    def __init__(self, curve: InputCurve, x: Array, mu: Array) -> None:
+        self.curve, self.x, self.mu = curve, x, mu
         self.sign = 1.0 if mu[-1] >= mu[0] else -1.0
-        # Rounding may make a plateau go down by a digit; what counts is where a level is first met.
+        # Rounding may make a plateau fall by a digit; a root is where its level is first reached.
         self._risen = np.maximum.accumulate(self.sign * mu)
 
     def holds(self, level: Array) -> Bools:
-        """Which of the levels (n,) lie between the ends of the piece, these included."""
+        """Which of the levels (n,) lie between the ends of the branch, these included."""
         low, high = sorted((float(self.mu[0]), float(self.mu[-1])))
         return np.asarray((level >= low) & (level <= high))
 
     def end(self) -> float:
-        """Where the piece first has its last value: at its end, or where the plateau begins that
+        """Where the branch first has its last value: at its end, or where the plateau begins that
         ends it."""
-        at = int(np.argmax(self.mu == self.mu[-1]))
-        before, there = self.x[max(at - 1, 0) : at], self.x[at : at + 1]
+        index = int(np.argmax(self.mu == self.mu[-1]))
+        before, first_x = self.x[max(index - 1, 0) : index], self.x[index : index + 1]
         return float(
-            last_double(lambda x: self.sweep.mu(x) != self.mu[-1], before, there)[1][0]
-            if at
-            else there[0]
+            last_double(lambda x: self.curve.mu(x) != self.mu[-1], before, first_x)[1][0]
+            if index
+            else first_x[0]
         )
 
     def meet(self, level: Array, leave: ArrayLike = False) -> Array:
         """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,)
         [SI].
 
-        To a rounding error of mu_macro; an end of the piece where it never does.
+        To a rounding error of mu_macro; an end of the branch where it never does.
         """
-        going = np.broadcast_to(np.asarray(leave, dtype=np.bool_), level.shape)
+        leaving = np.broadcast_to(np.asarray(leave, dtype=np.bool_), level.shape)
         first, beyond = (
             np.searchsorted(self._risen, self.sign * level, side) for side in ("left", "right")
         )
-        j = np.where(going, beyond, first)
+        j = np.where(leaving, beyond, first)
         inside = np.flatnonzero((j > 0) & (j < self.x.size))
-        out: Array = np.where(j == 0, self.x[0], self.x[-1])
+        x: Array = np.where(j == 0, self.x[0], self.x[-1])
         if inside.size:
-            out[inside] = self._newton(level[inside], j[inside], going[inside])
-        return out
+            x[inside] = self._newton(level[inside], j[inside], leaving[inside])
+        return x
 
     def _newton(self, level: Array, j: Places, leave: Bools) -> Array:
         """The same for levels between the samples j - 1 and j, (n,)."""
@@ -74,33 +74,35 @@ class Curve:
         width = np.log(b) - start
         x = np.exp(start + np.clip(fa / np.where(fb > fa, fa - fb, -1.0), 0.02, 0.98) * width)
         last = width.copy()  # the last step, in ln x
-        found: Array = np.empty_like(a)
+        roots: Array = np.empty_like(a)
         i = np.arange(level.size)
         while i.size:
             lower, upper = a[i], b[i]
-            at = np.where((x[i] > lower) & (x[i] < upper), x[i], _middle(lower, upper))
-            answer, slope = self.sweep.with_slope(at)
+            trial = np.where((x[i] > lower) & (x[i] < upper), x[i], _middle(lower, upper))
+            answer, slope = self.curve.with_slope(trial)
             f, slope = self.sign * (np.asarray(answer.mu_macro) - level[i]), self.sign * slope
             below = (f < 0.0) | (leave[i] & (f == 0.0))
-            a[i], fa[i] = np.where(below, at, lower), np.where(below, f, fa[i])
-            b[i], fb[i] = np.where(below, upper, at), np.where(below, fb[i], f)
+            a[i], fa[i] = np.where(below, trial, lower), np.where(below, f, fa[i])
+            b[i], fb[i] = np.where(below, upper, trial), np.where(below, fb[i], f)
             steep = np.isfinite(slope) & (slope > 0.0)
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 step = np.where(steep, -f / np.where(steep, slope, 1.0), np.inf)
-                wanted = at * np.exp(np.clip(step, -1.0e3, 1.0e3))
-                # less than the doubles are apart, though not met (the cusp of the static limit):
-                # its neighbour, then
-                wanted = np.where(
-                    wanted == at, np.nextafter(at, np.where(below, np.inf, 0.0)), wanted
+                proposal = trial * np.exp(np.clip(step, -1.0e3, 1.0e3))
+                # a step below the spacing of doubles goes to the neighbour: near the cusp of the
+                # static limit the level is not yet reached
+                proposal = np.where(
+                    proposal == trial, np.nextafter(trial, np.where(below, np.inf, 0.0)), proposal
                 )
-                good = (wanted > a[i]) & (wanted < b[i]) & (2.0 * np.abs(step) <= np.abs(last[i]))
-                x[i] = np.where(good, wanted, _middle(a[i], b[i]))
-                last[i] = np.where(good, step, np.log(x[i] / at))
+                accepted = (
+                    (proposal > a[i]) & (proposal < b[i]) & (2.0 * np.abs(step) <= np.abs(last[i]))
+                )
+                x[i] = np.where(accepted, proposal, _middle(a[i], b[i]))
+                last[i] = np.where(accepted, step, np.log(x[i] / trial))
             met = steep & (np.abs(f) <= 2.0 * _ROUNDING * np.abs(level[i]))
-            shut = np.nextafter(a[i], np.inf) >= b[i]
-            found[i] = np.where(met, at, np.where(np.abs(fa[i]) < np.abs(fb[i]), a[i], b[i]))
-            i = i[~(met | shut)]
-        return found
+            closed = np.nextafter(a[i], np.inf) >= b[i]
+            roots[i] = np.where(met, trial, np.where(np.abs(fa[i]) < np.abs(fb[i]), a[i], b[i]))
+            i = i[~(met | closed)]
+        return roots
 
 
 def samples(low: float, high: float, per_decade: int) -> Array:
@@ -111,23 +113,24 @@ def samples(low: float, high: float, per_decade: int) -> Array:
         return np.clip(np.exp(np.linspace(start, stop, count)), max(low, TINY), high)
 
 
-def curves_between(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
-    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the
+def branches_between(curve: InputCurve, edges: list[float], x: Array, mu: Array) -> list[Branch]:
+    """The monotone branches between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the
     whole range."""
-    at = np.array(edges)
-    ends = sweep.mu(at)
-    curves = []
-    for i in range(at.size - 1):
-        two = slice(i, i + 2)
+    edge_x = np.array(edges)
+    ends = curve.mu(edge_x)
+    branches = []
+    for i in range(edge_x.size - 1):
+        pair = slice(i, i + 2)
         inside = slice(
-            np.searchsorted(x, at[i], side="right"), np.searchsorted(x, at[i + 1], side="left")
+            np.searchsorted(x, edge_x[i], side="right"),
+            np.searchsorted(x, edge_x[i + 1], side="left"),
         )
         # next to a turning point a sample may lie beyond it by a rounding error
-        between = np.clip(mu[inside], ends[two].min(), ends[two].max())
-        curves.append(
-            Curve(sweep, np.insert(at[two], 1, x[inside]), np.insert(ends[two], 1, between))
+        inner_mu = np.clip(mu[inside], ends[pair].min(), ends[pair].max())
+        branches.append(
+            Branch(curve, np.insert(edge_x[pair], 1, x[inside]), np.insert(ends[pair], 1, inner_mu))
         )
-    return curves
+    return branches
 
 
 def _middle(a: Array, b: Array) -> Array:
@@ -138,7 +141,7 @@ def _middle(a: Array, b: Array) -> Array:
     return np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
 
 
-def _ordered(x: ArrayLike) -> NDArray[np.int64]:
+def _order_key(x: ArrayLike) -> NDArray[np.int64]:
     """Doubles >= 0 as integers of the same order.  Adding 0.0 turns -0.0, the smallest integer,
     into 0.0."""
     return (np.asarray(x, dtype=np.float64) + 0.0).view(np.int64)
@@ -149,12 +152,13 @@ def last_double(
 ) -> tuple[Array, Array]:
     """Neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
 
-    For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like
-    the integers with the same bits, so this ends at two neighbours, whatever the scale.  ``below``
+    For functions without a slope, such as a regime.  Cuts the *bits*: doubles of one sign are
+    ordered like the integers with the same bits, so this ends at two neighbours, whatever the
+    scale.  ``below``
     maps (n, m) values, row i for bracket i, to bool; from true at ``low`` (n,) to false at ``high``
     it changes once.
     """
-    a, b = _ordered(low).copy(), _ordered(high).copy()
+    a, b = _order_key(low).copy(), _order_key(high).copy()
     rows = np.arange(a.size)
     # a call costs as much as some hundred points: few brackets are cut into many parts at once
     parts = min(max(_PER_CALL // max(a.size, 1), 2), 64)

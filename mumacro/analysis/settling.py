@@ -75,9 +75,9 @@ def settling(
     mu0, Fz, k, y0, v0, omega or f : array_like
         The case [-, N, N/m, m, m/s, rad/s or Hz], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float
-        What is left of the disturbance [-], 0 < remaining < 1.
+        Share of the disturbance that is left [-], 0 < remaining < 1.
     contact : str
-        "spring"; or "ball", whose slowest spring is answered for.
+        "spring"; or "ball", for which the periods are those of its slowest spring.
     direction : str
         "across" only, else InputError: the decay is not derived for the other directions.
 
@@ -96,9 +96,9 @@ def settling(
     --------
     >>> from mumacro import Surrogate
     >>> s = Surrogate.open("tables/mumacro-1e-10.nc")
-    >>> found = settling(s, mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
-    >>> round(found.periods, 2), round(found.slip_path, 3)      # slow sliding settles slowly
-    (22.86, 0.201)
+    >>> result = settling(s, mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3, v0=0.01)
+    >>> round(result.periods, 2), round(result.slip_path, 3)      # slow sliding settles slowly
+    (22.13, 0.208)
     """
     if not 0.0 < remaining < 1.0:
         raise InputError("remaining", remaining, "> 0 and < 1")
@@ -117,27 +117,35 @@ def settling(
         if f is None
         else RAD_PER_CYCLE * np.asarray(f, dtype=np.float64)
     )
-    share = 1.5 if kind.contact else 1.0  # load of the middle spring of a ball over the mean
-    v, y, l0 = answer.v_tilde / share, answer.y_tilde / share, share * answer.length_scale
-    still = (amplitude == 0.0) | (frequency == 0.0)  # no oscillation: dragged only, mu~ = 1
-    inside = np.isfinite(v) & np.isfinite(y) & ~still
-    there = np.where(inside, v, 1.0), np.where(inside, y, 0.0)
-    ratio, bound, _ = surrogate.ratio_with_bound(*there)
-    power, power_bound = surrogate.power_with_bound(*there)
+    load_ratio = 1.5 if kind.contact else 1.0  # load of the middle spring of a ball over the mean
+    v, y, l0 = (
+        answer.v_tilde / load_ratio,
+        answer.y_tilde / load_ratio,
+        load_ratio * answer.length_scale,
+    )
+    unshaken = (amplitude == 0.0) | (frequency == 0.0)  # no oscillation: dragged only, mu~ = 1
+    inside = np.isfinite(v) & np.isfinite(y) & ~unshaken
+    groups = np.where(inside, v, 1.0), np.where(inside, y, 0.0)
+    ratio, bound, _ = surrogate.ratio_with_bound(*groups)
+    power, power_bound = surrogate.power_with_bound(*groups)
     decay = math.log(1.0 / remaining)
     with np.errstate(all="ignore"):
         # slip speed of the foot in units of l0 omega; infinite for rigid contact and beyond double
         # range
-        dragged = np.where(speed == 0.0, 0.0, speed / l0 / frequency)
-        rate = np.where(inside, v * ratio + power, np.where(still, dragged, np.inf))
+        drag_rate = np.where(speed == 0.0, 0.0, speed / l0 / frequency)
+        rate = np.where(inside, v * ratio + power, np.where(unshaken, drag_rate, np.inf))
         rate = np.where(np.isnan(answer.mu_ratio), np.nan, rate)  # an illegal case of an array
-        off = np.where(inside, (v * bound + power_bound) / rate, 0.0)
+        relative_error = np.where(inside, (v * bound + power_bound) / rate, 0.0)
         slip_path = 2.0 * math.pi * rate
         periods = decay / slip_path
         # nothing slips at rate 0, rigid contact at rest included
         time = np.where(
-            rate == 0.0, np.inf, np.where(still, l0 * (decay / speed), decay / rate / frequency)
+            rate == 0.0, np.inf, np.where(unshaken, l0 * (decay / speed), decay / rate / frequency)
         )
-        error = np.where((rate == 0.0) | (off >= 1.0), np.inf, periods * off / (1.0 - off))
-    found = (periods, 2.0 * periods, time, slip_path, error)
-    return Settling(*(x if np.ndim(answer.mu_ratio) else float(x) for x in found))
+        error = np.where(
+            (rate == 0.0) | (relative_error >= 1.0),
+            np.inf,
+            periods * relative_error / (1.0 - relative_error),
+        )
+    values = (periods, 2.0 * periods, time, slip_path, error)
+    return Settling(*(x if np.ndim(answer.mu_ratio) else float(x) for x in values))

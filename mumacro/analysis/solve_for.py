@@ -1,7 +1,6 @@
 """The inverse problem: which values of one input give a mu_macro.
 
-What is known of mu_macro as a function of one input, the others constant, for an oscillation
-across:
+The course of mu_macro over one input, the others constant, for an oscillation across:
 
 =====  =====================================  =====================================================
 input  course                                 roots
@@ -28,7 +27,7 @@ runs through the same values in the same order, its turning points and its borde
 stand in ln Fz 1/(1 - m) times as far apart.  For m = 1 it is constant.  For normal it rises with Fz
 at constant k and rises with k, so it rises with Fz for every m, up to mu0 where that is reached.
 
-How a level is found on a monotone piece: :mod:`mumacro.analysis.rootfinding`.
+How a level is found on a monotone branch: :mod:`mumacro.analysis.rootfinding`.
 """
 
 import math
@@ -38,12 +37,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
 from mumacro.analysis.load import Stiffening, stiffening_of
-from mumacro.analysis.rootfinding import TINY, Curve, curves_between, last_double, samples
-from mumacro.analysis.sweep import EVERYWHERE, Sweep
+from mumacro.analysis.rootfinding import TINY, Branch, branches_between, last_double, samples
 from mumacro.answer import Answer
 from mumacro.errors import InputError
-from mumacro.inputs.cases import other_five, real, without_interval
+from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import POSITIVE
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.kernel.arrays import Array, Bools, Places
@@ -100,7 +99,7 @@ class Solution:
     targets: tuple[float, ...]  #: the wanted mu_macro [-]
     #: of each target, ascending; empty where it is not reachable
     roots: tuple[tuple[Root, ...], ...]
-    reach: Reach  #: what is reachable in the range that was searched
+    reach: Reach  #: the reachable mu_macro in the range of the search
     #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
     constant: bool
     #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
@@ -152,13 +151,13 @@ def solve_for(
     Examples
     --------
     >>> import mumacro
-    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
     >>> solution = mumacro.solve_for(mumacro.open(), "y0", target=[0.15, 0.4], **case)
     >>> [[f"{root.value:.4e} m" for root in roots] for roots in solution.roots]  # 0.4: above mu0
-    [['2.8570e-06 m'], []]
+    [['2.8656e-06 m'], []]
     """
     kind = kind_of(contact, direction)
-    others, interval = without_interval(case, unknown)
+    inputs, interval = without_interval(case, unknown)
     if interval:
         softest, middle, stiffest = (
             solve_for(
@@ -169,13 +168,13 @@ def solve_for(
                 contact=contact,
                 direction=direction,
                 stiffness_exponent=stiffness_exponent,
-                **{**others, "k": k},
+                **{**inputs, "k": k},
             )
-            for k in (interval["k_low"], others["k"], interval["k_high"])
+            for k in (interval["k_low"], inputs["k"], interval["k_high"])
         )
         return replace(middle, ends=(softest, stiffest))
-    others, stiffening = stiffening_of(others, unknown, kind, stiffness_exponent)
-    sweep = Sweep(surrogate, other_five(others, unknown, kind), unknown, kind, stiffening)
+    inputs, stiffening = stiffening_of(inputs, unknown, kind, stiffness_exponent)
+    curve = InputCurve(surrogate, fixed_inputs(inputs, unknown, kind), unknown, kind, stiffening)
     levels = real("target", target).ravel()
     bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:
@@ -185,78 +184,78 @@ def solve_for(
             "finite and >= 0",
             int(bad[0]) if np.ndim(target) else None,
         )
-    low, high = _default_range(sweep, levels) if within is None else _checked_range(sweep, within)
+    low, high = _default_range(curve, levels) if within is None else _checked_range(curve, within)
     folds = unknown in ("k", "Fz") and direction == "across"
     x = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
-    answer = sweep.answer(x)
+    answer = curve.answer(x)
     mu, noise = answer.mu_macro, 2.0 * answer.error_bound
-    turns = _turning_points(sweep, x, mu, noise) if folds else []
-    curves = curves_between(sweep, [low, *turns, high], x, mu)
-    if low == 0.0 and unknown != "v0" and abs(curves[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
+    turns = _turning_points(curve, x, mu, noise) if folds else []
+    branches = branches_between(curve, [low, *turns, high], x, mu)
+    if low == 0.0 and unknown != "v0" and abs(branches[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
         # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other
         # value
-        curves = [
-            Curve(sweep, np.zeros(1), curves[0].mu[:1]),
-            *curves_between(sweep, [TINY, high], x, mu),
+        branches = [
+            Branch(curve, np.zeros(1), branches[0].mu[:1]),
+            *branches_between(curve, [TINY, high], x, mu),
         ]
-    ends = np.concatenate([curve.mu[[0, -1]] for curve in curves])
+    ends = np.concatenate([branch.mu[[0, -1]] for branch in branches])
     reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
     constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
     if within is None and unknown in EVERYWHERE and not constant:
-        reach = _without_limit(sweep, reach)
-    found = _roots(sweep, [] if constant else curves, levels)
+        reach = _without_limit(curve, reach)
+    candidates = _roots(curve, [] if constant else branches, levels)
     roots = (
-        tuple(some) if reach.holds(level) else ()
-        for level, some in zip(levels.tolist(), found, strict=True)
+        tuple(of_level) if reach.holds(level) else ()
+        for level, of_level in zip(levels.tolist(), candidates, strict=True)
     )
     targets = tuple(levels.tolist())
-    return Solution(unknown, targets, tuple(roots), reach, constant, stiffening=sweep.stiffening)
+    return Solution(unknown, targets, tuple(roots), reach, constant, stiffening=curve.stiffening)
 
 
-def _legal(sweep: Sweep) -> tuple[float, float]:
+def _legal(curve: InputCurve) -> tuple[float, float]:
     """Smallest and largest legal value of the unknown."""
-    low, high = TINY if sweep.unknown in POSITIVE else 0.0, HUGE
-    if sweep.kind.normal and sweep.unknown == "Fz":
-        low = math.nextafter(sweep.case[AMPLITUDE], math.inf)
-    return low, math.nextafter(sweep.case["Fz"], 0.0) if sweep.unknown == AMPLITUDE else high
+    low, high = TINY if curve.unknown in POSITIVE else 0.0, HUGE
+    if curve.kind.normal and curve.unknown == "Fz":
+        low = math.nextafter(curve.case[AMPLITUDE], math.inf)
+    return low, math.nextafter(curve.case["Fz"], 0.0) if curve.unknown == AMPLITUDE else high
 
 
-def _checked_range(sweep: Sweep, within: tuple[float, float]) -> tuple[float, float]:
+def _checked_range(curve: InputCurve, within: tuple[float, float]) -> tuple[float, float]:
     try:
         low, high = (float(end) for end in within)
     except (TypeError, ValueError) as error:
         raise InputError("range", within, "two ascending, finite numbers") from error
-    least, most = _legal(sweep)
+    least, most = _legal(curve)
     if not least <= low < high <= most:
-        bound = "two ascending, finite numbers " + ("> 0" if sweep.unknown in POSITIVE else ">= 0")
-        bound += ", with Fz_amplitude below Fz" * sweep.kind.normal
+        bound = "two ascending, finite numbers " + ("> 0" if curve.unknown in POSITIVE else ">= 0")
+        bound += ", with Fz_amplitude below Fz" * curve.kind.normal
         raise InputError("range", [low, high], bound)
     return low, high
 
 
-def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
-    """Everywhere; or from a soft contact to a rigid one, to 1e-12 or so, and what the targets need
-    beyond."""
-    case, unknown, (least, most) = sweep.case, sweep.unknown, _legal(sweep)
+def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
+    """All legal values; or from a soft contact to a rigid one, to 1e-12 or so, and further where
+    the targets need it."""
+    case, unknown, (least, most) = curve.case, curve.unknown, _legal(curve)
     if unknown in EVERYWHERE:
         return least, most
-    low, high = _soft_to_rigid(sweep, targets, least)
-    if sweep.stiffening is not None:
-        lightest, heaviest = sweep.stiffening.range(case["k"])
+    low, high = _soft_to_rigid(curve, targets, least)
+    if curve.stiffening is not None:
+        lightest, heaviest = curve.stiffening.range(case["k"])
         inner = max(low, lightest), min(high, heaviest)
         low, high = inner if inner[0] < inner[1] else (max(least, lightest), heaviest)
     return low, high
 
 
-def _soft_to_rigid(sweep: Sweep, targets: Array, least: float) -> tuple[float, float]:
-    """The same for k, Fz and mu0, whose smallest legal value is ``least``."""
-    case, unknown = sweep.case, sweep.unknown
-    amplitude = case[AMPLITUDE if sweep.kind.normal else "y0"]
-    if 0.0 in (amplitude, case["omega"]) or sweep.proportional:
+def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[float, float]:
+    """The range for k, Fz and mu0, whose smallest legal value is ``least``."""
+    case, unknown = curve.case, curve.unknown
+    amplitude = case[AMPLITUDE if curve.kind.normal else "y0"]
+    if 0.0 in (amplitude, case["omega"]) or curve.proportional:
         return max(least, 1e-300), 1e300
-    if unknown == "Fz" and sweep.kind.normal:
+    if unknown == "Fz" and curve.kind.normal:
         return least, min(1e17 * amplitude, 1e300)
-    direction = sweep.kind.names["direction"]
+    direction = curve.kind.names["direction"]
     soft, stiff = _ENDS[direction]
     if direction == "across" and case.get("k") != math.inf:
         log_r = (
@@ -266,78 +265,83 @@ def _soft_to_rigid(sweep: Sweep, targets: Array, least: float) -> tuple[float, f
         )
         r = math.exp(min(log_r, 230.0))
         stiff = max(stiff, stiff * r, 1e3 * r * r)
-    low, high = sorted((sweep.where(soft), sweep.where(stiff)))
+    low, high = sorted((curve.where(soft), curve.where(stiff)))
     if unknown == "mu0":  # mu_macro grows with it without limit
-        wanted = targets[targets > 0.0]
+        positive = targets[targets > 0.0]
         low, high = (
-            0.5 * float(wanted.min(initial=2.0 * low)),
-            2.0 * float(wanted.max(initial=0.5 * high)),
+            0.5 * float(positive.min(initial=2.0 * low)),
+            2.0 * float(positive.max(initial=0.5 * high)),
         )
     return max(low, 1e-300), min(high, 1e300)
 
 
-def _without_limit(sweep: Sweep, reach: Reach) -> Reach:
+def _without_limit(curve: InputCurve, reach: Reach) -> Reach:
     """``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in
     general not reached."""
-    if sweep.unknown == "v0":
-        return replace(reach, max_included=sweep.kind.direction > 0)
-    if sweep.unknown == AMPLITUDE:
+    if curve.unknown == "v0":
+        return replace(reach, max_included=curve.kind.direction > 0)
+    if curve.unknown == AMPLITUDE:
         return reach
-    vanishes = sweep.unknown == "y0" or sweep.case["k"] == math.inf
+    vanishes = curve.unknown == "y0" or curve.case["k"] == math.inf
     # at rest friction takes its last value at y0 = l0, or at any frequency
     return replace(
-        reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=sweep.case["v0"] == 0.0
+        reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=curve.case["v0"] == 0.0
     )
 
 
-def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[float]:
+def _turning_points(curve: InputCurve, x: Array, mu: Array, noise: Array) -> list[float]:
     """Where mu_macro over k or Fz has its minimum and maximum, ascending, from samples ``x``,
     ``mu`` (n,)."""
     # along k it falls, may rise by more than the noise, and falls again
-    order = 1 if sweep.unknown == "k" else -1
+    order = 1 if curve.unknown == "k" else -1
     falling = mu[::order]
     rise = falling - np.minimum.accumulate(falling)
     top = int(np.argmax(rise))
     if rise[top] <= noise[::order][top]:
         return []
     bottom = int(np.argmin(falling[: top + 1]))
-    places = np.array([bottom, top] if order == 1 else [x.size - 1 - top, x.size - 1 - bottom])
+    indices = np.array([bottom, top] if order == 1 else [x.size - 1 - top, x.size - 1 - bottom])
     sign = np.array([[-1.0], [1.0]])[::order]
-    inside = (places > 0) & (places < x.size - 1)
-    places, sign = places[inside], sign[inside]
+    inside = (indices > 0) & (indices < x.size - 1)
+    indices, sign = indices[inside], sign[inside]
     _, turns = last_double(
-        lambda at: ~(sign * sweep.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1]
+        lambda at: ~(sign * curve.with_slope(at)[1] < 0.0), x[indices - 1], x[indices + 1]
     )
     return [*map(float, turns)]
 
 
-def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]]:
-    """All roots on all pieces, ascending."""
-    found: list[list[Root]] = [[] for _ in targets]
-    for curve in curves:
-        which = np.flatnonzero(curve.holds(targets))
-        if not which.size:
+def _roots(curve: InputCurve, branches: list[Branch], targets: Array) -> list[list[Root]]:
+    """All roots on all branches, ascending."""
+    roots: list[list[Root]] = [[] for _ in targets]
+    for branch in branches:
+        indices = np.flatnonzero(branch.holds(targets))
+        if not indices.size:
             continue
-        wanted, start = targets[which], curve.x[0]
+        levels, start = targets[indices], branch.x[0]
         # a target equal to the value at an edge has its root there; just inside, rounding may hide
         # it
-        value = np.where(wanted == curve.mu[0], start, curve.meet(wanted))
-        last = wanted == curve.mu[-1]
+        value = np.where(levels == branch.mu[0], start, branch.meet(levels))
+        last = levels == branch.mu[-1]
         if last.any():
-            value = np.where(last & (sweep.mu(value) != wanted), curve.end(), value)
-        answer, slope = sweep.with_slope(value)
-        low, high = _enclosures(sweep, curve, wanted, value, answer, slope)
+            value = np.where(last & (curve.mu(value) != levels), branch.end(), value)
+        answer, slope = curve.with_slope(value)
+        low, high = _enclosures(curve, branch, levels, value, answer, slope)
         columns = (value, low, high, answer.mu_macro, answer.regime)
         for i, root in zip(
-            which.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True
+            indices.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True
         ):
-            if not found[i] or root.value != found[i][-1].value:
-                found[i].append(root)
-    return found
+            if not roots[i] or root.value != roots[i][-1].value:
+                roots[i].append(root)
+    return roots
 
 
 def _enclosures(
-    sweep: Sweep, curve: Curve, wanted: Array, value: Array, answer: Answer[Any], slope: Array
+    curve: InputCurve,
+    branch: Branch,
+    targets: Array,
+    value: Array,
+    answer: Answer[Any],
+    slope: Array,
 ) -> tuple[Array, Array]:
     """Between which values mu_macro is within its error bound of the target: ``low`` and ``high``
     of a root, (n,).
@@ -346,54 +350,60 @@ def _enclosures(
     """
     bound = answer.error_bound
     if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
-        beside = np.minimum(np.nextafter(value, HUGE), curve.x[-1])
-        bound = np.maximum(bound, sweep.answer(beside).error_bound)
-    # a root is found to rounding, even where mu_macro is exact
-    bound = np.maximum(bound, 2.0**-50 * wanted)
+        neighbour = np.minimum(np.nextafter(value, HUGE), branch.x[-1])
+        bound = np.maximum(bound, curve.answer(neighbour).error_bound)
+    # a root is exact to rounding only, even where mu_macro is exact
+    bound = np.maximum(bound, 2.0**-50 * targets)
     # an end may be a jump of mu_macro, at the border or a seam, with a larger bound beyond it: then
     # that one counts
-    bounds, left = np.concatenate((bound, bound)), np.arange(2 * value.size)
-    ends, outwards, targets = (
-        np.empty(left.size),
+    bounds, pending = np.concatenate((bound, bound)), np.arange(2 * value.size)
+    ends, outwards, end_targets = (
+        np.empty(pending.size),
         np.repeat([0.0, HUGE], value.size),
-        np.concatenate((wanted, wanted)),
+        np.concatenate((targets, targets)),
     )
-    while left.size:
-        ends[left] = _where_off(
-            sweep, curve, left % value.size, left >= value.size, bounds[left], wanted, value, slope
+    while pending.size:
+        ends[pending] = _where_off(
+            curve,
+            branch,
+            pending % value.size,
+            pending >= value.size,
+            bounds[pending],
+            targets,
+            value,
+            slope,
         )
-        beyond = sweep.answer(
-            np.clip(np.nextafter(ends[left], outwards[left]), curve.x[0], curve.x[-1])
+        beyond = curve.answer(
+            np.clip(np.nextafter(ends[pending], outwards[pending]), branch.x[0], branch.x[-1])
         )
-        still = np.abs(beyond.mu_macro - targets[left]) < 0.97 * beyond.error_bound
-        still &= beyond.error_bound > bounds[left]
-        left = left[still]
-        bounds[left] = beyond.error_bound[still]
+        exceeds = np.abs(beyond.mu_macro - end_targets[pending]) < 0.97 * beyond.error_bound
+        exceeds &= beyond.error_bound > bounds[pending]
+        pending = pending[exceeds]
+        bounds[pending] = beyond.error_bound[exceeds]
     return np.minimum(ends[: value.size], value), np.maximum(ends[value.size :], value)
 
 
 def _where_off(
-    sweep: Sweep,
-    curve: Curve,
+    curve: InputCurve,
+    branch: Branch,
     i: Places,
     above: Bools,
     bound: Array,
-    wanted: Array,
+    targets: Array,
     value: Array,
     slope: Array,
 ) -> Array:
     """Where, above or below the roots ``i``, mu_macro is off its target by ``bound``, each (m,)."""
     sign = np.where(above, 1.0, -1.0)
-    levels = wanted[i] + sign * curve.sign * bound
+    levels = targets[i] + sign * branch.sign * bound
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        step = bound / (curve.sign * slope[i])
+        step = bound / (branch.sign * slope[i])
         ends: Array = value[i] * np.exp(sign * step)
-        straight = (ends > curve.x[0]) & (ends < curve.x[-1]) & (step > 0.0)
-    # most often the curve is straight over so short a way; where it is not, the levels are searched
-    # for
-    tried = np.where(straight, ends, curve.x[0])
-    straight &= np.abs(sweep.mu(tried) - levels) <= 0.01 * bound
-    curved = np.flatnonzero(~straight)
-    if curved.size:
-        ends[curved] = curve.meet(levels[curved], leave=above[curved])
+        straight = (ends > branch.x[0]) & (ends < branch.x[-1]) & (step > 0.0)
+    # over so short a way the curve is mostly straight; where it is not, Newton steps follow
+    trial = np.where(straight, ends, branch.x[0])
+    straight &= np.abs(curve.mu(trial) - levels) <= 0.01 * bound
+    bent = np.flatnonzero(~straight)
+    if bent.size:
+        ends[bent] = branch.meet(levels[bent], leave=above[bent])
     return ends

@@ -32,7 +32,8 @@ inputs, each as name=value, in SI units or with a unit as in y0=2um:
   mu0    Coulomb friction coefficient [-], > 0
   Fz     normal force [N], > 0
   k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
-  y0     amplitude of the oscillation [m], >= 0; of the normal force Fz_amplitude [N], < Fz
+  y0     amplitude of the oscillation [m], half of peak to peak, >= 0; with --direction normal
+         that of the force, Fz_amplitude [N], < Fz
   omega  its angular frequency [rad/s], or f, its frequency [Hz], >= 0
   v0     sliding speed [m/s], >= 0
 """
@@ -49,11 +50,18 @@ class ImpossibleError(MumacroError):
     """The request is valid and has no result; one line, with the reason."""
 
 
+class _Lines(RawDescriptionHelpFormatter):
+    """Help of 100 columns, an option a line: most of it fits a screen."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=34, width=100)
+
+
 class OneLineParser(argparse.ArgumentParser):
     """A fault, reported in one line."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(formatter_class=RawDescriptionHelpFormatter, allow_abbrev=False, **options)
+        super().__init__(formatter_class=_Lines, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault, with the choice that may have been meant."""
@@ -194,7 +202,7 @@ def read_case(
     other inputs must be there, but for those that are ``optional``.  UsageError tells everything
     that is wrong, in one line.
 
-    >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20.69kHz v0=0.01"])["k"]
+    >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])["k"]
     1000000.0
     """
     case: dict[str, Any] = {}
@@ -294,8 +302,9 @@ def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
 
 def in_words(text: str, case: Mapping[str, Any]) -> str:
     """The advice of a model line with what the command takes in place of Python's keyword."""
-    k = case["k"]
-    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}")
+    unit, size = ("N/um", 1e6) if case["k"] >= 1e5 else ("N/m", 1.0)
+    k = case["k"] / size
+    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}")
 
 
 def format_for(

@@ -10,7 +10,7 @@ from mumacro.cli import common
 from mumacro.cli.common import CURVE, UsageError, as_json, in_columns, open_table, read_case
 from mumacro.inputs.fields import field_of, unit_of
 
-EXAMPLE = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1mm/s 1m/s"
+EXAMPLE = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz' --along v0 0.1mm/s 1m/s"
 
 
 def run(words: Sequence[str]) -> str:

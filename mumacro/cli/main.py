@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from mumacro.cli import common, fit, law, one_case, solve_for, stiffness, table
+from mumacro.cli import common, fit, law, motion, one_case, solve_for, stiffness, table
 from mumacro.cli import map as map_
 from mumacro.cli.common import ImpossibleError, UsageError
 from mumacro.errors import missing
@@ -24,24 +24,25 @@ friction of one case:      mumacro '{one_case.EXAMPLE}'
 friction along the speed:  {law.EXAMPLE}
 which amplitude halves it: {solve_for.EXAMPLE}
 everything else:           mumacro --help"""
-OVERVIEW = f"""\
-Macroscopic friction of a contact that oscillates across or along its sliding direction,
-or normally.
-
-  mumacro '{one_case.EXAMPLE}'          one case
-  mumacro eval cases.parquet -o out.parquet                      files: csv, ndjson, parquet
-  mumacro law 'mu0=0.3 ...' --along v0 1mm/s 1m/s -o law.png     mu_macro along one input
-  mumacro solve-for y0 'mu0=0.3 ...' --target 0.15               which input gives a wanted mu_macro
-  mumacro map -o map.png                                         mu_macro/mu0, speed and amplitude
-  {fit.EXAMPLE}    k and mu0 from measured points
-  {stiffness.EXAMPLE}    k from materials
-  mumacro table                                                  the table in use and its errors
-  mumacro export --format csv                                    the table for other tools
-  mumacro serve                                                  the same over HTTP
-
-Each command has its own help: mumacro eval --help.
-
-"""
+_TASKS = {
+    f"mumacro '{one_case.EXAMPLE}'": "one case",
+    "mumacro eval cases.parquet -o out.parquet": "files: csv, ndjson, parquet",
+    "mumacro law 'mu0=0.3 ...' --along v0 1mm/s 1m/s -o law.png": "mu_macro along one input",
+    "mumacro solve-for y0 'mu0=0.3 ...' --target 0.15": "the input for a mu_macro",
+    "mumacro map -o map.png": "the map of all cases",
+    "mumacro motion 'mu0=0.3 ...' --x 1um@90deg --y 2um": "any periodic motion",
+    "mumacro fit measured.csv 'Fz=10N ...' -o fit.png": "k from measured points",
+    "mumacro stiffness ball --radius 5mm --Fz 10N ...": "k from materials",
+    "mumacro table": "the table in use, its errors",
+    "mumacro export --format csv": "the table for other tools",
+    "mumacro serve": "page and REST service",
+}
+OVERVIEW = (
+    "Friction of a contact that is shaken across or along its sliding direction, or by its normal\n"
+    "force.  Each command has its own help: mumacro eval --help.\n\n"
+    + "".join(f"  {words:68}  {told}\n" for words, told in _TASKS.items())
+    + "\n"
+)
 
 
 def _part(name: str) -> Any:
@@ -73,7 +74,7 @@ def _serve(words: Sequence[str]) -> int:
     service = _part("service")
     if "MUMACRO_TABLES" not in os.environ and bundled_tables():
         os.environ["MUMACRO_TABLES"] = os.pathsep.join(map(str, bundled_tables()))
-    return int(service.main(list(words)))
+    return int(service.main(list(words), "mumacro serve"))
 
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
@@ -81,6 +82,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
     "law": law.run,
     "solve-for": solve_for.run,
     "map": map_.run,
+    "motion": motion.run,
     "fit": fit.run,
     "stiffness": stiffness.run,
     "table": table.run,

@@ -26,10 +26,9 @@ def run(words: Sequence[str]) -> str:
     if chosen.words:
         case = surrogate.evaluate(**{**read_case(chosen.words, kind, one_k=one_k), **kind.names})
         point = (case.v_tilde, case.y_tilde)
-    ranges = (plotting.V_RANGE, plotting.y_range(kind.normal))
-    v, y = (
-        x.ravel() for x in np.meshgrid(np.geomspace(*ranges[0], 141), np.geomspace(*ranges[1], 101))
-    )
+    grid = np.meshgrid(plotting.speeds(141), plotting.amplitudes(101, kind.normal))
+    v, y = (x.ravel() for x in grid)
+    ranges = ((v[0], v[-1]), (y[0], y[-1]))
     columns = {
         "v_tilde": v,
         "y_tilde": y,

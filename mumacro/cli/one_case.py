@@ -12,7 +12,7 @@ from mumacro.inputs.kind import SPRING, Kind
 from mumacro.surrogate import Surrogate
 from mumacro.version import __version__
 
-EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s"
+EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz v0=10mm/s"
 REGIME_WORDS = {
     "continuous": "slips all the time",
     "stick_slip": "sticks during a part of each period",

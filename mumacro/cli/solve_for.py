@@ -18,7 +18,7 @@ from mumacro.cli.common import (
 from mumacro.inputs.fields import NAMES, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE
 
-EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --target 0.15"
+EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s' --target 0.15"
 
 
 def run(words: Sequence[str]) -> str:
@@ -65,13 +65,15 @@ def run(words: Sequence[str]) -> str:
     reach, two = solution.reach, solution.ends
     if not solution.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
+        if not ends:  # all that a double holds
+            where = f"any {unknown}"
         if solution.constant:
             raise ImpossibleError(
-                f"{unknown} has no influence here: mu_macro is {reach.mu_min:.12g} for {where}"
+                f"{unknown} has no influence here: mu_macro is {reach.mu_min:.6g} for {where}"
             )
         raise ImpossibleError(
-            f"mu_macro = {target:.12g} is out of reach: {where} gives {reach.mu_min:.12g} to "
-            f"{reach.mu_max:.12g}"
+            f"mu_macro = {target:.6g} is out of reach: {where} gives {reach.mu_min:.4g} to "
+            f"{reach.mu_max:.4g}"
         )
     places = {common.middle_of(case).get("k"): solution}
     if two:

@@ -1,5 +1,4 @@
-"""The geometries of :mod:`mumacro.contacts.stiffness` by name, with arguments, units and meaning:
-the one list of them.
+"""The geometries of :mod:`mumacro.contacts.stiffness` by name, with arguments, units and meaning.
 
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
@@ -31,7 +30,7 @@ class Argument(NamedTuple):
 
 
 class Geometry(NamedTuple):
-    """One geometry: its function, what it is, and its own arguments beside those of the two
+    """One geometry: its function, its meaning, and its own arguments beside those of the two
     bodies."""
 
     function: Callable[..., Contact]
@@ -46,7 +45,7 @@ _PASCAL = {
     "N/mm2": Scale(1e6),
     "GPa": Scale(1e9),
 }
-_ONE = {"": Scale(), "-": Scale()}
+_NUMBER = {"": Scale(), "-": Scale()}
 ARGUMENTS = {
     "radius": Argument(
         "m", UNITS_OF["y0"], "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)"
@@ -57,13 +56,13 @@ ARGUMENTS = {
         "", {}, "how the contact oscillates beside the axis of the cylinder", AXES
     ),
     "E": Argument("Pa", _PASCAL, "Young's modulus of the first body; rigid, or a number"),
-    "nu": Argument("-", _ONE, "its Poisson's ratio"),
+    "nu": Argument("-", _NUMBER, "its Poisson's ratio"),
     "E2": Argument(
         "Pa",
         _PASCAL,
         "Young's modulus of the second body; left out, the bodies are of one material",
     ),
-    "nu2": Argument("-", _ONE, "its Poisson's ratio; left out, that of the first body"),
+    "nu2": Argument("-", _NUMBER, "its Poisson's ratio; left out, that of the first body"),
 }
 #: arguments of every geometry; the first two are required
 BODIES = ("E", "nu", "E2", "nu2")
@@ -80,7 +79,7 @@ GEOMETRIES = {
 }
 
 
-def contact_of(geometry: str, /, **given: Any) -> Contact:
+def contact_of(geometry: str, /, **arguments: Any) -> Contact:
     """The contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies in SI.
 
     Its warnings are in it.  InputError for an unknown geometry, and an argument that is missing,
@@ -91,22 +90,24 @@ def contact_of(geometry: str, /, **given: Any) -> Contact:
     """
     if geometry not in GEOMETRIES:
         raise InputError("geometry", geometry, f"one of {', '.join(GEOMETRIES)}")
-    found = GEOMETRIES[geometry]
-    known = (*found.arguments, *BODIES)
-    for name, value in given.items():
-        if name not in known:
-            raise InputError(name, value, f"left out: {unknown_name(name, known)}")
+    entry = GEOMETRIES[geometry]
+    names = (*entry.arguments, *BODIES)
+    for name, value in arguments.items():
+        if name not in names:
+            raise InputError(name, value, f"left out: {unknown_name(name, names)}")
         if not ARGUMENTS[name].choices and real(name, value).ndim:
             raise InputError(name, value, "one number")
-    if absent := next((name for name in (*found.arguments, "E", "nu") if name not in given), None):
+    if absent := next(
+        (name for name in (*entry.arguments, "E", "nu") if name not in arguments), None
+    ):
         unit = ARGUMENTS[absent].unit
         raise InputError(
             absent, None, f"given{f' [{unit}]' if unit else ''}: {ARGUMENTS[absent].meaning}"
         )
-    first = Material(given["E"], given["nu"])
-    second = Material(given.get("E2", first.E), given.get("nu2", first.nu))
-    return found.function(
-        first=first, second=second, **{name: given[name] for name in found.arguments}
+    first = Material(arguments["E"], arguments["nu"])
+    second = Material(arguments.get("E2", first.E), arguments.get("nu2", first.nu))
+    return entry.function(
+        first=first, second=second, **{name: arguments[name] for name in entry.arguments}
     )
 
 
@@ -117,7 +118,7 @@ def read_argument(name: str, text: str) -> Any:
     >>> read_argument("E", "210 GPa"), read_argument("radius", "5mm"), read_argument("E2", "rigid")
     (210000000000.0, 0.005, inf)
     """
-    about = ARGUMENTS[name]
-    if about.choices:
+    argument = ARGUMENTS[name]
+    if argument.choices:
         return text.strip()
-    return read_quantity(name, text, about.meaning, about.units, rigid=name in ("E", "E2"))
+    return read_quantity(name, text, argument.meaning, argument.units, rigid=name in ("E", "E2"))

@@ -14,7 +14,7 @@ DRIVEN_NODES = 28
 _P = _Q = 2
 
 
-def points(nodes: int) -> Array:
+def piece_rule(nodes: int) -> Array:
     """Points (nodes, 2): the share of the radius beyond a node, and its weight."""
     x, weight = np.polynomial.legendre.leggauss(nodes)
     t = 0.5 * (1.0 + x)
@@ -37,7 +37,7 @@ def driven_rule() -> Array:
     x, _ = np.polynomial.legendre.leggauss(DRIVEN_NODES)
     degrees = np.arange(DRIVEN_NODES - 3, DRIVEN_NODES)
     nulls = np.polynomial.legendre.legvander(x, DRIVEN_NODES)[:, degrees] * (2 * degrees + 1)
-    return np.ascontiguousarray(np.concatenate([points(DRIVEN_NODES), nulls], axis=1))
+    return np.ascontiguousarray(np.concatenate([piece_rule(DRIVEN_NODES), nulls], axis=1))
 
 
 def put_driven(data: Data) -> None:

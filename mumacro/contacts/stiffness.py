@@ -53,17 +53,17 @@ SOFT = 1e6  # [Pa]; a modulus below it may be meant in GPa
 
 
 def _number(name: str, value: Any) -> float:
-    found = real(name, value)
-    if found.ndim:
+    number = real(name, value)
+    if number.ndim:
         raise InputError(name, value, "one number")
-    return float(found)
+    return float(number)
 
 
 def _positive(**values: Any) -> None:
-    for name, given in values.items():
-        value = _number(name, given)
-        if not SMALLEST <= value <= LARGEST:
-            raise InputError(name, value, f"finite and > 0, from {SMALLEST:g} to {LARGEST:g}")
+    for name, value in values.items():
+        number = _number(name, value)
+        if not SMALLEST <= number <= LARGEST:
+            raise InputError(name, number, f"finite and > 0, from {SMALLEST:g} to {LARGEST:g}")
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Contact:
     warnings: tuple[str, ...] = ()  #: where the theory behind k is off; also issued by ``warnings``
 
     def keys(self) -> tuple[str, ...]:
-        """What is passed on: k, and the kind of contact where it is not the usual one."""
+        """The keywords for ``evaluate``: k, and the kind of contact where it is not one spring."""
         return ("k",) if self.contact == "spring" else ("k", "contact")
 
     def __getitem__(self, name: str) -> Any:
@@ -130,11 +130,11 @@ def _moduli(first: Material, second: Material) -> tuple[float, float]:
     return 1.0 / compliance, 1.0 / shear
 
 
-def _narrow(
+def _hertz_cautions(
     half_width: float, radius: float, first: Material, second: Material, power: float
 ) -> tuple[str, ...]:
-    """What to say of a Hertzian contact beside the radius of the body; InputError where it is the
-    wider one.
+    """Warnings of a Hertzian contact that is wide beside the radius of the body; InputError where
+    it is wider.
 
     The half width is proportional to E* to the power -``power``.
     """
@@ -148,25 +148,25 @@ def _narrow(
         )
     soft = [body for body in (first, second) if body.E < SOFT]
     if soft:
-        meant = (
+        in_gpa = (
             Material(1e9 * body.E, body.nu) if body in soft else body for body in (first, second)
         )
-        sound = share * (_moduli(first, second)[0] / _moduli(*meant)[0]) ** power
-        if sound <= WIDE:
-            given = soft[0].E
-            told = (
-                f"in pascals: did you mean {given:g} GPa? With {given:g} Pa the contact is "
+        share_in_gpa = share * (_moduli(first, second)[0] / _moduli(*in_gpa)[0]) ** power
+        if share_in_gpa <= WIDE:
+            modulus = soft[0].E
+            bound = (
+                f"in pascals: did you mean {modulus:g} GPa? With {modulus:g} Pa the contact is "
                 f"{share:.3g} radii wide"
             )
-            raise InputError("E", given, told)
-    told = (
+            raise InputError("E", modulus, bound)
+    bound = (
         f">= {half_width:.3g}, the half width of the contact: Hertz's theory holds for a small "
         "contact only"
     )
-    raise InputError("radius", radius, told)
+    raise InputError("radius", radius, bound)
 
 
-def _warned(contact: Contact) -> Contact:
+def _issue_warnings(contact: Contact) -> Contact:
     """The contact, whose warnings are issued to the caller of the caller."""
     for text in contact.warnings:
         warnings.warn(text, stacklevel=3)
@@ -199,7 +199,7 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
     >>> f"{1e6 * contact.length_scale(mu0=0.3, Fz=10.0):.2f} um"
     '0.23 um'
     """
-    return _warned(hertz_ball(radius, Fz, first, second))
+    return _issue_warnings(hertz_ball(radius, Fz, first, second))
 
 
 def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> Contact:
@@ -207,9 +207,9 @@ def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> C
     _positive(radius=radius, Fz=Fz)
     modulus, shear = _moduli(first, second)
     a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
-    told = _narrow(a, radius, first, second, 1.0 / 3.0)
+    cautions = _hertz_cautions(a, radius, first, second, 1.0 / 3.0)
     return Contact(
-        8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a), "ball", told
+        8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a), "ball", cautions
     )
 
 
@@ -284,7 +284,7 @@ def cylinder_on_flat(
     across 1.67e+08 N/m, 33.2 um
     along 1.32e+08 N/m, 33.2 um
     """
-    return _warned(hertz_cylinder(radius, length, Fz, first, second, oscillation))
+    return _issue_warnings(hertz_cylinder(radius, length, Fz, first, second, oscillation))
 
 
 def hertz_cylinder(
@@ -301,7 +301,7 @@ def hertz_cylinder(
     _positive(radius=radius, length=length, Fz=Fz)
     modulus, _ = _moduli(first, second)
     b = math.sqrt(4.0 * (Fz / length) * radius / (math.pi * modulus))
-    told = _narrow(b, radius, first, second, 0.5)
+    cautions = _hertz_cautions(b, radius, first, second, 0.5)
     if 2.0 * b > length:
         raise InputError(
             "length",
@@ -315,7 +315,7 @@ def hertz_cylinder(
         _ellipse_compliance(narrow, wide, Material(body.E, 0.0), along) * (1.0 - body.nu**2)
         for body in (first, second)
     )
-    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length), warnings=told)
+    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length), warnings=cautions)
 
 
 def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool) -> float:

@@ -1,6 +1,6 @@
 """The three formats: which files and columns there are, and blocks of records.
 
-Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else stays text.
+Cells of CSV and values of NDJSON are text.  Inputs become numbers; other columns stay text.
 """
 
 import csv
@@ -30,45 +30,50 @@ LONGEST = 64 * 2**20  # bytes of a line
 class Block(NamedTuple):
     """Some records in order; ``share`` is how much of the file is read after them.
 
-    A record that could not be read is a row of nulls; ``wrong`` has by its index the text and the
-    fault. ``texts`` are the records as they came in, where they are text: cells of CSV, lines of
+    A record that could not be read is a row of nulls; ``unreadable`` has its index, its text and
+    the fault. ``texts`` are the unchanged records, where they are text: cells of CSV, lines of
     NDJSON.
     """
 
     batch: pa.RecordBatch
     share: float
     texts: Sequence[Any] = ()
-    wrong: Sequence[tuple[int, str, str]] = ()
+    unreadable: Sequence[tuple[int, str, str]] = ()
 
 
 def format_of(path: Path) -> tuple[str, bool]:
     """The format by a name's ending, empty for another ending, and whether it is compressed."""
     name = path.name.lower()
-    kind, packed = FORMATS.get(Path(name.removesuffix(".gz")).suffix, ""), name.endswith(".gz")
-    return "" if packed and kind == "parquet" else kind, packed
+    file_format, compressed = (
+        FORMATS.get(Path(name.removesuffix(".gz")).suffix, ""),
+        name.endswith(".gz"),
+    )
+    return "" if compressed and file_format == "parquet" else file_format, compressed
 
 
-def find_files(given: Sequence[str | Path]) -> tuple[list[Path], str]:
+def find_files(cases: Sequence[str | Path]) -> tuple[list[Path], str]:
     """The files that paths, folders and patterns name, in order, and their format; FilesError where
-    there is no one."""
+    one names no file, or the formats differ."""
     files: list[Path] = []
-    for entry in given:
+    for entry in cases:
         path = Path(entry)
         pattern = f"{glob.escape(str(path))}/**/*" if path.is_dir() else str(path)
-        found = [path] if path.is_file() else sorted(map(Path, glob.glob(pattern, recursive=True)))
+        matches = (
+            [path] if path.is_file() else sorted(map(Path, glob.glob(pattern, recursive=True)))
+        )
         # in a folder, what begins with _ is metadata
-        fit = [
+        candidates = [
             p
-            for p in found
+            for p in matches
             if p == path or not (p.name.startswith("_") or p.name.endswith(".rejects.csv"))
         ]
-        files += (named := [p for p in fit if p.is_file() and format_of(p)[0]])
-        if not named:
+        files += (usable := [p for p in candidates if p.is_file() and format_of(p)[0]])
+        if not usable:
             raise FilesError(f"{entry}: no such file, or none that ends in {ENDINGS}")
-    kinds = sorted({format_of(path)[0] for path in files})
-    if len(kinds) > 1:
-        raise FilesError(f"the files are of several formats: {', '.join(kinds)}")
-    return files, kinds[0]
+    formats = sorted({format_of(path)[0] for path in files})
+    if len(formats) > 1:
+        raise FilesError(f"the files are of several formats: {', '.join(formats)}")
+    return files, formats[0]
 
 
 class ParquetSource:
@@ -80,9 +85,9 @@ class ParquetSource:
         names = [str(path) for path in files]
         hive = pa.dataset.partitioning(flavor="hive") if folder else None
         options = {"format": "parquet", "partitioning": hive, "partition_base_dir": folder}
-        found = pa.dataset.dataset(names, **options)
-        schemas = [part.physical_schema.remove_metadata() for part in found.get_fragments()]
-        self.schema = pa.unify_schemas([found.schema, *schemas], promote_options="permissive")
+        dataset = pa.dataset.dataset(names, **options)
+        schemas = [part.physical_schema.remove_metadata() for part in dataset.get_fragments()]
+        self.schema = pa.unify_schemas([dataset.schema, *schemas], promote_options="permissive")
         self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
 
     def blocks(self, file: int, skip: int, names: Sequence[str]) -> Iterator[Block]:
@@ -139,7 +144,7 @@ class TextSource:
             heads = [_head(path, sep, decimal) for path in files]
             names = [[cell.strip("\ufeff \t") for cell in head] for head in heads]
             if differ := [
-                path for path, found in zip(files, names, strict=True) if found != names[0]
+                path for path, header in zip(files, names, strict=True) if header != names[0]
             ]:
                 raise FilesError(f"{differ[0]}: its header differs from that of {files[0]}")
         else:
@@ -169,8 +174,10 @@ class TextSource:
                     skip - len(texts) + 1 + next(i for i, x in enumerate(texts) if not _is_utf8(x))
                 )
                 raise FilesError(f"{lines.path}: row {row} {NO_UTF8}") from None
-            wrong = [(i, self._shown(texts[i]), why) for i, why in enumerate(faults) if why]
-            yield Block(batch, lines.share, texts, wrong)
+            unreadable = [
+                (i, self._excerpt(texts[i]), fault) for i, fault in enumerate(faults) if fault
+            ]
+            yield Block(batch, lines.share, texts, unreadable)
 
     def _records(self, lines: _Lines) -> Iterator[Any]:
         """Lists of cells, or lines."""
@@ -192,23 +199,25 @@ class TextSource:
     def _columns(
         self, records: Any, names: Sequence[str], where: str
     ) -> tuple[dict[str, Any], Sequence[str | None]]:
-        """Values by column, and what is wrong with each record."""
+        """Values by column, and the fault of each record, if any."""
         if self.sep:
             width = len(self.head)
             faults = [
                 None if len(x) == width else f"has {len(x)} cells, the header has {width}"
                 for x in records
             ]
-            whole = (row if len(row) == width else [None] * width for row in records)
-            return dict(zip(self.schema.names, zip(*whole, strict=True), strict=True)), faults
+            rows = (row if len(row) == width else [None] * width for row in records)
+            return dict(zip(self.schema.names, zip(*rows, strict=True), strict=True)), faults
         objects, faults = zip(*map(_object, records), strict=True)
-        if not self.verbatim and (new := {name for found in objects for name in found} - {*names}):
+        if not self.verbatim and (
+            new := {name for record in objects for name in record} - {*names}
+        ):
             raise FilesError(
                 f"{where}: {min(new)!r} is in no earlier row; name it in the first, or write NDJSON"
             )
-        return {name: [_text(found.get(name)) for found in objects] for name in names}, faults
+        return {name: [_text(record.get(name)) for record in objects] for name in names}, faults
 
-    def _shown(self, record: Any) -> str:
+    def _excerpt(self, record: Any) -> str:
         text: str = self.sep.join(record) if self.sep else record.decode("utf-8", "replace")
         return text if len(text) <= 500 else text[:500] + "…"
 
@@ -237,22 +246,22 @@ def _is_utf8(record: Sequence[str]) -> bool:
 
 
 def _object(text: bytes) -> tuple[dict[str, Any], str | None]:
-    """The object of a line, and what is wrong with it."""
+    """The object of a line, and its fault, if any."""
     try:
-        found = _DECODER.decode(text.decode("utf-8-sig"))
+        value = _DECODER.decode(text.decode("utf-8-sig"))
         if b"\\u" in text:
-            json.dumps(found, ensure_ascii=False).encode()  # half of a surrogate pair is no text
-        return (found, None) if isinstance(found, dict) else ({}, "is no JSON object")
+            json.dumps(value, ensure_ascii=False).encode()  # half of a surrogate pair is no text
+        return (value, None) if isinstance(value, dict) else ({}, "is no JSON object")
     except (ValueError, RecursionError) as error:
         return {}, f"is no JSON object: {error}"
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    if len(found := dict(pairs)) < len(pairs):
+    if len(unique := dict(pairs)) < len(pairs):
         raise ValueError(
             f"repeats the key {Counter(name for name, _ in pairs).most_common(1)[0][0]!r}"
         )
-    return found
+    return unique
 
 
 def _refuse_constant(word: str) -> None:

@@ -88,14 +88,14 @@ def answer(
     Examples
     --------
     >>> case = {"mu0": [0.3], "Fz": [10], "k": ["rigid"], "y0 [um]": [2.0]}
-    >>> case |= {"f": [20690], "v0": [-1.0]}
+    >>> case |= {"f": [20e3], "v0": [-1.0]}
     >>> answered, rejects = answer(pa.RecordBatch.from_pydict(case))
     >>> rejects.to_pylist()
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
     """
     kind = kind_of(contact, direction)
-    places, names = find_columns(batch.schema.names, rigid, include, kind)
-    added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), places, names, kind)
+    headings, names = find_columns(batch.schema.names, rigid, include, kind)
+    added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), headings, names, kind)
     schema = pa.schema([*batch.schema, *added_fields(names)], batch.schema.metadata)
     answered = pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema)
     return answered, pa.RecordBatch.from_pylist(
@@ -110,37 +110,40 @@ def find_columns(
     kind: Kind = SPRING,
     where: str = "",
 ) -> tuple[dict[str, tuple[str, Scale]], list[str]]:
-    """By input, in their order, the heading and what its unit is in SI; and the names of the
+    """By input, in their order, the heading and the scale of its unit; and the names of the
     columns that are added.
 
-    FilesError names, after ``where``, all columns that are there twice, would be written twice,
-    have an unknown unit, or are missing; for those it lists the columns that were seen, or names a
-    similar one.
+    FilesError names, after ``where``, all columns that stand twice in the heading, would be written
+    twice, have an unknown unit, or are missing; for a missing one it lists the columns of the file,
+    or names a similar one.
 
     >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"])[0]["Fz"]
     ('Fz [kN]', Scale(times=1000.0, over=1.0))
     """
-    found, faults = find_heads(
+    heads, faults = find_heads(
         names, {name: LIKE.get(name, name) for name in (*kind.columns, *ENDS)}
     )
-    others = dict.fromkeys(name for name in names if split_unit(name)[0] not in found)
-    faults += [f"the column {name!r} is there twice" for name in others if names.count(name) > 1]
-    stiff = [column for column in names if meant_by(column, loosely=False) == "k"]
-    if rigid and stiff:
+    other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in heads)
+    faults += [
+        f"the column {name!r} is there twice" for name in other_names if names.count(name) > 1
+    ]
+    stiffness_columns = [column for column in names if meant_by(column, loosely=False) == "k"]
+    if rigid and stiffness_columns:
         faults.append(
-            f"--rigid is given, but the column {stiff[0]!r} looks like a stiffness; leave one out"
+            f"--rigid is given, but the column {stiffness_columns[0]!r} looks like a stiffness; "
+            "leave one out"
         )
-    if "k" in found and (end := [name for name in ENDS if name in found]):
+    if "k" in heads and (end := [name for name in ENDS if name in heads]):
         faults.append(f"there are both k and {end[0]}; leave one out")
-    ends = ENDS if found.keys() & {*ENDS} else () if rigid else ("k",)
-    wanted = [name for field in kind.fields for name in (ends if field == "k" else (field,))]
-    for name in wanted:
-        if name not in found and (name != "omega" or "f" not in found):
-            told = absent(name, names)
+    ends = ENDS if heads.keys() & {*ENDS} else () if rigid else ("k",)
+    required = [name for field in kind.fields for name in (ends if field == "k" else (field,))]
+    for name in required:
+        if name not in heads and (name != "omega" or "f" not in heads):
+            fault = absent(name, names)
             if name == "y0" and AMPLITUDE in (split_unit(column)[0] for column in names):
-                told = f"there is no column y0, but {AMPLITUDE}: give --direction normal"
+                fault = f"there is no column y0, but {AMPLITUDE}: give --direction normal"
             or_rigid = "; rename the one that holds it, or give --rigid if all contacts are rigid"
-            faults.append(told + or_rigid if name == "k" and "similar" not in told else told)
+            faults.append(fault + or_rigid if name == "k" and "similar" not in fault else fault)
     slopes = [f"d_mu_macro_d_{name}" for name in kind.fields] if "gradient" in include else []
     added = [ANSWERS[0], *(BAND if ends == ENDS else ()), *ANSWERS[1:], *slopes]
     faults += [
@@ -149,114 +152,120 @@ def find_columns(
     if faults:
         raise FilesError(where + "; ".join(faults))
     return {
-        name: (names[found[name][0]], found[name][1]) for name in (*wanted, "f") if name in found
+        name: (names[heads[name][0]], heads[name][1]) for name in (*required, "f") if name in heads
     }, added
 
 
 def answer_columns(
     batch: pa.RecordBatch,
     surrogate: Surrogate,
-    places: Mapping[str, tuple[str, Scale]],
+    headings: Mapping[str, tuple[str, Scale]],
     names: Sequence[str],
     kind: Kind,
     decimal: str = ".",
 ) -> tuple[list[pa.Array], list[tuple[int, str, str | None, str]], dict[str, Array]]:
-    """The columns ``names`` that :func:`answer` adds, rows of the rejects, and the inputs in their
-    units by heading."""
-    given: dict[str, Array] = {}
+    """The columns ``names`` that :func:`answer` adds, rows of the rejects, and the inputs in the
+    file's units by heading."""
+    columns_in: dict[str, Array] = {}
     values: dict[str, Array] = (
-        {} if {"k", *ENDS} & places.keys() else {"k": np.full(len(batch), math.inf)}
+        {} if {"k", *ENDS} & headings.keys() else {"k": np.full(len(batch), math.inf)}
     )
     faults: dict[str, dict[int, str]] = {}
-    for name, (heading, scale) in places.items():
-        given[heading], faults[name] = numbers(batch.column(heading), name, decimal)
-        values[name] = _in_si(given[heading], scale, faults[name])
+    for name, (heading, scale) in headings.items():
+        columns_in[heading], faults[name] = numbers(batch.column(heading), name, decimal)
+        values[name] = _in_si(columns_in[heading], scale, faults[name])
     cases = Cases.of(values, kind)
-    found = surrogate.answer(cases, gradient="d_mu_macro_d_mu0" in names)
-    bad = found.source_code < 0
-    mask = bad if bad.any() else None
-    code = np.where(bad, 0, found.source_code).astype(np.int8)
+    result = surrogate.answer(cases, gradient="d_mu_macro_d_mu0" in names)
+    rejected = result.source_code < 0
+    mask = rejected if rejected.any() else None
+    source_code = np.where(rejected, 0, result.source_code).astype(np.int8)
     arrays = {
-        "regime": _words(REGIME_OF_SOURCE[code], REGIMES, mask),
-        "source": _words(code, SOURCES, mask),
+        "regime": _dictionary(REGIME_OF_SOURCE[source_code], REGIMES, mask),
+        "source": _dictionary(source_code, SOURCES, mask),
     }
-    for name, slope in (found.gradient or {}).items():
+    for name, slope in (result.gradient or {}).items():
         # the slope along k is 0 for a rigid contact, which has no k
-        told = (
+        column = (
             slope
             if name != "k" or name not in values
             else np.where(np.isinf(values["k"]), math.nan, slope)
         )
-        arrays[f"d_mu_macro_d_{name}"] = pa.array(told, mask=np.isnan(told))
+        arrays[f"d_mu_macro_d_{name}"] = pa.array(column, mask=np.isnan(column))
     columns = [
-        arrays[name] if name in arrays else pa.array(getattr(found, name), mask=mask)
+        arrays[name] if name in arrays else pa.array(getattr(result, name), mask=mask)
         for name in names
     ]
     rejects = []
-    for i in np.flatnonzero(bad).tolist():
-        name, why = _in_words(cases.reason(i))
-        cell = batch.column(places[name][0])[i].as_py()
-        rejects.append((i, name, None if cell is None else str(cell), faults[name].get(i, why)))
-    return columns, rejects, given
+    for i in np.flatnonzero(rejected).tolist():
+        name, reason = _field_and_reason(cases.reason(i))
+        cell = batch.column(headings[name][0])[i].as_py()
+        rejects.append((i, name, None if cell is None else str(cell), faults[name].get(i, reason)))
+    return columns, rejects, columns_in
 
 
-def _words(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
+def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
     return pa.DictionaryArray.from_arrays(
         pa.array(codes, pa.int8(), mask=mask), pa.array(words, pa.string())
     )
 
 
-def _in_si(found: Array, scale: Scale, faults: dict[int, str]) -> Array:
+def _in_si(column: Array, scale: Scale, faults: dict[int, str]) -> Array:
     """Values in SI; a power of ten below one divides, so that 2 um is the double 2e-6."""
     if scale == Scale():
-        return found
+        return column
     with np.errstate(over="ignore"):
-        values: Array = found * scale.times / scale.over
-    beyond = np.isinf(values) & np.isfinite(found)  # a large stiffness is not a rigid contact
+        values: Array = column * scale.times / scale.over
+    beyond = np.isinf(values) & np.isfinite(column)  # a large stiffness is not a rigid contact
     values[beyond] = math.nan
     faults |= dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)
     return values
 
 
 def numbers(array: pa.Array, name: str, decimal: str = ".") -> tuple[Array, dict[int, str]]:
-    """A column of the input ``name`` as doubles (n,), NaN where it holds none, and what is wrong
-    with cells of text.
+    """A column of the input ``name`` as doubles (n,), NaN where a cell has no number, and
+    what is wrong with cells of text.
 
-    FilesError where its type is none of numbers or text.
+    FilesError where the column is of another type than numbers or text.
     """
     if pa.types.is_dictionary(array.type):
         array = array.dictionary_decode()
-    kind, text = array.type, array
+    arrow_type, column = array.type, array
     is_text = (
-        pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
+        pa.types.is_string(arrow_type)
+        or pa.types.is_large_string(arrow_type)
+        or pa.types.is_string_view(arrow_type)
     )
-    is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
-    if not (is_text or is_number or pa.types.is_null(kind)):
-        raise FilesError(f"the column {name} holds {kind}, not numbers")
+    is_number = (
+        pa.types.is_integer(arrow_type)
+        or pa.types.is_floating(arrow_type)
+        or pa.types.is_decimal(arrow_type)
+    )
+    if not (is_text or is_number or pa.types.is_null(arrow_type)):
+        raise FilesError(f"the column {name} holds {arrow_type}, not numbers")
     with suppress(pa.ArrowInvalid):
         if is_text and decimal != ".":  # with a decimal comma 1.5 may mean 1500: it is no number
-            text = pc.replace_substring(pc.replace_substring(array, ".", "?"), decimal, ".")
-        found = pc.fill_null(pc.cast(text, pa.float64(), safe=False), math.nan).to_numpy(
+            column = pc.replace_substring(pc.replace_substring(array, ".", "?"), decimal, ".")
+        values = pc.fill_null(pc.cast(column, pa.float64(), safe=False), math.nan).to_numpy(
             zero_copy_only=False
         )
-        if not is_text or np.isfinite(found).all():
-            return found, {}
+        if not is_text or np.isfinite(values).all():
+            return values, {}
     # cell by cell, as not all of them are numbers
-    found, faults = np.full(len(array), math.nan), {}
+    values, faults = np.full(len(array), math.nan), {}
     for i, cell in enumerate(array.to_pylist()):
         try:
-            found[i] = read_cell(name, cell or "", decimal)
+            values[i] = read_cell(name, cell or "", decimal)
         except ValueError as error:
             faults[i] = str(error)
-    return found, faults
+    return values, faults
 
 
-def _in_words(error: InputError) -> tuple[str, str]:
+def _field_and_reason(error: InputError) -> tuple[str, str]:
     """The input of a row that has no result, and why."""
     name, value = error.field, error.value
     if isinstance(value, tuple):  # of an interval the end that is missing, or the lower one
-        at = int(math.isnan(value[1]) and not math.isnan(value[0]))
-        name, value = ENDS[at], value[at]
+        end = int(math.isnan(value[1]) and not math.isnan(value[0]))
+        name, value = ENDS[end], value[end]
     number = float(value)  # type: ignore[arg-type]  # a number of the row
     if math.isnan(number):
         return name, GAP if name == "k" else "is missing"

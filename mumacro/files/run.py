@@ -2,10 +2,10 @@
 the same bytes.
 
 While it runs, ``OUT.parts/log`` holds a line for the plan (inputs with checksums, options, table),
-and then the pieces of the output, each behind a note: size and checksum of the piece, what is done
-with it, its rejects, and a checksum of the note itself.  Pieces that fit their notes are kept; what
-follows them is done again. ``OUT.run.json`` stays: it tells what the output was made of, so that
-the same command finds it complete.
+and then the pieces of the output, each behind a note: size and checksum of the piece, the state
+after it, its rejects, and a checksum of the note itself.  Pieces that fit their notes are kept;
+the rest is done again.  ``OUT.run.json`` stays: it records how the output was made, so that the
+same command recognises it as complete.
 """
 
 import hashlib
@@ -40,8 +40,8 @@ from mumacro.version import __version__
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run did: rows read, answered, rejected, found done already; the files (``rejects``
-    None without any)."""
+    """What a run did: rows read, answered, rejected, and kept from an earlier run; the files
+    (``rejects`` is None without any)."""
 
     rows: int
     answered: int
@@ -52,7 +52,7 @@ class Summary:
 
 
 def evaluate_files(
-    given: Sequence[str | Path],
+    cases: Sequence[str | Path],
     out: str | Path,
     surrogate: Surrogate,
     *,
@@ -70,7 +70,7 @@ def evaluate_files(
 
     Parameters
     ----------
-    given : sequence of path
+    cases : sequence of path
         Files, folders or patterns; all of one format.
     out : path
         Its ending sets the format.  Rows keep their order; a rejected row is not in it, but in
@@ -83,8 +83,8 @@ def evaluate_files(
     force : bool
         Replace an output that exists, and delete the parts of another run.
     progress, say : callable
-        Called with the share that is done, rows read and rejected; with one line about what a
-        resumed run found.
+        Called with the finished share, rows read and rejected; with one line about
+        what a resumed run keeps.
 
     Raises
     ------
@@ -105,18 +105,18 @@ def evaluate_files(
     """
     try:
         run = _Run(
-            given, Path(out), surrogate, rigid, include, sep, decimal, kind_of(contact, direction)
+            cases, Path(out), surrogate, rigid, include, sep, decimal, kind_of(contact, direction)
         )
         return run.go(force, progress, say)
     except (
         pa.ArrowException
     ) as error:  # no Parquet, or columns that are unlike or of a type that text cannot hold
-        raise FilesError(f"{given[0]}: {error}") from None
+        raise FilesError(f"{cases[0]}: {error}") from None
 
 
-class _Done(NamedTuple):
-    """What is done with a piece: ``at`` records of a file, rows in all and the rejected ones; its
-    rejects as CSV."""
+class _State(NamedTuple):
+    """How far the run is after a piece: ``at`` records of a file, all rows and the rejected ones;
+    the piece's rejects as CSV."""
 
     file: int = 0
     at: int = 0
@@ -128,7 +128,7 @@ class _Done(NamedTuple):
 class _Run:
     def __init__(
         self,
-        given: Sequence[str | Path],
+        cases: Sequence[str | Path],
         out: Path,
         surrogate: Surrogate,
         rigid: bool,
@@ -141,42 +141,50 @@ class _Run:
             raise FilesError(
                 f"--sep and --decimal are both {sep!r}; give another --sep, such as ';'"
             )
-        self.files, start = reading.find_files(given)
-        end, packed = reading.format_of(out)
-        if not end or out.is_dir():
+        self.files, input_format = reading.find_files(cases)
+        output_format, compressed = reading.format_of(out)
+        if not output_format or out.is_dir():
             raise FilesError(f"{out}: must be the name of a file that ends in {reading.ENDINGS}")
         self.out, self.parts, self.rejects, self.record = (
             out.with_name(out.name + ending)
             for ending in ("", ".parts", ".rejects.csv", ".run.json")
         )
-        self.log, self.made = self.parts / "log", self.parts / "made"
-        for target in (out, self.rejects, self.record, self.log, self.made):
-            if target.exists() and any(target.samefile(path) for path in self.files):
+        self.log, self.unfinished = self.parts / "log", self.parts / "made"
+        for output in (out, self.rejects, self.record, self.log, self.unfinished):
+            if output.exists() and any(output.samefile(path) for path in self.files):
                 raise FilesError(
-                    f"{target}: is an input, and would be overwritten; give another -o"
+                    f"{output}: is an input, and would be overwritten; give another -o"
                 )
         self.checksums = [_checksum(path) for path in self.files]
-        self.verbatim = start == end != "parquet"
+        self.verbatim = input_format == output_format != "parquet"
         self.source: reading.ParquetSource | reading.TextSource
-        if start == "parquet":
-            folder = str(given[0]) if len(given) == 1 and Path(given[0]).is_dir() else None
+        if input_format == "parquet":
+            folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
             self.source = reading.ParquetSource(self.files, folder)
         else:
             self.source = reading.TextSource(
-                self.files, sep if start == "csv" else "", decimal, self.verbatim
+                self.files, sep if input_format == "csv" else "", decimal, self.verbatim
             )
-        places, names = find_columns(
+        headings, names = find_columns(
             self.source.schema.names, rigid, include, kind, f"{self.files[0]}: "
         )
-        self.how = surrogate, places, names, kind, decimal if start == "csv" else "."
-        inputs = [heading for heading, _ in places.values()]
-        self.output = Output(end, packed, sep, decimal, places.get("k", (None,))[0])
-        copied = [
-            field.with_type(pa.float64()) if field.name in inputs and start != "parquet" else field
+        self.evaluation = (
+            surrogate,
+            headings,
+            names,
+            kind,
+            decimal if input_format == "csv" else ".",
+        )
+        input_headings = [heading for heading, _ in headings.values()]
+        self.output = Output(output_format, compressed, sep, decimal, headings.get("k", (None,))[0])
+        input_fields = [
+            field.with_type(pa.float64())
+            if field.name in input_headings and input_format != "parquet"
+            else field
             for field in self.source.schema
         ]
-        self.wanted = inputs if self.verbatim else self.source.schema.names
-        fields = [*([] if self.verbatim else copied), *added_fields(names)]
+        self.columns_read = input_headings if self.verbatim else self.source.schema.names
+        fields = [*([] if self.verbatim else input_fields), *added_fields(names)]
         self.schema = pa.schema(fields, self.source.schema.metadata)
         plan = {
             "version": __version__,
@@ -185,124 +193,129 @@ class _Run:
                 [path.name, checksum]
                 for path, checksum in zip(self.files, self.checksums, strict=True)
             ],
-            "options": [self.output, [*places.items()], kind, names, reading.ROWS],
+            "options": [self.output, [*headings.items()], kind, names, reading.ROWS],
         }
-        self.first = json.dumps(plan).encode() + b"\n"
+        self.plan_line = json.dumps(plan).encode() + b"\n"
 
     def go(
         self, force: bool, progress: Callable[[float, int, int], None], say: Callable[[str], None]
     ) -> Summary:
-        """Find what is done, do what is left, and put it into place."""
+        """Keep the sound pieces of an earlier run, do the rest, and put the files into place."""
         with alone_in(self.parts):
-            if begun := None if force else self._complete():
-                done = begun
+            if earlier := None if force else self._complete():
+                state = earlier
                 say(f"{self.out}: is complete already; nothing is left to do")
             else:
-                begun = self._begin(force, say)
-                done = begun or _Done()
+                earlier = self._begin(force, say)
+                state = earlier or _State()
                 try:
-                    # nothing is brought to the disk here: after a loss of power the checksums tell
-                    # what is there
+                    # no flush to the disk here: after a loss of power the checksums show which
+                    # pieces are whole
                     with self.log.open("ab") as log:
-                        for done, text, share in self._evaluated(begun):
-                            note = json.dumps([len(text), zlib.crc32(text), *done]).encode()
+                        for state, text, share in self._new_pieces(earlier):
+                            note = json.dumps([len(text), zlib.crc32(text), *state]).encode()
                             log.write(b"%08x %b\n" % (zlib.crc32(note), note))
                             log.write(text)
                             log.flush()
-                            progress(share, done.rows, done.rejected)
+                            progress(share, state.rows, state.rejected)
                 except (
                     FilesError,
                     pa.ArrowException,
                 ):  # an input must be changed before this run can end
                     self._clear()
-                    self._refuse_changed()  # first: what was half written looks like a damaged row
+                    self._refuse_changed()  # first: a half-written input looks damaged
                     raise
-                self._finish(done)
+                self._finish(state)
             self._clear()
-        rows, rejected, resumed = done.rows, done.rejected, begun.rows if begun else 0
+        rows, rejected, rows_before = state.rows, state.rejected, earlier.rows if earlier else 0
         return Summary(
-            rows, rows - rejected, rejected, self.out, self.rejects if rejected else None, resumed
+            rows,
+            rows - rejected,
+            rejected,
+            self.out,
+            self.rejects if rejected else None,
+            rows_before,
         )
 
-    def _complete(self) -> _Done | None:
-        """What an earlier run of the same command has done, if its files are as it left them."""
+    def _complete(self) -> _State | None:
+        """The last state of an earlier run of the same command, if its files are unchanged."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             record = json.loads(self.record.read_bytes())
-            done = _Done(rows=record["rows"], rejected=record["rejected"])
-            return done if record == self._record(done) else None
+            state = _State(rows=record["rows"], rejected=record["rejected"])
+            return state if record == self._record(state) else None
         return None
 
-    def _record(self, done: _Done) -> dict[str, Any]:
-        """What ``OUT.run.json`` holds; the files with their content."""
+    def _record(self, state: _State) -> dict[str, Any]:
+        """The content of ``OUT.run.json``: rows, the plan, and the checksums of the files."""
         checksums = [
-            _checksum(path) for path in ([self.out, self.rejects] if done.rejected else [self.out])
+            _checksum(path) for path in ([self.out, self.rejects] if state.rejected else [self.out])
         ]
         return {
-            "rows": done.rows,
-            "rejected": done.rejected,
+            "rows": state.rows,
+            "rejected": state.rejected,
             "files": checksums,
-            "plan": json.loads(self.first),
+            "plan": json.loads(self.plan_line),
         }
 
-    def _begin(self, force: bool, say: Callable[[str], None]) -> _Done | None:
-        """Keep what is sound of an earlier run of the same command, or make a new beginning."""
-        found = b""
+    def _begin(self, force: bool, say: Callable[[str], None]) -> _State | None:
+        """Keep the sound pieces of an earlier run of the same command, or start anew."""
+        first_line = b""
         with suppress(FileNotFoundError), self.log.open("rb") as log:
-            found = log.readline()
-        if found == self.first:
-            (done, end), *_ = deque(((done, end) for done, _, end in self._kept()), 1) or [
-                (None, len(found))
-            ]
-            more = "; what follows them was cut or changed, and is done again" * (
+            first_line = log.readline()
+        if first_line == self.plan_line:
+            (state, end), *_ = deque(
+                ((state, end) for state, _, end in self._sound_pieces()), 1
+            ) or [(None, len(first_line))]
+            remark = "; what follows them was cut or changed, and is done again" * (
                 end < self.log.stat().st_size
             )
             os.truncate(self.log, end)
-            rows, rejected = (done or _Done())[2:4]
-            say(f"{self.parts}: {rows:,} rows are done already ({rejected:,} rejected){more}")
-            return done
-        if found and not force:
-            plan, old = json.loads(self.first), json.loads(found)
-            differ = ", ".join(name for name in plan if old.get(name) != plan[name])
+            rows, rejected = (state or _State())[2:4]
+            say(f"{self.parts}: {rows:,} rows are done already ({rejected:,} rejected){remark}")
+            return state
+        if first_line and not force:
+            plan, earlier_plan = json.loads(self.plan_line), json.loads(first_line)
+            differences = ", ".join(name for name in plan if earlier_plan.get(name) != plan[name])
             raise FilesError(
-                f"{self.parts}: has parts of another run ({differ} differ); --force deletes them"
+                f"{self.parts}: has parts of another run ({differences} differ); "
+                "--force deletes them"
             )
         for path in (self.out, self.rejects):
             if path.exists() and not force:
                 raise FilesError(f"{path}: exists already; --force replaces it")
         self._clear()
-        write_whole(self.log, self.first)
+        write_whole(self.log, self.plan_line)
         return None
 
-    def _kept(self) -> Iterator[tuple[_Done, bytes, int]]:
-        """What the log holds, as far as it is sound: pieces with what is done, and where they
-        end."""
+    def _sound_pieces(self) -> Iterator[tuple[_State, bytes, int]]:
+        """The sound pieces of the log: the state after each, its text, and where it ends."""
         with self.log.open("rb") as log:
             log.readline()
             while line := log.readline():
                 note = line[9:-1]
                 if line != b"%08x %b\n" % (zlib.crc32(note), note):
                     return
-                size, checksum, *done = json.loads(note)
+                size, checksum, *state = json.loads(note)
                 text = log.read(size)
                 if zlib.crc32(text) != checksum:
                     return
-                yield _Done(*done), text, log.tell()
+                yield _State(*state), text, log.tell()
 
-    def _evaluated(self, done: _Done | None) -> Iterator[tuple[_Done, bytes, float]]:
-        """What follows a piece, with the share of the input that is read; from the beginning, the
-        head comes first."""
-        if done is None:
-            heads = csv_lines(
+    def _new_pieces(self, state: _State | None) -> Iterator[tuple[_State, bytes, float]]:
+        """The pieces that follow a state, with the share of the input that is read; at the
+        beginning the head comes first."""
+        if state is None:
+            headings = csv_lines(
                 [[*(self.source.head if self.verbatim else ()), *self.schema.names]],
                 self.output.sep,
             )
-            done = _Done(rejects=csv_lines([["file"] * (len(self.files) > 1) + REJECTS.names]))
-            yield done, self.output.pack(heads) if self.output.kind == "csv" else b"", 0.0
-        for file in range(done.file, len(self.files)):
-            done = done if file == done.file else done._replace(file=file, at=0)
-            for block in self.source.blocks(file, done.at, self.wanted):
-                done, text = self._piece(done, block)
-                yield done, text, (file + block.share) / len(self.files)
+            state = _State(rejects=csv_lines([["file"] * (len(self.files) > 1) + REJECTS.names]))
+            yield state, self.output.pack(headings) if self.output.format == "csv" else b"", 0.0
+        for file in range(state.file, len(self.files)):
+            state = state if file == state.file else state._replace(file=file, at=0)
+            for block in self.source.blocks(file, state.at, self.columns_read):
+                state, text = self._piece(state, block)
+                yield state, text, (file + block.share) / len(self.files)
         self._refuse_changed()
 
     def _refuse_changed(self) -> None:
@@ -312,13 +325,13 @@ class _Run:
                     f"{path}: changed while it was read; give the command again"
                 ) from None
 
-    def _piece(self, done: _Done, block: reading.Block) -> tuple[_Done, bytes]:
-        """A block as it stands in the output, and what is done with it."""
-        added, rejects, given = answer_columns(block.batch, *self.how)
-        faults = {row: why for row, *why in rejects}
-        faults |= {i: [None, text, why] for i, text, why in block.wrong}
+    def _piece(self, state: _State, block: reading.Block) -> tuple[_State, bytes]:
+        """A block as it stands in the output, and the state after it."""
+        added, rejects, columns_in = answer_columns(block.batch, *self.evaluation)
+        faults = {row: reason for row, *reason in rejects}
+        faults |= {i: [None, text, reason] for i, text, reason in block.unreadable}
         columns = [
-            column if column.type == field.type else pa.array(given[field.name])
+            column if column.type == field.type else pa.array(columns_in[field.name])
             for field, column in zip(
                 self.schema, [] if self.verbatim else block.batch.columns, strict=False
             )
@@ -328,31 +341,33 @@ class _Run:
             block.texts,
         )
         if faults:
-            kept = np.ones(len(batch), np.bool_)
-            kept[[*faults]] = False
-            batch, texts = batch.filter(pa.array(kept)), [*compress(texts, kept)]
-        file = [self.files[done.file]] * (len(self.files) > 1)
-        listed = csv_lines([*file, done.at + i + 1, *why] for i, why in faults.items())
-        n, rejected = len(block.batch), done.rejected + len(faults)
+            accepted = np.ones(len(batch), np.bool_)
+            accepted[[*faults]] = False
+            batch, texts = batch.filter(pa.array(accepted)), [*compress(texts, accepted)]
+        file = [self.files[state.file]] * (len(self.files) > 1)
+        reject_lines = csv_lines([*file, state.at + i + 1, *reason] for i, reason in faults.items())
+        n, rejected = len(block.batch), state.rejected + len(faults)
         text = self.output.piece(batch, texts if self.verbatim else None)
-        return _Done(done.file, done.at + n, done.rows + n, rejected, listed), text
+        return _State(state.file, state.at + n, state.rows + n, rejected, reject_lines), text
 
-    def _finish(self, done: _Done) -> None:
+    def _finish(self, state: _State) -> None:
         """Put the files into place; a run that is stopped here does this again."""
-        if done.rejected:
-            with self.made.open(
+        if state.rejected:
+            with self.unfinished.open(
                 "w", encoding="utf-8", errors="surrogateescape", newline=""
             ) as stream:
-                stream.writelines(kept.rejects for kept, *_ in self._kept())
-            put(self.made, self.rejects)
+                stream.writelines(state_before.rejects for state_before, *_ in self._sound_pieces())
+            put(self.unfinished, self.rejects)
         else:
             self.rejects.unlink(missing_ok=True)
-        self.output.whole(self.made, self.schema, (text for _, text, _ in self._kept() if text))
-        put(self.made, self.out)
-        write_whole(self.record, json.dumps(self._record(done), indent=1).encode())
+        self.output.whole(
+            self.unfinished, self.schema, (text for _, text, _ in self._sound_pieces() if text)
+        )
+        put(self.unfinished, self.out)
+        write_whole(self.record, json.dumps(self._record(state), indent=1).encode())
 
     def _clear(self) -> None:
-        for path in (self.made, self.log):
+        for path in (self.unfinished, self.log):
             path.unlink(missing_ok=True)
 
 

@@ -22,15 +22,15 @@ def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
 
 
 class Output(NamedTuple):
-    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``packed`` (.gz) piece by
+    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``compressed`` (.gz) piece by
     piece.
 
     ``sep`` and ``decimal`` are those of CSV; in the column ``stiffness`` infinity is written as
     ``rigid``.
     """
 
-    kind: str
-    packed: bool
+    format: str
+    compressed: bool
     sep: str
     decimal: str
     stiffness: str | None
@@ -39,12 +39,12 @@ class Output(NamedTuple):
         """A piece of text as it is in the file."""
         data = text.encode("utf-8", "surrogateescape")
         # without name and time, so that the same text gives the same bytes
-        return gzip.compress(data, 6, mtime=0) if self.packed else data
+        return gzip.compress(data, 6, mtime=0) if self.compressed else data
 
     def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes:
-        """Rows; where ``texts`` holds the records as they came in, the columns are put behind
+        """Rows as bytes; where ``texts`` has the unchanged input records, the columns stand behind
         them."""
-        if self.kind == "parquet":
+        if self.format == "parquet":
             sink = pa.BufferOutputStream()
             with pa.ipc.new_stream(sink, batch.schema) as writer:
                 writer.write_batch(batch)
@@ -54,7 +54,7 @@ class Output(NamedTuple):
             for name, column in zip(batch.schema.names, batch.columns, strict=True)
         ]
         rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
-        if self.kind == "csv":
+        if self.format == "csv":
             rows = (
                 rows
                 if texts is None
@@ -77,37 +77,39 @@ class Output(NamedTuple):
 
     def _cells(self, name: str, column: pa.Array) -> list[str | None]:
         """A column as cells of text."""
-        kind, is_json = column.type, self.kind == "ndjson"
-        if pa.types.is_dictionary(kind):
+        arrow_type, is_json = column.type, self.format == "ndjson"
+        if pa.types.is_dictionary(arrow_type):
             words = [*self._cells(name, column.dictionary), "null" if is_json else None]
             return [words[i] for i in pc.fill_null(column.indices, len(words) - 1).to_pylist()]
-        if pa.types.is_nested(kind):
+        if pa.types.is_nested(arrow_type):
             return [json.dumps(value, default=str) for value in column.to_pylist()]
         text = pc.cast(column, pa.string())
-        if pa.types.is_floating(kind):
+        if pa.types.is_floating(arrow_type):
             rigid = ('"rigid"' if is_json else "rigid") if name == self.stiffness else None
             text = pc.if_else(
                 pc.is_finite(column), text, pc.if_else(pc.is_inf(column), rigid, None)
             )
         if not is_json:
-            is_real = pa.types.is_floating(kind) or pa.types.is_decimal(kind)
+            is_real = pa.types.is_floating(arrow_type) or pa.types.is_decimal(arrow_type)
             return list(
                 (pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist()
             )
-        if pa.types.is_primitive(kind) and not pa.types.is_temporal(kind):
+        if pa.types.is_primitive(arrow_type) and not pa.types.is_temporal(arrow_type):
             return list(pc.fill_null(text, "null").to_pylist())
         return [json.dumps(cell) for cell in text.to_pylist()]
 
     def whole(self, path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
         """The file of all pieces; doubles in Parquet are written plainly, which is three times as
         fast."""
-        if self.kind != "parquet":
+        if self.format != "parquet":
             with path.open("wb") as stream:
                 stream.writelines(pieces)
             return
-        coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
+        dictionary_columns = [
+            field.name for field in schema if not pa.types.is_floating(field.type)
+        ]
         with pa.parquet.ParquetWriter(
-            path, schema, use_dictionary=coded, compression="snappy"
+            path, schema, use_dictionary=dictionary_columns, compression="snappy"
         ) as writer:
             for piece in pieces:
                 writer.write_table(pa.ipc.open_stream(piece).read_all())

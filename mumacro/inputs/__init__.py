@@ -1,1 +1,1 @@
-"""What a case is: inputs by name, unit and bound; contact and direction; an interval of k."""
+"""A case: inputs by name, unit and bound; contact and direction; an interval of k."""

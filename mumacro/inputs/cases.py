@@ -1,7 +1,7 @@
-"""Cases in their one form: six columns of numbers by name, made once from whatever was asked.
+"""Cases in their one form: six columns of numbers by name, made once from any form of inputs.
 
 Keywords, a mapping, a data frame, Arrow columns, a row of a file or of JSON become names and values
-(:func:`by_name`), and these become :class:`Cases`.  Whoever asks the kernel asks with them.  Labels
+(:func:`by_name`), and these become :class:`Cases`, which alone the kernel evaluates.  Labels
 of pandas, xarray and Dask are taken off and put back by :mod:`mumacro.frames`, between the two
 steps.
 """
@@ -31,7 +31,8 @@ from mumacro.kernel.arrays import Array, common_shape, flat
 
 
 class Absent(enum.Enum):
-    """The default of an input.  None is no such default: it is a gap, and k has none."""
+    """The default of an input.  None cannot be it: None is a gap in the data, which is refused for
+    k."""
 
     ABSENT = "left out"
 
@@ -42,7 +43,7 @@ class Absent(enum.Enum):
 ABSENT: Final = Absent.ABSENT
 #: types of one real number
 NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
+    (float, int, bool, np.bool_, *(np.dtype(code).type for code in "efdbhilqBHILQ"))
 )
 NUMBERS_AND_ARRAYS = NUMBERS | {np.ndarray}
 _UNLABELLED = NUMBERS_AND_ARRAYS | {list, tuple, type(None), dict, str}
@@ -61,7 +62,7 @@ class Cases(NamedTuple):
     shape: tuple[int, ...]
     #: lowest and highest k of an interval, each (n,)
     ends: tuple[Array, Array] | None = None
-    #: what was given as f [Hz], which reasons name in place of omega
+    #: the values of f [Hz], where the inputs had f: messages then name f in place of omega
     frequency: Any = None
 
     @classmethod
@@ -78,8 +79,8 @@ class Cases(NamedTuple):
         """
         low = high = ends = None
         if "k_low" in inputs:
-            low, high, between = middle(inputs, strict)
-            inputs = {**inputs, "k": between}
+            low, high, geometric_middle = middle(inputs, strict)
+            inputs = {**inputs, "k": geometric_middle}
         columns = columns_of(inputs, kind)
         arrays = {name: x for name, x in columns.items() if not isinstance(x, float)}
         try:
@@ -123,21 +124,8 @@ class Cases(NamedTuple):
             return error
         raise AssertionError(f"{case} has an answer")
 
-    def length_scale(self) -> Array:
-        """l0 = mu0 Fz / k [m], eq. (5), without overflow of mu0 Fz; 0 for rigid contact; (n,)."""
-        mu0, Fz, k = np.broadcast_arrays(*(self.columns[name] for name in ("mu0", "Fz", "k")))
-        with np.errstate(all="ignore"):
-            quotient = Fz / k
-            out = np.asarray(mu0 * quotient)
-            low, high = np.minimum(quotient, out), np.maximum(quotient, out)
-            odd = ~((low > 1e-290) & (high < 1e290))  # a partial result may have lost digits
-            if odd.any():
-                (a, i), (b, j), (c, n) = (np.frexp(x[odd]) for x in (mu0, Fz, k))
-                out[odd] = np.ldexp(a * (b / c), i + j - n)
-        return out
 
-
-# --- from what was asked to names and values ------------------------------------------------------
+# --- from inputs of any form to names and values --------------------------------------------------
 
 
 def by_name(cases: Any, inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, Any]:
@@ -149,30 +137,33 @@ def by_name(cases: Any, inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[
     >>> by_name({"mu0": 0.3, "note": "dry"}, {"k_range": (1e6, 2e6)})
     {'mu0': 0.3, 'k_low': 1000000.0, 'k_high': 2000000.0}
     """
-    found = dict(inputs)
+    values = dict(inputs)
     if cases is not None:
-        columns = picked("cases", cases, (*kind.columns, *ENDS))
-        if twice := columns.keys() & inputs.keys():
-            name = min(twice)
+        columns = select("cases", cases, (*kind.columns, *ENDS))
+        if duplicates := columns.keys() & inputs.keys():
+            name = min(duplicates)
             raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
-        found = {**columns, **inputs}
-    right = _AMPLITUDES[kind.normal]
-    wrong = _AMPLITUDES[not kind.normal]
-    if wrong in found:
-        told = f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is {right}"
-        raise InputError(wrong, found[wrong], told)
-    if not found.keys().isdisjoint(("k_range", *ENDS)):
-        found = as_ends(found)
-    for name, value in found.items():
+        values = {**columns, **inputs}
+    own_amplitude = _AMPLITUDES[kind.normal]
+    wrong_amplitude = _AMPLITUDES[not kind.normal]
+    if wrong_amplitude in values:
+        bound = (
+            f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is "
+            f"{own_amplitude}"
+        )
+        raise InputError(wrong_amplitude, values[wrong_amplitude], bound)
+    if not values.keys().isdisjoint(("k_range", *ENDS)):
+        values = as_ends(values)
+    for name, value in values.items():
         if type(value) not in _UNLABELLED and not library_of(value) and _of_arrow(value):
-            found[name] = np.asarray(value)  # NaN where it is null
-    return found
+            values[name] = np.asarray(value)  # NaN where it is null
+    return values
 
 
-def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
+def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
     """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset
     has."""
-    # such as a reader of batches
+    # a stream of batches has no columns by name
     if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):
         # its columns come from one reading: a second one may have another order
         import pyarrow as pa
@@ -181,17 +172,17 @@ def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
     try:
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars
         # have lists of names
-        there = (
+        present = (
             cases
             if hasattr(cases, "keys")
             else getattr(cases, "column_names", None) or cases.columns
         )
-        return {name: cases[name] for name in names if name in there}
+        return {name: cases[name] for name in names if name in present}
     except (AttributeError, TypeError, KeyError) as error:
-        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
+        type_name = f"{type(cases).__module__}.{type(cases).__qualname__}"
         raise InputError(
             argument,
-            kind,
+            type_name,
             "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
             "give anything else as {name: array}, what is lazy after its collect() or read_all()",
         ) from error
@@ -199,8 +190,8 @@ def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
 
 def _of_arrow(value: Any) -> bool:
     """Whether a column comes from Arrow, Polars or another library with Arrow's interface."""
-    kind = type(value)
-    return hasattr(kind, "__arrow_c_stream__") or hasattr(kind, "__arrow_c_array__")
+    value_type = type(value)
+    return hasattr(value_type, "__arrow_c_stream__") or hasattr(value_type, "__arrow_c_array__")
 
 
 def library_of(value: Any) -> str:
@@ -209,28 +200,28 @@ def library_of(value: Any) -> str:
     return name if name in ("pandas", "xarray", "dask") else ""
 
 
-def labelled(cases: Any, inputs: Mapping[str, Any]) -> bool:
-    """Whether there are labels to give back."""
+def has_labels(cases: Any, inputs: Mapping[str, Any]) -> bool:
+    """Whether the answer is labelled, since an input is."""
     values = (cases, *inputs.values())
     return not _UNLABELLED.issuperset(map(type, values)) and any(map(library_of, values))
 
 
-def other_five(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
+def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
     """The inputs of one case beside the unknown or swept one, by the names of ``kind.fields``; an
     infinite ``k`` is rigid.
 
-    ``f`` may stand for ``omega``, what is None is left out.  InputError where one of the five is
-    missing, is not one legal number, or the unknown is there, too.
+    ``f`` may stand for ``omega``; inputs that are None are left out.  InputError where one of the
+    five is missing or is not one legal number, and where the unknown has a value.
     """
     if unknown not in kind.fields:
         raise InputError("unknown", unknown, f"one of {', '.join(kind.fields)}")
     for name in ("k_range", *ENDS):
         if case.get(name) is not None:
-            told = (
+            bound = (
                 "left out: over an interval of k a target has an interval of roots; solve for "
                 "both ends of it"
             )
-            raise InputError(name, case[name], told)
+            raise InputError(name, case[name], bound)
     for name in case.keys() - {*kind.columns, *_AMPLITUDES, "k_range", *ENDS}:
         bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
         raise InputError(name, case[name], bound)
@@ -252,27 +243,30 @@ def other_five(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> di
 
 
 def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Inputs with ``k_low`` and ``k_high`` for ``k_range``; InputError for k beside it, half an
-    interval, or what is no pair."""
-    found = dict(inputs)
-    if "k_range" in found:
-        if beside := [name for name in ("k", *ENDS) if name in found]:
-            raise InputError(beside[0], found[beside[0]], "left out beside k_range")
-        pair = found.pop("k_range")
+    """Inputs with ``k_low`` and ``k_high`` for ``k_range``; InputError for k beside it, for one end
+    without the other, and where it is no pair."""
+    values = dict(inputs)
+    if "k_range" in values:
+        if conflicting := [name for name in ("k", *ENDS) if name in values]:
+            raise InputError(conflicting[0], values[conflicting[0]], "left out beside k_range")
+        pair = values.pop("k_range")
         try:
-            found["k_low"], found["k_high"] = pair
+            values["k_low"], values["k_high"] = pair
         except (TypeError, ValueError) as error:
             raise InputError("k_range", pair, BOUND) from error
-    if missing := [name for name in ENDS if name not in found]:
+    if missing := [name for name in ENDS if name not in values]:
         raise InputError(missing[0], None, "given [N/m] beside the other end of the interval")
-    if "k" in found:
-        raise InputError("k", found["k"], "left out beside an interval of it")
-    return found
+    if "k" in values:
+        raise InputError("k", values["k"], "left out beside an interval of it")
+    return values
 
 
 def middle(inputs: Mapping[str, Any], strict: bool = False) -> tuple[Array, Array, Array]:
-    """Both ends of an interval, and its geometric middle: NaN for what is none, or InputError where
-    ``strict`` and for one alone."""
+    """Both ends of an interval, and its geometric middle.
+
+    The middle of an illegal interval is NaN; InputError where ``strict``, and for one interval
+    alone.
+    """
     low, high = (real(name, inputs[name]) for name in ENDS)
     try:
         shape = common_shape((low, high))
@@ -285,25 +279,27 @@ def middle(inputs: Mapping[str, Any], strict: bool = False) -> tuple[Array, Arra
         i = int(np.flatnonzero(~legal)[0])
         ends = tuple(float(np.broadcast_to(end, shape).flat[i]) for end in (low, high))
         raise InputError("k_range", ends, BOUND, i if shape else None)
-    least, most = (np.where(legal, end, np.nan) for end in (low, high))
-    return low, high, np.asarray(np.clip(np.sqrt(least) * np.sqrt(most), least, most))
+    lower, upper = (np.where(legal, end, np.nan) for end in (low, high))
+    return low, high, np.asarray(np.clip(np.sqrt(lower) * np.sqrt(upper), lower, upper))
 
 
 def without_interval(
     case: Mapping[str, Any], along: str = ""
 ) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """A case with the middle stiffness, and the ends of an interval of it, if any; there is none
-    where k is swept."""
+    """A case with the middle of an interval of k, and the two ends; no ends where it has one k.
+
+    InputError for an interval where k itself is swept.
+    """
     if all(case.get(name) is None for name in ("k_range", *ENDS)):
         return case, {}
-    found = as_ends(case)
+    values = as_ends(case)
     if along == "k":
         raise InputError(
-            "k_range", (found["k_low"], found["k_high"]), "left out where k is the swept input"
+            "k_range", (values["k_low"], values["k_high"]), "left out where k is the swept input"
         )
-    between = middle(found, strict=True)[2]
-    ends = {name: found.pop(name) for name in ENDS}
-    return {**found, "k": between}, ends
+    geometric_middle = middle(values, strict=True)[2]
+    ends = {name: values.pop(name) for name in ENDS}
+    return {**values, "k": geometric_middle}, ends
 
 
 # --- from values to numbers -----------------------------------------------------------------------
@@ -322,24 +318,24 @@ def columns_of(inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
         if type(value) is not float:
             value = _column(source, value)
         if source == "f":
-            with np.errstate(over="ignore"):  # infinite, which is refused as a value of f
+            with np.errstate(over="ignore"):  # an infinite omega, refused as a value of f
                 value = value * RAD_PER_CYCLE
         columns[name] = value
     return columns
 
 
 def _frequency_in(inputs: Mapping[str, Any]) -> str:
-    """Which of omega and f there is."""
-    both = inputs.get("omega") is not None
-    if both == (inputs.get("f") is not None):
-        told = "not both" if both else "one of them"
-        raise InputError("omega", inputs.get("omega"), f"given or f [Hz] in its place, {told}")
-    return "omega" if both else "f"
+    """Which of omega and f the inputs have."""
+    has_omega = inputs.get("omega") is not None
+    if has_omega == (inputs.get("f") is not None):
+        choice = "not both" if has_omega else "one of them"
+        raise InputError("omega", inputs.get("omega"), f"given or f [Hz] in its place, {choice}")
+    return "omega" if has_omega else "f"
 
 
 def _column(name: str, value: Any) -> float | Array:
     """A value of the input ``name`` as one number or an array of float64; InputError with the
-    remedy where it is none."""
+    remedy where it has no real numbers."""
     if type(value) is np.ndarray and value.dtype == _FLOAT:
         return value if value.ndim else float(value)
     if value is ABSENT or (name == AMPLITUDE and value is None):
@@ -365,8 +361,8 @@ def _column(name: str, value: Any) -> float | Array:
 
 
 def _stiffness(value: Any) -> Array:
-    """A stiffness, or an array of them, which may say ``rigid``; InputError with the remedy for a
-    gap."""
+    """A stiffness, or an array of them, with the word ``rigid`` allowed; InputError with the remedy
+    for a gap."""
     try:
         return real("k", _rigid_as_infinity(value))
     except InputError as error:
@@ -383,8 +379,8 @@ def _rigid_as_infinity(value: Any) -> Any:
         return value
     try:
         texts = np.asarray(value, dtype=object)
-        read = [math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]
-        return np.array(read).reshape(texts.shape)
+        values = [math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]
+        return np.array(values).reshape(texts.shape)
     except ValueError:  # lists of several lengths
         return value
 
@@ -393,7 +389,7 @@ def real(name: str, value: Any) -> Array:
     """``value`` as float64; complex numbers, times, text and None are refused, also where numpy
     would convert them.
 
-    What is masked is unknown: NaN.
+    Masked entries are NaN.
     """
     try:
         if isinstance(value, np.ma.MaskedArray):
@@ -417,31 +413,31 @@ def real(name: str, value: Any) -> Array:
 def check(
     columns: Mapping[str, float | Array], frequency: Any = None, shape: tuple[int, ...] = ()
 ) -> None:
-    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in
-    place of omega, ``shape`` what the columns broadcast to, for the index of the case."""
+    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` has the values of ``f`` where
+    it replaced omega, ``shape`` is that of all cases, for the index of the case."""
     for name, values in columns.items():
         legal = np.greater(values, 0.0) if name in POSITIVE else np.greater_equal(values, 0.0)
-        bad = ~(legal if name == "k" else legal & np.isfinite(values))
-        if bad.any():
-            field, given = name, values
+        illegal = ~(legal if name == "k" else legal & np.isfinite(values))
+        if illegal.any():
+            field, column = name, values
             if name == "omega" and frequency is not None:
-                field, given = "f", real("f", frequency)
-            value = float(np.ravel(given)[np.flatnonzero(bad)[0]])
+                field, column = "f", real("f", frequency)
+            value = float(np.ravel(column)[np.flatnonzero(illegal)[0]])
             bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
             bound = STIFFNESS if field == "k" and math.isnan(value) else bound
             bound = LIFTS_OFF if field == AMPLITUDE else bound
-            raise InputError(field, value, bound, _first_case(bad, shape))
+            raise InputError(field, value, bound, _first_case(illegal, shape))
     if AMPLITUDE in columns and "Fz" in columns:
-        bad = ~np.less(columns[AMPLITUDE], columns["Fz"])
-        if bad.any():
-            amplitude = np.broadcast_to(columns[AMPLITUDE], bad.shape)
-            value = float(amplitude.flat[np.flatnonzero(bad)[0]])
-            raise InputError(AMPLITUDE, value, LIFTS_OFF, _first_case(bad, shape))
+        illegal = ~np.less(columns[AMPLITUDE], columns["Fz"])
+        if illegal.any():
+            amplitude = np.broadcast_to(columns[AMPLITUDE], illegal.shape)
+            value = float(amplitude.flat[np.flatnonzero(illegal)[0]])
+            raise InputError(AMPLITUDE, value, LIFTS_OFF, _first_case(illegal, shape))
 
 
-def _first_case(bad: Any, shape: tuple[int, ...]) -> int | None:
-    """The first case that a column spoils; None for a value alone, which spoils all of them."""
-    if not bad.ndim:
+def _first_case(illegal: Any, shape: tuple[int, ...]) -> int | None:
+    """The first case with an illegal value; None for one value that is in all cases."""
+    if not illegal.ndim:
         return None
-    cases = np.flatnonzero(np.broadcast_to(bad, shape or bad.shape))
+    cases = np.flatnonzero(np.broadcast_to(illegal, shape or illegal.shape))
     return int(cases[0]) if cases.size else 0

@@ -1,9 +1,8 @@
-"""The six inputs of a case: names, units, bounds, and what may stand for them.  The one truth of a
-case.
+"""The six inputs of a case: names, units, bounds, and the inputs in their place.
 
 The library, the files, the command line, the service and the exports take their fields from here.
 A frequency ``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one
-of them.  The stiffness ``k`` is always said: a positive number, or rigid contact by the word
+of them.  The stiffness ``k`` has no default: it is a positive number, or rigid contact by the word
 ``rigid`` or by infinity.
 
 **A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column
@@ -13,7 +12,7 @@ of them.  The stiffness ``k`` is always said: a positive number, or rigid contac
 import math
 import sys
 
-#: names that may be given, and the SI unit in words, for errors such as "give metres"
+#: names of inputs, and the SI unit in words, for errors such as "give metres"
 SI = {
     "mu0": ("-", "a plain number"),
     "Fz": ("N", "newtons"),
@@ -23,8 +22,8 @@ SI = {
     "f": ("Hz", "hertz"),
     "v0": ("m/s", "metres per second"),
 }
-#: what may stand for an input, and the input that has its unit: the amplitude of the normal force,
-#: the ends of k
+#: inputs in place of another one -> the input whose unit they have: the amplitude of the normal
+#: force, the ends of k
 LIKE = {"Fz_amplitude": "Fz", "k_low": "k", "k_high": "k"}
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
@@ -38,7 +37,7 @@ BOUNDS = {
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
 RIGID = "rigid"  # the word for a stiffness without bound
 GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
-#: what a stiffness must be, told by :class:`InputError`
+#: what a stiffness must be, in messages of :class:`InputError`
 STIFFNESS = 'a number > 0 [N/m], or for a rigid contact "rigid" or math.inf'
 MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
 
@@ -53,7 +52,7 @@ def is_rigid(text: str) -> bool:
 
 
 def unit_of(name: str) -> str:
-    """The SI unit of an input, or of what may stand for one.
+    """The SI unit of an input, or of one in its place.
 
     >>> unit_of("k_low"), unit_of("f")
     ('N/m', 'Hz')
@@ -62,7 +61,7 @@ def unit_of(name: str) -> str:
 
 
 def field_of(name: str) -> tuple[str, float]:
-    """The field behind the name of an input, and what one unit of the name is of it.
+    """The field behind the name of an input, and its value for one unit of the name.
 
     >>> field_of("f"), field_of("y0")
     (('omega', 6.283185307179586), ('y0', 1.0))

@@ -1,5 +1,4 @@
-"""The contact and the direction of the oscillation: what a case may be beside one spring that is
-shaken across.
+"""The contact and the direction of the oscillation; one spring, shaken across, is the default.
 
 ``contact="ball"`` is a sphere on a flat, Hertz under a constant load, as independent springs
 (method of dimensionality reduction): mu~(v~, y~) = (3/2) int_0^1 s mu~_spring(v~/(1.5 s), y~/(1.5
@@ -49,13 +48,15 @@ class Kind(NamedTuple):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """What a table of cases may hold."""
+        """Names of columns that a table of cases may have."""
         return (*self.fields, "f")
 
 
 SPRING, BALL = Kind(0, 0), Kind(1, 0)  # across
 _KINDS: dict[tuple[str, str], Kind] = {
-    (word, way): Kind(i, j) for i, word in enumerate(CONTACTS) for j, way in enumerate(DIRECTIONS)
+    (contact, direction): Kind(i, j)
+    for i, contact in enumerate(CONTACTS)
+    for j, direction in enumerate(DIRECTIONS)
 }
 del _KINDS["ball", "normal"]
 
@@ -71,14 +72,14 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
         return _KINDS[contact, direction]
     except (KeyError, TypeError):
         pass  # the reason follows
-    for name, value, known in (
+    for name, value, names in (
         ("contact", contact, CONTACTS),
         ("direction", direction, DIRECTIONS),
     ):
-        if not isinstance(value, str) or value not in known:
-            raise InputError(name, value, f"one of {', '.join(known)}")
-    told = (
+        if not isinstance(value, str) or value not in names:
+            raise InputError(name, value, f"one of {', '.join(names)}")
+    bound = (
         "across or along for a ball: a normal force that oscillates changes its contact "
         "radius, not modelled"
     )
-    raise InputError("direction", direction, told)
+    raise InputError("direction", direction, bound)

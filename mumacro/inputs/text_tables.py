@@ -17,7 +17,7 @@ from mumacro.inputs.units import (
     suggestion,
 )
 
-#: what may stand between the cells of CSV, by the word for it
+#: separators of the cells of CSV, by name
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"
 NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
@@ -27,34 +27,34 @@ _SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 def _advice(
     header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]
 ) -> str | None:
-    """The options to give, where a file is not as they say; None where it is."""
-    found, sign = _recognised(header, rows, sep, decimal, more)
-    if (found, sign) == (sep, decimal):
+    """The options to give where a file has another separator or decimal sign; else None."""
+    separator, sign = _detect(header, rows, sep, decimal, more)
+    if (separator, sign) == (sep, decimal):
         return None
-    word = next(word for word, known in SEPARATORS.items() if known == found)
-    told = f"the columns are separated by {word!r} and the decimal sign is {sign!r}"
-    return f"{told}: give --sep '{word}' --decimal '{sign}'"
+    word = next(word for word, character in SEPARATORS.items() if character == separator)
+    finding = f"the columns are separated by {word!r} and the decimal sign is {sign!r}"
+    return f"{finding}: give --sep '{word}' --decimal '{sign}'"
 
 
-def _recognised(
+def _detect(
     header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]
 ) -> tuple[str, str]:
     """The separator that gives most names of inputs or ``more``, and the decimal sign of most
-    numbers; or as given."""
+    numbers; at a tie those of the options."""
 
-    def inputs(given: str) -> list[int]:
-        names = [split_unit(name)[0] for name in header.replace('"', "").split(given)]
+    def inputs(separator: str) -> list[int]:
+        names = [split_unit(name)[0] for name in header.replace('"', "").split(separator)]
         return [
             i for i, name in enumerate(names) if name in more or suggestion(name, loosely=False)
         ]
 
     best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
-    places = inputs(best)
+    input_columns = inputs(best)
     cells = [
         cell.strip()
         for row in csv.reader(rows, delimiter=best)
         for i, cell in enumerate(row)
-        if i in places
+        if i in input_columns
     ]
 
     def cells_with(sign: str) -> int:
@@ -81,8 +81,8 @@ def read_text(data: bytes, where: str) -> str:
 def read_head(
     line: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str] = ()
 ) -> list[str]:
-    """The names in the first line of CSV; ValueError where it is none, or the ``rows`` behind it
-    ask for other options.
+    """The names in the first line of CSV; ValueError where it is no header, or the ``rows``
+    behind it need other options.
 
     ``more`` are names of columns that are no inputs.
 
@@ -105,7 +105,7 @@ def read_head(
 def find_heads(
     heads: Sequence[str], like: Mapping[str, str]
 ) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
-    """Where the columns are, what one unit of each is, and what is wrong with the heads.
+    """The place and unit of each column by name, and the faults of the heads.
 
     ``like`` has the names of the columns, and for each the input whose units it has; other columns
     are left out.
@@ -113,7 +113,7 @@ def find_heads(
     >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
     ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
     """
-    places: dict[str, tuple[int, Scale]] = {}
+    columns: dict[str, tuple[int, Scale]] = {}
     faults = []
     for i, head in enumerate(heads):
         name, unit = split_unit(head)
@@ -124,51 +124,52 @@ def find_heads(
             hint = (
                 "; a frequency is f [Hz]" if name == "omega" and scale_of("f", unit or "") else ""
             )
-            known = ", ".join(sorted(UNITS_OF[like[name]]))
+            units = ", ".join(sorted(UNITS_OF[like[name]]))
             faults.append(
-                f"the column {head!r} has a unit that {name} cannot have{hint}; known are {known}"
+                f"the column {head!r} has a unit that {name} cannot have{hint}; known are {units}"
             )
-        if name in places:
+        if name in columns:
             faults.append(
-                f"{name} is there twice: {heads[places[name][0]]!r} and {head!r}; rename one"
+                f"{name} is there twice: {heads[columns[name][0]]!r} and {head!r}; rename one"
             )
-        places[name] = i, scale or Scale()
-    if {"f", "omega"} <= places.keys():
+        columns[name] = i, scale or Scale()
+    if {"f", "omega"} <= columns.keys():
         faults.append("there are both f [Hz] and omega [rad/s]; leave one out")
-    return places, faults
+    return columns, faults
 
 
 def meant_by(head: str, *, loosely: bool = True) -> str | None:
-    """The input that a head is taken for, as a whole or by its first word: ``k_N_per_mm`` for k."""
+    """The input that a head probably stands for, as a whole or by its first word: k for
+    ``k_N_per_mm``."""
     name = split_unit(head)[0]
     first = re.split(r"[\W_]+", name.strip("_ "))[0]
     return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
 
 
 def absent(name: str, heads: Sequence[str]) -> str:
-    """What to do about a column that is not there.
+    """What to do about a column that is missing.
 
     >>> absent("v0", ["speed", "mu_macro"])
     "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
     brackets)"
     """
     for head in heads:
-        meant = meant_by(head)
-        if meant and meant in (name, {"omega": "f"}.get(name)):
+        field = meant_by(head)
+        if field and field in (name, {"omega": "f"}.get(name)):
             remedy = (
-                f"rename that column to {meant} [{unit_of(meant)}] (or another unit in brackets)"
+                f"rename that column to {field} [{unit_of(field)}] (or another unit in brackets)"
             )
             return f"there is no column {name}; {head!r} is similar: {remedy}"
     unit = f"{name} [{unit_of(name) if name in (*UNITS_OF, *LIKE) else '-'}]"
-    told = f"{unit} or f [Hz]" if name == "omega" else unit
-    return f"there is no column {told}; there are {', '.join(map(repr, heads))}"
+    heading = f"{unit} or f [Hz]" if name == "omega" else unit
+    return f"there is no column {heading}; there are {', '.join(map(repr, heads))}"
 
 
 def read_cell(name: str, cell: str, decimal: str = ".") -> float:
     """The number in a cell of the column ``name``: NaN where it is empty, infinity for the word
     rigid in k.
 
-    With a decimal comma 1.5 is refused: it may be meant for 1500.  ValueError says what is wrong.
+    With a decimal comma 1.5 is refused: it may stand for 1500.  ValueError says what is wrong.
 
     >>> read_cell("v0", " 0,5 ", ","), read_cell("k", "Rigid"), read_cell("k", "")
     (0.5, inf, nan)
@@ -180,9 +181,9 @@ def read_cell(name: str, cell: str, decimal: str = ".") -> float:
         return math.inf
     plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
     if not PLAIN.fullmatch(plain):
-        told = decimal == "." or (name == "k" and ".." in text)
+        has_hint = decimal == "." or (name == "k" and ".." in text)
         raise ValueError(
-            number_hint(name, text) if told else f"must be a number such as 0{decimal}5"
+            number_hint(name, text) if has_hint else f"must be a number such as 0{decimal}5"
         )
     value = float(plain)
     # too many digits must not pass for an infinite stiffness

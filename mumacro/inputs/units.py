@@ -1,4 +1,4 @@
-"""Numbers and units as text: what a person writes, read in SI; and what was probably meant."""
+"""Numbers and units as text, read in SI; and hints for a text that cannot be read."""
 
 import difflib
 import math
@@ -74,9 +74,9 @@ UNITS_OF: dict[str, dict[str, Scale]] = {
     },
 }
 
-# Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a
-# file that has one of them while the input itself is missing is refused.
-_OTHER_NAMES = {
+# Lower case, without spaces and punctuation.  Only names that hardly mean anything else, since a
+# file whose column has one of them while the input itself is missing is refused.
+_SYNONYMS = {
     "mu": "mu0",
     "mus": "mu0",
     "muk": "mu0",
@@ -122,7 +122,7 @@ _OTHER_NAMES = {
     "slidingspeed": "v0",
     "slidingvelocity": "v0",
 }
-_OTHER_NAMES |= {name.lower(): name for name in NAMES}
+_SYNONYMS |= {name.lower(): name for name in NAMES}
 
 _IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -139,14 +139,14 @@ def split_unit(column: str) -> tuple[str, str | None]:
     >>> split_unit("k [N/mm]"), split_unit("v0")
     (('k', 'N/mm'), ('v0', None))
     """
-    found = _IN_BRACKETS.fullmatch(column)
-    if found is None:
+    match = _IN_BRACKETS.fullmatch(column)
+    if match is None:
         return column.strip(), None
-    return found[1], found[2] if found[2] is not None else found[3]
+    return match[1], match[2] if match[2] is not None else match[3]
 
 
 def scale_of(name: str, unit: str) -> Scale | None:
-    """What one ``unit`` of the input ``name`` is in SI; None for a unit that is not in the table.
+    """The scale of a ``unit`` of the input ``name``; None for a unit that is not in the table.
 
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
@@ -159,8 +159,8 @@ def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:
 
 
 def suggestion(name: str, *, loosely: bool = True) -> str | None:
-    """The input that ``name`` is taken for, in another case, by another name or (``loosely``)
-    misspelt; None for none.
+    """The input that ``name`` probably stands for, in another case, by another name or
+    (``loosely``) misspelt; else None.
 
     >>> [suggestion(name) for name in ("FZ", "F", "stiffness", "omga", "temperature")]
     ['Fz', 'Fz', 'k', 'omega', None]
@@ -168,25 +168,25 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
     if name.strip() == "F":  # a force; without case it would be the frequency f
         return "Fz"
     plain = re.sub(r"[\s_.\-~^*{}$\\]", "", name).lower()
-    if plain in _OTHER_NAMES:
-        return _OTHER_NAMES[plain]
+    if plain in _SYNONYMS:
+        return _SYNONYMS[plain]
     if loosely and len(plain) > 1:
-        near = difflib.get_close_matches(plain, _OTHER_NAMES, n=1, cutoff=0.75)
-        return _OTHER_NAMES[near[0]] if near else None
+        matches = difflib.get_close_matches(plain, _SYNONYMS, n=1, cutoff=0.75)
+        return _SYNONYMS[matches[0]] if matches else None
     return None
 
 
-def unknown_name(name: str, known: Iterable[str]) -> str:
-    """Why an unknown name is refused, with the known name that was probably meant.
+def unknown_name(name: str, allowed: Iterable[str]) -> str:
+    """Why an unknown name is refused, with the most similar one of those allowed.
 
     >>> unknown_name("omga", ("omega", "f"))
     'unknown field; did you mean omega? allowed: omega, f'
     """
-    names = list(known)
-    meant = suggestion(name[:80], loosely=False)
-    if meant not in names:
-        meant = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)
-    advice = f"did you mean {meant}? " if meant else ""
+    names = list(allowed)
+    nearest = suggestion(name[:80], loosely=False)
+    if nearest not in names:
+        nearest = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)
+    advice = f"did you mean {nearest}? " if nearest else ""
     return f"unknown field; {advice}allowed: {', '.join(names)}"
 
 
@@ -217,14 +217,14 @@ def number_hint(name: str, value: object) -> str:
             "must be a number, or rigid; an interval is k_range in JSON, columns k_low and "
             "k_high in a file"
         )
-    found = _WITH_UNIT.fullmatch(text)
-    if found is None:
+    match = _WITH_UNIT.fullmatch(text)
+    if match is None:
         return "must be a number, or rigid" if name == "k" else "must be a number"
     like = LIKE.get(name, name if name in SI else "mu0")  # another number is a plain one, too
-    words, scale = SI[like][1], scale_of(like, found[2])
+    words, scale = SI[like][1], scale_of(like, match[2])
     if scale is None:
         return f"must be a number without a unit: give {words}"
-    return f"must be a number: give {words}, {scale.si(float(found[1])):.12g}"
+    return f"must be a number: give {words}, {scale.si(float(match[1])):.12g}"
 
 
 def read_number(name: str, text: str) -> float:
@@ -246,8 +246,8 @@ def read_number(name: str, text: str) -> float:
 def read_quantity(
     name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False
 ) -> float:
-    """As :func:`read_number`, of any quantity: what it is in ``words``, its ``units``, whether it
-    may be ``rigid``."""
+    """As :func:`read_number`, of any quantity: ``words`` for its SI unit, its ``units``, whether
+    it may be ``rigid``."""
     text = text.strip()
     if rigid and is_rigid(text):
         return math.inf
@@ -259,36 +259,38 @@ def read_quantity(
         return scale.si(float(with_unit[1]))
     if PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
-    if meant := _meant(name, text, units):
-        raise ValueError(f"{name}={text}: {meant}")
-    known = ", ".join([unit for unit in units if unit][:4])
-    hint = ", or rigid" if rigid else ""
+    if hint := _hint(name, text, units):
+        raise ValueError(f"{name}={text}: {hint}")
+    examples = ", ".join([unit for unit in units if unit][:4])
+    or_rigid = ", or rigid" if rigid else ""
     raise ValueError(
-        f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {known}, "
-        f"...{hint}"
+        f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {examples}, "
+        f"...{or_rigid}"
     )
 
 
-def _meant(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
-    """What was probably meant by a text that is no quantity: an interval, a unit in other case, f
-    for omega.
+def _hint(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
+    """A hint for a text that is no quantity: how an interval is written, a unit in another case, f
+    in place of omega.
 
-    >>> _meant("k", "0.8-1.2N/um", UNITS_OF["k"]), _meant("omega", "20kHz", UNITS_OF["omega"])
+    >>> _hint("k", "0.8-1.2N/um", UNITS_OF["k"]), _hint("omega", "20kHz", UNITS_OF["omega"])
     ('write an interval as k=0.8..1.2N/um', 'did you mean f=20kHz? omega is in rad/s')
     """
     if name == "k" and (ends := _DASHED.fullmatch(text)):
         return f"write an interval as k={ends[1]}..{ends[2]}{ends[3] or ''}"
-    if not (found := _WITH_UNIT.fullmatch(text)):
+    if not (match := _WITH_UNIT.fullmatch(text)):
         return None
-    number, unit = found[1], found[2].replace(" ", "")
-    near = [known for known in units if known.lower() == unit.lower()]
-    other = {"omega": "f", "f": "omega"}.get(name)
-    if near:
-        return f"did you mean {' or '.join(f'{number}{known}' for known in near)}?"
-    if other and (
-        there := next((known for known in UNITS_OF[other] if known.lower() == unit.lower()), None)
+    number, unit = match[1], match[2].replace(" ", "")
+    symbols = [symbol for symbol in units if symbol.lower() == unit.lower()]
+    partner = {"omega": "f", "f": "omega"}.get(name)
+    if symbols:
+        return f"did you mean {' or '.join(f'{number}{symbol}' for symbol in symbols)}?"
+    if partner and (
+        partner_unit := next(
+            (symbol for symbol in UNITS_OF[partner] if symbol.lower() == unit.lower()), None
+        )
     ):
-        return f"did you mean {other}={number}{there}? {name} is in {SI[name][0]}"
+        return f"did you mean {partner}={number}{partner_unit}? {name} is in {SI[name][0]}"
     return None
 
 
@@ -301,8 +303,8 @@ def read_range(name: str, text: str) -> tuple[float, float]:
     """
     low, _, high = text.partition("..")
     plain = [PLAIN.fullmatch(end.strip()) for end in (low, high)]  # 1.2e6 is not 1.2 of a unit e6
-    if plain[0] and not plain[1] and (found := _WITH_UNIT.fullmatch(high.strip())):
-        low = f"{low} {found[2]}"
+    if plain[0] and not plain[1] and (match := _WITH_UNIT.fullmatch(high.strip())):
+        low = f"{low} {match[2]}"
     ends = read_number(name, low), read_number(name, high)
     if not 0.0 < ends[0] < ends[1] < math.inf:
         raise ValueError(f"{name}={text}: the ends of a range must be > 0, finite and ascending")

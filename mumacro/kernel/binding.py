@@ -9,7 +9,7 @@ every instruction level of the processor; the best one is used, and those with f
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from cffi import FFI
@@ -19,6 +19,8 @@ from mumacro.kernel.arrays import Array, Codes
 #: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
 BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 
+MOST_STEPS = 200_000  # of a period of a motion
+
 _HERE = Path(__file__).resolve().parent.parent
 _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
 _DECLARED = "".join(
@@ -26,29 +28,152 @@ _DECLARED = "".join(
 )
 _FFI = FFI()
 _FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
-_NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"))
+_NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "mumacro_case *"))
 _POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
-_SIX, _STRIDES, _COLUMNS = map(_FFI.typeof, ("double[6]", "int64_t[6]", "double *[6]"))
+_COLUMNS = _FFI.typeof("mumacro_columns *")
 _NOTHING: Any = _FFI.NULL
-_new, _unpack = _FFI.new, _FFI.unpack
+_new = _FFI.new
 
 
 def _numbers(array: Array | None) -> Any:
     return _NOTHING if array is None else _FFI.from_buffer(_NUMBERS, array)
 
 
-def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, Any, list[Any]]:
-    """Six columns, (n,) or one number, as pointers with their strides, and what these point to."""
-    constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
-    kept = [constants]
+def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
+    """How many harmonics x, y and the normal force have, and all of them."""
+    joined = [float(order) for part in orders for order in part]
+    return _new("int32_t[3]", [len(part) for part in orders]), _new("double[]", joined or [0.0])
+
+
+def _out(rows: Sequence[Array], start: int) -> tuple[Any, int]:
+    """Where the kernel writes rows of one array from column ``start`` on, and their stride."""
+    whole = np.asarray(rows[0].base)
+    return _numbers(whole.reshape(-1)[start:]), whole.shape[1]
+
+
+def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, list[Any]]:
+    """Six columns, (n,) or one number, as a ``mumacro_columns``, and what it points to."""
+    of_kernel, kept = _new(_COLUMNS), []
+    arrays, constants = of_kernel.array, of_kernel.constant
     for i, column in enumerate(columns):
         if isinstance(column, float):
             constants[i] = column
-            pointers[i] = constants + i
         else:
-            pointers[i], strides[i] = pointer, _ = _numbers(column), 1
+            arrays[i] = pointer = _numbers(column)
             kept.append(pointer)
-    return pointers, strides, kept
+    return of_kernel, kept
+
+
+_ROW = _FFI.typeof("enum mumacro_row").relements
+_SLOPE_ROWS = _FFI.typeof("enum mumacro_slope_row").relements["MU_SLOPE_ROWS"]
+_EXTREME_ROWS = _FFI.typeof("enum mumacro_extreme_row").relements["MU_EXTREME_ROWS"]
+#: how much of an answer is wanted, and the first row that is not filled then
+Detail = Literal["values", "groups", "gradient"]
+_END: dict[Detail, int] = {
+    "values": _ROW["MU_ROW_V_TILDE"],
+    "groups": _ROW["MU_ROW_GRADIENT"],
+    "gradient": _ROW["MU_ROWS"],
+}
+
+
+class CaseRows:
+    """Answers to n cases, which :meth:`Kernel.cases` fills in, by the names of ``mumacro_row``.
+
+    ``v_tilde``, ``y_tilde`` and ``length_scale`` are there from the detail "groups" on,
+    ``gradient`` and ``gradient_bound``, six rows each, for "gradient".  ``source`` holds codes, -1
+    for an illegal case, whose numbers are NaN.
+    """
+
+    __slots__ = ("numbers", "source")
+
+    def __init__(self, numbers: Array, source: Codes) -> None:
+        self.numbers, self.source = numbers, source
+
+    @classmethod
+    def empty(cls, n: int, detail: Detail = "values") -> Self:
+        """Room for n answers, (n,) each."""
+        return cls(np.empty((_END[detail], n)), np.empty(n, np.int8))
+
+    def reshaped(self, shape: tuple[int, ...]) -> Self:
+        """The same answers, in another shape."""
+        if shape == self.source.shape:
+            return self
+        rows = self.numbers.reshape(len(self.numbers), *shape)
+        return type(self)(rows, self.source.reshape(shape))
+
+    @property
+    def mu_macro(self) -> Array:
+        """Friction coefficient [-]."""
+        return self._row("MU_ROW_MU_MACRO")
+
+    @property
+    def mu_ratio(self) -> Array:
+        """mu_macro / mu0 [-]."""
+        return self._row("MU_ROW_MU_RATIO")
+
+    @property
+    def error_bound(self) -> Array:
+        """Bound of the absolute error of mu_macro [-]."""
+        return self._row("MU_ROW_ERROR_BOUND")
+
+    @property
+    def v_tilde(self) -> Array:
+        """Dimensionless speed [-]."""
+        return self._row("MU_ROW_V_TILDE")
+
+    @property
+    def y_tilde(self) -> Array:
+        """Dimensionless amplitude [-]."""
+        return self._row("MU_ROW_Y_TILDE")
+
+    @property
+    def length_scale(self) -> Array:
+        """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact."""
+        return self._row("MU_ROW_LENGTH_SCALE")
+
+    @property
+    def gradient(self) -> Array:
+        """d mu_macro / d input, (6, n)."""
+        return self.numbers[_ROW["MU_ROW_GRADIENT"] : _ROW["MU_ROW_GRADIENT_BOUND"]]
+
+    @property
+    def gradient_bound(self) -> Array:
+        """Bounds of the absolute errors of :attr:`gradient`, (6, n)."""
+        return self.numbers[_ROW["MU_ROW_GRADIENT_BOUND"] : _ROW["MU_ROWS"]]
+
+    def _row(self, name: str) -> Array:
+        row: Array = self.numbers[_ROW[name]]
+        return row
+
+
+class SlopeRows(NamedTuple):
+    """A quantity, its slopes v~ d/d v~ and y~ d/d y~, and the bounds of these two, (n,) each, in
+    the order of ``mumacro_slope_row``."""
+
+    value: Array
+    along_v: Array
+    along_y: Array
+    along_v_bound: Array
+    along_y_bound: Array
+
+    @classmethod
+    def empty(cls, n: int) -> Self:
+        """Room for n points."""
+        return cls(*np.empty((_SLOPE_ROWS, n)))
+
+
+class ExtremeRows(NamedTuple):
+    """Smallest and largest mu_macro over intervals of k, and the largest bound met there, (n,)
+    each, in the order of ``mumacro_extreme_row``."""
+
+    low: Array
+    high: Array
+    error_bound: Array
+
+    @classmethod
+    def empty(cls, n: int) -> Self:
+        """Room for n intervals."""
+        return cls(*np.empty((_EXTREME_ROWS, n)))
 
 
 class Data:
@@ -155,38 +280,35 @@ class Kernel:
         quantity: int,
         v: Array,
         y: Array,
-        rows: Array,
+        rows: SlopeRows,
         start: int = 0,
         contact: int = 0,
     ) -> None:
-        """Value, slopes along ln v~ and ln y~ and their bounds: ``rows`` (5, N) from column
-        ``start`` on."""
-        out = _numbers(rows.reshape(-1)[start:])
+        """A quantity and its slopes at points (n,): fill ``rows`` from ``start`` on."""
         points = _numbers(v), _numbers(y)
-        self._found.slopes(data.pointer, contact, quantity, v.size, *points, out, rows.shape[1])
+        self._found.slopes(data.pointer, contact, quantity, v.size, *points, *_out(rows, start))
 
     def cases(
         self,
         data: Data,
         n: int,
         columns: Sequence[Array | float],
-        rows: Array,
-        source: Codes,
+        answers: CaseRows,
         start: int = 0,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """Cases ``start`` to ``start`` + n: fill ``rows`` (3, 5 or 17, N) and ``source`` (n,).
+        """n cases: fill ``answers`` from ``start`` on.
 
-        ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~,
-        y~; slopes by input and their bounds.  ``kind``: another contact and direction, see
-        :class:`mumacro.inputs.kind.Kind`.
+        ``columns`` are the six inputs, (n,) or one number.  ``kind``: another contact and
+        direction, see :class:`mumacro.inputs.kind.Kind`.
         """
-        pointers, strides, _kept = _columns_of(columns)
-        out = _numbers(rows.reshape(-1)[start:] if start else rows)
-        codes = _FFI.from_buffer(_CODES, source)
-        self._cases(
-            data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
-        )
+        six, _kept = _columns_of(columns)
+        rows, stride = answers.numbers.shape
+        numbers, codes = answers.numbers, answers.source
+        if start:
+            numbers, codes = numbers.reshape(-1)[start:], codes[start:]
+        out, sources = _numbers(numbers), _FFI.from_buffer(_CODES, codes)
+        self._cases(data.pointer, *kind, n, six, rows, out, stride, sources)
 
     def intervals(
         self,
@@ -194,24 +316,20 @@ class Kernel:
         n: int,
         columns: Sequence[Array | float],
         high: Array,
-        rows: Array,
+        rows: ExtremeRows,
         start: int = 0,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """As :meth:`cases`, with k from its column to ``high`` (n,): smallest and largest mu_macro
-        and the largest bound met there, ``rows`` (3, N)."""
-        pointers, strides, _kept = _columns_of(columns)
-        out = _numbers(rows.reshape(-1)[start:])
-        self._found.intervals(
-            data.pointer, *kind, n, pointers, strides, _numbers(high), out, rows.shape[1]
-        )
+        """As :meth:`cases`, with k from its column to ``high`` (n,)."""
+        six, _kept = _columns_of(columns)
+        self._found.intervals(data.pointer, *kind, n, six, _numbers(high), *_out(rows, start))
 
-    def one(self, pointer: Any, six: Sequence[float], numbers: int) -> list[float]:
-        """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also
-        slopes and bounds."""
-        out, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six  # named: a call with *six takes longer
-        self._one(pointer, mu0, Fz, k, y0, omega, v0, numbers, out)
-        return _unpack(out, numbers)  # type: ignore[no-any-return]
+    def one(self, pointer: Any, six: Sequence[float], with_gradient: bool) -> Any:
+        """One case in plain numbers: a ``mumacro_case``, its gradient only where asked for."""
+        # named: a call with *six takes longer
+        answer, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six
+        self._one(pointer, mu0, Fz, k, y0, omega, v0, with_gradient, answer)
+        return answer
 
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
         """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
@@ -244,6 +362,54 @@ class Kernel:
         ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
         given = map(_numbers, (before, after, k, dx, dy, forces, sums))
         self._found.element_steps(before.size, forces.shape[1], *given)
+
+    def motions(
+        self,
+        contact: int,
+        orders: Sequence[Sequence[int]],
+        cases: Array,
+        tolerance: float,
+        out: Array,
+    ) -> None:
+        """Steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms), see
+        ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force."""
+        counts, joined = _harmonics(orders)
+        self._found.motions(
+            contact,
+            cases.shape[0],
+            counts,
+            joined,
+            _numbers(cases),
+            tolerance,
+            MOST_STEPS,
+            _numbers(np.empty(2 * MOST_STEPS)),
+            _numbers(out),
+        )
+
+    def motion_cycle(
+        self,
+        orders: Sequence[Sequence[int]],
+        case: Array,
+        shares: Array,
+        weights: Array,
+        tolerance: float,
+        n: int,
+    ) -> Array:
+        """Forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
+        forces, (counts, joined) = np.empty((n + 1, 2)), _harmonics(orders)
+        self._found.motion_cycle(
+            counts,
+            joined,
+            _numbers(case),
+            shares.size,
+            *map(_numbers, (shares, weights)),
+            tolerance,
+            MOST_STEPS,
+            _numbers(np.empty(2 * MOST_STEPS)),
+            n,
+            _numbers(forces),
+        )
+        return forces
 
     # --- for the builder --------------------------------------------------------------------------
 

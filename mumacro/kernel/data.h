@@ -33,6 +33,38 @@ typedef struct {
     mumacro_driven_rule driven;
 } mumacro_data;
 
+/* The six inputs of n cases, mu0, Fz, k, y0 (normal: Fz_amplitude), omega, v0: each an array (n,), or one constant where
+ * its array is NULL. */
+typedef struct {
+    const double *array[6];
+    double constant[6];
+} mumacro_columns;
+
+/* Rows of the answers to cases.  A call fills all of them, or those before the gradient, or those before v~. */
+enum mumacro_row {
+    MU_ROW_MU_MACRO,
+    MU_ROW_MU_RATIO,
+    MU_ROW_ERROR_BOUND,
+    MU_ROW_V_TILDE,
+    MU_ROW_Y_TILDE,
+    MU_ROW_LENGTH_SCALE,                         /* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact */
+    MU_ROW_GRADIENT,                             /* d mu_macro / d input, one row for each of the six */
+    MU_ROW_GRADIENT_BOUND = MU_ROW_GRADIENT + 6, /* bounds of the errors of these six */
+    MU_ROWS = MU_ROW_GRADIENT_BOUND + 6
+};
+
+/* Rows of a quantity and its slopes v~ d/d v~ and y~ d/d y~, and of the bounds of these two. */
+enum mumacro_slope_row { MU_SLOPE_VALUE, MU_SLOPE_V, MU_SLOPE_Y, MU_SLOPE_V_BOUND, MU_SLOPE_Y_BOUND, MU_SLOPE_ROWS };
+
+/* Rows of the answers over an interval of k: smallest and largest mu_macro, the largest bound met there. */
+enum mumacro_extreme_row { MU_EXTREME_LOW, MU_EXTREME_HIGH, MU_EXTREME_BOUND, MU_EXTREME_ROWS };
+
+/* The answer to one case, as in these rows. */
+typedef struct {
+    double mu_macro, mu_ratio, error_bound, v_tilde, y_tilde, length_scale, gradient[6], gradient_bound[6];
+    int source;
+} mumacro_case;
+
 /* A table as the export writes it: mumacro_table. */
 typedef struct {
     mumacro_data data, ball; /* without cells where the table has no ball */

@@ -177,15 +177,20 @@ MU_INLINE void mu_pass_groups(int n, double in[6][MU_CHUNK], double *v, double *
     }
 }
 
-/* Rows of answers to cases, and the numbers of one answer, which begin alike, see library.h. */
-enum { MU_ROW_MACRO, MU_ROW_RATIO, MU_ROW_BOUND, MU_ROW_V, MU_ROW_Y, MU_ROW_SLOPES, MU_ROWS = MU_ROW_SLOPES + 12 };
-enum { MU_ONE_LENGTH = MU_ROW_SLOPES, MU_ONE_SOURCE, MU_ONE_SLOPES, MU_ONE_WITH_SLOPES = MU_ONE_SLOPES + 12 };
+/* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact. */
+static double mu_length_scale(double mu0, double Fz, double k) {
+    const double quotient = Fz / k, length = mu0 * quotient;
+    int64_t i, j, l;
+    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290)) return length;
+    const double mantissa = mu_split(mu0, &i) * (mu_split(Fz, &j) / mu_split(k, &l));
+    return mu_scale(mantissa, i + j - l);
+}
 
 /* Up to MU_CHUNK cases; in: the six inputs, filled up to whole lanes. */
 MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n, double in[6][MU_CHUNK], int rows,
                                  double *out, int64_t stride, int8_t *source) {
-    double v[MU_CHUNK], y[MU_CHUNK], *mu = out + MU_ROW_RATIO * stride, *bound = out + MU_ROW_BOUND * stride;
-    double *slopes = rows == MU_ROWS ? out + MU_ROW_SLOPES * stride : NULL;
+    double v[MU_CHUNK], y[MU_CHUNK], *mu = out + MU_ROW_MU_RATIO * stride, *bound = out + MU_ROW_ERROR_BOUND * stride;
+    double *slopes = rows == MU_ROWS ? out + MU_ROW_GRADIENT * stride : NULL;
     mu_chunk c;
     mu_slope slope[MU_CHUNK];
     int left;
@@ -215,9 +220,12 @@ MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n, d
         out[i] = mu[i] * in[0][i];
         bound[i] *= in[0][i];
     }
-    if (rows > MU_ROW_V) {
-        memcpy(out + MU_ROW_V * stride, v, (size_t)n * sizeof *v);
-        memcpy(out + MU_ROW_Y * stride, y, (size_t)n * sizeof *y);
+    if (rows > MU_ROW_V_TILDE) {
+        memcpy(out + MU_ROW_V_TILDE * stride, v, (size_t)n * sizeof *v);
+        memcpy(out + MU_ROW_Y_TILDE * stride, y, (size_t)n * sizeof *y);
+        for (int i = 0; i < n; ++i)
+            out[MU_ROW_LENGTH_SCALE * stride + i] =
+                source[i] < 0 ? NAN : mu_length_scale(in[0][i], in[1][i], in[2][i]);
     }
 }
 
@@ -256,38 +264,38 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
         for (int j = 0; j < 6; ++j) in[j] = columns[j][strides[j] ? i : 0];
         memcpy(&six, in, sizeof six);
         found = mu_any_case(data, contact, direction, &six, &v, &y, slopes);
-        out[MU_ROW_MACRO * stride + i] = found.value * six.mu0;
-        out[MU_ROW_RATIO * stride + i] = found.value;
-        out[MU_ROW_BOUND * stride + i] = found.bound * six.mu0;
+        out[MU_ROW_MU_MACRO * stride + i] = found.value * six.mu0;
+        out[MU_ROW_MU_RATIO * stride + i] = found.value;
+        out[MU_ROW_ERROR_BOUND * stride + i] = found.bound * six.mu0;
         source[i] = (int8_t)found.source;
-        if (rows > MU_ROW_V) {
-            out[MU_ROW_V * stride + i] = v;
-            out[MU_ROW_Y * stride + i] = y;
+        if (rows > MU_ROW_V_TILDE) {
+            out[MU_ROW_V_TILDE * stride + i] = v;
+            out[MU_ROW_Y_TILDE * stride + i] = y;
+            out[MU_ROW_LENGTH_SCALE * stride + i] =
+                found.source < 0 ? NAN : mu_length_scale(six.mu0, six.Fz, six.k);
         }
         if (rows == MU_ROWS)
-            mu_gradient(data, contact, direction, &six, found, slopes, v, y, out + MU_ROW_SLOPES * stride + i, stride);
+            mu_gradient(data, contact, direction, &six, found, slopes, v, y, out + MU_ROW_GRADIENT * stride + i, stride);
     }
 }
 
-/* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact. */
-static double mu_length_scale(double mu0, double Fz, double k) {
-    const double quotient = Fz / k, length = mu0 * quotient;
-    int64_t i, j, l;
-    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290)) return length;
-    const double mantissa = mu_split(mu0, &i) * (mu_split(Fz, &j) / mu_split(k, &l));
-    return mu_scale(mantissa, i + j - l);
-}
-
 static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
-                   int numbers, double *out) {
+                   int with_gradient, mumacro_case *out) {
     double in[6][MU_CHUNK], rows[MU_ROWS];
     const double six[6] = {mu0, Fz, k, y0, omega, v0};
     int8_t source;
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
-    mu_chunk_of_cases(data, MU_SPRING, 1, in, numbers > MU_ONE_SLOPES ? MU_ROWS : MU_ROW_SLOPES, rows, 1, &source);
-    memcpy(out, rows, MU_ROW_SLOPES * sizeof *out);
-    out[MU_ONE_LENGTH] = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
-    out[MU_ONE_SOURCE] = source;
-    if (numbers > MU_ONE_SLOPES) memcpy(out + MU_ONE_SLOPES, rows + MU_ROW_SLOPES, 12 * sizeof *out);
+    mu_chunk_of_cases(data, MU_SPRING, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
+    out->mu_macro = rows[MU_ROW_MU_MACRO];
+    out->mu_ratio = rows[MU_ROW_MU_RATIO];
+    out->error_bound = rows[MU_ROW_ERROR_BOUND];
+    out->v_tilde = rows[MU_ROW_V_TILDE];
+    out->y_tilde = rows[MU_ROW_Y_TILDE];
+    out->length_scale = rows[MU_ROW_LENGTH_SCALE];
+    out->source = source;
+    if (with_gradient) {
+        memcpy(out->gradient, rows + MU_ROW_GRADIENT, sizeof out->gradient);
+        memcpy(out->gradient_bound, rows + MU_ROW_GRADIENT_BOUND, sizeof out->gradient_bound);
+    }
 }

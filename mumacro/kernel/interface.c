@@ -22,11 +22,15 @@ static double mu_held_value(int quantity, double v, double y, double *bound) {
 
 /* An answer from its rows; what is returned. */
 static int mu_fill(const double *rows, int source, int returned, mumacro_answer *out) {
-    memcpy(out, rows, MU_ROW_SLOPES * sizeof *rows); /* the first members are these rows */
+    out->mu_macro = rows[MU_ROW_MU_MACRO];
+    out->mu_ratio = rows[MU_ROW_MU_RATIO];
+    out->error_bound = rows[MU_ROW_ERROR_BOUND];
+    out->v_tilde = rows[MU_ROW_V_TILDE];
+    out->y_tilde = rows[MU_ROW_Y_TILDE];
     out->source = source;
     out->regime = source < 0 ? -1 : MU_REGIME_OF_SOURCE[source];
-    memcpy(out->gradient, rows + MU_ROW_SLOPES, sizeof out->gradient);
-    memcpy(out->gradient_bound, rows + MU_ROW_SLOPES + 6, sizeof out->gradient_bound);
+    memcpy(out->gradient, rows + MU_ROW_GRADIENT, sizeof out->gradient);
+    memcpy(out->gradient_bound, rows + MU_ROW_GRADIENT_BOUND, sizeof out->gradient_bound);
     return returned;
 }
 
@@ -90,9 +94,9 @@ MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y
 }
 
 MUMACRO_API double mumacro_mu_macro(double mu0, double Fz, double k, double y0, double omega, double v0) {
-    double found[MU_ONE_SLOPES];
-    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, MU_ONE_SLOPES, found);
-    return found[MU_ROW_MACRO];
+    mumacro_case answer;
+    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, 0, &answer);
+    return answer.mu_macro;
 }
 
 MUMACRO_API void mumacro_mu_macros(int64_t n, const double *mu0, const double *Fz, const double *k, const double *y0,
@@ -101,27 +105,27 @@ MUMACRO_API void mumacro_mu_macros(int64_t n, const double *mu0, const double *F
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const double *const columns[6] = {mu0 + i, Fz + i, k + i, y0 + i, omega + i, v0 + i};
         const int few = mu_few(n - i);
-        double rows[MU_ROW_V * MU_CHUNK];
+        double rows[MU_ROW_V_TILDE * MU_CHUNK];
         int8_t source[MU_CHUNK];
-        mu_cases(MU_TABLE, MU_SPRING, few, columns, strides, MU_ROW_V, rows, MU_CHUNK, source);
-        memcpy(mu_macro + i, rows + MU_ROW_MACRO * MU_CHUNK, (size_t)few * sizeof *rows);
-        if (bound) memcpy(bound + i, rows + MU_ROW_BOUND * MU_CHUNK, (size_t)few * sizeof *rows);
+        mu_cases(MU_TABLE, MU_SPRING, few, columns, strides, MU_ROW_V_TILDE, rows, MU_CHUNK, source);
+        memcpy(mu_macro + i, rows + MU_ROW_MU_MACRO * MU_CHUNK, (size_t)few * sizeof *rows);
+        if (bound) memcpy(bound + i, rows + MU_ROW_ERROR_BOUND * MU_CHUNK, (size_t)few * sizeof *rows);
     }
 }
 
 MUMACRO_API int mumacro_evaluate_point(int quantity, double v_tilde, double y_tilde, mumacro_point *out) {
     const mumacro_point nothing = {NAN, NAN, NAN, NAN, NAN, NAN, -1};
-    double slopes[5];
+    double slopes[MU_SLOPE_ROWS];
     int8_t source;
     if (out == NULL) return MUMACRO_NO_OUTPUT;
     *out = nothing;
     if (!mu_is_held(quantity)) return MUMACRO_NO_QUANTITY;
     mu_values(MU_TABLE, MU_SPRING, quantity, 1, &v_tilde, &y_tilde, &out->value, &out->bound, &source);
     mu_slopes_of_points(MU_TABLE, MU_SPRING, quantity, 1, &v_tilde, &y_tilde, slopes, 1);
-    out->slope_v = slopes[1];
-    out->slope_y = slopes[2];
-    out->slope_v_bound = slopes[3];
-    out->slope_y_bound = slopes[4];
+    out->slope_v = slopes[MU_SLOPE_V];
+    out->slope_y = slopes[MU_SLOPE_Y];
+    out->slope_v_bound = slopes[MU_SLOPE_V_BOUND];
+    out->slope_y_bound = slopes[MU_SLOPE_Y_BOUND];
     out->source = source;
     return source >= 0 ? 0 : v_tilde >= 0.0 ? 2 : 1;
 }

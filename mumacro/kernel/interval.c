@@ -37,11 +37,11 @@ static mu_sample mu_take_sample(mu_interval *of, double k) {
     mu_sample out;
     mu_cases_as(of->data, of->contact, of->direction, 1, columns, strides, MU_ROWS, rows, 1, &source);
     out.k = k;
-    out.mu = rows[MU_ROW_MACRO];
-    out.slope = rows[MU_ROW_SLOPES + 2] * k;
+    out.mu = rows[MU_ROW_MU_MACRO];
+    out.slope = rows[MU_ROW_GRADIENT + 2] * k;
     of->least = mu_min(of->least, out.mu);
     of->most = mu_max(of->most, out.mu);
-    of->bound = mu_max(of->bound, rows[MU_ROW_BOUND]);
+    of->bound = mu_max(of->bound, rows[MU_ROW_ERROR_BOUND]);
     return out;
 }
 
@@ -118,10 +118,10 @@ static void mu_go_on(mu_interval *of, double k) {
 
 /* The smallest and the largest mu_macro for low <= k <= high, and the largest bound met; NaN for what is no case. */
 static void mu_extremes_of(const mumacro_data *data, int contact, int direction, const mu_inputs *low, double high,
-                           double out[3]) {
+                           double out[MU_EXTREME_ROWS]) {
     const double end = low->k, ratio = mu_amplitude_ratio(low);
     mu_interval of = {data, contact, direction, *low, HUGE_VAL, -HUGE_VAL, 0.0, {0.0, 0.0, 0.0}};
-    out[0] = out[1] = out[2] = NAN;
+    for (int i = 0; i < MU_EXTREME_ROWS; ++i) out[i] = NAN;
     if (mu_first_bad(direction, low) || !(end <= high && high < HUGE_VAL)) return;
     of.last = mu_take_sample(&of, end);
     if (direction == MU_ACROSS && ratio > MU_TURNING) {
@@ -138,7 +138,7 @@ static void mu_extremes_of(const mumacro_data *data, int contact, int direction,
     }
     mu_go_on(&of, high);
     if (!(of.least <= of.most)) return;
-    out[0] = of.least;
-    out[1] = of.most;
-    out[2] = of.bound;
+    out[MU_EXTREME_LOW] = of.least;
+    out[MU_EXTREME_HIGH] = of.most;
+    out[MU_EXTREME_BOUND] = of.bound;
 }

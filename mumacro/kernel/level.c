@@ -1,5 +1,6 @@
 /* The shared object's functions for one instruction level; compiled once for each. */
 #include "kernel.c"
+#include "motion.c"
 #include "library.h"
 #include "interval.c"
 
@@ -29,15 +30,34 @@ static void mu_borders_as(const mumacro_data *data, int contact, int direction, 
     for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_as(data, contact, direction, y[i]);
 }
 
-static void mu_intervals(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
-                         const int64_t *strides, const double *high, double *out, int64_t stride) {
+/* Where the columns stand, and their strides. */
+static void mu_take_columns(const mumacro_columns *in, const double *columns[6], int64_t strides[6]) {
+    for (int i = 0; i < 6; ++i) {
+        columns[i] = in->array[i] ? in->array[i] : &in->constant[i];
+        strides[i] = in->array[i] != NULL;
+    }
+}
+
+static void mu_cases_of_columns(const mumacro_data *data, int contact, int direction, int64_t n,
+                                const mumacro_columns *in, int rows, double *out, int64_t stride, int8_t *source) {
+    const double *columns[6];
+    int64_t strides[6];
+    mu_take_columns(in, columns, strides);
+    mu_cases_as(data, contact, direction, n, columns, strides, rows, out, stride, source);
+}
+
+static void mu_intervals(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *in,
+                         const double *high, double *out, int64_t stride) {
+    const double *columns[6];
+    int64_t strides[6];
+    mu_take_columns(in, columns, strides);
     for (int64_t i = 0; i < n; ++i) {
-        double six[6], found[3];
+        double six[6], extremes[MU_EXTREME_ROWS];
         mu_inputs low;
         for (int j = 0; j < 6; ++j) six[j] = columns[j][strides[j] ? i : 0];
         memcpy(&low, six, sizeof low);
-        mu_extremes_of(data, contact, direction, &low, high[i], found);
-        for (int j = 0; j < 3; ++j) out[j * stride + i] = found[j];
+        mu_extremes_of(data, contact, direction, &low, high[i], extremes);
+        for (int j = 0; j < MU_EXTREME_ROWS; ++j) out[j * stride + i] = extremes[j];
     }
 }
 
@@ -116,7 +136,8 @@ static const mumacro_atlas MU_ATLAS = {
 
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
-    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points, mu_cases_as,
+    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points,
+    mu_cases_of_columns,
     mu_intervals, mu_ratio_alone, mu_one, mu_borders_as, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares,
-    mu_entries, mu_roots, mu_outers, mu_element_steps,
+    mu_entries, mu_roots, mu_outers, mu_element_steps, mu_motions, mu_motion_cycle,
 };

@@ -2,7 +2,7 @@
  *
  *     #include "mumacro.h"
  *     mumacro_answer a;
- *     int error = mumacro_evaluate(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01, &a);
+ *     int error = mumacro_evaluate(0.3, 10.0, 1e6, 2e-6, 125663.7, 0.01, &a);
  *     if (error) puts(mumacro_error_text(error)); else printf("%.6f, numerical error %.1e\n", a.mu_macro, a.error_bound);
  *
  * C99 and C++17; of the mathematical library only sqrt and fabs.  No memory is taken, nothing is stored between calls,

@@ -317,11 +317,11 @@ MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int q
         }
         for (int j = 0; j < few; ++j) {
             const mu_slopes found = mu_slopes_of(data, contact, quantity, &c, slope, j, v[i + j], y[i + j]);
-            out[i + j] = found.value;
-            out[stride + i + j] = found.along_v;
-            out[2 * stride + i + j] = found.along_y;
-            out[3 * stride + i + j] = found.bound_v;
-            out[4 * stride + i + j] = found.bound_y;
+            out[MU_SLOPE_VALUE * stride + i + j] = found.value;
+            out[MU_SLOPE_V * stride + i + j] = found.along_v;
+            out[MU_SLOPE_Y * stride + i + j] = found.along_y;
+            out[MU_SLOPE_V_BOUND * stride + i + j] = found.bound_v;
+            out[MU_SLOPE_Y_BOUND * stride + i + j] = found.bound_y;
         }
     }
 }

@@ -37,7 +37,7 @@ CONTINUOUS, STICK_SLIP, STATIC = (
     REGIMES.index(name) for name in ("continuous", "stick_slip", "static")
 )
 
-#: coordinate of a table file -> what it is
+#: coordinate of a table file -> its meaning
 COORDINATES = {
     "y_squared": "square of the dimensionless amplitude",
     "v_squared_share": "v_tilde^2/(1 + v_tilde^2)",
@@ -160,7 +160,8 @@ class Chart:
     """One block: name, regime, coordinates with their ranges, and what its nodes hold for mu~.
 
     ``floor`` and ``rounding`` are what the bound of mu~ allows for rounding, absolute and relative
-    to the factor.
+    to the factor.  The checksum of a table covers the repr of its charts, so the names of the other
+    fields here and in :class:`Axis` belong to the file's format.
     """
 
     name: str
@@ -214,13 +215,13 @@ class Chart:
         return self.regime != CONTINUOUS or quantity.while_sliding
 
 
-def _axis(found: Any) -> Axis:
-    return Axis(_text(found.name), found.low, found.high)
+def _axis(axis: Any) -> Axis:
+    return Axis(_text(axis.name), axis.low, axis.high)
 
 
 def _quantity(q: Any) -> Quantity:
-    said = _text(q.name), _text(q.variable), _text(q.meaning)
-    return Quantity(*said, bool(q.while_sliding), bool(q.smooth_at_border))
+    texts = _text(q.name), _text(q.variable), _text(q.meaning)
+    return Quantity(*texts, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
 def _charts(listed: Any, count: int) -> tuple[Chart, ...]:
@@ -238,7 +239,7 @@ CHARTS = _charts(_ATLAS.chart, _ATLAS.charts)
 BALL_CHARTS = _charts(_ATLAS.ball_chart, _ATLAS.ball_charts)
 #: by code of the contact
 CHARTS_OF = (CHARTS, BALL_CHARTS)
-NAMES = tuple(chart.name for chart in CHARTS)
+BLOCK_NAMES = tuple(chart.name for chart in CHARTS)
 #: v~crit in pieces: name, coordinate, what its nodes hold
 BORDER_PIECES = tuple(
     (_text(p.name), _axis(p.axis), _text(p.tabulated))

@@ -1,4 +1,4 @@
-"""What a table holds: the pieces of the border, the blocks, and the grid for a person to look at.
+"""The content of a table: the pieces of the border, the blocks, and a plain grid for people.
 
 Nodes and errors as a table file stores them; ``netcdf.py`` reads and writes them,
 ``polynomials.py`` turns nodes into cells for evaluation.
@@ -44,7 +44,7 @@ class Block:
     )
     #: the same for every cell (cells, 3), in the order of the cells, for slopes
     cell_errors: dict[str, Array] = field(default_factory=dict)
-    max_abs_error: float = 0.0  #: the largest errors of mu~ found
+    max_abs_error: float = 0.0  #: the largest errors of mu~ that verification met
     max_rel_error: float = 0.0
 
 
@@ -70,7 +70,7 @@ class Table:
         return names_in(self.attributes)
 
     def held(self, chart: atlas.Chart) -> list[atlas.Quantity]:
-        """Those that the block of ``chart`` tabulates."""
+        """The quantities that the block of ``chart`` tabulates."""
         return [BY_NAME[name] for name in self.quantities if chart.holds(BY_NAME[name])]
 
 

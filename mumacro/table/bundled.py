@@ -15,7 +15,7 @@ def bundled_tables() -> list[Path]:
     # A folder "tables" beside the package may belong to another project; this project's are
     # mumacro-*.nc.
     for folder in (_PACKAGE / "data", _PACKAGE.parent / "tables"):
-        found = sorted(folder.glob("mumacro-*.nc"))
-        if found:
-            return found
+        paths = sorted(folder.glob("mumacro-*.nc"))
+        if paths:
+            return paths
     return []

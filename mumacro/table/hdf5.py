@@ -29,21 +29,21 @@ class Group:
     """One group; every method raises what ``refuse`` makes where a part is missing, of another kind
     or too large."""
 
-    def __init__(self, found: Any, path: str, size: int, refuse: Refuse) -> None:
-        self._id, self.path, self._size, self.refuse = found, path, size, refuse
+    def __init__(self, handle: Any, path: str, size: int, refuse: Refuse) -> None:
+        self._id, self.path, self._size, self.refuse = handle, path, size, refuse
 
     def holds(self, name: str) -> bool:
         """Whether there is a group or variable of this name."""
         return bool(self._id.links.exists(name.encode()))
 
-    def _open(self, name: str, kind: type, what: str) -> Any:
+    def _open(self, name: str, part_type: type, role: str) -> Any:
         if not self.holds(name) or self._id.links.get_info(name.encode()).type != h5l.TYPE_HARD:
             # other links may lead to other files
-            raise self.refuse(f"{what} {name!r} is missing in {self.path}")
-        found = h5o.open(self._id, name.encode())
-        if not isinstance(found, kind):
-            raise self.refuse(f"{name!r} in {self.path} is no {what}")
-        return found
+            raise self.refuse(f"{role} {name!r} is missing in {self.path}")
+        part = h5o.open(self._id, name.encode())
+        if not isinstance(part, part_type):
+            raise self.refuse(f"{name!r} in {self.path} is no {role}")
+        return part
 
     def group(self, name: str) -> "Group":
         """A group in this one."""
@@ -68,10 +68,12 @@ class Group:
         count, by_age = h5a.get_num_attrs(self._id), h5py.h5.INDEX_CRT_ORDER
         if count > MOST_ATTRIBUTES:
             raise self.refuse(f"{self.path} has more than {MOST_ATTRIBUTES} attributes")
-        found = (h5a.open(self._id, index=i, index_type=by_age) for i in range(count))
-        named = {one.name.decode(): one for one in found}
+        handles = (h5a.open(self._id, index=i, index_type=by_age) for i in range(count))
+        handle_by_name = {handle.name.decode(): handle for handle in handles}
         return {
-            name: self._value(name, one) for name, one in named.items() if not name.startswith("_")
+            name: self._value(name, handle)
+            for name, handle in handle_by_name.items()
+            if not name.startswith("_")
         }
 
     def numbers(self, name: str, count: int) -> Array:
@@ -86,13 +88,13 @@ class Group:
         return values.astype(np.float64)
 
     def _value(self, name: str, attribute: Any) -> Any:
-        kind, shape = attribute.get_type(), attribute.shape
+        hdf5_type, shape = attribute.get_type(), attribute.shape
         if attribute.get_storage_size() > MOST_TEXT or math.prod(shape) > MOST_ITEMS:
             raise self.refuse(f"attribute {name!r} of {self.path} is too large")
-        is_text = isinstance(kind, h5t.TypeStringID) and shape in ((), (1,))
-        if not is_text and not isinstance(kind, (h5t.TypeFloatID, h5t.TypeIntegerID)):
+        is_text = isinstance(hdf5_type, h5t.TypeStringID) and shape in ((), (1,))
+        if not is_text and not isinstance(hdf5_type, (h5t.TypeFloatID, h5t.TypeIntegerID)):
             raise self.refuse(f"attribute {name!r} of {self.path} is neither text nor numbers")
-        values = np.empty(shape, kind.dtype if is_text else kind.dtype.newbyteorder("="))
+        values = np.empty(shape, hdf5_type.dtype if is_text else hdf5_type.dtype.newbyteorder("="))
         attribute.read(values)
         first = values.reshape(-1)[0] if values.size == 1 else values
         return first.decode() if isinstance(first, bytes) else str(first) if is_text else first
@@ -102,9 +104,9 @@ class Group:
     def array(self, name: str, most: int, shape: tuple[int, ...] | None = None) -> Array:
         """A variable of finite float64, of at most ``most`` numbers, as the netCDF library stores
         numbers."""
-        found = self._open(name, h5d.DatasetID, "variable")
-        space, stored = found.get_space(), found.get_create_plist()
-        is_double = space.get_simple_extent_type() == h5s.SIMPLE and found.get_type().equal(
+        dataset = self._open(name, h5d.DatasetID, "variable")
+        space, creation = dataset.get_space(), dataset.get_create_plist()
+        is_double = space.get_simple_extent_type() == h5s.SIMPLE and dataset.get_type().equal(
             h5t.IEEE_F64LE
         )
         if not is_double or math.prod(space.shape) > most:
@@ -113,29 +115,29 @@ class Group:
             )
         if shape is not None and space.shape != shape:
             raise self.refuse(f"{self.path}: the shape of {name!r} is {space.shape}, not {shape}")
-        layout = stored.get_layout()
-        filters = tuple(stored.get_filter(i)[0] for i in range(stored.get_nfilters()))
-        if layout == h5d.CHUNKED and filters in _FILTERS and stored.get_chunk() == space.shape:
-            values = self._unpacked(found, name, filters)
-        elif layout in (h5d.CONTIGUOUS, h5d.COMPACT) and not stored.get_external_count():
+        layout = creation.get_layout()
+        filters = tuple(creation.get_filter(i)[0] for i in range(creation.get_nfilters()))
+        if layout == h5d.CHUNKED and filters in _FILTERS and creation.get_chunk() == space.shape:
+            values = self._unpack(dataset, name, filters)
+        elif layout in (h5d.CONTIGUOUS, h5d.COMPACT) and not creation.get_external_count():
             values = np.empty(space.shape)
-            found.read(h5s.ALL, h5s.ALL, values)
+            dataset.read(h5s.ALL, h5s.ALL, values)
         else:
             raise self.refuse(f"variable {name!r} in {self.path} is stored in an unknown way")
         if not np.all(np.isfinite(values)):
             raise self.refuse(f"variable {name!r} in {self.path} holds non-finite values")
         return values
 
-    def _unpacked(self, found: Any, name: str, filters: tuple[int, ...]) -> Array:
+    def _unpack(self, dataset: Any, name: str, filters: tuple[int, ...]) -> Array:
         """The one chunk of a variable, unpacked here with a limit: HDF5 itself has none."""
-        size = 8 * math.prod(found.shape)
+        size = 8 * math.prod(dataset.shape)
         if (
-            found.get_num_chunks() != 1
-            or (chunk := found.get_chunk_info(0)).size > self._size
+            dataset.get_num_chunks() != 1
+            or (chunk := dataset.get_chunk_info(0)).size > self._size
             or chunk.filter_mask
         ):
             raise self.refuse(f"variable {name!r} in {self.path} is stored in an unknown way")
-        data = found.read_direct_chunk(chunk.chunk_offset)[1]
+        data = dataset.read_direct_chunk(chunk.chunk_offset)[1]
         if h5z.FILTER_DEFLATE in filters:
             data = zlib.decompressobj().decompress(data, size + 1)
         if len(data) != size:
@@ -143,7 +145,7 @@ class Group:
         raw = np.frombuffer(data, np.uint8)
         if h5z.FILTER_SHUFFLE in filters:
             raw = np.ascontiguousarray(raw.reshape(8, -1).T)
-        return raw.view(np.dtype("<f8")).reshape(found.shape).astype(np.float64)
+        return raw.view(np.dtype("<f8")).reshape(dataset.shape).astype(np.float64)
 
 
 def open_image(image: bytes, refuse: Refuse) -> Group:

@@ -32,7 +32,7 @@ MOST_NODES = 1024  # along an axis: 91; preparing cells takes matrices of its sq
 MOST_CELLS = 1024  # along an axis: 156
 MOST_PATCHES = 8192  # cells of a block: 1833, of 512 bytes each and quantity
 
-_one_at_a_time = threading.Lock()
+_netcdf_lock = threading.Lock()
 
 _PLAIN = {
     "v_tilde": ("dimensionless sliding speed, v0 k/(mu0 Fz omega)", ()),
@@ -51,8 +51,8 @@ _PLAIN = {
         ("y_tilde",),
     ),
 }
-#: what is told of bound over error in the attribute ``verified_bound_over_error``
 BALL = "ball_"  # before the names of attributes at the root that tell of a ball
+#: the statistics of bound over error in the attribute ``verified_bound_over_error``
 RATIOS = ("least", "median", "largest")
 #: quantities of a ball whose slopes a table gives
 BALL_SLOPES = ("mu_ratio",)
@@ -193,13 +193,13 @@ def _fill_blocks(
         axes = (chart.a.name, chart.b.name)
         _put(one, axes[0], block.a, atlas.COORDINATES[axes[0]])
         _put(one, axes[1], block.b, atlas.COORDINATES[axes[1]])
-        for about in table.held(chart):
+        for quantity in table.held(chart):
             meaning = (
                 chart.quantity
-                if about.name == "mu_ratio"
-                else f"{about.meaning}, scaled for this block"
+                if quantity.name == "mu_ratio"
+                else f"{quantity.meaning}, scaled for this block"
             )
-            _put(one, about.variable, block.nodes[about.name], meaning, axes)
+            _put(one, quantity.variable, block.nodes[quantity.name], meaning, axes)
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
         one.setncatts(
             {
@@ -245,7 +245,7 @@ def _image(table: Table) -> bytes:
     """The bytes of a file that holds ``table``.
 
     A temporary file: where the disk is full the netCDF library reports little and keeps the file
-    open.  What it makes in memory holds the time of day.
+    open.  A file that it makes in memory contains the time of day.
     """
     import tempfile  # only writing needs it: reading a table starts sooner without
 
@@ -253,7 +253,7 @@ def _image(table: Table) -> bytes:
 
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         path = Path(folder) / "table.nc"
-        with _one_at_a_time, netCDF4.Dataset(str(path), "w", format="NETCDF4") as root:
+        with _netcdf_lock, netCDF4.Dataset(str(path), "w", format="NETCDF4") as root:
             _fill(root, table)
         return path.read_bytes()
 
@@ -263,16 +263,16 @@ def _image(table: Table) -> bytes:
 
 def _nodes(group: hdf5.Group, axis: atlas.Axis) -> Array:
     """The nodes of an axis, which must be those of the running atlas."""
-    found = group.array(axis.name, MOST_NUMBERS)
-    if found.ndim != 1 or not 2 <= found.size <= MOST_NODES:
+    values = group.array(axis.name, MOST_NUMBERS)
+    if values.ndim != 1 or not 2 <= values.size <= MOST_NODES:
         raise group.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
     # the cosine's last digit differs between mathematical libraries
-    off = np.abs(found - nodes(found.size, axis.low, axis.high))
-    if np.any(off > 1e-15 * max(abs(axis.low), abs(axis.high))):
+    deviation = np.abs(values - nodes(values.size, axis.low, axis.high))
+    if np.any(deviation > 1e-15 * max(abs(axis.low), abs(axis.high))):
         raise group.refuse(
             f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart"
         )
-    return found
+    return values
 
 
 def _cells(group: hdf5.Group, count: int) -> list[int]:
@@ -284,36 +284,38 @@ def _cells(group: hdf5.Group, count: int) -> list[int]:
     return [int(n) for n in cells]
 
 
-def _errors(group: hdf5.Group, name: str, found: Array) -> Array:
-    if np.any(found < 0.0):
+def _errors(group: hdf5.Group, name: str, errors: Array) -> Array:
+    if np.any(errors < 0.0):
         raise group.refuse(f"{group.path}: an error in {name!r} is negative")
-    return found
+    return errors
 
 
 def _error(group: hdf5.Group, name: str) -> float:
     return float(_errors(group, name, group.numbers(name, 1))[0])
 
 
-def _check_same(group: hdf5.Group, name: str, wanted: Any) -> None:
-    found = group.attribute(name)
-    if not np.array_equal(found, wanted):
-        told = wanted.tolist() if isinstance(wanted, np.ndarray) else wanted
-        raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {told!r}")
+def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
+    stored = group.attribute(name)
+    if not np.array_equal(stored, expected):
+        printable = expected.tolist() if isinstance(expected, np.ndarray) else expected
+        raise group.refuse(
+            f"{group.path}: {name} is {stored!r}, this program's atlas has {printable!r}"
+        )
 
 
-def _check_distribution(root: hdf5.Group, found: dict[str, Any], of: str) -> None:
-    """Refuse a distribution of errors that is not one; an older table has none."""
-    if f"{of}verified_quantities" not in found:
+def _check_distribution(root: hdf5.Group, attributes: dict[str, Any], of: str) -> None:
+    """Refuse a damaged distribution of errors; older tables have no distribution."""
+    if f"{of}verified_quantities" not in attributes:
         return
     shares = root.attribute(f"{of}verified_quantiles")
-    names = str(found[f"{of}verified_quantities"]).split()
-    for name, each in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
-        if np.any(root.numbers(f"{of}verified_{name}", each * len(names)) < 0.0):
+    names = str(attributes[f"{of}verified_quantities"]).split()
+    for name, count in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
+        if np.any(root.numbers(f"{of}verified_{name}", count * len(names)) < 0.0):
             raise root.refuse(f"attribute '{of}verified_{name}' has a negative number")
 
 
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
-    """Those of the root: what the program uses of them is of the right kind."""
+    """The attributes of the root; those that the program uses are checked."""
     if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
         raise root.refuse(
             "not a mumacro table: format_version, tolerance or content_sha256 is missing"
@@ -323,51 +325,55 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
         raise root.refuse(
             f"format version {version}, this program reads {WITHOUT_BALL} and {FORMAT_VERSION}"
         )
-    found = root.attributes()
+    attributes = root.attributes()
     for name in (
         "tolerance",
         *([f"{BALL}tolerance"] if np.array_equal(version, FORMAT_VERSION) else []),
-        *(key for key in found if key.removeprefix(BALL).startswith("verified_max_")),
+        *(key for key in attributes if key.removeprefix(BALL).startswith("verified_max_")),
     ):
         if not root.numbers(name, 1)[0] > 0.0:
-            raise root.refuse(f"attribute {name!r} must be > 0, got {found[name]!r}")
+            raise root.refuse(f"attribute {name!r} must be > 0, got {attributes[name]!r}")
     for of in ("", BALL):
-        _check_distribution(root, found, of)
-    if not isinstance(found["content_sha256"], str):
+        _check_distribution(root, attributes, of)
+    if not isinstance(attributes["content_sha256"], str):
         raise root.refuse("attribute 'content_sha256' is no text")
     try:
-        json.loads(found.get("builder_options", "{}"))
+        json.loads(attributes.get("builder_options", "{}"))
     except (ValueError, TypeError, RecursionError) as error:
         raise root.refuse(f"attribute 'builder_options' is no JSON ({error})") from None
-    names = names_in(found)
+    names = names_in(attributes)
     if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= BY_NAME.keys():
         raise root.refuse(
             f"attribute 'quantities' is {names}, this program knows {', '.join(BY_NAME)}"
         )
-    return found
+    return attributes
 
 
 def _border_piece(group: hdf5.Group, axis: atlas.Axis) -> BorderPiece:
     _check_same(group, "range", [axis.low, axis.high])
-    at = _nodes(group, axis)
+    axis_nodes = _nodes(group, axis)
     (cells,) = _cells(group, 1)
     return BorderPiece(
-        at, group.array("value", MOST_NUMBERS, at.shape), cells, _error(group, "max_rel_error")
+        axis_nodes,
+        group.array("value", MOST_NUMBERS, axis_nodes.shape),
+        cells,
+        _error(group, "max_rel_error"),
     )
 
 
 def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
-    for name, wanted in _geometry(chart).items():
-        _check_same(group, name, wanted)
+    for name, expected in _geometry(chart).items():
+        _check_same(group, name, expected)
     a, b = _nodes(group, chart.a), _nodes(group, chart.b)
     quantities = [BY_NAME[name] for name in names if chart.holds(BY_NAME[name])]
-    found = {
-        one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities
+    node_values = {
+        quantity.name: group.array(quantity.variable, MOST_NUMBERS, (a.size, b.size))
+        for quantity in quantities
     }
     na, nb = _cells(group, 2)
-    block = Block(a, b, (na, nb), found)
+    block = Block(a, b, (na, nb), node_values)
     block.max_abs_error, block.max_rel_error = (
-        _error(group, f"verified_max_{kind}_error") for kind in ("abs", "rel")
+        _error(group, f"verified_max_{norm}_error") for norm in ("abs", "rel")
     )
     errors = _errors(group, "errors", group.numbers("errors", 3 * len(names)))
     block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))
@@ -376,8 +382,8 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
 
 def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str]) -> None:
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
-    found = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
-    for name, errors in zip(names, _errors(group, "cell_errors", found), strict=True):
+    stored = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
+    for name, errors in zip(names, _errors(group, "cell_errors", stored), strict=True):
         for block, part in zip(blocks, np.split(errors, last[:-1]), strict=True):
             if name in block.nodes:
                 block.cell_errors[name] = part
@@ -460,16 +466,16 @@ def error_distribution(table: Table, of: str = "") -> dict[str, dict[str, float]
 
     ``of``: :data:`BALL` for those of a ball.
     """
-    told = table.attributes
-    names = str(told.get(f"{of}verified_quantities", "")).split()
+    attributes = table.attributes
+    names = str(attributes.get(f"{of}verified_quantities", "")).split()
     if not names:
         return {}
-    heads = [f"{share:g}" for share in told[f"{of}verified_quantiles"]]
-    errors = np.reshape(told[f"{of}verified_error_quantiles"], (len(names), -1)).tolist()
-    over = np.reshape(told[f"{of}verified_bound_over_error"], (len(names), -1)).tolist()
+    heads = [f"{share:g}" for share in attributes[f"{of}verified_quantiles"]]
+    errors = np.reshape(attributes[f"{of}verified_error_quantiles"], (len(names), -1)).tolist()
+    ratios = np.reshape(attributes[f"{of}verified_bound_over_error"], (len(names), -1)).tolist()
     return {
         name: dict(zip(heads, error, strict=True)) | dict(zip(RATIOS, ratio, strict=True))
-        for name, error, ratio in zip(names, errors, over, strict=True)
+        for name, error, ratio in zip(names, errors, ratios, strict=True)
     }
 
 

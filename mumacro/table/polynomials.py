@@ -79,19 +79,19 @@ def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
     start, stop = axis.span
     edge = np.arange(cells)[:, None]
     x = (start + (stop - start) * (0.5 * (2.0 * edge + 1.0 + LOCAL[None, :]) / cells)).ravel()
-    at = axis.to_file(x)
+    position = axis.to_file(x)
     if axis.name == "s":
-        dead = axis.to_file(atlas.SQRT2 * (np.arange(cells) + 1.0) / cells) <= axis.low
-        at.reshape(cells, WIDTH)[dead] = axis.low
-    return x, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
+        below = axis.to_file(atlas.SQRT2 * (np.arange(cells) + 1.0) / cells) <= axis.low
+        position.reshape(cells, WIDTH)[below] = axis.low
+    return x, (2.0 * position - axis.low - axis.high) / (axis.high - axis.low)
 
 
 def cells_1d(piece: int, values: Array, cells: int) -> Array:
     """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node
     ``values`` (n,)."""
-    x, at = cell_positions(atlas.BORDER_PIECES[piece][1], cells)
+    x, positions = cell_positions(atlas.BORDER_PIECES[piece][1], cells)
     local = (
-        interpolation_matrix(values.size, at)
+        interpolation_matrix(values.size, positions)
         @ chebyshev_coefficients(values)
         * cell_scale(piece, x)
     )
@@ -99,7 +99,7 @@ def cells_1d(piece: int, values: Array, cells: int) -> Array:
 
 
 def cell_scale(piece: int, x: Array) -> Array:
-    """What a piece of v~crit is multiplied by from nodes to cells, at its coordinate ``x`` (n,)."""
+    """Factor from node values to cell values of a piece of v~crit, at its coordinate ``x`` (n,)."""
     with np.errstate(divide="ignore", invalid="ignore"):  # both are infinite at y~ = infinity
         of_nodes, of_cells = kernels[-1].border_scales(
             piece, atlas.BORDER_PIECES[piece][1].amplitude(x)
@@ -124,9 +124,9 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from 7 down to
     0.
     """
-    left = interpolation_matrix(values.shape[0], cell_positions(a, cells[0])[1])
-    right = interpolation_matrix(values.shape[1], cell_positions(b, cells[1])[1])
-    local = (left @ chebyshev_coefficients(values) @ right.T).reshape(
+    matrix_a = interpolation_matrix(values.shape[0], cell_positions(a, cells[0])[1])
+    matrix_b = interpolation_matrix(values.shape[1], cell_positions(b, cells[1])[1])
+    local = (matrix_a @ chebyshev_coefficients(values) @ matrix_b.T).reshape(
         cells[0], WIDTH, cells[1], WIDTH
     )
     mean = local.mean(axis=(1, 3))
@@ -137,7 +137,7 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
     return np.asarray(power, dtype=np.float64).reshape(-1, WIDTH, WIDTH)
 
 
-def _joined(patches: Sequence[Array]) -> Array:
+def _join_patches(patches: Sequence[Array]) -> Array:
     """The patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line: a row
     lies in one."""
     shape = (sum(p.shape[0] for p in patches), WIDTH, WIDTH)
@@ -169,11 +169,11 @@ def block_rows(blocks: Sequence[Block], charts: Sequence[Chart] = atlas.CHARTS) 
 
 
 def quantity_cells(
-    blocks: Sequence[Block], quantity: int, charts: Sequence[Chart] = atlas.CHARTS
+    blocks: Sequence[Block], code: int, charts: Sequence[Chart] = atlas.CHARTS
 ) -> tuple[Array, Array, Array]:
-    """What :meth:`mumacro.kernel.binding.Data.put` wants of a quantity: polynomials, errors, errors
-    in every cell."""
-    name, errors = atlas.QUANTITY_NAMES[quantity], np.zeros((len(atlas.SOURCES) + 1, 2))
+    """A quantity for :meth:`mumacro.kernel.binding.Data.put`: polynomials, errors, errors in every
+    cell."""
+    name, errors = atlas.QUANTITY_NAMES[code], np.zeros((len(atlas.SOURCES) + 1, 2))
     patches, in_cells = [], []
     for error, chart, block in zip(errors, charts, blocks, strict=False):
         cells = block.cells[0] * block.cells[1]
@@ -184,10 +184,11 @@ def quantity_cells(
             else cells_2d(chart.a, chart.b, nodes, block.cells)
         )
         error[0] = block.errors[name][0]
-        if quantity == atlas.MU:
+        if code == atlas.MU:
             error += chart.rounding, chart.floor
-        in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))  # none where it is zero
-    return _joined(patches), errors, np.concatenate(in_cells)
+        # zero where the block does not tabulate the quantity
+        in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))
+    return _join_patches(patches), errors, np.concatenate(in_cells)
 
 
 @functools.cache
@@ -217,6 +218,6 @@ class Border:
         )
 
     def __call__(self, y: Array) -> Array:
-        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN for what is no
-        amplitude."""
+        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN below 0 and for
+        NaN."""
         return kernels[-1].border(self._data, np.ascontiguousarray(y).reshape(-1)).reshape(y.shape)

@@ -9,6 +9,8 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import Response
 
+from mumacro.inputs.kind import SPRING, kind_of
+
 from .. import __version__
 from ..page_data import POLICY, map_of, names
 from ..wire.json import dump
@@ -46,13 +48,15 @@ async def _names(request: Request) -> Response:
 
 
 async def _map(request: Request) -> Response:
-    """The data of the map: mu~ on a grid, rows of constant y~ from below, and the border."""
+    """The data of the map of a contact and a direction, see ``page_data.map_of``."""
     surrogate = request.app.tables.pick().surrogate
-    etag = f'"{surrogate.checksum[:32]}-{__version__}"'
+    asked = [request.query_params.get(name, word) for name, word in SPRING.names.items()]
+    kind = kind_of(*asked)
+    etag = f'"{surrogate.checksum[:32]}-{__version__}-{"-".join(asked)}"'
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
-    return await in_thread(request, lambda: Reply(dump(map_of(surrogate)), headers))
+    return await in_thread(request, lambda: Reply(dump(map_of(surrogate, **kind.names)), headers))
 
 
 async def _description(request: Request) -> Response:

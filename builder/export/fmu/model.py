@@ -58,7 +58,7 @@ _TEXTS = {
     "force": "friction force along v0, mu_macro Fz from v_rest on",
     "v_rest": "speed below which force is regularised",
 }
-_OUTPUTS, _WHOLE = ("mu_macro", "mu_ratio", "force"), ("regime", "source")
+_OUTPUTS, _INTEGERS = ("mu_macro", "mu_ratio", "force"), ("regime", "source")
 _CHOICES: dict[str, tuple[str, ...]] = {"contact": CONTACTS, "direction": DIRECTIONS}
 _UNITS = """<UnitDefinitions>
 <Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>
@@ -88,19 +88,19 @@ def _unit(table: Table, version: int) -> bytes:
     sources = {
         name: (_HERE / name).read_text("ascii") for name in ("instance.h", f"fmu{version}.c")
     }
-    defined = f"#define MUMACRO_FMU_STARTS {{{starts}}}\n#define MUMACRO_FMU_REST {REST!r}\n"
-    sources["instance.h"] = defined + sources["instance.h"]
+    macros = f"#define MUMACRO_FMU_STARTS {{{starts}}}\n#define MUMACRO_FMU_REST {REST!r}\n"
+    sources["instance.h"] = macros + sources["instance.h"]
     sources["mumacro.h"] = header_text(table)
-    described = _description(version, str(table.attributes["content_sha256"]))
-    files: dict[str, str | bytes] = {"modelDescription.xml": described}
+    description = _description(version, str(table.attributes["content_sha256"]))
+    files: dict[str, str | bytes] = {"modelDescription.xml": description}
     files |= {f"sources/{name}": text for name, text in sources.items()}
     if version == 3:
         files["sources/buildDescription.xml"] = _BUILD
     binaries: dict[str, str | bytes] = {}
-    for place, command in _targets(version):
-        if f"binaries/{place}" not in binaries:
-            library = [] if place.endswith(".dll") else ["-lm"]
-            binaries[f"binaries/{place}"] = _compiled(
+    for path, command in _targets(version):
+        if f"binaries/{path}" not in binaries:
+            library = [] if path.endswith(".dll") else ["-lm"]
+            binaries[f"binaries/{path}"] = _compile(
                 sources, [*command, *OPTIONS, f"fmu{version}.c", *library]
             )
     if not binaries:
@@ -126,48 +126,48 @@ def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
         "x86_64-darwin": "darwin64",
     }
 
-    def place(three: str) -> str:
-        suffix = {"windows": ".dll", "darwin": ".dylib"}.get(three.partition("-")[2], ".so")
-        return f"{folders.get(three, three) if version == 2 else three}/mumacro{suffix}"
+    def library_path(target: str) -> str:
+        suffix = {"windows": ".dll", "darwin": ".dylib"}.get(target.partition("-")[2], ".so")
+        return f"{folders.get(target, target) if version == 2 else target}/mumacro{suffix}"
 
-    for three, target in (
+    for target, zig_target in (
         ("x86_64-linux", "x86_64-linux-gnu.2.17"),
         ("x86_64-windows", "x86_64-windows-gnu"),
     ):
-        if command := _zig(target):
-            yield place(three), [*command, "-s"]
+        if command := _zig(zig_target):
+            yield library_path(target), [*command, "-s"]
     processor = {"arm64": "aarch64"}.get(platform.machine(), platform.machine())
-    found = next((path for path in map(shutil.which, ("gcc", "clang", "cc")) if path), None)
-    if found and platform.system() in ("Linux", "Darwin") and processor in ("x86_64", "aarch64"):
-        yield place(f"{processor}-{platform.system().lower()}"), [found]
+    compiler = next((path for path in map(shutil.which, ("gcc", "clang", "cc")) if path), None)
+    if compiler and platform.system() in ("Linux", "Darwin") and processor in ("x86_64", "aarch64"):
+        yield library_path(f"{processor}-{platform.system().lower()}"), [compiler]
 
 
 def _zig(target: str) -> list[str] | None:
-    """The command that compiles for a target of zig's; None where the package ziglang is not
+    """The command that compiles for a target of zig; None where the package ziglang is not
     installed."""
-    found = importlib.util.find_spec("ziglang")
-    return [sys.executable, "-m", "ziglang", "cc", "-target", target] if found else None
+    package = importlib.util.find_spec("ziglang")
+    return [sys.executable, "-m", "ziglang", "cc", "-target", target] if package else None
 
 
-def _compiled(texts: dict[str, str], command: list[str]) -> bytes:
-    """What ``command`` makes in a folder that holds ``texts`` by name."""
+def _compile(texts: dict[str, str], command: list[str]) -> bytes:
+    """The output of ``command``, run in a folder that holds ``texts`` by name."""
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         for name, text in texts.items():
             Path(folder, name).write_text(text, "ascii")
         # the folder by its whole name: zig's cache would take two files "./mumacro.h" for one
-        words = [*command, f"-I{folder}", "-o", "made"]
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
-        if done.returncode != 0:
-            raise ExportError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
+        arguments = [*command, f"-I{folder}", "-o", "made"]
+        process = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        if process.returncode != 0:
+            raise ExportError(f"{' '.join(arguments)}: {process.stderr.strip()[-2000:]}")
         return Path(folder, "made").read_bytes()
 
 
 def _description(version: int, token: str) -> str:
     """modelDescription.xml."""
-    second, numbers = version == 2, {name: number for number, name in enumerate(_TEXTS, 1)}
-    token_name, state, able = (
+    fmi2, numbers = version == 2, {name: number for number, name in enumerate(_TEXTS, 1)}
+    token_name, state_flag, derivatives_flag = (
         ("guid", "canGetAndSetFMUstate", "providesDirectionalDerivative")
-        if second
+        if fmi2
         else ("instantiationToken", "canGetAndSetFMUState", "providesDirectionalDerivatives")
     )
     lines = [
@@ -176,52 +176,53 @@ def _description(version: int, token: str) -> str:
         ' description="Macroscopic friction of a contact that is oscillated"'
         f' version="{__version__}" license="Apache-2.0" generationTool="mumacro {__version__}"'
         f' variableNamingConvention="flat"'
-        f"{' numberOfEventIndicators=' + quoteattr('0') if second else ''}>",
+        f"{' numberOfEventIndicators=' + quoteattr('0') if fmi2 else ''}>",
     ]
-    for kind, extra in (
+    for interface, extra in (
         ("ModelExchange", ""),
         ("CoSimulation", ' canHandleVariableCommunicationStepSize="true"'),
     ):
-        inside = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if second else ""
+        source_files = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if fmi2 else ""
         lines.append(
-            f'<{kind} modelIdentifier="mumacro" {state}="true" '
-            f'{able}="true"{extra}>{inside}</{kind}>'
+            f'<{interface} modelIdentifier="mumacro" {state_flag}="true" '
+            f'{derivatives_flag}="true"{extra}>{source_files}</{interface}>'
         )
     lines += [
         _UNITS,
         "<TypeDefinitions>",
-        *(_type(second, name) for name in _CHOICES),
+        *(_type(fmi2, name) for name in _CHOICES),
         "</TypeDefinitions>",
     ]
     lines += ['<DefaultExperiment startTime="0" stopTime="1"/>', "<ModelVariables>"]
-    if not second:
+    if not fmi2:
         lines.append(
             '<Float64 name="time" valueReference="0" causality="independent" '
             'variability="continuous"/>'
         )
-    lines += [_variable(second, *item) for item in numbers.items()]
+    lines += [_variable(fmi2, *item) for item in numbers.items()]
     lines += ["</ModelVariables>", "<ModelStructure>"]
-    known = " ".join(str(numbers[name]) for name in STARTS)
+    dependencies = " ".join(str(numbers[name]) for name in STARTS)
     for group in ("Output", "InitialUnknown"):
-        name, index = ("Unknown", "index") if second else (group, "valueReference")
+        name, index = ("Unknown", "index") if fmi2 else (group, "valueReference")
         rows = [
-            f'<{name} {index}="{numbers[output]}" dependencies="{known}"/>' for output in _OUTPUTS
+            f'<{name} {index}="{numbers[output]}" dependencies="{dependencies}"/>'
+            for output in _OUTPUTS
         ]
-        lines += [f"<{group}s>", *rows, f"</{group}s>"] if second else rows
+        lines += [f"<{group}s>", *rows, f"</{group}s>"] if fmi2 else rows
     return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>", ""])
 
 
-def _type(second: bool, name: str) -> str:
+def _type(fmi2: bool, name: str) -> str:
     """The enumeration of a parameter."""
     items = "".join(f'<Item name="{item}" value="{i}"/>' for i, item in enumerate(_CHOICES[name]))
-    if second:
+    if fmi2:
         return f'<SimpleType name="{name}"><Enumeration>{items}</Enumeration></SimpleType>'
     return f'<EnumerationType name="{name}">{items}</EnumerationType>'
 
 
-def _variable(second: bool, name: str, reference: int) -> str:
+def _variable(fmi2: bool, name: str, reference: int) -> str:
     parameter = name in _CHOICES or name == "v_rest"
-    kind = (
+    causality = (
         "input"
         if name in STARTS
         else "output"
@@ -230,13 +231,13 @@ def _variable(second: bool, name: str, reference: int) -> str:
         if parameter
         else "local"
     )
-    varies = "discrete" if name in _WHOLE else "fixed" if parameter else "continuous"
-    held = "Enumeration" if name in _CHOICES else "Real" if second else "Float64"
-    if name in _WHOLE:
-        held = "Integer" if second else "Int32"
-    about = (
+    variability = "discrete" if name in _INTEGERS else "fixed" if parameter else "continuous"
+    value_type = "Enumeration" if name in _CHOICES else "Real" if fmi2 else "Float64"
+    if name in _INTEGERS:
+        value_type = "Integer" if fmi2 else "Int32"
+    attributes = (
         f'name="{name}" valueReference="{reference}" description={quoteattr(_TEXTS[name])} '
-        f'causality="{kind}" variability="{varies}"'
+        f'causality="{causality}" variability="{variability}"'
     )
     unit = {**UNITS, AMPLITUDE: "N", "force": "N", "v_rest": "m/s"}.get(name, "-")
     value = "" if unit == "-" else f' unit="{unit}"'
@@ -247,7 +248,7 @@ def _variable(second: bool, name: str, reference: int) -> str:
     elif name in _CHOICES:
         value = f' declaredType="{name}" start="0"'
     else:
-        about += ' initial="calculated"'
-    if second:
-        return f"<ScalarVariable {about}><{held}{value}/></ScalarVariable>"
-    return f"<{held} {about}{value}/>"
+        attributes += ' initial="calculated"'
+    if fmi2:
+        return f"<ScalarVariable {attributes}><{value_type}{value}/></ScalarVariable>"
+    return f"<{value_type} {attributes}{value}/>"

@@ -6,15 +6,8 @@ import {
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
 
-// [level, colour of what is below it, painted over that of the level before, where along v~ its number stands]; viridis
-const SHADES = [
-  [Infinity, "#fde725"], [0.99, "#d0e11c", 0.93], [0.95, "#a0da39"], [0.9, "#73d056", 0.82], [0.8, "#4ac16d"],
-  [0.7, "#2db27d", 0.7], [0.6, "#1fa187"], [0.5, "#21918c", 0.6], [0.4, "#277f8e"], [0.3, "#2e6e8e", 0.5],
-  [0.2, "#365c8d"], [0.1, "#3f4788", 0.4], [0.05, "#46327e"], [0.02, "#481b6d"], [0.01, "#440154", 0.3],
-];
 const FINE = 1000; // steps from the foot of the map to its top
-
-const isMapped = ({ contact, direction }) => contact === "spring" && direction === "across";
+const kindOf = ({ contact, direction }) => `contact=${contact}&direction=${direction}`;
 
 /** A function of a place in shares of the axes, linear between the values of map.json. */
 function interpolated({ v_tilde: { n: columns }, y_tilde: { n: rows }, mu_ratio, unit }) {
@@ -26,13 +19,29 @@ function interpolated({ v_tilde: { n: columns }, y_tilde: { n: rows }, mu_ratio,
   };
 }
 
-/** The map: `set({ name: value [SI] })`, `nudge(name, steps)`; that it cannot be had is told to `status`. */
+/** The map of the chosen contact: `set({ name: value [SI] })`, `nudge(name, steps)`; that it cannot be had is told to
+ *  `status`. */
 export function mapPanel(set, nudge, status) {
-  let state, answer, data, ratio, shades, frame, point;
+  let state, answer, asked, data, frame, point;
+  const maps = new Map(); // by kind of contact
   const plot = new Plot($("map"), paint);
+  const channel = status.channel("map", (kind) => get(`static/page/map.json?${kind}`), (found, kind) => {
+    maps.set(kind, prepared(found));
+    mark();
+  });
+
+  /** The data of a map with its areas of one colour: how high each ends above a place along v~. */
+  function prepared(found) {
+    const ratio = interpolated(found);
+    const shares = Array.from({ length: found.v_tilde.n }, (_, i) => i / (found.v_tilde.n - 1));
+    const shades = [Infinity, ...found.levels.toReversed()].map((level, i) => ({
+      colour: found.colours.at(-1 - i), heights: shares.map((x) => crossing(ratio, x, level)),
+    }));
+    return { ...found, ratio, shades };
+  }
 
   /** How high the ratio falls below a level; in shares of the axes. */
-  function crossing(x, level) {
+  function crossing(ratio, x, level) {
     let up = 0;
     while (up < 1 && ratio(x, up) >= level) up += 1 / FINE;
     return up;
@@ -41,29 +50,32 @@ export function mapPanel(set, nudge, status) {
   function read(x, y) {
     if (!frame?.holds(x, y)) return "";
     const [v, a] = [frame.x.value(x), frame.y.value(y)];
-    const here = ratio(frame.x.share(v), frame.y.share(a)).toFixed(2);
+    const here = data.ratio(frame.x.share(v), frame.y.share(a)).toFixed(2);
     return `ṽ = ${show(v, 3)}, ỹ = ${show(a, 3)}: µ/µ₀ ≈ ${here}`;
   }
+
+  const swing = () => (state.direction === "normal" ? "Fz_amplitude" : "y0");
 
   /** Moves the point, where there is one: v~ by the speed, y~ by the amplitude. */
   function pick(v, y) {
     const [mu0, Fz, k, omega] = ["mu0", "Fz", "k", "omega"].map((name) => valueOf(state, name));
     const length = (mu0 * Fz) / k; // 0 for a rigid contact
-    if (length && omega && isMapped(state)) set({ v0: v * length * omega, y0: y * length });
+    if (length && omega) set({ v0: v * length * omega, [swing()]: y * (state.direction === "normal" ? Fz : length) });
   }
 
-  /** Marks the point of the answer; says where there is none. */
+  /** Marks the point of the answer on the map of its contact; says where there is none. */
   function mark() {
+    data = maps.get(kindOf(state));
+    $("map-section").classList.toggle("other", !data);
     point = null;
     plot.redraw();
     if (!answer) return;
-    const { groups: { v_tilde, y_tilde }, asked, mu_ratio, regime } = answer;
+    const { groups: { v_tilde, y_tilde }, asked: { k, v0, ...kind }, mu_ratio, regime } = answer;
     const [v, y] = [v_tilde ?? Infinity, y_tilde ?? Infinity];
     let out = "";
-    if (!isMapped(asked)) out = "This map is that of one spring across. It does not hold for what is chosen.";
-    else if (asked.k === RIGID) out = "A rigid contact has no point on the map.";
-    else if (v_tilde === null && asked.v0.low === 0) out = "A contact at rest has no point on the map.";
-    else {
+    if (k === RIGID) out = "A rigid contact has no point on the map.";
+    else if (v_tilde === null && v0.low === 0) out = "A contact at rest has no point on the map.";
+    else if (kindOf(kind) === kindOf(state)) {
       point = [v, y];
       const away = [["ṽ", v, data?.v_tilde], ["ỹ", y, data?.y_tilde]]
         .filter(([, value, axis]) => value < axis?.start || value > axis?.stop)
@@ -72,30 +84,50 @@ export function mapPanel(set, nudge, status) {
       const here = `speed ${show(v, 3)}, amplitude ${show(y, 3)}, ratio ${show(mu_ratio, 3)}, ${inWords(regime)}`;
       $("map").setAttribute("aria-label", `Map of the friction ratio. The point: ${here}.`);
     }
-    $("map-section").classList.toggle("other", !isMapped(asked));
     $("map-out").textContent = out;
   }
 
   function paint(width, height) {
-    if (!data) return [];
-    const axis = (name, title) => ({ low: data[name].start, high: data[name].stop, log: true, title });
-    const [v, y] = [axis("v_tilde", "dimensionless speed ṽ"), axis("y_tilde", "dimensionless amplitude ỹ")];
-    frame = new Frame(width, height, v, y);
+    if (!data) return [...$("map").children]; // until there is another one
+    const axis = (name, title, words) => {
+      const { start: low, stop: high, log } = data[name];
+      return { low, high, log, title, words };
+    };
+    const size = state.direction === "normal" ? "ỹ = ΔFz/Fz" : "ỹ = y₀k/(µ₀Fz)";
+    frame = new Frame(width, height, axis("v_tilde", "speed ṽ = v₀k/(µ₀Fzω)", "faster sliding →"),
+      axis("y_tilde", `amplitude ${size}`, "larger amplitude →"));
     const { x: left, y: top, width: wide, height: tall } = frame.box;
-    const border = (kind) => frame.curve(...[0, 1].map((i) => data.border.map((at) => at[i])), kind);
-    const at = (text, x, up, kind) => label(text, left + x * wide, top + (1 - up) * tall + 4, kind);
+    const border = frame.curve(...[0, 1].map((i) => data.border.map((at) => at[i])), "border");
+    const at = (x, up) => [left + x * wide, top + (1 - up) * tall];
     const shade = ({ colour, heights }) => {
-      const edge = heights.map((up, i) => `${left + (i * wide) / (heights.length - 1)} ${top + (1 - up) * tall}`);
+      const edge = heights.map((up, i) => at(i / (heights.length - 1), up).join(" "));
       const path = make("path", { d: `M${edge.join("L")}V${top}H${left}Z`, class: "shade" });
       path.style.fill = colour;
       return path;
     };
+    const areas = data.areas.map(([x, up, text]) => {
+      const [[px, py], half] = [at(x, up), 4.2 * text.length + 8];
+      return [text, Math.min(Math.max(px, left + half), left + wide - half), py, half];
+    });
+    const numbers = []; // those that have room
+    for (const one of data.labels) {
+      const [px, py] = at(one[1], one[2]);
+      const free = areas.every(([, x, y, half]) => Math.abs(x - px) > half + 8 || Math.abs(y - 4 - py) > 20);
+      if (free && numbers.every(([, x, y]) => Math.hypot(x - px, y - py) > 24)) numbers.push([one, px, py]);
+    }
+    /** The number of a level, turned along its line. */
+    const number = ([[level, x], ...place]) => {
+      const { heights } = data.shades[data.levels.length - data.levels.indexOf(level)];
+      const i = Math.min(Math.max(Math.round(x * (heights.length - 1)), 2), heights.length - 3);
+      const rise = ((heights[i + 2] - heights[i - 2]) * tall) / ((4 * wide) / (heights.length - 1));
+      const turn = (-180 / Math.PI) * Math.atan(rise);
+      const text = label(String(level), 0, 4, "tag");
+      text.setAttribute("transform", `translate(${place}) rotate(${turn})`);
+      return text;
+    };
     return [
-      shades.map(shade), frame.axes(false),
-      frame.inside(
-        SHADES.map(([level, , x]) => x && at(String(level), x, crossing(x, level), "tag")),
-        border("border back"), border("border"),
-        at("stick–slip", 0.16, 0.3, "tag area"), at("continuous", 0.78, 0.16, "tag area")),
+      frame.inside(data.shades.map(shade)), frame.axes(false),
+      frame.inside(border, numbers.map(number), areas.map(([text, ...place]) => label(text, ...place.slice(0, 2), "tag area"))),
       point && frame.point(...point),
     ];
   }
@@ -103,17 +135,13 @@ export function mapPanel(set, nudge, status) {
   plot.follow({
     move: (x, y) => { $("map-read").textContent = read(x, y); },
     pick: (x, y) => frame && pick(frame.x.value(x), frame.y.value(y)),
-    step: (right, up) => isMapped(state) && nudge(right ? "v0" : "y0", right || up),
+    step: (right, up) => nudge(right ? "v0" : swing(), right || up),
   });
   $("map-image").addEventListener("click", () => plot.save(caption(state), "friction-map.svg"));
-  status.channel("map", () => get("static/page/map.json"), (found) => {
-    [data, ratio] = [found, interpolated(found)];
-    const shares = Array.from({ length: data.v_tilde.n }, (_, i) => i / (data.v_tilde.n - 1));
-    shades = SHADES.map(([level, colour]) => ({ colour, heights: shares.map((x) => crossing(x, level)) }));
-    mark();
-  }).push(null);
   return (...now) => {
     [state, answer] = now;
+    if (asked !== kindOf(state) && !maps.has(kindOf(state))) channel.push(kindOf(state));
+    asked = kindOf(state);
     mark();
   };
 }
@@ -172,7 +200,7 @@ export function lawPanel(set, nudge) {
     const values = law.values.map(shown);
     const top = 1.06 * Math.max(along === "mu0" ? 0 : valueOf(state, "mu0"), 1e-300, ...(high ?? mu));
     const x = { low: values[0], high: values.at(-1), log: scale === "log", title: heading() };
-    frame = new Frame(width, height, x, { low: 0, high: top, title: "µ macro" });
+    frame = new Frame(width, height, x, { low: 0, high: top, title: "friction µ macro" });
     const { box: { y, height: tall } } = frame;
     const upright = (kind, at) => make("path", { d: `M${at} ${y}v${tall}`, class: kind });
     const places = values.map((value) => frame.x.pixel(value));
@@ -187,7 +215,7 @@ export function lawPanel(set, nudge) {
         const [away, anchor] = at < frame.x.to - 70 ? [5, "start"] : [-5, "end"]; // on the side that has room
         return [upright("mark border", at), label("border", at + away, frame.y.from - 8, "mark", anchor)];
       }),
-      label("static", frame.x.from + 5, frame.y.pixel(still[0]) - 4, "tick", "start"),
+      label("static", frame.x.from + 5, Math.min(frame.y.pixel(still[0]) + 14, frame.y.from - 5), "tick", "start"),
       cursor !== null && [upright("grid strong", places[cursor]), frame.dot(values[cursor], mu[cursor], 4, "dot")],
       answer && frame.point(shown(valueOf(answer.asked, along)), answer.mu_macro),
     ];

@@ -25,25 +25,45 @@ export function inputForm(set, setSI, status) {
     const radio = (value) => make("label", {}, make("input", { type: "radio", name, value }), value);
     $(name).append(...Object.keys(words).map(radio));
   }
+  $("contact").append(make("label", { class: "switch" }, rigid, "rigid"));
+  /** Which contact and oscillation there are beside what is chosen; the others cannot be, and why. */
+  function offer({ contact, direction, k }) {
+    const reasons = [];
+    for (const [name, kind] of [["contact", (one) => `${one} ${direction}`], ["direction", (one) => `${contact} ${one}`]]) {
+      for (const radio of $(name).querySelectorAll("[type=radio]")) {
+        const reason = about.impossible[kind(radio.value)];
+        radio.disabled = reason !== undefined;
+        if (reason) reasons.push(reason);
+      }
+    }
+    const body = k === RIGID ? "rigid contact" : about.choices.contact[contact];
+    const said = `${body}, ${about.choices.direction[direction]}`;
+    $("chosen").textContent = reasons[0] ?? `${said[0].toUpperCase()}${said.slice(1)}.`;
+    for (const part of $("sketch").querySelectorAll(".body, .motion")) {
+      part.toggleAttribute("hidden", !part.matches(`.body.${k === RIGID ? "rigid" : contact}, .motion.${direction}`));
+    }
+    $("sketch").setAttribute("aria-label", `The set-up: ${said}`);
+  }
   const options = [["along", "symbol"], ["unknown", "label"]].flatMap(([id, word]) => {
     $(id).append(...Object.entries(about.inputs).map(([name, input]) => new Option(input[word], name)));
     return [...$(id).options];
   });
   $("unknown").value = "y0";
-  const rows = Object.entries(about.inputs).map(([name, { label, symbol, range: [low, high] }]) => {
+  const rows = Object.entries(about.inputs).map(([name, { label, symbol, note, range: [low, high] }]) => {
     const fault = make("p", { id: `fault-${name}`, class: "fault" });
     const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
     const steps = { min: low * STEPS, max: high * STEPS, step: 1 };
     const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...steps });
     slider.addEventListener("input", () => setSI({ [name]: 10 ** (slider.value / STEPS) }));
-    const elastic = name === "k" && make("label", { class: "switch" }, rigid, "rigid (no spring)");
-    const row = make("div", { class: "field" }, make("label", { for: input.id }, label), input, slider, elastic, fault);
-    return { name, symbol, row, input, slider, fault };
+    const words = make("label", { for: input.id }, label, note && make("small", {}, note));
+    return { name, symbol, row: make("div", { class: "field" }, words, input, slider), input, slider, fault };
   });
+  $("messages").append(...rows.map(({ fault }) => fault));
   $("form").append(...rows.map(({ row }) => row));
   return (now) => {
     if (now === state) return; // what is being typed stays
     state = now;
+    offer(state);
     rigid.checked = state.k === RIGID;
     if (!rigid.checked) elastic = state.k.text;
     fill($("range"), state.range);
@@ -56,7 +76,8 @@ export function inputForm(set, setSI, status) {
       fill(input, quantity);
       slider.value = size > 0 ? Math.round(STEPS * Math.log10(size)) : slider.min;
       slider.setAttribute("aria-valuetext", `${symbolOf(name, quantity.unit)} = ${quantity.text}`);
-      fault.textContent = quantity.fault ? `${symbol}: ${quantity.fault}.` : "";
+      fault.textContent = quantity.fault && !row.hidden ? `${symbol}: ${quantity.fault}.` : "";
+      fault.classList.toggle("bad", input.ariaInvalid === "true");
       status.set(`typed ${name}`, row.hidden ? "" : fault.textContent, input.ariaInvalid === "false");
     }
   };
@@ -95,7 +116,7 @@ function panel(name, path, read, show) {
 
 /** Shows lines: [text], or [text, ...given] with a button for `use(...given)`. */
 const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...given]) => {
-  const button = make("button", { "aria-label": `use ${text}` }, "Use");
+  const button = make("button", { class: "use", "aria-label": `use ${text}` }, "Use");
   button.addEventListener("click", () => use(...given));
   return make("li", {}, text, given.length > 0 && button);
 }));
@@ -152,18 +173,23 @@ export function stiffness(use) {
   });
 }
 
-/** k and µ₀ from measured points. */
-export function fit(use) {
+/** k and µ₀ from measured points; `load(case)` takes the case of the example, in the words of an address. */
+export function fit(use, load) {
   let paint = () => [];
   let told;
   const plot = new Plot($("fit-plot"), (...size) => paint(...size));
+  $("example").title = about.example.label;
+  $("example").addEventListener("click", () => {
+    $("points").value = about.example.points;
+    load(about.example.case);
+  });
   $("fit-image").addEventListener("click", () => plot.save(told, "friction-fit.svg"));
   return panel("fit", "v1/fit", (state) => {
     const points = readPoints($("points").value);
     const unknowns = $("unknowns").value.split(" ").filter((name) => !(name in points)); // a column mu0 is known
     if (!unknowns.length) refuse("µ₀ is a column of the points: choose k as the unknown");
     return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...points };
-  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, curve }, asked, state) => {
+  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, residuals, curve }, asked, state) => {
     /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
     const text = (name, value, digits = 4) =>
       (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, state[name].unit, digits));
@@ -182,22 +208,25 @@ export function fit(use) {
     told = lines.map(([line]) => line).join("; ");
     list("fit-found", lines, use);
     list("fit-warnings", warnings.map((line) => [line]));
-    paint = (width, height) => picture(width, height, asked, curve, state.v0.unit);
+    paint = (width, height) => picture(width, height, asked, curve, residuals, state.v0.unit);
     plot.redraw();
   });
 }
 
-/** Points with their standard deviations, the curve of the fit (null: there is none) and its 95 % band. */
-function picture(width, height, { v0, mu_macro: mu, std = [] }, curve, unit) {
+/** Points with their standard deviations, the curve of the fit and its 95 % band; where there is none (null), such as
+ *  with mu0 at each point, a line through the fit at the points. */
+function picture(width, height, { v0, mu_macro: mu, std = [] }, curve, residuals, unit) {
   const [speeds, at] = [v0, curve?.v0 ?? []].map((column) => column.map((value) => fromSI("v0", value, unit)));
+  const fitted = speeds.map((one, i) => [one, mu[i] - residuals[i]]).sort(([a], [b]) => a - b);
   const [least, most] = [Math.min(...speeds, ...at), Math.max(...speeds, ...at)];
   const log = least > 0 && most > 10 * least;
   const x = { low: log ? least / 1.2 : 0, high: log ? most * 1.2 : 1.05 * most || 1, log, title: `v₀ [${unit}]` };
   const ends = mu.map((one, i) => [one - (std[i] ?? 0), one + (std[i] ?? 0)]);
   const top = 1.06 * Math.max(1e-300, ...ends.flat(), ...(curve?.mu_macro ?? []));
-  const frame = new Frame(width, height, x, { low: 0, high: top, title: "µ macro" });
+  const frame = new Frame(width, height, x, { low: 0, high: top, title: "friction µ macro" });
   return [frame.axes(), frame.inside(
     curve && [frame.band(at, curve.low, curve.high), frame.curve(at, curve.mu_macro, "curve")],
+    !curve && frame.curve(...[0, 1].map((i) => fitted.map((one) => one[i])), "curve"),
     speeds.map((one, i) => [frame.curve([one, one], ends[i], "measured"), frame.dot(one, mu[i], 3.5, "measured")]),
   )];
 }

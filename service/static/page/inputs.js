@@ -1,5 +1,5 @@
 // The inputs: units and bounds, what a person types, numbers as text, the state of the page, its case and its address.
-// Nothing here needs a browser; tests/page tests it with node.
+// Nothing here needs a browser; tests/service/page tests it with node.
 
 /** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
  *  slider's decimal exponents (SI), start value; beside them the choices with their words, geometries
@@ -74,13 +74,16 @@ export function within(where, read) {
 
 const NUMBER = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?![\d.,])(.*)$/is;
 
-/** [number, unit] of a typed text, unit "" where there is none. */
+/** [number, unit] of a typed text, unit "" where there is none; a comma is a decimal sign where it is no sign of
+ *  thousands. */
 function readNumber(text) {
   const tidy = text.trim().replace("−", "-");
   const [, digits, unit] = NUMBER.exec(tidy) ?? [];
   if (digits === undefined) {
     const point = tidy.replace(",", ".");
-    const why = NUMBER.test(point) ? `“${tidy}”: the decimal sign is a point, ${point}` : `“${tidy}” is not a number`;
+    if (NUMBER.test(point) && !/^[+-]?[1-9]\d*,\d{3}(?!\d)/.test(tidy)) return readNumber(point);
+    const why = NUMBER.test(point) ? `“${tidy}” can be ${point} or ${tidy.replace(",", "")}: write one of them`
+      : `“${tidy}” is not a number`;
     refuse(tidy === "" ? "give a number" : why);
   }
   const value = Number(digits);
@@ -269,7 +272,10 @@ export function fromAddress(hash) {
   };
   for (const [key, words] of Object.entries(WORDS)) {
     const known = words(state);
-    take(key, (word) => (known.includes(word) ? word : refuse(`must be one of ${known.join(", ")}`)));
+    take(key, (word) => {
+      if (!known.includes(word)) refuse(`must be one of ${known.join(", ")}`);
+      return about.impossible[key === "direction" ? `${state.contact} ${word}` : ""] ? refuse("not for a ball") : word;
+    });
   }
   if (texts.has("omega")) take("f", () => refuse("omega is given, too"));
   for (const name of namesOf(state)) take(name, (text) => readValue(name, text, about.inputs[name].unit));

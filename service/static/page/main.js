@@ -30,9 +30,6 @@ function change(changed) {
   follow();
   for (const name of ["contact", "direction", "along", "scale"]) $("form").elements[name].value = state[name];
   $("digits").checked = state.digits === "all";
-  for (const swing of document.querySelectorAll("#sketch g")) {
-    swing.toggleAttribute("hidden", !swing.matches(`.${state.direction}`));
-  }
   // browsers refuse an address that changes with every step of a slider
   clearTimeout(addressTimer);
   addressTimer = setTimeout(() => history.replaceState(null, "", toAddress(state)), 150);
@@ -73,6 +70,11 @@ function readAddress({ newURL }) {
   change(read.state);
 }
 
+/** A sentence of the service in the page's signs. */
+const prose = (text) => text.replaceAll("mu_macro", "µ").replaceAll("mu0", "µ₀").replaceAll("y0", "y₀")
+  .replaceAll("y~", "ỹ").replaceAll(" um ", " µm ").replace("give k_range", "give k as an interval")
+  .replace(/(\d) (?=%|µm)/g, "$1\u00a0");
+
 /** Shows an answer; with the digits that k supports, or with all that the table supports. */
 function showAnswer({ asked, ...found }) {
   const { mu_macro: mu, mu_macro_low: low, mu_macro_high: high, error_bound: bound, limits, groups, power } = found;
@@ -84,11 +86,13 @@ function showAnswer({ asked, ...found }) {
   $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
-  $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; compared with one published set of measured points, along.`;
+  $("model").textContent = `One model: ${kind}, ${about.choices.direction[direction]}; compared with one published set of measured points, along.`;
   const rows = found.model ?? [];
-  const units = rows.find(({ row }) => row === "units"); // beside the number: it is probably wrong
-  $("units").textContent = units ? `Check the units: ${units.text}` : "";
-  $("rows").replaceChildren(...rows.filter((one) => one !== units).map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
+  const [units, known] = ["units", "k is known"].map((name) => rows.find(({ row }) => row === name)); // beside the number
+  $("units").textContent = units ? `Check the units: ${prose(units.text)}` : "";
+  $("known").textContent = known ? `${prose(known.text)}.` : "";
+  $("rows").replaceChildren(...rows.filter((one) => one !== units && one !== known)
+    .map(({ row, text }) => make("li", {}, make("b", {}, `${row}: `), `${prose(text)}.`)));
   list("values", {
     "µ/µ₀": all ? friction(found.mu_ratio, bound / valueOf(asked, "mu0"), 15) : show(found.mu_ratio, 4),
     "static µ (v₀ → 0)": show(limits.mu_static, 4),
@@ -126,9 +130,10 @@ function showBars({ gradient, mu_macro: mu }, asked) {
 
 function start(names) {
   Object.assign(about, names);
+  $("version").textContent = about.version;
   for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
   parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge),
-    solver(setSI), stiffness(setSI), fit(setSI)];
+    solver(setSI), stiffness(setSI), fit(setSI, (words) => change(fromAddress(`#${words}`).state))];
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
   addEventListener("change", take);

@@ -1,7 +1,7 @@
 // Elements, and what the plots share: an SVG that follows its size, axes with ticks, curves, pictures for download.
 
 export const $ = (id) => document.getElementById(id);
-const SVG = ["svg", "path", "rect", "circle", "text"];
+const SVG = ["svg", "g", "path", "rect", "circle", "text", "tspan"];
 
 /** An element of HTML or SVG with attributes and children; null children are left out. */
 export function make(tag, attributes = {}, ...children) {
@@ -19,8 +19,8 @@ const power = (exponent) => `10${String(exponent).replace(/./g, (sign) => "â»â
 
 /** A linear or logarithmic axis from `low` to `high`, drawn between the pixels `from` and `to`. */
 class Axis {
-  constructor({ low, high, log, title }, from, to) {
-    Object.assign(this, { low, high, log, title, from, to });
+  constructor({ low, high, log, title, words = "" }, from, to) {
+    Object.assign(this, { low, high, log, title, words, from, to });
     [this.a, this.b] = log ? [Math.log10(low), Math.log10(high)] : [low, high];
   }
 
@@ -50,25 +50,31 @@ class Axis {
   }
 }
 
-/** Two axes, { low, high, log, title } each, in a plot of this size; what is drawn in them is given by its values. */
+/** Two axes, { low, high, log, title, words } each, in a plot of this size; what is drawn in them is given by its values. */
 export class Frame {
   constructor(width, height, x, y) {
-    this.x = new Axis(x, 58, width - 14);
-    this.y = new Axis(y, height - 46, 12);
-    this.box = { x: 58, y: 12, width: width - 72, height: height - 58 };
+    const foot = x.words ? 62 : 46; // words stand below the title of an axis
+    const left = y.words ? 74 : 58;
+    this.x = new Axis(x, left, width - 14);
+    this.y = new Axis(y, height - foot, 12);
+    this.box = { x: left, y: 12, width: width - left - 14, height: height - foot - 12 };
   }
 
   /** Ticks and titles, with lines through the plot or (`grid` false) short ones. */
   axes(grid = true) {
     const { x, y, box } = this;
     const line = (d) => make("path", { d, class: "grid" });
+    const upright = (at, text, kind) =>
+      make("text", { class: kind, transform: `translate(${at} ${box.y + box.height / 2}) rotate(-90)` }, text);
     return [
       x.ticks(56).map(([at, text]) => [
         line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`), label(text, at, y.from + 18, "tick")]),
       y.ticks(36).map(([at, text]) => [
         line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`), label(text, x.from - 7, at + 4, "tick", "end")]),
+      x.words && label(x.words, box.x + box.width / 2, y.from + 54, "words"),
+      y.words && upright(30, y.words, "upright words"),
       label(x.title, box.x + box.width / 2, y.from + 38),
-      make("text", { class: "upright", transform: `translate(15 ${box.y + box.height / 2}) rotate(-90)` }, y.title),
+      upright(14, y.title, "upright"),
     ];
   }
 
@@ -109,7 +115,7 @@ export class Frame {
 }
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "font",
+const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-opacity", "stroke-dasharray", "stroke-linejoin", "font",
   "text-anchor", "paint-order"];
 
 /** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */

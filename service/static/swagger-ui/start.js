@@ -42,5 +42,8 @@ function show(spec) {
   });
 }
 
+// no channel: its answer, which needs no key, would take away the field of the key
+const { found: names } = await get("static/page/names.json");
+for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !names?.guide;
 const tell = (text) => { $("status").textContent = text; };
 new Channel(() => get("openapi.json"), show, tell).push(null);

@@ -1,0 +1,222 @@
+"""Errors over their estimates, times and pictures of `mumacro.motion`.
+
+python benchmarks/motion.py [--only SECTION] [--share 0.01]
+
+Motions are random: up to three harmonics of 1 to 5 along and across, up to two of the load, drags
+from 1e-3 to 10 of the amplitude or of mu0 Fz / k, every tenth at rest.
+"""
+
+from benchmarks.measuring import IMAGES, best_of, main, markdown, quantity, sections  # isort: split
+
+import functools
+import math
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro import Surrogate, motion
+
+Array = NDArray[np.float64]
+CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5}
+L0 = 3e-6  # m, mu0 Fz / k
+#: contact, tolerance, motions, and the tolerance of what they are compared with
+SEARCHES = (
+    ("spring", 1e-4, 5_000, 1e-8),
+    ("spring", 1e-6, 10_000, 1e-9),
+    ("spring", 1e-7, 5_000, 1e-9),
+    ("ball", 1e-6, 150, 1e-8),
+)
+AGAINST_TABLES = (
+    ("spring", "across", 20_000),
+    ("spring", "along", 20_000),
+    ("spring", "normal", 20_000),
+    ("ball", "across", 2_000),
+    ("ball", "along", 2_000),
+)
+
+
+def random_motions(n: int, ball: bool = False, seed: int = 1) -> Iterator[dict[str, Any]]:
+    """Keywords of ``motion``."""
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        size = 10.0 ** rng.uniform(-2.0, 2.0)
+        counts = [*rng.integers(0, 4, 2), 0 if ball else rng.integers(0, 3)]
+        if not any(counts[:2]):
+            counts[rng.integers(0, 2)] = 1
+        parts = []
+        for count in counts:
+            orders = rng.integers(1, 6, count)
+            amplitudes = rng.uniform(0.0, 1.0, count) * 10.0 ** rng.uniform(-1.0, 0.0)
+            even = rng.random(count) < 0.2  # phases at which events may coincide
+            phases = np.where(even, 90.0 * rng.integers(0, 4, count), rng.uniform(0, 360, count))
+            parts.append([*zip(orders.tolist(), amplitudes, phases, strict=True)])
+        x, y = ([(o, a * size * L0, p) for o, a, p in part] for part in parts[:2])
+        total = sum(a for _, a, _ in parts[2]) or 1.0
+        swing = rng.uniform(0.01, 0.98) * CASE["Fz"]
+        normal = [(o, a / total * swing, p) for o, a, p in parts[2]]
+        drag = 10.0 ** rng.uniform(-3.0, 1.0) * (size if rng.random() < 0.5 else 1.0)
+        v0 = 0.0 if rng.random() < 0.1 else drag * L0 * CASE["omega"]
+        yield {**CASE, "v0": v0, "x": x or 0.0, "y": y or 0.0, "normal": normal or 0.0}
+
+
+def ratios(contact: str, tolerance: float, finer: float, n: int, seed: int = 1) -> Array:
+    """Error, estimate and tolerance mu0 of random motions, (n, 3); the error from finer cycles."""
+    rows = []
+    for case in random_motions(n, contact == "ball", seed):
+        a, b = (motion(**case, contact=contact, tolerance=t) for t in (tolerance, finer))
+        error = math.hypot(a.mu_macro - b.mu_macro, a.mu_lateral - b.mu_lateral)
+        rows.append((error, a.error_estimate, tolerance * CASE["mu0"]))
+    return np.array(rows)
+
+
+def errors(share: float = 1.0) -> str:
+    """Error over estimate of random motions beside cycles of a finer tolerance."""
+    rows = []
+    for contact, tolerance, n, finer in SEARCHES:
+        error, estimate, most = ratios(contact, tolerance, finer, max(1, round(share * n))).T
+        ratio = error / estimate
+        rows.append(
+            [
+                f"{contact}, {tolerance:g}",
+                f"{error.size:,}",
+                *(quantity(float(x)) for x in np.quantile(ratio, (0.5, 0.99, 1.0))),
+                f"{np.count_nonzero(ratio > 1.0)}",
+                quantity(float(error.max() / CASE["mu0"])),
+                f"{np.count_nonzero(estimate > most)}",
+            ]
+        )
+    header = (
+        "contact, tolerance",
+        "motions",
+        "error/estimate: median",
+        "99 %",
+        "largest",
+        "above 1",
+        "largest error/mu0",
+        "given up",
+    )
+    return markdown(header, rows)
+
+
+def table_points(direction: str, n: int, seed: int = 2) -> tuple[Array, Array]:
+    """v~ and y~, log-uniform, of the load's oscillation uniform."""
+    rng = np.random.default_rng(seed)
+    y = 10.0 ** rng.uniform(-2.0, 4.0, n)
+    return 10.0 ** rng.uniform(-4.0, 1.5, n), rng.uniform(
+        0.01, 0.99, n
+    ) if direction == "normal" else y
+
+
+def beside_table(contact: str, direction: str, n: int, seed: int = 2) -> tuple[Array, Array]:
+    """Errors of mu_macro/mu0 beside the table, and estimate plus bound, (n,)."""
+    v, y = table_points(direction, n, seed)
+    case = {**CASE, "v0": v * L0 * CASE["omega"]}
+    name = {"across": "y", "along": "x", "normal": "normal"}[direction]
+    size = y * (CASE["Fz"] if direction == "normal" else L0)
+    field = "Fz_amplitude" if direction == "normal" else "y0"
+    a = motion(**case, **{name: size}, contact=contact)
+    b = Surrogate.open().evaluate(**case, **{field: size}, contact=contact, direction=direction)
+    error = np.hypot(a.mu_macro - b.mu_macro, a.mu_lateral)
+    return error / CASE["mu0"], (a.error_estimate + b.error_bound) / CASE["mu0"]
+
+
+def beside_tables(share: float = 1.0) -> str:
+    """Single harmonics beside the tables: the error over estimate plus bound."""
+    rows = []
+    for contact, direction, n in AGAINST_TABLES:
+        error, off = beside_table(contact, direction, max(10, round(share * n)))
+        cells = (float(np.median(error)), float(error.max()), float((error / off).max()))
+        rows.append([f"{contact} {direction}", f"{error.size:,}", *map(quantity, cells)])
+    header = ("", "points", "median error/mu0", "largest", "error over estimate and bound")
+    return markdown(header, rows)
+
+
+def times(share: float = 1.0) -> str:
+    """Processor time of one motion at 1e-6, and 1,000 cases of one motion on all processors."""
+    rows = []
+    for contact, n in (("spring", 1000), ("ball", 300)):
+        each = []
+        for case in random_motions(max(3, round(share * n)), contact == "ball", seed=5):
+            call = functools.partial(motion, **case, contact=contact, threads=1)
+            each.append(1e3 * best_of(1, {"": call})[""])
+        rng = np.random.default_rng(3)
+        many = max(10, round(1000 * share))
+        case = {
+            **CASE,
+            "v0": 10.0 ** rng.uniform(-3, 0, many),
+            "x": (10.0 ** rng.uniform(-8, -4, many), rng.uniform(0, 360, many)),
+            "y": 10.0 ** rng.uniform(-8, -4, many),
+        }
+        start, used = time.perf_counter(), time.process_time()
+        motion(**case, contact=contact)
+        wall, used = time.perf_counter() - start, time.process_time() - used
+        quantiles = np.quantile(each, (0.5, 0.9, 0.99, 1.0))
+        rows.append(
+            [contact, *(f"{x:.2f}" for x in quantiles), f"{many:,}", f"{wall:.2f}", f"{used:.2f}"]
+        )
+    header = (
+        "",
+        "one, median [ms]",
+        "90 %",
+        "99 %",
+        "slowest",
+        "cases at once",
+        "seconds",
+        "of one processor",
+    )
+    return markdown(header, rows)
+
+
+PHASES = np.linspace(0.0, 360.0, 73)
+SPEEDS = (0.02, 0.1, 0.5)  # m/s
+
+
+def phase_sweep(v0: float) -> Array:
+    """mu_macro/mu0 over the phase between an oscillation along and that of the load, (73,)."""
+    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": v0}
+    return np.asarray(motion(**case, x=4e-6, normal=(5.0, PHASES)).mu_macro) / 0.3
+
+
+def pictures(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
+    """Writes the pictures of docs/how-to/motion.md, and prints the phase sweep at its ends."""
+    from matplotlib.figure import Figure
+
+    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
+    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+    motion(**case, x=(2e-6, 90), y=4e-6).plot(figure.subplots(1, 2))
+    figure.savefig(IMAGES / "motion-ellipse.png", dpi=110)
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    axes = figure.subplots()
+    rows = []
+    for v0 in SPEEDS:
+        ratio = phase_sweep(v0)
+        axes.plot(PHASES, ratio, label=f"$v_0$ = {v0:g} m/s")
+        low, high = int(ratio.argmin()), int(ratio.argmax())
+        rows.append(
+            [
+                f"{v0:g}",
+                f"{ratio[low]:.3f}",
+                f"{PHASES[low]:.0f}",
+                f"{ratio[high]:.3f}",
+                f"{PHASES[high]:.0f}",
+            ]
+        )
+    axes.axhline(0.0, lw=0.8, color="grey")
+    axes.set(
+        xlabel="phase of the load [degrees]",
+        ylabel=r"$\mu_\mathrm{macro}/\mu_0$ [-]",
+        xticks=np.arange(0, 361, 45),
+    )
+    axes.legend()
+    figure.savefig(IMAGES / "motion-phase.png", dpi=110)
+    header = ("v0 [m/s]", "least mu_macro/mu0", "at [degrees]", "most", "at [degrees]")
+    return markdown(header, rows)
+
+
+SECTIONS = sections(errors, beside_tables, times, pictures)
+
+if __name__ == "__main__":
+    main(__doc__, SECTIONS, share=1.0)

@@ -1,0 +1,101 @@
+"""mu_macro as a curve over one input, the other five constant."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mumacro.analysis.load import Stiffening
+from mumacro.answer import Answer
+from mumacro.inputs.cases import Cases
+from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
+from mumacro.kernel.arrays import Array
+from mumacro.surrogate import Surrogate
+
+EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
+_CHORD, _HALVINGS = 1e-3, 8  # of a refined curve: error of a straight line over the height, rounds
+
+
+class InputCurve:
+    """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
+    ``k`` is rigid.
+
+    With a ``stiffening`` the unknown is Fz, and ``k`` is that at one load and grows with Fz.
+    """
+
+    def __init__(
+        self,
+        surrogate: Surrogate,
+        case: Mapping[str, Any],
+        unknown: str,
+        kind: Kind = SPRING,
+        stiffening: Stiffening | None = None,
+    ) -> None:
+        self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
+        self.stiffening = None if case.get("k") == math.inf else stiffening
+
+    def answer(
+        self,
+        x: Any,
+        *,
+        gradient: bool = False,
+        groups: bool = False,
+        strict: bool = False,
+        **others: Any,
+    ) -> Answer[Any]:
+        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``others`` replace
+        inputs of the case.  InputError for a value out of bounds where ``strict``, else NaN."""
+        k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
+        inputs = {**self.case, **k, self.unknown: x, **others}
+        return self.surrogate.answer(Cases.of(inputs, self.kind, strict), gradient, groups)
+
+    def mu(self, x: Array) -> Array:
+        """mu_macro [-] at ``x`` (n,)."""
+        return np.asarray(self.answer(x).mu_macro)
+
+    def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
+        """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN
+        at an edge."""
+        answer = self.answer(x, gradient=True)
+        with np.errstate(over="ignore", invalid="ignore"):
+            slope = x * answer.gradient[self.unknown]  # type: ignore[index]
+            if self.stiffening is not None:
+                k = self.stiffening.stiffness(self.case["k"], x)
+                slope = slope + self.stiffening.exponent * k * answer.gradient["k"]  # type: ignore[index]
+            return answer, slope
+
+    def refined(self, values: Array) -> Array:
+        """``values`` and more between them, where chords of mu_macro differ from it."""
+        mu = self.mu(values)
+        for _ in range(_HALVINGS):
+            low, high = values[:-1], values[1:]
+            middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
+            middle_mu = self.mu(middle)
+            bent = np.abs(middle_mu - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
+            indices = np.flatnonzero(bent & (middle > low) & (middle < high))
+            if not indices.size:
+                break
+            values, mu = (
+                np.insert(values, indices + 1, middle[indices]),
+                np.insert(mu, indices + 1, middle_mu[indices]),
+            )
+        return values
+
+    def where(self, group: float) -> float:
+        """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``group``, within double range;
+        any value for a rigid contact."""
+        reference = self.answer(1.0 if self.stiffening is None else self.stiffening.load)
+        reference_group = float(
+            reference.v_tilde / reference.y_tilde if self.kind.normal else reference.y_tilde
+        )
+        scale = 1.0 if self.case.get("k") == math.inf else min(max(reference_group, 1e-300), 1e300)
+        if self.stiffening is not None:
+            return self.stiffening.place(group / scale)
+        return group / scale if self.unknown == "k" else scale / group
+
+    @property
+    def proportional(self) -> bool:
+        """Whether k grows in proportion to Fz, so that Fz has no influence."""
+        growth = self.stiffening
+        return growth is not None and growth.exponent == 1.0 and not self.kind.normal

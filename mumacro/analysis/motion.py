@@ -1,0 +1,420 @@
+"""Any periodic motion of the contact: oblique, elliptic, with harmonics, beside a load that
+oscillates, too.
+
+No table holds these.  The steady cycle is computed from the equations of the contact, those of
+:class:`mumacro.Element`, in ``kernel/motion.c``: a method of order 5 follows slip to its end, and
+the cycle is the fixed point of the map of a period.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mumacro import plotting
+from mumacro.errors import InputError
+from mumacro.inputs.cases import real
+from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS, is_rigid
+from mumacro.inputs.kind import kind_of
+from mumacro.kernel.arrays import Array, Bools, common_shape, flat
+from mumacro.kernel.binding import kernels
+from mumacro.kernel.threads import default_threads
+
+MOST_HARMONIC = 1000
+TOLERANCES = 1e-9, 1e-2
+FURTHEST, SLOWEST = 1e9, 1e-12  # of ways per radian, in units of mu0 Fz / k
+REMAINING = 0.01  # of a disturbance, after ``periods``
+PARTS = ("x", "y", "normal")
+_SPRINGS = 64  # of a ball that is drawn
+_AT_ONCE = 16, 1  # cases of a thread, of springs and balls
+_KERNEL = kernels[-1]
+_FORM = (
+    "an amplitude, a pair (amplitude, phase in degrees), or a list of triples (harmonic, "
+    "amplitude, phase in degrees)"
+)
+_WHOLE = (
+    f"a whole number from 1 to {MOST_HARMONIC}: other ratios have no period 2 pi/omega; give the "
+    "frequency of which all are multiples"
+)
+_LIFTS_OFF = "an oscillation that leaves a load > 0 at every moment: at 0 the contact lifts off"
+_STILL = "> 0, or x or y an oscillation: the friction of a contact that does not move is not fixed"
+_RIGID = "finite: a rigid contact is the limit of a large k; raise it until mu_macro stays the same"
+_OF_A_BALL = (
+    "left out for a ball: with its normal force the contact radius would change, not modelled"
+)
+
+
+class Term(NamedTuple):
+    """One harmonic of a motion: amplitude sin(harmonic omega t + phase)."""
+
+    harmonic: int
+    amplitude: Array  #: [m], of the normal force [N]; ``(n,)`` once broadcast
+    phase: Array  #: [rad]
+
+    def at(self, tau: Array, i: int) -> Array:
+        """Values of case i at tau = omega t."""
+        out: Array = self.amplitude[i] * np.sin(self.harmonic * tau + self.phase[i])
+        return out
+
+
+class Cycle(NamedTuple):
+    """One steady period of one case, arrays (n + 1,)."""
+
+    t: Array  #: time [s], from 0 to the end of the period
+    x: Array  #: way of the upper point along the drag [m], that of the drag included
+    y: Array  #: and across [m]
+    Fx: Array  #: the force on it along [N], mu_macro Fz in the mean
+    Fy: Array  #: and across [N]
+    Fz: Array  #: normal force [N]
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Inputs of n cases: columns (n,) in SI, and harmonics of x, y and the normal force."""
+
+    columns: dict[str, Array]  #: mu0, Fz, k, omega, v0
+    terms: tuple[tuple[Term, ...], ...]
+    contact: str
+    tolerance: float
+
+    @property
+    def orders(self) -> tuple[tuple[int, ...], ...]:
+        """The harmonics of each part."""
+        return tuple(tuple(term.harmonic for term in part) for part in self.terms)
+
+    @property
+    def length(self) -> Array:
+        """l0 = mu0 Fz / k [m]."""
+        c = self.columns
+        return np.asarray(c["mu0"] * c["Fz"] / c["k"])
+
+    @property
+    def dimensionless(self) -> Array:
+        """The cases as the kernel takes them, (n, 1 + 2 terms)."""
+        c = self.columns
+        with np.errstate(all="ignore"):  # illegal cases are left out later
+            length = self.length
+            rows = [c["v0"] / c["omega"] / length]
+            for part, unit in zip(self.terms, (length, length, c["Fz"]), strict=True):
+                for term in part:
+                    rows += [term.amplitude / unit, term.phase]
+        return np.ascontiguousarray(np.stack(rows, axis=1))
+
+
+@dataclass(frozen=True, repr=False)
+class Motion:
+    """Steady cycles: floats for one case, arrays of the broadcast shape otherwise; NaN at an
+    illegal case of an array."""
+
+    mu_macro: Any  #: mean force along the drag over the mean normal force [-]; may be negative
+    mu_lateral: Any  #: mean force along y over the mean normal force [-]
+    stick_fraction: Any  #: share of the period, of a ball that of its springs, too [-]
+    slip_path: Any  #: of the foot per period [m]; of a ball the mean of its springs
+    power: Any  #: of the shaker in x and y [W], mean
+    power_drive: Any  #: of the drive [W], mu_macro Fz v0
+    error_estimate: Any  #: of mu_macro and mu_lateral [-]
+    #: [-] until a small disturbance has fallen to 1 %, of a ball by its slowest spring; infinite
+    #: where nothing slips
+    periods: Any
+    scenes: Scenes = field(compare=False)
+
+    def cycle(self, index: int | None = None, points: int = 400) -> Cycle:
+        """One steady period at ``points`` + 1 equal times.
+
+        ``index`` is the place of a case in the flattened arrays, needed where there are many.  A
+        ball has 64 springs here; the mean of Fx/Fz may differ from ``mu_macro`` by 1e-3 mu0.
+        """
+        i, scenes = self._place(index), self.scenes
+        if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= 10**6:
+            raise InputError("points", points, "a whole number from 2 to 1000000")
+        if math.isnan(np.ravel(self.mu_macro)[i]):
+            raise InputError("index", i, "that of a case with an answer")
+        shares = weights = np.ones(1)
+        if scenes.contact == "ball":
+            nodes, halves = np.polynomial.legendre.leggauss(_SPRINGS)
+            at = 0.5 * (nodes + 1.0)
+            shares, weights = 1.5 * at**2 * (2.0 - at**2), halves * at
+        case = scenes.dimensionless[i].copy()
+        forces = _KERNEL.motion_cycle(
+            scenes.orders, case, shares, weights, scenes.tolerance, points
+        )
+        mu0, Fz, _, omega, v0 = (float(column[i]) for column in scenes.columns.values())
+        tau = np.linspace(0.0, 2.0 * math.pi, points + 1)
+        x, y, load = (
+            sum((term.at(tau, i) for term in part), np.zeros(tau.size)) for part in scenes.terms
+        )
+        Fx, Fy = mu0 * Fz * forces.T
+        return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load)
+
+    def plot(self, axes: Any = None, *, index: int | None = None) -> Any:
+        """Forces over a period and the path of the upper point, see
+        ``mumacro.plotting.plot_cycle``; needs matplotlib."""
+        mu0 = float(self.scenes.columns["mu0"][self._place(index)])
+        return plotting.plot_cycle(*self.cycle(index), mu0, axes)
+
+    def _place(self, index: int | None) -> int:
+        n = np.size(self.mu_macro)
+        if index is None and n == 1:
+            return 0
+        whole = isinstance(index, (int, np.integer)) and not isinstance(index, bool)
+        if index is None or not whole or not 0 <= index < n:
+            raise InputError("index", index, f"a whole number from 0 to {n - 1}: one of the cases")
+        return int(index)
+
+    def __repr__(self) -> str:
+        shape = np.shape(self.mu_macro)
+        if shape:
+            of = f"{self.scenes.contact}, {math.prod(shape)} cases of shape {shape}"
+            return f"<Motion of a {of}>"
+        return (
+            f"<Motion of a {self.scenes.contact}: mu_macro {self.mu_macro:.6g}, mu_lateral "
+            f"{self.mu_lateral:.6g}, error_estimate {self.error_estimate:.1e}>"
+        )
+
+
+def motion(
+    *,
+    mu0: ArrayLike,
+    Fz: ArrayLike,
+    k: ArrayLike,
+    v0: ArrayLike,
+    omega: ArrayLike | None = None,
+    f: ArrayLike | None = None,
+    x: Any = 0.0,
+    y: Any = 0.0,
+    normal: Any = 0.0,
+    contact: str = "spring",
+    tolerance: float = 1e-6,
+    threads: int | None = None,
+) -> Motion:
+    """The steady cycle of a contact that is dragged along x and shaken in x, y and normally.
+
+    Parameters
+    ----------
+    mu0, Fz, k : array_like
+        Coulomb friction [-], mean normal force [N], tangential stiffness [N/m], all > 0.
+    v0 : array_like
+        Drag along x [m/s], >= 0.  At 0 the contact starts without force, where the motion leaves
+        a choice.
+    omega or f : array_like
+        Angular frequency [rad/s] or frequency [Hz], > 0, of the period.
+    x, y, normal : array_like, tuple or list
+        Oscillations along [m], across [m] and of the normal force [N].  Each is an amplitude, a
+        pair (amplitude, phase in degrees), or a list of triples (harmonic, amplitude, phase), that
+        is amplitude sin(harmonic omega t + phase).  Harmonics are whole numbers from 1 to 1000.
+        Phases beyond 360 count as what is left of them.
+    contact : str
+        "spring", or "ball" under a constant normal force.
+    tolerance : float
+        Of the mean force over mu0 Fz, 1e-9 to 1e-2.
+    threads : int, optional
+        Threads for arrays; all processors if left out.
+
+    Returns
+    -------
+    Motion
+        ``error_estimate`` is below ``tolerance mu0``, unless the search gives up; then it says what
+        is left.
+
+    Raises
+    ------
+    InputError
+        A single value out of bounds; in arrays such a case is NaN.  At once for an input without a
+        meaning, a ball whose normal force oscillates, shapes that do not broadcast.
+
+    Examples
+    --------
+    Shaken obliquely, at 45 degrees to the drag: it also pushes the contact aside.
+
+    >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, f=20e3, v0=0.02)
+    >>> motion(**case, x=2e-6, y=2e-6)
+    <Motion of a spring: mu_macro 0.130052, mu_lateral -0.105596, error_estimate 1.2e-08>
+    """
+    kind = kind_of(contact)
+    terms = tuple(
+        tuple(_terms(name, part)) for name, part in zip(PARTS, (x, y, normal), strict=True)
+    )
+    if kind.contact and any(np.any(term.amplitude != 0.0) for term in terms[2]):
+        raise InputError("normal", normal, _OF_A_BALL)
+    if threads is not None and (type(threads) is not int or threads < 1):
+        raise InputError("threads", threads, "a whole number >= 1")
+    least, most = TOLERANCES
+    size = real("tolerance", tolerance)
+    if size.ndim or not least <= float(size) <= most:
+        raise InputError("tolerance", tolerance, f"from {least:g} to {most:g}")
+    if (omega is None) == (f is None):
+        raise InputError("omega", omega, "given [rad/s], or f [Hz], exactly one of them")
+    columns = {
+        "mu0": real("mu0", mu0),
+        "Fz": real("Fz", Fz),
+        "k": np.asarray(math.inf) if isinstance(k, str) and is_rigid(k) else real("k", k),
+        "omega": real("omega", omega) if f is None else RAD_PER_CYCLE * real("f", f),
+        "v0": real("v0", v0),
+    }
+    numbers = [number for part in terms for term in part for number in term[1:]]
+    try:
+        shape = common_shape([*columns.values(), *numbers])
+    except ValueError as error:
+        shapes = {name: column.shape for name, column in columns.items()}
+        raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
+    whole = shape or (1,)
+    scenes = Scenes(
+        {name: flat(column, whole) for name, column in columns.items()},
+        tuple(
+            tuple(Term(n, flat(size, whole), flat(phase, whole)) for n, size, phase in part)
+            for part in terms
+        ),
+        contact,
+        float(size),
+    )
+    legal = _legal(scenes, one=not shape, frequency="omega" if f is None else "f")
+    out = np.full((legal.size, 7), math.nan)
+    out[legal] = _steady(scenes, legal, default_threads() if threads is None else threads)
+    return _answer(scenes, out, shape)
+
+
+def _terms(name: str, part: Any) -> Iterable[Term]:
+    """The harmonics of one part of a motion; none for an amplitude 0."""
+    if isinstance(part, tuple) and len(part) == 2:
+        triples: Sequence[Any] = [(1, *part)]
+    elif isinstance(part, (list, tuple)) and all(isinstance(one, (list, tuple)) for one in part):
+        triples = part
+    else:
+        triples = [(1, part, 0.0)]
+    for triple in triples:
+        if not isinstance(triple, (list, tuple)) or len(triple) != 3:
+            raise InputError(name, part, _FORM)
+        harmonic, amplitude, phase = triple
+        try:
+            order = float(harmonic)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{name}, harmonic", harmonic, _WHOLE) from error
+        if isinstance(harmonic, (str, bool)) or not (
+            order.is_integer() and 1.0 <= order <= MOST_HARMONIC
+        ):
+            raise InputError(f"{name}, harmonic", harmonic, _WHOLE)
+        degrees = real(f"{name}, phase", phase)
+        with np.errstate(invalid="ignore"):
+            angle = np.deg2rad(np.fmod(degrees, 360.0))
+        size = real(f"{name}, amplitude", amplitude)
+        if size.ndim or angle.ndim or size != 0.0 or not np.isfinite(angle):
+            yield Term(int(order), size, np.asarray(angle))
+
+
+def _legal(scenes: Scenes, one: bool, frequency: str) -> Bools:
+    """Which cases have an answer, (n,); InputError for ``one`` that has none."""
+    c = scenes.columns
+    legal = np.ones(c["mu0"].size, dtype=np.bool_)
+
+    def require(name: str, holds: Any, value: Any, bound: str) -> None:
+        if one and not np.all(holds):
+            raise InputError(name, float(np.ravel(value)[0]), bound)
+        np.logical_and(legal, holds, out=legal)
+
+    for name in ("mu0", "Fz"):
+        require(name, (c[name] > 0.0) & np.isfinite(c[name]), c[name], BOUNDS[name])
+    require("k", ~np.isposinf(c["k"]), c["k"], _RIGID)
+    require("k", c["k"] > 0.0, c["k"], STIFFNESS)
+    cycles = c["omega"] / (RAD_PER_CYCLE if frequency == "f" else 1.0)
+    moves = (c["omega"] > 0.0) & np.isfinite(c["omega"])
+    require(frequency, moves, cycles, "finite and > 0: a motion needs its period")
+    require("v0", (c["v0"] >= 0.0) & np.isfinite(c["v0"]), c["v0"], BOUNDS["v0"])
+    for name, part in zip(PARTS, scenes.terms, strict=True):
+        for term in part:
+            size = term.amplitude
+            holds = (size >= 0.0) & np.isfinite(size)
+            require(f"{name}, amplitude", holds, size, "finite and >= 0")
+            require(f"{name}, phase", np.isfinite(term.phase), term.phase, "finite, in degrees")
+    lowest = _lowest_load(scenes, legal)
+    swing = sum((term.amplitude for term in scenes.terms[2]), np.zeros(legal.size))
+    require("normal", lowest > 0.0, swing, _LIFTS_OFF)
+    swings = sum(
+        (term.amplitude for part in scenes.terms[:2] for term in part), np.zeros(legal.size)
+    )
+    require("v0", (c["v0"] > 0.0) | (swings > 0.0), c["v0"], _STILL)
+    with np.errstate(all="ignore"):
+        length = scenes.length
+        drag = c["v0"] / c["omega"] / length
+        fastest = np.maximum(
+            drag,
+            sum(
+                (
+                    term.harmonic * (term.amplitude / length)
+                    for part in scenes.terms[:2]
+                    for term in part
+                ),
+                np.zeros(legal.size),
+            ),
+        )
+    unit = "mu0 Fz / k per radian of omega t"
+    holds = np.isfinite(length) & (length > 0.0)
+    require("mu0 Fz / k", holds, length, "a length > 0 within the range of numbers")
+    require("speed", fastest <= FURTHEST, fastest, f"at most {FURTHEST:g} {unit}")
+    require("v0", (drag == 0.0) | (drag >= SLOWEST), c["v0"], f"0, or at least {SLOWEST:g} {unit}")
+    return legal
+
+
+def _lowest_load(scenes: Scenes, legal: Bools) -> Array:
+    """A lower bound of the normal force over the period [N], (n,)."""
+    Fz, part = scenes.columns["Fz"], scenes.terms[2]
+    low: Array = Fz - sum((term.amplitude for term in part), np.zeros(Fz.size))
+    if not part:
+        return low
+    most = max(term.harmonic for term in part)
+    tau = np.linspace(0.0, 2.0 * math.pi, 64 * most, endpoint=False)
+    for i in np.flatnonzero(legal & ~(low > 0.0)):
+        # between the points it is lower by less than its curvature allows
+        bend = sum(term.harmonic**2 * term.amplitude[i] for term in part)
+        load = Fz[i] + sum((term.at(tau, int(i)) for term in part), np.zeros(tau.size))
+        low[i] = load.min() - bend * tau[1] ** 2 / 8.0
+    return low
+
+
+def _steady(scenes: Scenes, legal: Bools, threads: int) -> Array:
+    """Rows of the kernel for the legal cases."""
+    cases = np.ascontiguousarray(scenes.dimensionless[legal])
+    out = np.empty((cases.shape[0], 7))
+    ball = scenes.contact == "ball"
+    step = _AT_ONCE[ball]
+
+    def work(start: int) -> None:
+        part = slice(start, start + step)
+        _KERNEL.motions(int(ball), scenes.orders, cases[part], scenes.tolerance, out[part])
+
+    starts = range(0, cases.shape[0], step)
+    if threads == 1 or len(starts) < 2:
+        for start in starts:
+            work(start)
+    else:
+        with ThreadPoolExecutor(min(threads, len(starts)), thread_name_prefix="mumacro") as pool:
+            for _ in pool.map(work, starts):
+                pass
+    return out
+
+
+def _answer(scenes: Scenes, rows: Array, shape: tuple[int, ...]) -> Motion:
+    c = scenes.columns
+    along, across, stick, path, work, decay, error = rows.T
+    with np.errstate(all="ignore"):
+        limit, length = c["mu0"] * c["Fz"], scenes.length
+        mu = c["mu0"] * along
+        columns = {
+            "mu_macro": mu,
+            "mu_lateral": c["mu0"] * across,
+            "stick_fraction": stick,
+            "slip_path": path * length,
+            "power": work / (2.0 * math.pi) * limit * length * c["omega"],
+            "power_drive": mu * c["Fz"] * c["v0"],
+            "error_estimate": c["mu0"] * error,
+            # a decay that small is rounding of a contact that sticks
+            "periods": np.where(decay <= 1e-12, math.inf, math.log(1.0 / REMAINING) / decay),
+        }
+    answers: dict[str, Any] = {
+        name: column.reshape(shape) if shape else float(column[0])
+        for name, column in columns.items()
+    }
+    return Motion(**answers, scenes=scenes)

@@ -1,0 +1,120 @@
+"""``mumacro motion``: the friction under any periodic motion."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from mumacro import plotting
+from mumacro.analysis.motion import PARTS, Cycle, Motion
+from mumacro.analysis.motion import motion as steady_cycle
+from mumacro.cli import common
+from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
+from mumacro.inputs.kind import CONTACTS
+from mumacro.inputs.units import UNITS_OF, Scale, read_quantity
+
+EXAMPLE = "mumacro motion 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s' --x 1um@90deg --y 2um"
+_INPUTS = """\
+inputs, each as name=value, in SI units or with a unit as in v0=1cm/s:
+  mu0    Coulomb friction coefficient [-], > 0
+  Fz     mean normal force [N], > 0
+  k      tangential stiffness [N/m], > 0
+  omega  angular frequency [rad/s], or f, frequency [Hz], > 0
+  v0     speed of the drag along x [m/s], >= 0
+an oscillation is amplitude@phase, of several harmonics a list such as 2um,3:0.4um@90deg
+"""
+_UNITS = {"x": UNITS_OF["y0"], "y": UNITS_OF["y0"], "normal": UNITS_OF["Fz"]}
+_WORDS = {"x": "metres", "y": "metres", "normal": "newtons"}
+_ANGLES = {"deg": Scale(), "°": Scale(), "rad": Scale(180.0 / math.pi)}
+_TERM = re.compile(r"(?:([^:@]*):)?([^:@]+)(?:@([^:@]+))?")
+_ROWS = (
+    ("mu_macro", "-", "mean force along / Fz"),
+    ("mu_lateral", "-", "mean force across / Fz"),
+    ("stick_fraction", "-", "share of the period"),
+    ("slip_path", "m", "of the foot per period"),
+    ("power", "W", "of the shaker"),
+    ("power_drive", "W", "of the drive, mu_macro Fz v0"),
+    ("periods", "-", "until a disturbance has fallen to 1 %"),
+)
+_SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N"}
+
+
+def read_terms(name: str, text: str) -> list[tuple[float, float, float]]:
+    """Harmonic, amplitude [SI] and phase [degrees] of each part of ``text``.
+
+    >>> read_terms("y", "2um, 3:0.5um@90deg")
+    [(1.0, 2e-06, 0.0), (3.0, 5e-07, 90.0)]
+    """
+    terms = []
+    for part in text.split(","):
+        found = _TERM.fullmatch(part.strip())
+        if found is None:
+            raise ValueError(f"{name}={text}: write amplitude@phase, or harmonic:amplitude@phase")
+        harmonic, amplitude, phase = found.groups()
+        try:
+            order = 1.0 if harmonic is None else float(harmonic)
+        except ValueError:
+            raise ValueError(f"{name}={text}: the harmonic {harmonic!r} is no number") from None
+        terms.append(
+            (
+                order,
+                read_quantity(f"--{name}", amplitude, _WORDS[name], _UNITS[name]),
+                0.0 if phase is None else read_quantity("phase", phase, "degrees", _ANGLES),
+            )
+        )
+    return terms
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro motion``."""
+    parser = OneLineParser(
+        prog="mumacro motion",
+        description="The mean friction of a contact that is dragged along x and shaken in any "
+        "periodic way, and its steady cycle.",
+        epilog=f"{_INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} --normal 3N@45deg -o cycle.png",
+    )
+    parser.add_argument("words", nargs="+", metavar="name=value", help="a case without y0")
+    helps = ("oscillation along the drag [m]", "across it [m]", "of the normal force [N]")
+    for name, text in zip(PARTS, helps, strict=True):
+        parser.add_argument(f"--{name}", metavar="AMPLITUDE[@PHASE]", help=text)
+    parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
+    text = "of the mean force over mu0 Fz, 1e-9 to 1e-2; default: 1e-6"
+    parser.add_argument("--tolerance", type=float, default=1e-6, help=text)
+    text = "write the cycle there: a picture, .png, .svg or .pdf, or .csv"
+    parser.add_argument("-o", "--out", type=Path, help=text)
+    common.add_form(parser)
+    chosen = parser.parse_intermixed_args(words)
+    case = read_case(chosen.words, one_k="one motion has one k; ask for both ends", optional=["y0"])
+    if "y0" in case:
+        raise UsageError("y0 is an option here: --y for across, --x for along the drag")
+    texts = [(name, text) for name in PARTS if (text := getattr(chosen, name)) is not None]
+    parts = common.read_values(texts, read_terms)
+    found = steady_cycle(
+        **case,
+        **dict(zip((name for name, _ in texts), parts, strict=True)),
+        contact=chosen.contact,
+        tolerance=chosen.tolerance,
+    )
+    names = [*(name for name, _, _ in _ROWS), "error_estimate"]
+    if chosen.json:
+        lines = as_json({name: getattr(found, name) for name in names})
+    else:
+        form = f"#.{chosen.digits or 6}g"
+        rows = [
+            (name, f"{getattr(found, name):{form}}", f"[{unit}]", text)
+            for name, unit, text in _ROWS
+        ]
+        lines = f"{in_columns(rows)}\nnumerical error of both about {found.error_estimate:.1e}"
+    if chosen.out is None:
+        return lines
+    _write(chosen.out, found)
+    return lines if chosen.json else f"{lines}\nwritten: {chosen.out}"
+
+
+def _write(path: Path, found: Motion) -> None:
+    if path.suffix != ".csv":
+        plotting.save(path, found.plot, panels=2)
+        return
+    cycle: Cycle = found.cycle()
+    columns = {f"{name} [{_SI[name]}]": column for name, column in cycle._asdict().items()}
+    common.write_result(path, columns, found.plot)

@@ -1,0 +1,913 @@
+/* The steady cycle of a contact under any periodic motion beside a drag.
+ *
+ * Units: the mean limit mu0 Fz for forces, l0 = mu0 Fz / k for lengths, the angle tau = omega t for time.  One spring
+ * sticks, where its force follows the motion, or slips, where |f| is the limit L.  With the velocity w of the upper
+ * point and the angle th of the force, slip is
+ *
+ *     th' = w.t / L,   slip speed = w.n - L',   n = (cos th, sin th), t = (-sin th, cos th),
+ *
+ * a quadratic equation for u = tan((th - th0)/2), which the method of Radau of order 5 integrates.  Stick ends where
+ * |f| reaches L, slip where its speed falls through 0.  Steps end there and at marks of the period, so that each step
+ * is smooth.  The cycle is the fixed point of the map of a period, found by Newton's method: of a small disturbance d of
+ * the force only the part along t survives where slip begins, and exp(-integral of slip speed / L) of that during slip.
+ *
+ * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of the last two over
+ * all marks, which cannot cancel.  A ball is many independent springs, see element.c. */
+
+enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 2000, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48 };
+enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
+#define MU_MOTION_ROUNDING 2e-10 /* of the mean force: sticks too short to be found */
+#define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
+#define MU_SQRT6 2.449489742783178
+
+/* A motion of one spring: harmonics of x, y and the normal force one after another, whose terms are amplitude and phase.
+ * Lengths are multiplied by scale, which is 1 over the spring's share of the limit. */
+typedef struct {
+    const int32_t *counts;
+    const double *orders, *terms;
+    double drag, scale, acceleration; /* the last is a bound */
+    int marks, nodes; /* parts of a period whose sums are kept; steps at least */
+} mu_shaken;
+
+/* The motion at tau: way, velocity, limit and its slope. */
+typedef struct {
+    double tau, x, y, wx, wy, limit, slope;
+} mu_moment;
+
+/* Times at which steps end at the latest, up to 2 pi, and room for more of them. */
+typedef struct {
+    double *nodes;
+    int64_t n, room;
+} mu_grid;
+
+/* Where a period is, and what it has summed so far. */
+typedef struct {
+    mu_moment at;
+    double f[2];
+    int slips;
+    double step, began; /* what the next slip may take; of the last stick */
+    double mean[MU_MEANS], marked[2 * MU_MARKS];
+    /* of a small disturbance: the direction that survives first, the last one, what is left as a logarithm, as a factor */
+    double first[2], last[2], decay, turned;
+    int slipped, failed;
+    mu_grid *steps; /* ends of all its steps */
+} mu_march;
+
+/* A steady cycle: means per period; decay of a disturbance per period as its logarithm; distance to the cycle; the
+ * estimate of the error of the mean force. */
+typedef struct {
+    double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error;
+} mu_steady;
+
+/* One cycle at equal times, to be drawn: each spring adds its forces with a weight. */
+typedef struct {
+    double *forces, weight;
+    int64_t n, next;
+} mu_drawing;
+
+static mu_moment mu_moment_at(const mu_shaken *m, double tau) {
+    const double *order = m->orders, *term = m->terms;
+    mu_moment at = {tau, m->drag * tau, 0.0, m->drag, 0.0, 1.0, 0.0};
+    double sine, cosine;
+    for (int i = 0; i < m->counts[0]; ++i, ++order, term += 2) {
+        mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
+        at.x += term[0] * sine;
+        at.wx += *order * term[0] * cosine;
+    }
+    for (int i = 0; i < m->counts[1]; ++i, ++order, term += 2) {
+        mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
+        at.y += term[0] * sine;
+        at.wy += *order * term[0] * cosine;
+    }
+    for (int i = 0; i < m->counts[2]; ++i, ++order, term += 2) {
+        mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
+        at.limit += term[0] * sine;
+        at.slope += *order * term[0] * cosine;
+    }
+    at.x *= m->scale;
+    at.y *= m->scale;
+    at.wx *= m->scale;
+    at.wy *= m->scale;
+    return at;
+}
+
+/* The mean way over a time that no harmonic turns by more than 0.4. */
+static void mu_mean_way(const mu_shaken *m, double tau, double length, double *way) {
+    const double *order = m->orders, *term = m->terms, middle = tau + 0.5 * length;
+    way[0] = m->drag * middle;
+    way[1] = 0.0;
+    for (int i = 0; i < m->counts[0] + m->counts[1]; ++i, ++order, term += 2) {
+        const double half = 0.5 * *order * length, z = half * half;
+        /* sin(half) / half, to 1e-17 */
+        const double damping = 1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0))));
+        double sine, cosine;
+        mu_sine_cosine(*order * middle + term[1], &sine, &cosine);
+        way[i >= m->counts[0]] += term[0] * sine * damping;
+    }
+    way[0] *= m->scale;
+    way[1] *= m->scale;
+}
+
+/* Of what may be squared. */
+static double mu_length(double x, double y) { return sqrt(x * x + y * y); }
+
+/* --- slip ------------------------------------------------------------------------------------------------------------ */
+
+static const double MU_RADAU_AT[3] = {(4.0 - MU_SQRT6) / 10.0, (4.0 + MU_SQRT6) / 10.0, 1.0};
+static const double MU_RADAU[3][3] = {
+    {(88.0 - 7.0 * MU_SQRT6) / 360.0, (296.0 - 169.0 * MU_SQRT6) / 1800.0, (-2.0 + 3.0 * MU_SQRT6) / 225.0},
+    {(296.0 + 169.0 * MU_SQRT6) / 1800.0, (88.0 + 7.0 * MU_SQRT6) / 360.0, (-2.0 - 3.0 * MU_SQRT6) / 225.0},
+    {(16.0 - MU_SQRT6) / 36.0, (16.0 + MU_SQRT6) / 36.0, 1.0 / 9.0},
+};
+/* weights of the embedded estimate of order 3, and the real eigenvalue of the inverse of the matrix */
+static const double MU_RADAU_ERROR[3] = {-(13.0 + 7.0 * MU_SQRT6) / 3.0, (-13.0 + 7.0 * MU_SQRT6) / 3.0, -1.0 / 3.0};
+static const double MU_RADAU_REAL = 3.6378342527444962;
+
+/* A step of slip: its stages, with u = tan((th - th0)/2) and the slip speed there. */
+typedef struct {
+    mu_moment stage[3];
+    double length, u[3], speed[3], error, ex, ey; /* (ex, ey): direction of the force at the start */
+} mu_slip;
+
+/* Direction of the force at u. */
+static void mu_direction(const mu_slip *slip, double u, double *nx, double *ny) {
+    const double square = u * u, cosine = (1.0 - square) / (1.0 + square), sine = 2.0 * u / (1.0 + square);
+    *nx = cosine * slip->ex - sine * slip->ey;
+    *ny = cosine * slip->ey + sine * slip->ex;
+}
+
+static double mu_slip_speed(const mu_slip *slip, const mu_moment *at, double u) {
+    double nx, ny;
+    mu_direction(slip, u, &nx, &ny);
+    return at->wx * nx + at->wy * ny - at->slope;
+}
+
+/* The stages of a step of this length; returns 0 where none are found. */
+static int mu_slip_step(const mu_shaken *m, const mu_moment *start, double ex, double ey, double length, double end,
+                        mu_slip *slip) {
+    const double a0 = (start->wx * ex + start->wy * ey) / start->limit;
+    const double rate = 0.5 * (start->wy * ex - start->wx * ey) / start->limit;
+    double a[3], b[3], *u = slip->u, change = 1.0;
+    slip->length = length;
+    slip->ex = ex;
+    slip->ey = ey;
+    for (int i = 0; i < 3; ++i) {
+        const mu_moment at = mu_moment_at(m, i < 2 ? start->tau + MU_RADAU_AT[i] * length : end);
+        slip->stage[i] = at;
+        a[i] = length * (at.wx * ex + at.wy * ey) / at.limit;
+        b[i] = length * (at.wy * ex - at.wx * ey) / at.limit;
+        u[i] = 0.0;
+    }
+    for (int count = 0; change > 1e-10; ++count) {
+        double rest[3], j[3], c[3][3], d[3], minor[3], determinant;
+        if (count == 9) return 0;
+        for (int i = 0; i < 3; ++i) {
+            rest[i] = 0.5 * b[i] * (1.0 - u[i] * u[i]) - a[i] * u[i];
+            j[i] = a[i] + b[i] * u[i];
+        }
+        for (int i = 0; i < 3; ++i) {
+            d[i] = -u[i];
+            for (int k = 0; k < 3; ++k) {
+                d[i] += MU_RADAU[i][k] * rest[k];
+                c[i][k] = MU_RADAU[i][k] * j[k];
+            }
+            c[i][i] += 1.0;
+        }
+        minor[0] = c[1][1] * c[2][2] - c[1][2] * c[2][1];
+        minor[1] = c[1][2] * c[2][0] - c[1][0] * c[2][2];
+        minor[2] = c[1][0] * c[2][1] - c[1][1] * c[2][0];
+        determinant = c[0][0] * minor[0] + c[0][1] * minor[1] + c[0][2] * minor[2];
+        {
+            const double x = d[0] * minor[0] + d[1] * (c[0][2] * c[2][1] - c[0][1] * c[2][2]) +
+                             d[2] * (c[0][1] * c[1][2] - c[0][2] * c[1][1]);
+            const double y = d[0] * minor[1] + d[1] * (c[0][0] * c[2][2] - c[0][2] * c[2][0]) +
+                             d[2] * (c[0][2] * c[1][0] - c[0][0] * c[1][2]);
+            const double z = d[0] * minor[2] + d[1] * (c[0][1] * c[2][0] - c[0][0] * c[2][1]) +
+                             d[2] * (c[0][0] * c[1][1] - c[0][1] * c[1][0]);
+            u[0] += x / determinant;
+            u[1] += y / determinant;
+            u[2] += z / determinant;
+            change = (fabs(x) + fabs(y) + fabs(z)) / fabs(determinant);
+        }
+        if (!(fabs(u[0]) + fabs(u[1]) + fabs(u[2]) < 9.0)) return 0;
+    }
+    if (!(mu_max(fabs(u[0]), mu_max(fabs(u[1]), fabs(u[2]))) < 0.5)) return 0;
+    slip->error = rate * length;
+    for (int i = 0; i < 3; ++i) {
+        slip->speed[i] = mu_slip_speed(slip, &slip->stage[i], u[i]);
+        slip->error += MU_RADAU_ERROR[i] * u[i];
+    }
+    slip->error = fabs(2.0 * start->limit * slip->error / (MU_RADAU_REAL + mu_max(length * a0, 0.0)));
+    return 1;
+}
+
+/* u at a share of the step: the cubic through the stages and 0. */
+static double mu_slip_at(const mu_slip *slip, double share) {
+    const double p = MU_RADAU_AT[0], q = MU_RADAU_AT[1];
+    const double at_p = (share - q) * (share - 1.0) / (p * (p - q) * (p - 1.0));
+    const double at_q = (share - p) * (share - 1.0) / (q * (q - p) * (q - 1.0));
+    const double at_1 = (share - p) * (share - q) / ((1.0 - p) * (1.0 - q));
+    return share * (slip->u[0] * at_p + slip->u[1] * at_q + slip->u[2] * at_1);
+}
+
+/* --- events ---------------------------------------------------------------------------------------------------------- */
+
+/* A root between low and high, where the values have different signs, or that of low is 0. */
+typedef struct {
+    double low, high, at_low, at_high;
+    int last;
+} mu_bracket;
+
+static double mu_next_guess(const mu_bracket *b) {
+    const double middle = 0.5 * (b->low + b->high);
+    const double guess = b->low + (b->high - b->low) * (b->at_low / (b->at_low - b->at_high));
+    return b->at_low != 0.0 && guess > b->low && guess < b->high ? guess : middle;
+}
+
+/* Regula falsi, as of Illinois: the value at an end that stays is halved. */
+static void mu_narrow(mu_bracket *b, double x, double value) {
+    if ((value > 0.0) == (b->at_high > 0.0)) {
+        b->high = x;
+        b->at_high = value;
+        if (b->last == 1) b->at_low *= 0.5;
+        b->last = 1;
+    } else {
+        b->low = x;
+        b->at_low = value;
+        if (b->last == -1) b->at_high *= 0.5;
+        b->last = -1;
+    }
+}
+
+static double mu_speed_at(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, double share) {
+    const mu_moment at = mu_moment_at(m, start->tau + share * slip->length);
+    return mu_slip_speed(slip, &at, mu_slip_at(slip, share));
+}
+
+/* Whether the speed of a step falls below 0, and between which shares first.  Where all stages are above, the least of
+ * the cubic through them is looked at. */
+static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, mu_bracket *b) {
+    const double x[4] = {0.0, MU_RADAU_AT[0], MU_RADAU_AT[1], 1.0};
+    const double speed[4] = {mu_max(mu_slip_speed(slip, start, 0.0), 0.0), slip->speed[0], slip->speed[1],
+                             slip->speed[2]};
+    double first, second, third, c, d, e, root, at[3], value[3];
+    int left = 0;
+    for (int i = 1; i < 4; ++i) {
+        if (speed[i] < 0.0) {
+            const mu_bracket found = {x[i - 1], x[i], speed[i - 1], speed[i], 0};
+            *b = found;
+            return 1;
+        }
+    }
+    /* divided differences, and the slope c x^2 + 2 d x + e of the cubic */
+    first = (speed[1] - speed[0]) / x[1];
+    second = ((speed[2] - speed[1]) / (x[2] - x[1]) - first) / x[2];
+    third = (((speed[3] - speed[2]) / (x[3] - x[2]) - (speed[2] - speed[1]) / (x[2] - x[1])) / (x[3] - x[1]) - second) / x[3];
+    c = 3.0 * third;
+    d = second - third * (x[1] + x[2]);
+    e = first - second * x[1] + third * x[1] * x[2];
+    if (!(d * d > c * e)) return 0;
+    root = sqrt(d * d - c * e);
+    /* of the two places of no slope that with c x + d > 0 */
+    at[1] = d > 0.0 ? -e / (d + root) : (root - d) / c;
+    if (!(at[1] > 0.0 && at[1] < 1.0)) return 0;
+    while (left < 2 && x[left + 1] < at[1]) ++left;
+    value[0] = speed[left];
+    value[2] = speed[left + 1];
+    at[0] = x[left];
+    at[2] = x[left + 1];
+    value[1] = speed[0] + at[1] * (first + (at[1] - x[1]) * (second + (at[1] - x[2]) * third));
+    if (value[1] > 0.3 * mu_max(mu_max(speed[0], speed[1]), mu_max(speed[2], speed[3]))) return 0;
+    for (int count = 0; count < 3; ++count) {
+        double p, q, next;
+        value[1] = mu_speed_at(m, start, slip, at[1]);
+        if (value[1] < 0.0) {
+            const mu_bracket found = {at[0], at[1], value[0], value[1], 0};
+            *b = found;
+            return 1;
+        }
+        /* the vertex of the parabola */
+        p = (value[1] - value[0]) / (at[1] - at[0]);
+        q = (value[2] - value[1]) / (at[2] - at[1]);
+        if (!(q > p)) return 0;
+        next = 0.5 * (at[0] + at[1]) - 0.5 * p * (at[2] - at[0]) / (q - p);
+        if (!(next > at[0] && next < at[2]) || next == at[1]) return 0;
+        if (next > at[1]) {
+            at[0] = at[1];
+            value[0] = value[1];
+        } else {
+            at[2] = at[1];
+            value[2] = value[1];
+        }
+        at[1] = next;
+    }
+    return 0;
+}
+
+/* At which share of a step its speed falls through 0. */
+static double mu_slip_end(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, mu_bracket *b) {
+    const double fastest = mu_max(slip->speed[0], mu_max(slip->speed[1], slip->speed[2]));
+    for (int count = 0; count < 60 && b->high - b->low > 1e-15; ++count) {
+        const double share = mu_next_guess(b), speed = mu_speed_at(m, start, slip, share);
+        mu_narrow(b, share, speed);
+        if (fabs(speed) <= 1e-13 * fastest) return share;
+    }
+    return b->low;
+}
+
+/* A stick from a moment with a force, and how far that is inside the limit. */
+typedef struct {
+    const mu_shaken *m;
+    mu_moment start;
+    double f[2], length;
+} mu_stick;
+
+static mu_moment mu_stuck_at(const mu_stick *stick, double share, double *f) {
+    const mu_moment at = mu_moment_at(stick->m, stick->start.tau + share * stick->length);
+    f[0] = stick->f[0] + (at.x - stick->start.x);
+    f[1] = stick->f[1] + (at.y - stick->start.y);
+    return at;
+}
+
+/* |f|^2 - L^2, and its slope over 2. */
+static double mu_excess(const mu_moment *at, const double *f) {
+    return f[0] * f[0] + f[1] * f[1] - at->limit * at->limit;
+}
+
+static double mu_excess_slope(const mu_moment *at, const double *f) {
+    return f[0] * at->wx + f[1] * at->wy - at->limit * at->slope;
+}
+
+/* At which share of its step a stick ends; 1 where it lasts.  fresh: it has just begun, on the limit; then 0 says that
+ * it does not begin. */
+static double mu_stick_end(const mu_stick *stick, int fresh) {
+    double f[2];
+    mu_moment at = mu_stuck_at(stick, 1.0, f);
+    mu_bracket b = {0.0, 1.0, mu_min(mu_excess(&stick->start, stick->f), 0.0), mu_excess(&at, f), 0};
+    if (b.at_high <= 0.0) {
+        /* between the ends it may have been outside */
+        mu_bracket top = {0.0, 1.0, mu_excess_slope(&stick->start, stick->f), mu_excess_slope(&at, f), 0};
+        if (fresh || top.at_low <= 0.0 || top.at_high >= 0.0) return 1.0;
+        for (int count = 0; count < 12 && b.at_high <= 0.0; ++count) {
+            const double share = mu_next_guess(&top);
+            at = mu_stuck_at(stick, share, f);
+            b.high = share;
+            b.at_high = mu_excess(&at, f);
+            mu_narrow(&top, share, mu_excess_slope(&at, f));
+        }
+        if (b.at_high <= 0.0) return 1.0;
+    }
+    if (fresh) {
+        b.at_low = 0.0;
+        for (double share = 0.5 * b.high; b.at_low >= 0.0; share *= 0.5) {
+            double value;
+            if (share < 1e-12) return 0.0;
+            at = mu_stuck_at(stick, share, f);
+            value = mu_excess(&at, f);
+            if (value < 0.0) {
+                b.low = share;
+                b.at_low = value;
+            } else {
+                b.high = share;
+                b.at_high = value;
+            }
+        }
+    }
+    for (int count = 0; count < 60 && b.high - b.low > 1e-15; ++count) {
+        const double share = mu_next_guess(&b);
+        double value;
+        at = mu_stuck_at(stick, share, f);
+        value = mu_excess(&at, f);
+        mu_narrow(&b, share, value);
+        if (fabs(value) <= 1e-15 * at.limit * at.limit) return share;
+    }
+    return b.high;
+}
+
+/* --- a period ---------------------------------------------------------------------------------------------------------- */
+
+/* Adds a force, which has done a work beside the drag. */
+static void mu_add(mu_march *march, const mu_shaken *m, double middle, double time, double fx, double fy, double work) {
+    const int place = 2 * (int)(middle * (0.5 / MU_PI) * m->marks);
+    march->mean[MU_MEAN_X] += time * fx;
+    march->mean[MU_MEAN_Y] += time * fy;
+    march->mean[MU_MEAN_WORK] += work;
+    march->marked[place] += time * fx;
+    march->marked[place + 1] += time * fy;
+}
+
+/* The forces at the times to be drawn before tau. */
+static int mu_is_drawn(const mu_drawing *drawing, double tau, double *time) {
+    if (!drawing || drawing->next > drawing->n) return 0;
+    *time = drawing->next < drawing->n ? 2.0 * MU_PI * (double)drawing->next / (double)drawing->n : 2.0 * MU_PI;
+    return *time <= tau;
+}
+
+static void mu_draw(mu_drawing *drawing, double fx, double fy) {
+    drawing->forces[2 * drawing->next] += drawing->weight * fx;
+    drawing->forces[2 * drawing->next + 1] += drawing->weight * fy;
+    ++drawing->next;
+}
+
+/* Slip begins with the force as it is: of a disturbance the part along t is left. */
+static void mu_begin_slip(mu_march *march) {
+    const double size = mu_length(march->f[0], march->f[1]);
+    const double tx = -march->f[1] / size, ty = march->f[0] / size;
+    if (march->slipped) {
+        march->turned *= march->last[0] * tx + march->last[1] * ty;
+    } else {
+        march->first[0] = tx;
+        march->first[1] = ty;
+    }
+    march->last[0] = tx;
+    march->last[1] = ty;
+    march->slipped = march->slips = 1;
+}
+
+static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, double end, int *ends,
+                         mu_drawing *drawing) {
+    static const double *weight = MU_RADAU[2];
+    const mu_moment start = march->at;
+    const double size = mu_length(march->f[0], march->f[1]), ex = march->f[0] / size, ey = march->f[1] / size;
+    const double rest = end - start.tau;
+    const double length = march->step >= rest ? rest : march->step > 0.5 * rest ? 0.5 * rest : march->step;
+    double factor, nx, ny, time;
+    mu_bracket fall;
+    mu_slip slip;
+    if (!mu_slip_step(m, &start, ex, ey, length, length == rest ? end : start.tau + length, &slip)) {
+        march->step = 0.25 * length;
+        return;
+    }
+    factor = slip.error > 0.0 ? 0.85 * sqrt(sqrt(tolerance / slip.error)) : 4.0;
+    factor = mu_max(0.2, mu_min(factor, 4.0));
+    if (slip.error > tolerance) {
+        march->step = length * mu_min(factor, 0.9);
+        return;
+    }
+    march->step = length < march->step ? mu_max(march->step, factor * length) : factor * length;
+    if (*ends && mu_slip_falls(m, &start, &slip, &fall)) {
+        const double shorter = length * mu_slip_end(m, &start, &slip, &fall);
+        march->slips = 0;
+        march->began = start.tau + shorter;
+        if (!(start.tau + shorter > start.tau)) return;
+        if (!mu_slip_step(m, &start, ex, ey, shorter, start.tau + shorter, &slip)) {
+            march->failed = 1;
+            return;
+        }
+    }
+    *ends = 1;
+    for (int i = 0; i < 3; ++i) {
+        const double share = slip.length * weight[i], limit = slip.stage[i].limit;
+        mu_direction(&slip, slip.u[i], &nx, &ny);
+        mu_add(march, m, start.tau + 0.5 * slip.length, share, limit * nx, limit * ny,
+               share * limit * (nx * (slip.stage[i].wx - m->scale * m->drag) + ny * slip.stage[i].wy));
+        march->mean[MU_MEAN_PATH] += share * slip.speed[i];
+        march->decay += share * slip.speed[i] / limit;
+    }
+    while (mu_is_drawn(drawing, slip.stage[2].tau, &time)) {
+        const mu_moment at = mu_moment_at(m, time);
+        mu_direction(&slip, mu_slip_at(&slip, (time - start.tau) / slip.length), &nx, &ny);
+        mu_draw(drawing, at.limit * nx, at.limit * ny);
+    }
+    mu_direction(&slip, slip.u[2], &nx, &ny);
+    march->at = slip.stage[2];
+    march->f[0] = march->at.limit * nx;
+    march->f[1] = march->at.limit * ny;
+    march->last[0] = -ny;
+    march->last[1] = nx;
+}
+
+static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *fresh, int *ends,
+                          mu_drawing *drawing) {
+    mu_stick stick = {m, march->at, {march->f[0], march->f[1]}, end - march->at.tau};
+    const double speed = mu_length(stick.start.wx, stick.start.wy), way = 0.5 * stick.start.limit;
+    const double slowest = speed + sqrt(speed * speed + 2.0 * m->acceleration * way);
+    double share, time;
+    int whole = 1;
+    if (slowest * stick.length > 2.0 * way) {
+        whole = 0;
+        stick.length = 2.0 * way / slowest;
+    }
+    share = *fresh && stick.length < MU_MOTION_SHORT ? 1.0 : mu_stick_end(&stick, *fresh);
+    if (share > 0.0) {
+        const double taken = share * stick.length, drag = m->scale * m->drag;
+        double dx, dy, fx, fy, size, way[2];
+        time = stick.start.tau + taken;
+        march->at = mu_moment_at(m, whole && share == 1.0 ? end : time);
+        dx = march->at.x - stick.start.x;
+        dy = march->at.y - stick.start.y;
+        fx = stick.f[0] + dx;
+        fy = stick.f[1] + dy;
+        mu_mean_way(m, stick.start.tau, taken, way);
+        way[0] -= stick.start.x;
+        way[1] -= stick.start.y;
+        /* the integral of f (w - drag), exactly */
+        mu_add(march, m, stick.start.tau + 0.5 * taken, taken, stick.f[0] + way[0], stick.f[1] + way[1],
+               stick.f[0] * (dx - drag * taken) + stick.f[1] * dy + 0.5 * (dx * dx + dy * dy) - drag * way[0] * taken);
+        march->mean[MU_MEAN_STUCK] += taken;
+        size = mu_length(fx, fy);
+        if (share < 1.0 && size > 0.0) {
+            fx *= march->at.limit / size;
+            fy *= march->at.limit / size;
+        }
+        while (mu_is_drawn(drawing, march->at.tau, &time)) {
+            const mu_moment at = mu_moment_at(m, time);
+            mu_draw(drawing, stick.f[0] + (at.x - stick.start.x), stick.f[1] + (at.y - stick.start.y));
+        }
+        march->f[0] = fx;
+        march->f[1] = fy;
+    }
+    *fresh = *fresh && share == 1.0 && stick.length < MU_MOTION_SHORT;
+    if (share < 1.0) {
+        *ends = march->at.tau - march->began > MU_MOTION_SHORT; /* slip that rounding ends goes on for a step */
+        mu_begin_slip(march);
+    }
+}
+
+/* One period from the force f, with this tolerance of a step; the ends of the steps go to march->steps. */
+static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double *f, double tolerance,
+                           mu_march *march, mu_drawing *drawing) {
+    static const mu_march none;
+    const double step = march->step;
+    mu_grid *steps = march->steps;
+    int64_t count = 0;
+    int fresh, ends = 1;
+    *march = none;
+    march->step = step > 0.0 ? step : 0.1 * sqrt(sqrt(tolerance));
+    march->turned = 1.0;
+    march->began = -1.0;
+    march->steps = steps;
+    steps->n = 0;
+    march->at = mu_moment_at(m, 0.0);
+    march->f[0] = f[0];
+    march->f[1] = f[1];
+    fresh = mu_length(f[0], f[1]) >= march->at.limit * (1.0 - 1e-12);
+    if (fresh && f[0] * march->at.wx + f[1] * march->at.wy - march->at.limit * march->at.slope > 0.0) mu_begin_slip(march);
+    for (int64_t i = 0; i < grid->n; ++i) {
+        const double end = grid->nodes[i];
+        if (end - march->at.tau < MU_MOTION_SHORT && i + 1 < grid->n) continue;
+        while (march->at.tau < end && !march->failed) {
+            const double before = march->at.tau;
+            if (march->slips) {
+                mu_take_slip(march, m, tolerance, end, &ends, drawing);
+                fresh = 1;
+            } else {
+                mu_take_stick(march, m, end, &fresh, &ends, drawing);
+            }
+            if (march->at.tau > before && steps->n < steps->room) steps->nodes[steps->n++] = march->at.tau;
+            if (steps->n == steps->room || ++count > 4 * steps->room || !(march->step > 1e-15)) march->failed = 1;
+        }
+    }
+    for (int i = 0; i < MU_MEANS; ++i)
+        if (i != MU_MEAN_PATH && i != MU_MEAN_WORK) march->mean[i] /= 2.0 * MU_PI;
+    for (int i = 0; i < 2 * m->marks; ++i) march->marked[i] /= 2.0 * MU_PI;
+}
+
+/* --- the steady cycle --------------------------------------------------------------------------------------------------- */
+
+static void mu_keep_below(double limit, double *f) {
+    const double size = mu_length(f[0], f[1]);
+    if (size > limit) {
+        f[0] *= limit / size;
+        f[1] *= limit / size;
+    }
+}
+
+/* A period as a map of the force at its start: how far it moves it, and by how much Newton's method would. */
+typedef struct {
+    double moved[2], step[2], size;
+} mu_residual;
+
+static mu_residual mu_residual_of(const mu_march *march, const double *f, double limit) {
+    mu_residual r = {{march->f[0] - f[0], march->f[1] - f[1]}, {0.0, 0.0}, 0.0};
+    r.size = mu_length(r.moved[0], r.moved[1]);
+    if (march->slipped) { /* the derivative of the map is left last first^T */
+        const double left = march->turned * mu_decay(march->decay), *first = march->first, *last = march->last;
+        const double stays = mu_max(1.0 - left * (first[0] * last[0] + first[1] * last[1]), 1e-16);
+        const double along = left * (first[0] * r.moved[0] + first[1] * r.moved[1]) / stays;
+        r.step[0] = r.moved[0] + along * last[0];
+        r.step[1] = r.moved[1] + along * last[1];
+    } else if (r.size > 0.0) { /* it is only stretched: up to the limit */
+        const double a = r.size * r.size, b = f[0] * r.moved[0] + f[1] * r.moved[1];
+        const double c = mu_min(f[0] * f[0] + f[1] * f[1] - limit * limit, 0.0);
+        const double times = mu_max((sqrt(mu_max(b * b - a * c, 0.0)) - b) / a, 1.0);
+        r.step[0] = times * r.moved[0];
+        r.step[1] = times * r.moved[1];
+    }
+    return r;
+}
+
+static mu_steady mu_cycle_of(const mu_march *march, double distance) {
+    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0};
+    memcpy(out.mean, march->mean, sizeof out.mean);
+    memcpy(out.marked, march->marked, sizeof out.marked);
+    if (march->slipped) out.decay = march->turned != 0.0 ? march->decay - mu_log1(mu_min(fabs(march->turned), 1.0)) : HUGE_VAL;
+    return out;
+}
+
+/* The cycle whose distance to the steady one is below goal, or the nearest of many periods; f is its start.
+ *
+ * No two forces move apart, so that a step of Newton's method is too long where the force then moves back against it;
+ * then the step is cut by the rule of the secant. */
+static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance, double goal,
+                               double *f) {
+    const double limit = mu_moment_at(m, 0.0).limit;
+    double from[2] = {f[0], f[1]}, share = 1.0;
+    mu_residual r, base = {{0.0, 0.0}, {0.0, 0.0}, HUGE_VAL};
+    mu_march march;
+    march.step = 0.0;
+    march.steps = steps;
+    for (int period = 1;; ++period) {
+        double distance, ahead, behind;
+        mu_take_period(m, grid, f, tolerance, &march, NULL);
+        r = mu_residual_of(&march, f, limit);
+        distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_length(r.step[0], r.step[1]));
+        if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
+        distance = mu_min(distance, 2.0 * limit);
+        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed) return mu_cycle_of(&march, distance);
+        ahead = base.step[0] * r.moved[0] + base.step[1] * r.moved[1];
+        behind = base.step[0] * base.moved[0] + base.step[1] * base.moved[1];
+        if (ahead < 0.0 && r.size > 0.5 * base.size && share > 1e-3) {
+            share *= mu_max(0.1, mu_min(behind / (behind - ahead), 0.7));
+        } else {
+            base = r;
+            share = 1.0;
+            from[0] = f[0];
+            from[1] = f[1];
+        }
+        f[0] = from[0] + share * base.step[0];
+        f[1] = from[1] + share * base.step[1];
+        mu_keep_below(limit, f);
+    }
+}
+
+/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only one; of those that stick
+ * there are many, and only its way decides between them. */
+static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance,
+                                       double goal, double *f) {
+    double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance;
+    mu_march march;
+    mu_steady out;
+    f[0] = f[1] = 0.0;
+    out = mu_find_cycle(m, grid, steps, tolerance, goal, f);
+    if (out.distance <= goal && out.mean[MU_MEAN_PATH] > 1e3 * goal) return out;
+    f[0] = f[1] = 0.0;
+    march.step = 0.0;
+    march.steps = steps;
+    for (int period = 1;; ++period) {
+        double moved[2], rate;
+        mu_take_period(m, grid, f, tolerance, &march, NULL);
+        moved[0] = march.f[0] - f[0];
+        moved[1] = march.f[1] - f[1];
+        size[2] = size[1];
+        size[1] = size[0];
+        size[0] = mu_length(moved[0], moved[1]);
+        /* what is left to go, as a geometric series */
+        rate = mu_max(size[0] / size[1], size[1] / size[2]);
+        distance = march.mean[MU_MEAN_PATH] < 1e-13 ? 0.0 : period > 2 && rate < 1.0 ? mu_min(2.0 * size[0] / (1.0 - rate), 2.0) : 2.0;
+        if (march.failed) distance = 2.0;
+        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) return mu_cycle_of(&march, distance);
+        f[0] = march.f[0];
+        f[1] = march.f[1];
+    }
+}
+
+static double mu_difference(const mu_steady *a, const mu_steady *b, int marks) {
+    double sum = 0.0;
+    for (int i = 0; i < 2 * marks; i += 2)
+        sum += mu_length(a->marked[i] - b->marked[i], a->marked[i + 1] - b->marked[i + 1]);
+    return sum;
+}
+
+/* Each step in two halves. */
+static int mu_halve(const mu_grid *steps, mu_grid *grid) {
+    double from = 0.0;
+    if (2 * steps->n > grid->room) return 0;
+    for (int64_t i = 0; i < steps->n; ++i) {
+        const double to = steps->nodes[i];
+        grid->nodes[2 * i] = 0.5 * (from + to);
+        grid->nodes[2 * i + 1] = to;
+        from = to;
+    }
+    grid->n = 2 * steps->n;
+    return 1;
+}
+
+/* The steady cycle of a spring: steps are halved until the estimate is below the tolerance. */
+static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps, double *f) {
+    const double limit = mu_moment_at(m, 0.0).limit;
+    double of_step = mu_cube_root_near(mu_min(0.3 * tolerance, 1e-3));
+    mu_steady last, out;
+    of_step *= of_step;
+    grid->n = mu_min(m->nodes, (double)grid->room);
+    for (int i = 0; i < grid->n; ++i) grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
+    for (int level = 0;; ++level) {
+        mu_keep_below(limit, f);
+        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, 0.01 * tolerance, f);
+        out.error = level > 0 ? 2.0 * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + MU_MOTION_ROUNDING : 2.0 * limit;
+        if (out.error <= tolerance || level == MU_MOTION_LEVELS || !mu_halve(steps, grid)) return out;
+        last = out;
+        of_step *= 0.06;
+    }
+}
+
+/* The rule of Kronrod with 15 points: places and weights from the middle outwards. */
+static const double MU_KRONROD[8][2] = {
+    {0.0, 0.209482141084727828012999174891714},
+    {0.207784955007898467600689403773245, 0.204432940075298892414161999234649},
+    {0.405845151377397166906606412076961, 0.190350578064785409913256402421014},
+    {0.586087235467691130294144691693145, 0.169004726639267902826583426598550},
+    {0.741531185599394439863864773280788, 0.140653259715525918745189590510238},
+    {0.864864423359769072789712788640926, 0.104790010322250183839876322541518},
+    {0.949107912342758524526189684047851, 0.063092092629978553290700663189204},
+    {0.991455371120812639206854697526329, 0.022935322010529224963732008058970},
+};
+
+/* Place and weight of point i of 15, from -1 to 1. */
+static double mu_kronrod(int i, double *weight) {
+    const double *point = MU_KRONROD[i < 7 ? 7 - i : i - 7];
+    *weight = point[1];
+    return i < 7 ? -point[0] : point[0];
+}
+
+/* Springs of a ball from t = low to high: the error of their sum, and their values at both ends by the polynomial through
+ * the points. */
+typedef struct {
+    double low, high, error, start[2], end[2];
+    double mean[MU_MEANS], decay, of_springs;
+} mu_panel;
+
+/* How rough two functions are at the points of the rule: the size of their four highest coefficients by polynomials that
+ * are orthogonal there.  They stay large at kinks, wherever these lie between the points. */
+static double mu_roughness(const double values[15][2], double *start, double *end) {
+    double x[15], weight[15], last[15] = {0.0}, p[15], size = 0.0, square = 0.0;
+    double at_end = 0.7071067811865476, before = 0.0, sign = 1.0;
+    for (int i = 0; i < 15; ++i) {
+        x[i] = mu_kronrod(i, &weight[i]);
+        p[i] = at_end;
+    }
+    start[0] = start[1] = end[0] = end[1] = 0.0;
+    for (int degree = 0; degree < 15; ++degree) {
+        double next[15], sum = 0.0, c[2] = {0.0, 0.0}, beyond;
+        for (int i = 0; i < 15; ++i) {
+            c[0] += weight[i] * p[i] * values[i][0];
+            c[1] += weight[i] * p[i] * values[i][1];
+        }
+        for (int j = 0; j < 2; ++j) {
+            start[j] += sign * at_end * c[j];
+            end[j] += at_end * c[j];
+        }
+        if (degree > 10) square += c[0] * c[0] + c[1] * c[1];
+        for (int i = 0; i < 15; ++i) {
+            next[i] = x[i] * p[i] - size * last[i];
+            sum += weight[i] * next[i] * next[i];
+        }
+        beyond = at_end - size * before;
+        size = sqrt(sum);
+        before = at_end;
+        at_end = beyond / size;
+        sign = -sign;
+        for (int i = 0; i < 15; ++i) {
+            last[i] = p[i];
+            p[i] = next[i] / size;
+        }
+    }
+    return sqrt(square);
+}
+
+/* The error of panel i: its own, and that of a kink between its end and its first point, which shows in the neighbour's
+ * other value there. */
+static double mu_panel_error(const mu_panel *panels, int n, int i) {
+    const mu_panel *one = &panels[i];
+    const double gap = 0.5 * (1.0 - MU_KRONROD[7][0]) * (one->high - one->low);
+    double error = one->error;
+    for (int j = 0; j < n; ++j) {
+        const mu_panel *other = &panels[j];
+        if (other->low == one->high)
+            error += gap * mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
+        if (other->high == one->low)
+            error += gap * mu_length(one->start[0] - other->end[0], one->start[1] - other->end[1]);
+    }
+    return error;
+}
+
+/* The motion of a spring with this share of the limit. */
+static mu_shaken mu_of_spring(const mu_shaken *m, double share) {
+    mu_shaken out = *m;
+    out.scale = 1.0 / share;
+    out.acceleration = m->acceleration / share;
+    return out;
+}
+
+/* The springs of a ball from t = low to high: xi = 1 - t^2, so that they lie dense at the rim, where little load may
+ * behave otherwise than all the rest. */
+static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, double tolerance, mu_grid *grid, mu_grid *steps,
+                              double *f) {
+    mu_panel out;
+    const double half = 0.5 * (high - low), middle = 0.5 * (high + low);
+    double values[15][2];
+    memset(&out, 0, sizeof out);
+    out.low = low;
+    out.high = high;
+    out.decay = HUGE_VAL;
+    for (int i = 0; i < 15; ++i) {
+        double weight;
+        const double t = middle + half * mu_kronrod(i, &weight), share = 1.5 * t * t * (2.0 - t * t);
+        const mu_shaken one = mu_of_spring(m, share);
+        const mu_steady spring = mu_spring_motion(&one, tolerance / share, grid, steps, f);
+        for (int j = 0; j < MU_MEANS; ++j) {
+            /* forces and works are in units of its limit, paths in those of its l0 */
+            const double unit = 2.0 * t * (j == MU_MEAN_WORK ? share * share : share);
+            out.mean[j] += half * weight * unit * spring.mean[j];
+            if (j <= MU_MEAN_Y) values[i][j] = unit * spring.mean[j];
+        }
+        out.of_springs += half * weight * 2.0 * t * share * spring.error;
+        out.decay = mu_min(out.decay, spring.decay);
+    }
+    out.error = 3.0 * half * mu_roughness(values, out.start, out.end);
+    return out;
+}
+
+/* A ball: adaptive quadrature over its springs. */
+static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps) {
+    mu_panel panels[MU_MOTION_PANELS];
+    double f[2] = {m->drag > 0.0 ? 1.0 : 0.0, 0.0}, error = 0.0;
+    mu_steady out;
+    int n = 2;
+    memset(&out, 0, sizeof out);
+    out.decay = HUGE_VAL;
+    panels[0] = mu_ball_panel(m, 0.0, 0.5, 0.5 * tolerance, grid, steps, f);
+    panels[1] = mu_ball_panel(m, 0.5, 1.0, 0.5 * tolerance, grid, steps, f);
+    for (;; ++n) {
+        double most = -1.0;
+        int worst = 0;
+        error = 0.0;
+        for (int i = 0; i < n; ++i) {
+            const double own = mu_panel_error(panels, n, i);
+            error += own;
+            if (own > most) {
+                most = own;
+                worst = i;
+            }
+        }
+        if (error <= 0.5 * tolerance || n == MU_MOTION_PANELS) break;
+        {
+            const double low = panels[worst].low, high = panels[worst].high, middle = 0.5 * (low + high);
+            panels[worst] = mu_ball_panel(m, low, middle, 0.5 * tolerance, grid, steps, f);
+            panels[n] = mu_ball_panel(m, middle, high, 0.5 * tolerance, grid, steps, f);
+        }
+    }
+    for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < MU_MEANS; ++j) out.mean[j] += panels[i].mean[j];
+        out.error += panels[i].of_springs;
+        out.decay = mu_min(out.decay, panels[i].decay);
+    }
+    out.error += error;
+    return out;
+}
+
+static mu_shaken mu_shaken_as(const int32_t *counts, const double *orders, const double *one) {
+    mu_shaken m = {counts, orders, one + 1, one[0], 1.0, 0.0, 16, 16};
+    double largest = 1.0;
+    for (int i = 0; i < counts[0] + counts[1] + counts[2]; ++i) {
+        if (i < counts[0] + counts[1]) m.acceleration += orders[i] * orders[i] * fabs(m.terms[2 * i]);
+        largest = mu_max(largest, orders[i]);
+    }
+    m.marks = 16 * (int)mu_min(largest, MU_MARKS / 16);
+    m.nodes = m.marks * (((int)largest + MU_MARKS / 16 - 1) / (MU_MARKS / 16));
+    return m;
+}
+
+/* Steady cycles of n motions, see library.h. */
+static void mu_motions(int contact, int64_t n, const int32_t *counts, const double *orders, const double *cases,
+                       double tolerance, int64_t room, double *work, double *out) {
+    mu_grid grid = {work, 0, room}, steps = {work + room, 0, room};
+    const int64_t numbers = 1 + 2 * ((int64_t)counts[0] + counts[1] + counts[2]);
+    for (int64_t i = 0; i < n; ++i, cases += numbers, out += MU_MEANS + 2) {
+        const mu_shaken m = mu_shaken_as(counts, orders, cases);
+        double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
+        const mu_steady found = contact == MU_BALL ? mu_ball_motion(&m, tolerance, &grid, &steps) : mu_spring_motion(&m, tolerance, &grid, &steps, f);
+        memcpy(out, found.mean, sizeof found.mean);
+        out[MU_MEANS] = found.decay;
+        out[MU_MEANS + 1] = found.error;
+    }
+}
+
+/* One cycle of springs with shares of the limit and weights at n + 1 equal times, see library.h. */
+static void mu_motion_cycle(const int32_t *counts, const double *orders, const double *one, int springs,
+                            const double *shares, const double *weights, double tolerance, int64_t room, double *work, int64_t n,
+                            double *forces) {
+    mu_grid grid = {work, 0, room}, steps = {work + room, 0, room};
+    const mu_shaken m = mu_shaken_as(counts, orders, one);
+    double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
+    for (int64_t i = 0; i < 2 * (n + 1); ++i) forces[i] = 0.0;
+    for (int i = 0; i < springs; ++i) {
+        const mu_shaken spring = mu_of_spring(&m, shares[i]);
+        mu_drawing drawing = {forces, weights[i] * shares[i], n, 0};
+        mu_march march;
+        march.step = 0.0;
+        march.steps = &steps;
+        (void)mu_spring_motion(&spring, tolerance, &grid, &steps, f);
+        mu_take_period(&spring, &grid, f, tolerance, &march, &drawing);
+    }
+}

@@ -1,0 +1,278 @@
+"""``--format fmu`` and ``fmu3``: FMPy validates and simulates them, with Python's values and
+derivatives."""
+
+import math
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from builder.export.grid import export_table
+from mumacro import Surrogate
+from mumacro.inputs.fields import FIELDS
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS
+from tests.support import compilers
+from tests.support.cases import CASE, PAIRS, as_kind, tables
+from tests.support.comparing import close
+
+pytestmark = pytest.mark.slow
+
+table = tables(1e-4)
+
+
+@pytest.fixture(scope="module", params=["fmu", "fmu3"])
+def unit(
+    request: pytest.FixtureRequest, table: Surrogate, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    made = tmp_path_factory.mktemp("fmu") / f"{request.param}.fmu"
+    export_table(table.path, request.param, made)
+    return made
+
+
+@pytest.fixture
+def fmpy() -> Any:
+    """FMPy, and a compiler that has built the unit's binary."""
+    compilers.compiler("gcc")
+    pytest.importorskip("fmpy.validation", reason="fmpy of requirements/peers.txt is not installed")
+    import fmpy
+
+    return fmpy
+
+
+def test_the_sources_compile_without_a_warning(unit: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(unit) as archive:
+        archive.extractall(tmp_path)
+        names = archive.namelist()
+    assert {"modelDescription.xml", "sources/mumacro.h", "sources/instance.h"} < set(names)
+    (source,) = (tmp_path / "sources").glob("*.c")
+    for compiler in ("gcc", "clang"):
+        if shutil.which(compiler):
+            strict = ("-std=c99", "-O1", *compilers.STRICT, "-fsyntax-only")
+            compilers.run(*compilers.compiler(compiler), *strict, source)
+
+
+@pytest.mark.usefixtures("fmpy")
+def test_fmpy_finds_no_fault(unit: Path) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(unit)) == []
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_a_simulation_follows_its_inputs(
+    unit: Path, fmpy: Any, table: Surrogate, kind: Any
+) -> None:
+    time = np.linspace(0.0, 1.0, 41)
+    v0 = 10.0 ** (-4.0 + 5.0 * time)
+    given = np.array(list(zip(time, v0, strict=True)), dtype=[("time", float), ("v0", float)])
+    outputs = ["mu_macro", "mu_ratio", "error_bound", "v_tilde", "y_tilde", "regime", "source"]
+    found = fmpy.simulate_fmu(
+        str(unit),
+        fmi_type=kind,
+        stop_time=1.0,
+        output_interval=0.025,
+        input=given,
+        output=["v0", *outputs],
+        start_values={"Fz": 20.0, "mu0": 0.2},
+    )
+    assert len(found) >= 41
+    answer = table.evaluate({**CASE, "Fz": 20.0, "mu0": 0.2, "v0": found["v0"]}, groups=True)
+    for name in outputs[:5]:
+        expected = getattr(answer, name)
+        assert np.allclose(
+            found[name], expected, rtol=1e-6 if name == "error_bound" else 1e-13, atol=0.0
+        ), name
+    assert np.array_equal(found["source"], answer.source_code)
+    assert set(found["regime"]) == {0, 1}
+
+
+class Loaded:
+    """A unit of either standard, loaded and initialised with parameters; variables by name."""
+
+    def __init__(self, fmpy: Any, path: Path, folder: Path, **parameters: Any) -> None:
+        description = fmpy.read_model_description(str(path))
+        self.unit = unit = fmpy.instantiate_fmu(
+            fmpy.extract(str(path), str(folder)), description, fmi_type="CoSimulation"
+        )
+        self.at = {
+            variable.name: variable.valueReference for variable in description.modelVariables
+        }
+        self.outputs = [self.at[output.variable.name] for output in description.outputs]
+        if description.fmiVersion == "2.0":
+            unit.setupExperiment(startTime=0.0)
+            self._set, self._get = (unit.setReal, unit.setInteger), (unit.getReal, unit.getInteger)
+            self.save, self.restore, self.drop = (
+                unit.getFMUstate,
+                unit.setFMUstate,
+                unit.freeFMUstate,
+            )
+        else:
+            self._set, self._get = (
+                (unit.setFloat64, unit.setInt64),
+                (unit.getFloat64, unit.getInt64),
+            )
+            self.save, self.restore, self.drop = (
+                unit.getFMUState,
+                unit.setFMUState,
+                unit.freeFMUState,
+            )
+        for name, value in parameters.items():
+            self.put(**{name: value})
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+
+    def put(self, **values: Any) -> None:
+        """Set numbers, or with whole ones enumerations."""
+        for name, value in values.items():
+            self._set[isinstance(value, int)]([self.at[name]], [value])
+
+    def get(self, *names: Any, whole: bool = False) -> Any:
+        """Numbers, or the values of enumerations."""
+        return self._get[whole]([self.at[name] for name in names])
+
+    def slope(self, output: Any, **seeds: Any) -> Any:
+        """The derivative of an output along a direction of the inputs."""
+        known = [self.at[name] for name in seeds]
+        return self.unit.getDirectionalDerivative([self.at[output]], known, list(seeds.values()))[0]
+
+
+def test_directional_derivatives_are_the_gradient(
+    unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path
+) -> None:
+    made = Loaded(fmpy, unit, tmp_path)
+    assert made.outputs == [made.at[name] for name in ("mu_macro", "mu_ratio", "force")]
+    for case in (CASE, {**CASE, "v0": 1.0}, {**CASE, "y0": 2e-5}, {**CASE, "v0": -0.01}):
+        made.put(**case)
+        answer = table.evaluate({**case, "v0": abs(case["v0"])}, gradient=True)
+        sign = math.copysign(1.0, case["v0"])
+        assert made.get("force") == [close(sign * answer.mu_macro * case["Fz"], rel=1e-13)]
+        signs = {name: sign if name == "v0" else 1.0 for name in FIELDS}
+        gradient = {name: answer.gradient[name] * signs[name] for name in FIELDS}
+        for name in FIELDS:
+            of_ratio = (gradient[name] - answer.mu_ratio * (name == "mu0")) / case["mu0"]
+            of_force = sign * (gradient[name] * case["Fz"] + answer.mu_macro * (name == "Fz"))
+            found = [
+                made.slope(output, **{name: 1.0}) for output in ("mu_macro", "mu_ratio", "force")
+            ]
+            assert found == close([gradient[name], of_ratio, of_force], rel=1e-9)
+        seeds = {name: 1e-3 * value for name, value in case.items()}
+        expected = sum(gradient[name] * seed for name, seed in seeds.items())
+        assert made.slope("mu_macro", **seeds) == close(expected, rel=1e-9)
+        if hasattr(made.unit, "getAdjointDerivative"):
+            known = [made.at[name] for name in FIELDS]
+            adjoint = made.unit.getAdjointDerivative(
+                [made.at["mu_macro"]], known, [2.0], len(FIELDS)
+            )
+            assert adjoint == close([2.0 * slope for slope in gradient.values()], rel=1e-9)
+
+
+@pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
+def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path, pair: Any) -> None:
+    kind = {"contact": CONTACTS.index(pair[0]), "direction": DIRECTIONS.index(pair[1])}
+    said, fields, _ = as_kind(CASE, pair)
+    case = {name: {**CASE, "Fz_amplitude": 4.0}[name] for name in fields}
+    made = Loaded(fmpy, unit, tmp_path, **kind)
+    made.put(Fz_amplitude=4.0)
+    assert made.get(*kind, whole=True) == list(kind.values())
+    for v0 in 10.0 ** np.linspace(-4.0, 1.0, 21):
+        made.put(v0=v0)
+        answer = table.evaluate({**case, "v0": v0}, **said, groups=True)
+        expected = [answer.mu_macro, answer.y_tilde, answer.mu_macro * CASE["Fz"]]
+        assert made.get("mu_macro", "y_tilde", "force") == close(expected, rel=1e-13)
+    made.put(v0=CASE["v0"])
+    exact = table.evaluate(case, **said, gradient=True).gradient
+    for name in (*FIELDS, "Fz_amplitude"):
+        assert made.slope("mu_macro", **{name: 1.0}) == close(exact.get(name, 0.0), rel=1e-9)
+    for name, wrong in (
+        ("contact", -1),
+        ("contact", 2),
+        ("direction", -1),
+        ("direction", 3),
+        ("source", 0),
+    ):
+        with pytest.raises(Exception, match="status 3"):
+            made.put(**{name: wrong})
+    made.put(contact=1, direction=2)
+    with pytest.raises(Exception, match="status 2"):  # a ball whose normal force oscillates
+        made.get("mu_macro")
+
+
+@pytest.mark.parametrize("kind", [{}, {"contact": 1}, {"direction": 1}, {"direction": 2}])
+def test_the_force_passes_through_zero_with_its_derivatives(
+    unit: Path, fmpy: Any, tmp_path: Path, kind: Any
+) -> None:
+    made = Loaded(fmpy, unit, tmp_path, **kind, v_rest=1e-3)
+    made.put(Fz_amplitude=4.0)
+
+    def force(**moved: Any) -> Any:
+        made.put(**moved)
+        return made.get("force")[0]
+
+    assert (force(v0=0.0), force(v0=-4e-4)) == (0.0, -force(v0=4e-4))
+    assert (
+        0.0
+        < force(v0=4e-4)
+        < force(v0=9e-4)
+        < force(v0=1e-3)
+        == CASE["Fz"] * made.get("mu_macro")[0]
+    )
+    for case in ({**CASE, "v0": 4e-4}, {**CASE, "v0": -9e-4}, {**CASE, "v0": 0.0}):
+        made.put(**case)
+        slopes = {name: made.slope("force", **{name: 1.0}) for name in FIELDS}
+        for name, value in case.items():
+            step = 1e-5 * (value or 1e-3)
+            difference = (force(**{name: value + step}) - force(**{name: value - step})) / (
+                2.0 * step
+            )
+            made.put(**{name: value})
+            assert slopes[name] == close(
+                difference, rel=2e-4, abs=1e-5 * abs(force()) / (abs(value) + 1e-3)
+            ), name
+    for wrong in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(Exception, match="status 3"):
+            made.put(v_rest=wrong)
+    assert made.get("v_rest") == [1e-3]
+
+
+def test_states_are_kept_and_illegal_inputs_discarded(
+    unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path
+) -> None:
+    made = Loaded(fmpy, unit, tmp_path)
+    expected = table.evaluate(CASE).mu_macro
+    assert made.get("mu_macro") == [close(expected, rel=1e-13)]
+    kept = made.save()
+    made.put(y0=-1.0)
+    for output in ("mu_macro", "force"):
+        with pytest.raises(Exception, match="status 2"):  # discard
+            made.get(output)
+    made.put(y0=CASE["y0"], v0=1.0)
+    assert made.get("mu_macro") != [close(expected, rel=1e-3)]
+    made.restore(kept)
+    made.drop(kept)
+    assert made.get("mu_macro", "v0") == [close(expected, rel=1e-13), 0.01]
+    made.at["nothing"] = 99
+    with pytest.raises(Exception, match="status 3"):
+        made.get("nothing")
+    made.unit.reset()
+    assert made.get("k", "v_rest") == [1e6, 1e-4]
+
+
+def test_another_units_token_is_refused(unit: Path, fmpy: Any, tmp_path: Path) -> None:
+    description = fmpy.read_model_description(str(unit))
+    folder = fmpy.extract(str(unit), str(tmp_path))
+    description.guid = description.instantiationToken = "another"
+    with pytest.raises(Exception, match=r"(?i)instantiate"):
+        fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
+
+
+def test_zig_makes_linux_and_windows(table: Surrogate, tmp_path: Path) -> None:
+    compilers.compiler("zig cc")
+    export_table(table.path, "fmu3", tmp_path / "both.fmu")
+    with zipfile.ZipFile(tmp_path / "both.fmu") as archive:
+        archive.extractall(tmp_path)
+    binaries = tmp_path / "binaries"
+    assert (binaries / "x86_64-linux" / "mumacro.so").read_bytes()[:4] == b"\x7fELF"
+    assert (binaries / "x86_64-windows" / "mumacro.dll").read_bytes()[:2] == b"MZ"

@@ -1,0 +1,191 @@
+"""Many solves at once: the same numbers for any division of the work, resumed after a stop, and no
+missing points."""
+
+import math
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from builder.solver import compiled
+from builder.solver import sweep as module
+from builder.solver.slip import NO_STICK
+from builder.solver.steady import ADVICE, border, solve
+from builder.solver.sweep import CHUNK, COLUMNS, SolveError, Sweep, solve_chunk
+from mumacro import InputError
+
+
+def points(n: int) -> tuple[Any, Any]:
+    rng = np.random.default_rng(1)
+    return 10.0 ** rng.uniform(-3.0, 3.0, n), 10.0 ** rng.uniform(-3.0, 3.0, n)
+
+
+def test_values_do_not_depend_on_workers_or_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    v, y = points(3 * CHUNK + 17)
+    with Sweep(1) as one, Sweep(4) as four:
+        expected = one.solve("full", v, y)
+        found = four.solve("full", v, y)
+    monkeypatch.setattr(module, "CHUNK", 7)
+    with Sweep(2) as small:
+        again = small.solve("full", v, y)
+    for name in COLUMNS:
+        assert np.array_equal(found[name], expected[name])
+        assert np.array_equal(again[name], expected[name])
+
+
+def test_every_kind_equals_a_single_solve_in_every_shape() -> None:
+    v, y = points(40)
+    eta = np.where(np.arange(40) == 3, 1e-18, y - 1.0)
+    v[3], y[3] = 1e-27, 1.0  # y~ - 1 that y~ does not hold
+    with Sweep(2) as sweep:
+        full = sweep.solve("full", v.reshape(4, 10), y.reshape(4, 10), eta.reshape(4, 10))
+        crit = sweep.solve("border", np.ones((1, 1)), y)
+        assert sweep.n_solves == 80
+        assert crit["mu_ratio"].shape == (1, 40)
+        assert sweep.solve("full", np.empty(0), np.empty(0))["mu_ratio"].shape == (0,)
+        assert full["mu_ratio"][0, 3] < 0.8 * sweep.solve("full", v[3], y[3])["mu_ratio"]
+    for i in range(40):
+        single, row, column = solve(v[i], y[i], eta[i]), *divmod(i, 10)
+        for name in ("mu_ratio", "deficit", "stick_fraction", "power", "error_estimate"):
+            assert full[name][row, column] == getattr(single, name)
+        assert (crit["deficit"][0, i], crit["mu_ratio"][0, i]) == border(y[i])
+
+
+def test_a_point_out_of_range_is_named() -> None:
+    with Sweep(1) as sweep, pytest.raises(InputError) as caught:
+        sweep.solve("full", np.array([0.1, -1.0, math.nan]), np.array([0.5, 0.5, 0.5]))
+    assert (caught.value.field, caught.value.value, caught.value.index) == ("v_tilde", -1.0, 1)
+    assert sweep.n_solves == 0
+
+
+def test_a_point_that_fails_is_named_with_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(kind: str, points: Any) -> Any:
+        out = solve_chunk(kind, points)
+        out[1:, -1] = NO_STICK
+        return out
+
+    monkeypatch.setattr(module, "solve_chunk", fails)
+    with Sweep(1) as sweep, pytest.raises(SolveError) as caught:
+        sweep.solve("full", np.array([0.1, 0.2, 0.3]), np.array([0.5, 0.5, 0.5]))
+    assert str(caught.value) == f"2 of 3 points failed, first v~=0.2, y~=0.5: {ADVICE[NO_STICK]}"
+
+
+def test_finished_work_is_kept_and_taken_up_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    v, y = points(50)
+    folder = tmp_path / "work.checkpoint"
+    with Sweep(1, checkpoint=folder) as sweep:
+        expected = sweep.solve("full", v, y)
+    assert len(list(folder.iterdir())) == 1
+
+    def not_again(*_: object) -> None:
+        raise AssertionError("solved again")
+
+    with Sweep(1, checkpoint=folder) as sweep:
+        monkeypatch.setattr(sweep, "_run", not_again)
+        found = sweep.solve("full", v, y)
+        assert sweep.n_solves == 50  # the count is the same, resumed or not
+        with pytest.raises(AssertionError, match="solved again"):
+            sweep.solve("continuous", v, y)
+        with pytest.raises(AssertionError, match="solved again"):
+            sweep.solve("full", v * (1.0 + 1e-15), y)
+        monkeypatch.setattr(module, "source_digest", lambda *_: "of another program")
+        with pytest.raises(AssertionError, match="solved again"):
+            sweep.solve("full", v, y)
+    assert all(np.array_equal(found[name], expected[name]) for name in COLUMNS)
+
+
+@pytest.mark.parametrize("damage", [b"", b"no array", b"\x93NUMPY\x01\x00", None])
+def test_a_damaged_checkpoint_is_solved_again(tmp_path: Path, damage: bytes | None) -> None:
+    v, y = points(20)
+    folder = tmp_path / "work.checkpoint"
+    with Sweep(1, checkpoint=folder) as sweep:
+        expected = sweep.solve("full", v, y)["mu_ratio"]
+        (file,) = folder.iterdir()
+        whole = file.read_bytes()
+        if damage is None:
+            np.save(file, np.zeros((3, 2)))  # an array, of another shape
+        else:
+            file.write_bytes(damage)
+        assert np.array_equal(sweep.solve("full", v, y)["mu_ratio"], expected)
+    assert file.read_bytes() == whole
+    assert list(folder.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(("place", "pattern"), compiled.SOURCES)
+def test_the_digest_covers_sources_and_compiler(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: Path, pattern: str
+) -> None:
+    digests = {compiled.source_digest()}
+    copies = tmp_path / "sources"
+    for source in place.rglob(pattern):
+        copy = copies / source.relative_to(place)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(source.read_bytes())
+    assert list(copies.iterdir())
+    sources = [
+        (copies if entry == (place, pattern) else entry[0], entry[1]) for entry in compiled.SOURCES
+    ]
+    monkeypatch.setattr(compiled, "SOURCES", sources)
+    assert digests == {compiled.source_digest()}  # wherever the sources stand
+    # a module that moves is not lost
+    added = copies / "folder" / pattern.replace("*", "zz").replace("[ch]", "h")
+    added.parent.mkdir()
+    for text in ("", "x = 1"):
+        added.write_text(text)
+        digests.add(compiled.source_digest())
+    monkeypatch.setattr("numba.__version__", "0.0.0")
+    digests.add(compiled.source_digest())
+    assert len(digests) == 4
+
+
+def test_compiled_functions_are_kept_until_a_source_changes(tmp_path: Path) -> None:
+    """Also a function whose own module stays the same, while one that it calls changes."""
+    package = tmp_path / "builder"
+    shutil.copytree(Path(compiled.__file__).parents[1], package)
+    calls = "from .compiled import solver_kernel\n"
+    inner = calls + "@solver_kernel\ndef inner(x):\n    return {} * x\n"
+    outer = calls + "from .inner import inner\n@solver_kernel\ndef outer(x):\n    return inner(x)\n"
+    (package / "solver" / "outer.py").write_text(outer)
+    store = tmp_path / "store"
+
+    def result(factor: int) -> tuple[float, set[Path]]:
+        (package / "solver" / "inner.py").write_text(inner.format(factor))
+        script = "from builder.solver.outer import outer; print(outer(1.0))"
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(store), "PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return float(done.stdout), set(store.rglob("*.nbc"))
+
+    first, kept = result(2)
+    again, kept_again = result(2)
+    changed, kept_after_change = result(3)
+    assert (first, again, changed) == (2.0, 2.0, 3.0)
+    assert kept == kept_again < kept_after_change
+
+
+def test_the_solver_runs_where_nothing_can_be_kept(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    script = "from builder.solver.sections import border_guess; print(border_guess(1.0))"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "file" / "store")}
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=Path(compiled.__file__).parents[2],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert float(done.stdout) > 0.0

@@ -1,0 +1,169 @@
+"""``python -m builder`` beyond the simple cases: complete builds, failures during work, help."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import pytest
+
+from builder.__main__ import main
+from builder.tables.quantities import ABS_TO_REL
+from mumacro import Surrogate
+from mumacro.table.netcdf import read_table, write_table
+from tests.support.comparing import close
+
+pytestmark = pytest.mark.slow
+
+Run = Callable[..., "CompletedProcess[str]"]
+
+
+@pytest.fixture
+def here(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Run:
+    """``python -m builder ARGUMENTS`` without a process of its own, which would compile the solver
+    anew."""
+    monkeypatch.chdir(repository)
+
+    def run(*arguments: object) -> "CompletedProcess[str]":
+        words = [*map(str, arguments)]
+        code: Any = 0
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code
+        out, err = capfd.readouterr()
+        return CompletedProcess(words, int(code or 0), out, err)
+
+    return run
+
+
+def refused(done: Any, *parts: str) -> None:
+    """The command failed with a message that contains ``parts``, and without a traceback."""
+    assert done.returncode not in (0, None)
+    assert "Traceback" not in done.stderr + done.stdout
+    message = " ".join(done.stderr.split())
+    for part in parts:
+        assert part in message
+
+
+def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) -> None:
+    out = tmp_path / "rough.nc"
+    done = run_builder("build", "--tolerance", "1e-3", "--out", out, "--workers", 2)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)  # JSON only: the progress bar goes to stderr
+    opened = Surrogate.open(out)
+    assert (report["table"], report["content_sha256"]) == (str(out), opened.checksum)
+    assert report["tolerance"] == opened.tolerance == 1e-3
+    assert report["verified_max_abs_error"] == opened.max_abs_error <= 1e-3
+    assert report["verified_max_rel_error"] == opened.max_rel_error <= ABS_TO_REL * 1e-3
+    assert report["bytes"] == out.stat().st_size
+    assert report["n_solves"] == opened.attributes["n_solves"]
+    assert report["n_solves"] > 10_000
+    # no checkpoint, no partial file
+    assert [path.name for path in tmp_path.iterdir()] == ["rough.nc"]
+
+    verified = run_builder("verify", out, "--points", 300, "--seed", 5)
+    assert verified.returncode == 0, verified.stderr
+    assert {"holds": True, "not_covered": 0}.items() <= json.loads(verified.stdout).items()
+
+
+def test_verify_stores_what_it_finds_only_when_asked(
+    here: Run, tables_dir: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(tables_dir / "mumacro-1e-4.nc", tmp_path / "copy.nc"))
+    before, image = Surrogate.open(path), path.read_bytes()
+    words = ("verify", path, "--points", 300, "--seed", 5)
+    assert here(*words).returncode == 0
+    assert path.read_bytes() == image
+    report = json.loads(here(*words, "--write").stdout)
+    after = Surrogate.open(path)
+    assert after.checksum == before.checksum
+    assert after.attributes["verified_points"] == report["points"]
+    assert after.max_abs_error == report["max_abs_error"] < before.max_abs_error
+    for name, part in report["distribution"].items():
+        told = [*part["error_quantiles"], *part["bound_over_error"]]
+        assert [*after.error_distribution[name].values()] == told
+        assert told != [*before.error_distribution[name].values()]
+    # a table that misses its bounds is left as it is
+    table = read_table(path)
+    table.attributes["tolerance"] = 1e-9
+    write_table(table, path)
+    image = path.read_bytes()
+    refused(here(*words, "--write"), "misses its tolerance")
+    assert path.read_bytes() == image
+
+
+def test_solve_answers_at_the_ends_of_its_range(run_builder: Run, here: Run) -> None:
+    done = run_builder("solve", "--v", 0.1, "--y", 0.5)
+    assert json.loads(done.stdout)["mu_ratio"] == close(0.9420042895137095, abs=1e-15)
+    for v, y in (("1e10", "1e-15"), ("1e-60", "1e14")):
+        done = here("solve", "--v", v, "--y", y)
+        assert done.returncode == 0, done.stderr
+        answer = json.loads(done.stdout)
+        assert answer["status"] == 0
+        assert 0.0 < answer["mu_ratio"] <= 1.0
+        assert 0.0 <= answer["error_estimate"] < 2e-15
+    answer = json.loads(here("solve", "--v", "1e-9", "--y", "0.5").stdout)
+    # far below the border: not computed
+    assert (answer["regime"], answer["min_slip_speed"]) == ("stick_slip", None)
+    assert answer["stick_fraction"] > 0.99
+
+
+def test_verify_rejects_a_table_that_misses_its_tolerance(
+    here: Run, tables_dir: Path, tmp_path: Path
+) -> None:
+    table = read_table(tables_dir / "mumacro-1e-4.nc")
+    table.attributes["tolerance"] = 1e-9  # it states a tolerance that it does not meet
+    write_table(table, tmp_path / "boast.nc")
+    done = here("verify", tmp_path / "boast.nc", "--points", 300)
+    refused(done, "boast.nc", "misses its tolerance of 1e-09")
+    report = json.loads(done.stdout)
+    assert report["holds"] is False
+    assert report["max_abs_error"] > 1e-9
+
+
+def test_verify_refuses_a_damaged_table(here: Run, tables_dir: Path, tmp_path: Path) -> None:
+    cut = Path(shutil.copy(tables_dir / "mumacro-1e-4.nc", tmp_path / "cut.nc"))
+    cut.write_bytes(cut.read_bytes()[:60_000])
+    refused(here("verify", cut), "cut.nc", "not a readable netCDF-4 table")
+
+
+ROUGH, V_RANGE = "build --tolerance 1e-3 --out x.nc", "from 1e-60 to 1e+10"
+REFUSED: dict[str, tuple[str, ...]] = {
+    "build --tolerance 0.5 --out x.nc": ("--tolerance", "must be from 1e-12 to 0.01"),
+    **dict.fromkeys(
+        (f"build --tolerance {x} --out x.nc" for x in ("-1e-8", "nan")), ("--tolerance",)
+    ),
+    "build --tolerance 1e-15 --out x.nc": ("--tolerance", "1e-15"),
+    "build --tolerance 1e-3": ("--out",),
+    **dict.fromkeys((f"{ROUGH} --workers {n}" for n in ("0", "2000")), ("--workers",)),
+    f"{ROUGH} --sideways": ("--sideways",),
+    "build --tolerance 1e-2 --out tables": ("--out", "is a folder"),
+    "build --tolerance 1e-3 --out no/such/folder/x.nc": ("no/such/folder",),
+    **dict.fromkeys(("verify x.nc --points 1", "verify x.nc --points 99999999"), ("--points",)),
+    "verify x.nc --seed -1": ("--seed",),
+    "verify x.nc --workers 0": ("--workers",),
+    "verify": ("required: table",),
+    "verify no-such-table.nc": ("no-such-table.nc",),
+    "verify README.md": ("README.md",),
+    "bake": ("bake",),
+    "figures --out no/such/folder": ("--out",),
+    "figures --out . --table no-such-table.nc": ("no-such-table.nc",),
+    **dict.fromkeys((f"solve --v={v} --y 1" for v in ("-1", "nan", "fast", "")), ("--v",)),
+    "solve --v 1 --y 0": ("--y",),
+    "solve --v 1": ("--y",),
+    "solve 1 2": (),
+    "solve --v 1 --y=-inf": ("--y", "from 1e-15 to 1e+14", "-inf", "a table answers"),
+    "solve --v 1e999 --y 1": ("--v", V_RANGE, "got inf"),
+    "solve --v 1e-61 --y 1": ("--v", V_RANGE, "got 1e-61"),
+}
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_bad_arguments_are_refused_before_any_work(here: Run, words: str, repository: Path) -> None:
+    refused(here(*words.split()), *REFUSED[words])
+    assert not list(repository.glob("x.nc*"))

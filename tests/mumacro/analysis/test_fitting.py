@@ -1,0 +1,377 @@
+"""mumacro.fit: inputs recovered within their covariance, what points do not tell, bad input."""
+
+import itertools
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mumacro import InputError, Surrogate, fit
+from mumacro.inputs.kind import CONTACTS
+from tests.support.cases import Case
+from tests.support.comparing import close
+
+RIG: Case = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
+V0 = np.geomspace(1e-3, 1.0, 20)
+
+
+@pytest.fixture(autouse=True)
+def quiet() -> Any:
+    """Warnings are looked at in the result."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield
+
+
+def friction(surrogate: Surrogate, contact: Any = "spring", **inputs: Any) -> Any:
+    """mu_macro of a contact that is known."""
+    return np.asarray(
+        surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, contact=contact).mu_macro
+    )
+
+
+def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> Any:
+    """Points with noise, and their standard deviations."""
+    mu = friction(surrogate, **inputs)
+    return mu + np.random.default_rng(seed).normal(scale=spread, size=mu.shape)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("given", [True, False], ids=["std", "scatter"])
+@pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_inputs_lie_within_their_covariance(
+    surrogate: Surrogate, contact: Any, unknowns: Any, given: Any
+) -> None:
+    """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for
+    itself."""
+    from scipy.stats import binom, chi2
+    from scipy.stats import f as fisher
+
+    truth: Case = {"k": 1e6, "mu0": 0.3}
+    v0, y0, spread = np.tile(V0, 2), np.repeat([1e-6, 2.5e-6], 20), 2e-3
+    known = {name: value for name, value in truth.items() if name not in unknowns}
+    n = len(unknowns)
+    inside: Any = 0
+    intervals: Any = np.zeros(n, dtype=int)
+    clean = friction(surrogate, contact, v0=v0, y0=y0)
+    for seed in range(200):
+        mu = clean + np.random.default_rng(seed).normal(scale=spread, size=40)
+        data = {"v0": v0, "y0": y0, "mu_macro": mu} | ({"std": spread} if given else {})
+        found = fit(data, unknowns, contact=contact, Fz=10.0, f=20e3, **known)
+        off = np.array([found.values[name] - truth[name] for name in unknowns])
+        limit = chi2.ppf(0.95, n) if given else n * fisher.ppf(0.95, n, 40 - n)
+        inside += off @ np.linalg.solve(found.covariance, off) <= limit
+        intervals += [
+            found.interval[name][0] <= truth[name] <= found.interval[name][1] for name in unknowns
+        ]
+        assert len(found.solutions) == 1
+        assert found.reduced_chi2 * (1.0 if given else spread**-2) == close(1.0, abs=1.0)
+    low, high = (float(binom.ppf(level, 200, 0.95)) for level in (0.0005, 0.9995))
+    assert low <= inside <= high
+    assert np.all((low <= intervals) & (intervals <= high))
+
+
+def test_the_variance_is_that_of_the_scatter_over_the_degrees_of_freedom(
+    surrogate: Surrogate,
+) -> None:
+    # without oscillation mu_macro is mu0: its mean, and the deviation of a mean
+    mu = [0.28, 0.31, 0.3, 0.29]
+    found = fit({"v0": np.ones(4), "mu_macro": mu}, "mu0", k=1e6, **{**RIG, "y0": 0.0})
+    assert found.values["mu0"] == close(np.mean(mu), rel=1e-8)
+    assert found.std["mu0"] == close(np.std(mu, ddof=1) / 2.0, rel=1e-8)
+    both = fit({"v0": V0[::4], "mu_macro": noisy(surrogate, 3e-3, v0=V0[::4])}, **RIG)
+    case: Case = {**both.values, **RIG, "v0": V0[::4]}
+    slopes: Any = surrogate.evaluate(case, gradient=True).gradient
+    rows = np.stack([slopes["k"], slopes["mu0"]])
+    assert both.covariance == close(both.chi2 / (5 - 2) * np.linalg.inv(rows @ rows.T), rel=1e-6)
+
+
+def test_exact_points_that_hardly_tell_k_give_it(surrogate: Surrogate) -> None:
+    rig: Case = {"Fz": 10.0, "y0": 0.004 * 3.0 / 3e4, "f": 20e3}  # y~ = 0.004
+    v0 = np.geomspace(1e-3, 3.0, 20) * 1e-4 * 2.0 * math.pi * 20e3
+    asked: list[tuple[str, Case]] = [("k mu0", {}), ("k", {"mu0": 0.3})]
+    for names, known in asked:
+        mu = np.asarray(surrogate.evaluate(mu0=0.3, k=3e4, v0=v0, **rig).mu_macro)
+        found = fit({"v0": v0, "mu_macro": mu}, names.split(), **{**rig, **known})
+        assert found.values["k"] == close(3e4, rel=1e-7)
+        assert found.interval["k"][0] <= 3e4 <= found.interval["k"][1]
+
+
+def test_mu0_may_be_known_at_each_point(surrogate: Surrogate) -> None:
+    mu0 = np.linspace(0.35, 0.25, V0.size)
+    points = {"v0": V0, "mu0": mu0, "mu_macro": friction(surrogate, v0=V0, mu0=mu0)}
+    for unknowns in (None, "k"):
+        assert fit(points, unknowns, **RIG).values == {"k": close(1e6, rel=1e-8)}
+    for name, both in (("mu0", ["mu0"]), ("k", ["k", "mu0"]), ("k", ["k"])):
+        with pytest.raises(InputError, match=f"{name} must be left out, or taken from unknowns"):
+            fit({**points, "k": 1e6}, both, **RIG)
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("k", [2e5, 1e6, 1e7])
+def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: Any, k: Any) -> None:
+    mu = friction(surrogate, contact, v0=V0, k=k)
+    found = fit({"v0": V0, "mu_macro": mu}, contact=contact, **RIG)
+    assert found.values == {"k": close(k, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
+    assert np.abs(found.residuals).max() < 1e-9
+    assert fit({"v0": V0, "mu_macro": mu}, "k", contact=contact, mu0=0.3, **RIG).values[
+        "k"
+    ] == close(k, rel=1e-8)
+    assert fit({"v0": V0, "mu_macro": mu}, "mu0", contact=contact, k=k, **RIG).values[
+        "mu0"
+    ] == close(0.3, rel=1e-9)
+
+
+def test_every_input_may_vary(surrogate: Surrogate) -> None:
+    rng = np.random.default_rng(1)
+    columns: Case = {
+        "v0": rng.uniform(1e-3, 1.0, 30),
+        "Fz": rng.uniform(5.0, 20.0, 30),
+        "y0": rng.uniform(0.0, 5e-6, 30),
+        "omega": rng.uniform(1e4, 2e5, 30),
+    }
+    mu = np.asarray(surrogate.evaluate(mu0=0.3, k=1e6, **columns).mu_macro)
+    found = fit({**columns, "mu_macro": mu})
+    assert found.values == {"k": close(1e6, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({**columns, "mu_macro": mu, "std": 1e-3, "remark": "x"})
+    assert fit(frame).values == {"k": close(1e6, rel=1e-6), "mu0": close(0.3, rel=1e-7)}
+
+
+def test_weights_are_the_standard_deviations(surrogate: Surrogate) -> None:
+    mu, std = noisy(surrogate, 1e-4, v0=V0), np.full(20, 1e-4)
+    mu[3], std[3] = 0.9, 1e6
+    found = fit({"v0": V0, "mu_macro": mu, "std": std}, **RIG)
+    assert found.values["k"] == close(1e6, rel=2e-3)
+    assert found.warnings == ()
+    assert any(
+        "scatter by more than their std" in text
+        for text in fit({"v0": V0, "mu_macro": mu, "std": 1e-5}, **RIG).warnings
+    )
+
+
+def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate: Surrogate) -> None:
+    found = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0), "std": 1e-3}, **RIG)
+    mu, off = found.predict(v0=0.05)
+    both = np.linalg.cholesky(found.covariance)
+    drawn = both @ np.random.default_rng(2).normal(size=(2, 4000)) + np.array(
+        [[x] for x in found.values.values()]
+    )
+    each = surrogate.evaluate(k=drawn[0], mu0=drawn[1], v0=0.05, **RIG).mu_macro
+    assert float(mu[0]) == close(each.mean(), abs=3.0 * off[0] / 60.0)
+    assert float(off[0]) == close(each.std(), rel=0.05)
+
+
+# --- what points do not tell ----------------------------------------------------------------------
+
+
+def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(
+    surrogate: Surrogate,
+) -> None:
+    def measured(k: Any, spread: float = 3e-3) -> Any:
+        return fit(
+            {"v0": V0, "mu_macro": noisy(surrogate, spread, v0=V0, k=k), "std": spread}, **RIG
+        )
+
+    with pytest.warns(UserWarning, match="only a lower bound"):
+        stiff = measured(1e9)
+    low, high = stiff.interval["k"]
+    assert 1e7 < low < 1e9 < high == math.inf
+    assert stiff.interval["mu0"][0] < 0.3 < stiff.interval["mu0"][1]
+    rigid = fit({"v0": V0, "mu_macro": friction(surrogate, v0=V0, k=math.inf)}, **RIG)
+    assert rigid.values == {"k": math.inf, "mu0": close(0.3, rel=1e-9)}
+    assert rigid.std["k"] == rigid.interval["k"][1] == math.inf
+    soft, large = measured(1e3), measured(5e7, 1e-4)
+    assert soft.interval["k"][0] == 0.0 < 1e3 < soft.interval["k"][1] < 2e6
+    assert large.interval["k"][0] < 5e7 < large.interval["k"][1]
+    for found, said in (
+        (stiff, "only a lower bound"),
+        (soft, "only an upper bound"),
+        (large, "above 20"),
+    ):
+        assert any(said in text for text in found.warnings)
+
+
+def test_all_solutions_are_found(surrogate: Surrogate) -> None:
+    """mu_macro is not monotone in k: three stiffnesses give this friction."""
+    v0 = 2e-6 * 0.57 / 10.9 * 2.0 * math.pi * 20e3
+    k = np.geomspace(1e4, 1e10, 100_000)
+    mu = friction(surrogate, v0=v0, k=k)
+    rising = np.flatnonzero(np.diff(mu) > 0.0)
+    target = float(mu[rising].mean())
+    expected = k[:-1][np.diff(np.sign(mu - target)) != 0.0]
+    assert expected.size == 3
+    for std in ({}, {"std": 1e-4}):
+        found = fit({"v0": [v0], "mu_macro": [target], **std}, "k", mu0=0.3, **RIG)
+        assert sorted(one["k"] for one in found.solutions) == [
+            close(one, rel=1e-3) for one in expected
+        ]
+        assert any("3 solutions" in text for text in found.warnings)
+    # any of which may be the truth
+    for draw in np.random.default_rng(0).normal(scale=1e-5, size=10):
+        found = fit({"v0": [v0], "mu_macro": [target + draw], "std": 1e-5}, "k", mu0=0.3, **RIG)
+        assert found.interval["k"][0] < expected[0] < expected[-1] < found.interval["k"][1]
+        assert any(
+            "3 solutions fit within 95 %, the interval covers them all" in text
+            for text in found.warnings
+        )
+    # with the scatter of a usual measurement the three are one
+    assert (
+        len(fit({"v0": [v0], "mu_macro": [target], "std": 0.02}, "k", mu0=0.3, **RIG).solutions)
+        == 1
+    )
+
+
+def test_as_many_points_as_unknowns_have_no_error_without_std(surrogate: Surrogate) -> None:
+    v0 = np.array([0.002, 0.1])
+    found = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0)}, **RIG)
+    assert found.values["k"] == close(1e6, rel=1e-6)
+    assert math.isinf(found.std["k"])
+    assert math.isnan(found.reduced_chi2)
+    assert any("no measure of the error" in text for text in found.warnings)
+    known = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0), "std": 1e-3}, **RIG)
+    assert 0.0 < known.std["k"] < 1e5
+
+
+@pytest.mark.parametrize(
+    ("k", "mu0", "scale"), [(1e-3, 0.3, 1e-9), (1e15, 0.3, 1e9), (1e6, 1e-3, 1.0), (1e6, 30.0, 1.0)]
+)
+def test_units_and_sizes_do_not_matter(surrogate: Surrogate, k: Any, mu0: Any, scale: Any) -> None:
+    """Stiffness over force, and amplitude over l0, are what counts."""
+    rig = {"Fz": 10.0 * scale, "y0": 2.0 * mu0 * 10.0 * scale / k, "f": 20e3}
+    v0 = rig["y0"] * 1.3e5 * np.geomspace(0.01, 3.0, 20)
+    mu = surrogate.evaluate(mu0=mu0, k=k, v0=v0, **rig).mu_macro
+    assert fit({"v0": v0, "mu_macro": mu}, **rig).values == {
+        "k": close(k, rel=1e-7),
+        "mu0": close(mu0, rel=1e-8),
+    }
+
+
+@pytest.mark.parametrize("along", ["v0", "y0"])
+def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    x = {"v0": np.append(0.0, V0), "y0": np.geomspace(1e-7, 1e-5, 21)}[along]
+    given = {**RIG, "v0": 0.05, along: x}
+    found = fit(
+        {along: x, "mu_macro": friction(surrogate, **given), "std": 1e-3},
+        **{name: value for name, value in given.items() if name != along},
+    )
+    axes = found.plot()
+    assert axes.get_xlabel() == {"v0": "$v_0$ [m/s]", "y0": "$y_0$ [m]"}[along]
+    assert axes.get_ylabel() == r"$\mu_\mathrm{macro}$ [-]"
+    points, curve = axes.lines[0], axes.lines[-1]
+    assert np.array_equal(points.get_xdata(), x)
+    assert np.interp(x, curve.get_xdata(), curve.get_ydata()) == close(points.get_ydata(), abs=1e-3)
+    edges = axes.collections[-1].get_paths()[0].vertices[:, 1]
+    assert edges.min() < curve.get_ydata().min() < curve.get_ydata().max() < edges.max()
+    matplotlib.pyplot.close("all")
+
+
+# --- bad input ------------------------------------------------------------------------------------
+
+POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
+
+
+@pytest.mark.parametrize(
+    ("data", "given", "said"),
+    [
+        (POINTS, {**RIG, "unknowns": ("k", "y0")}, 'unknowns must be one or both of "k" and "mu0"'),
+        (POINTS, {**RIG, "contact": "cube"}, "contact must be one of"),
+        (POINTS, {**RIG, "k": 1e6}, "k must be left out, or taken from unknowns"),
+        (POINTS, {**RIG, "unknowns": "k"}, "mu0 must be given"),
+        (POINTS, {**RIG, "omga": 1.0}, "omga must be .* did you mean omega"),
+        (POINTS, {**RIG, "v0": 1.0}, "v0 must be given once: as a column or as a keyword"),
+        (POINTS, {"Fz": 10.0, "f": 2e4}, r"y0 must be given \[m\]"),
+        (POINTS, {"Fz": 10.0, "y0": 2e-6}, "omega must be given or f"),
+        (POINTS, {**RIG, "y0": -1.0}, "y0 must be finite and >= 0"),
+        ({"v0": [0.1, 0.2]}, RIG, "mu_macro must be a column of the data"),
+        ([0.1, 0.2], RIG, "data must be a mapping, DataFrame"),
+        ({"v0": [0.1, 0.1, 0.1], "mu_macro": [0.2, 0.21, 0.2]}, RIG, "at least 2 different inputs"),
+        (
+            {"v0": [0.1, 0.2, 0.3], "mu_macro": [0.2, 0.21]},
+            RIG,
+            "data must be columns of one length",
+        ),
+        (
+            {"v0": [0.1, 0.2], "mu_macro": [0.2, math.nan]},
+            RIG,
+            "mu_macro at index 1 must be finite and >= 0",
+        ),
+        (
+            {"v0": [0.1, 0.2], "mu_macro": [0.2, -0.1]},
+            RIG,
+            "mu_macro at index 1 must be finite and >= 0",
+        ),
+        ({"v0": [0.1, math.nan], "mu_macro": [0.2, 0.1]}, RIG, "v0 at index 1 must be finite"),
+        (
+            {"v0": [0.1, 0.2], "mu_macro": [0.0, 0.0]},
+            RIG,
+            "mu_macro must be > 0 in at least one point",
+        ),
+        ({**POINTS, "std": [1e-3, 0.0, 1e-3]}, RIG, "std at index 1 must be finite and > 0"),
+        (POINTS, {**RIG, "y0": 0.0}, "points with y0 > 0 and omega > 0"),
+        (
+            POINTS,
+            {**RIG, "unknowns": "k", "mu0": 0.28},
+            "mu_macro at index 2 must be <= mu0, within 5 %; give std",
+        ),
+        (
+            {**POINTS, "std": 1e-3},
+            {**RIG, "unknowns": "k", "mu0": 0.28},
+            "mu_macro at index 2 must be <= mu0",
+        ),
+        ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "0.3"]}, RIG, "mu_macro must be a real number"),
+    ],
+)
+def test_bad_input_is_named_with_the_remedy(data: Any, given: Any, said: Any) -> None:
+    with pytest.raises(InputError, match=said):
+        fit(data, **given)
+
+
+@pytest.mark.parametrize("amplitude", [-1.0, 10.0, 20.0])
+def test_an_amplitude_that_lifts_the_contact_off_is_refused(amplitude: float) -> None:
+    rig: dict[str, Any] = {"Fz": 10.0, "f": 20e3, "Fz_amplitude": amplitude}
+    with pytest.raises(InputError, match="lifts off") as caught:
+        fit({"v0": [0.01, 0.02, 0.03], "mu_macro": [0.2, 0.22, 0.24]}, direction="normal", **rig)
+    assert (caught.value.field, caught.value.value) == ("Fz_amplitude", amplitude)
+
+
+def test_points_that_do_not_depend_on_k_are_refused() -> None:
+    data = {"v0": [0.0, 0.1], "y0": [2e-6, 0.0], "mu_macro": [0.0, 0.3]}
+    with pytest.raises(InputError, match="points in which k matters"):
+        fit({**data, "y0": [0.0, 1e-15], "v0": [0.1, 1e6], "mu_macro": [0.3, 0.3]}, Fz=10.0, f=2e4)
+    # noise may lie on the other side of what is possible, if it is said
+    within = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.301], "std": 1e-3}
+    assert fit(within, "k", mu0=0.3, **RIG).values["k"] > 0.0
+    assert (
+        fit({"v0": [1e-3, 0.1, 1.0], "mu_macro": [-1e-4, 0.1, 0.3], "std": 1e-3}, **RIG).values["k"]
+        > 0.0
+    )
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_extreme_points_are_refused_or_give_no_nan(seed: int) -> None:
+    """One number of an ordinary measurement is replaced by one of any size."""
+    chance = np.random.default_rng(seed)
+    sizes = [0.0, 5e-324, 1.7e308, 1e20, *10.0 ** chance.uniform(-307, 308, 3)]
+    columns = {"v0": V0[::5], "mu_macro": np.array([0.02, 0.1, 0.2, 0.3])}
+    columns |= {"y0": np.full(4, 2e-6), "std": np.full(4, 0.01)}
+    for name, size, scattered in itertools.product(columns, sizes, (True, False)):
+        data = {key: x.copy() for key, x in columns.items() if key != "std" or not scattered}
+        data.setdefault(name, columns[name].copy())[chance.integers(4)] = size
+        try:
+            found = fit(data, Fz=10.0, f=20e3)
+        except InputError:
+            continue
+        told = [
+            *found.values.values(),
+            *found.std.values(),
+            *sum(found.interval.values(), ()),
+            *found.covariance.flat,
+        ]
+        assert not np.isnan([*told, found.chi2, *found.residuals]).any(), (name, size)
+        assert min(low for low, _ in found.interval.values()) >= 0.0

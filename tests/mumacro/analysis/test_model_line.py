@@ -1,0 +1,132 @@
+"""What an answer says about the model: rows of docs/validity.md, effects, digits."""
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mumacro import InputError, Surrogate
+from mumacro.analysis.validity import ROWS, digits, k_effect, model_rows
+from tests.support.cases import Case
+from tests.support.comparing import close
+
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+
+
+def rows(surrogate: Surrogate, contact: str = "spring", **changed: Any) -> Any:
+    """Text and effect by row."""
+    found = model_rows(surrogate, {**CASE, **changed}, contact)
+    assert [one["row"] for one in found] == sorted({one["row"] for one in found}, key=ROWS.index)
+    return {one["row"]: (one["text"], one["effect"]) for one in found}
+
+
+def test_rows_are_those_of_the_document(repository: Path) -> None:
+    text = (repository / "docs" / "validity.md").read_text("utf-8")
+    assert {*ROWS} <= {*re.findall(r"^\| ([^|]+?) \|", text.partition("\n## ")[0], re.MULTILINE)}
+
+
+def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) -> None:
+    mu = surrogate.evaluate(**CASE).mu_macro
+    off = [
+        abs(surrogate.evaluate(**{**CASE, "k": 1e6 * x}).mu_macro / mu - 1.0)
+        for x in (1.1, 1.0 / 1.1)
+    ]
+    text, effect = rows(surrogate)["k is known"]
+    assert effect == close(max(off), rel=1e-9)
+    assert f"{100.0 * effect:.2g} %" in text
+    assert k_effect(surrogate, CASE, known=1e-4) == close(
+        1e-4 * abs(surrogate.evaluate(**CASE, gradient=True).gradient["k"]) * 1e6 / mu, rel=1e-3
+    )
+    # at a maximum over k the slope is zero, and the effect is not
+    v0 = 2e-6 * 0.57 / 10.9 * 2.0 * math.pi * 20e3
+    k = np.geomspace(5e6, 3e8, 20_001)
+    top = float(k[surrogate.evaluate(**{**CASE, "v0": v0, "k": k}).mu_macro[5000:].argmax() + 5000])
+    assert k_effect(surrogate, {**CASE, "v0": v0, "k": top}) > 1e-5
+    assert k_effect(surrogate, {**CASE, "k": "rigid"}) == 0.0
+    # mu_macro = 0 for every such k
+    assert k_effect(surrogate, {**CASE, "y0": 20e-6, "v0": 0.0}) == 0.0
+    # 0, and not 0 for a softer contact
+    assert k_effect(surrogate, {**CASE, "y0": 3.1e-6, "v0": 0.0}) == math.inf
+
+
+def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate: Surrogate) -> None:
+    found = rows(surrogate, y0=2.0)
+    assert list(found) == ["units"]
+    assert "is y0 = 2 in metres?" in found["units"][0]
+    assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
+
+
+def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
+    text, _ = rows(surrogate, v0=1e-6)["steady cycle"]
+    periods, seconds = (float(x) for x in re.findall(r"([\d.e+]+) (?:periods|s$)", text))
+    assert periods == close(20e3 * seconds, rel=0.01)
+    # l0 over the way of a period, times ln 100
+    assert periods == close(math.log(100.0) * 3e-6 / (1e-6 / 20e3), rel=0.6)
+    assert "largest force" in rows(surrogate, v0=0.0)["steady cycle"][0]
+    assert "steady cycle" not in rows(surrogate, v0=0.1)
+
+
+def test_slip_path_tilt_and_heat_have_their_sizes(surrogate: Surrogate) -> None:
+    found = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
+    way = 1e-6 * float(re.findall(r"slip path ([\d.]+) um a", found["Coulomb friction"][0])[0])
+    # the foot follows the motion but for l0 = 0.23 um at each turn
+    assert way == close(4.0 * 5e-6, rel=0.1)
+    assert found["Coulomb friction"][1] == close(0.01 * math.log(100.0) / 0.3, rel=1e-12)
+    assert found["constant normal force"][1] == close(
+        1.21 * 0.3 * 0.01 * 5e-6 / (3.0 / 1.3e7), rel=1e-12
+    )
+    watts = float(re.findall(r"turns ([\d.]+) W", found["no wear, no heating"][0])[0])
+    assert watts == close(3.0 * way * 20e3, rel=0.1)
+    assert "constant normal force" not in rows(surrogate)
+
+
+@pytest.mark.parametrize("case", [{"y0": 0.0}, {"f": 0.0}, {"k": "rigid"}, {"k": math.inf}])
+def test_nothing_is_said_where_nothing_oscillates_or_gives_way(
+    surrogate: Surrogate, case: Case
+) -> None:
+    assert model_rows(surrogate, {**CASE, **case}) == []
+
+
+def test_the_other_contact_is_told_with_the_difference(surrogate: Surrogate) -> None:
+    case: Case = {"k": 1.307e7, "y0": 0.2e-6, "v0": 0.005}
+    text, effect = rows(surrogate, **case)["one spring"]
+    assert effect == close(0.2551 / 0.2477 - 1.0, abs=5e-4)
+    assert "ball" in text
+    assert rows(surrogate, "ball", **case)["one spring"][1] == close(
+        0.2477 / 0.2551 - 1.0, abs=5e-4
+    )
+
+
+def test_digits_are_those_that_the_uncertainty_leaves() -> None:
+    assert [digits(x) for x in (math.inf, 0.5, 0.06, 1e-3, 3e-4, 3e-5, 1e-9, 0.0)] == [
+        4,
+        4,
+        4,
+        4,
+        5,
+        6,
+        6,
+        6,
+    ]
+    assert digits(1e-9, most=12) == 10
+    assert all(digits(x) >= digits(2.0 * x) for x in np.geomspace(1e-9, 1.0, 50))
+    with pytest.raises(InputError, match="uncertainty must be >= 0"):
+        digits(math.nan)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"v0": -1.0}, "v0 must be"),
+        ({"k": [1e6, 2e6]}, "case must be one case"),
+        ({"contact": 1}, "contact"),
+    ],
+)
+def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> None:
+    with pytest.raises((InputError, TypeError), match=said):
+        model_rows(surrogate, {**CASE, **changed})
+    with pytest.raises(InputError, match="known must be finite and > 0"):
+        k_effect(surrogate, CASE, known=0.0)

@@ -1,0 +1,460 @@
+"""Any periodic motion: beside the tables, an independent march, limits, symmetry and energy; its
+estimate; refusals."""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.motion import CASE, L0, beside_table, phase_sweep, random_motions, ratios
+from mumacro import Element, InputError, Motion, Surrogate, motion, settling
+from mumacro.cli.main import main
+from mumacro.cli.motion import EXAMPLE
+from tests.support.cases import Array, Capture
+from tests.support.comparing import close
+
+SCENE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
+COMMAND = "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=2cm/s"
+
+
+# --- what it is compared with ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("contact", "direction", "n"),
+    [
+        ("spring", "across", 1000),
+        ("spring", "along", 1000),
+        ("spring", "normal", 1000),
+        ("ball", "across", 40),
+        ("ball", "along", 40),
+    ],
+)
+def test_one_harmonic_is_the_tables_within_both_bounds(
+    contact: str, direction: str, n: int
+) -> None:
+    error, off = beside_table(contact, direction, n)
+    assert (error <= off).all()
+    assert off.max() < 1.1e-6
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+@pytest.mark.parametrize("direction", ["across", "along"])
+def test_power_stick_slip_and_decay_are_those_of_the_table(
+    surrogate: Surrogate, contact: str, direction: str
+) -> None:
+    kind = {"contact": contact, "direction": direction}
+    for v0, size in ((0.02, 2e-6), (0.1, 6e-6), (2.0, 3e-6)):
+        part = {"y" if direction == "across" else "x": size}
+        found = motion(**{**SCENE, "v0": v0}, **part, contact=contact)
+        answer = surrogate.evaluate(**{**SCENE, "v0": v0}, y0=size, groups=True, **kind)
+        groups = answer.v_tilde, answer.y_tilde
+        unit = 0.3 * 10.0 * L0 * 2.0 * math.pi * 20e3
+        assert found.power == close(unit * surrogate.power(*groups, **kind), abs=2e-6 * unit)
+        share = surrogate.stick_fraction(*groups, **kind)
+        assert found.stick_fraction == close(share, abs=2e-5)
+        assert found.power_drive == close(answer.mu_macro * 10.0 * v0, abs=3e-6 * 10.0 * v0)
+        if contact == "spring" and direction == "across":
+            slow = settling(surrogate, **{**SCENE, "v0": v0}, y0=size)
+            assert found.slip_path == close(L0 * slow.slip_path, rel=1e-5)
+            assert found.periods <= slow.periods * (1.0 + 1e-5)
+            if not share:
+                assert found.periods == close(slow.periods, rel=1e-5)
+
+
+def marched(cases: list[dict[str, Any]], steps: int, periods: int) -> tuple[Array, Array]:
+    """Mean forces (2, n) over the last period in units of mu0 Fz, by steps of ``Element``, and how
+    far the last period has moved the force."""
+    tau = 2.0 * math.pi * np.arange(steps + 1) / steps
+
+    def along(case: dict[str, Any], name: str, unit: float) -> Array:
+        out = np.zeros(tau.size)
+        for order, size, phase in case[name] or ():
+            out += size / unit * np.sin(order * tau + math.radians(phase))
+        return out
+
+    drag = np.array([case["v0"] for case in cases]) / CASE["omega"] / L0
+    x, y, load = (
+        np.stack([along(case, name, unit) for case in cases], axis=1)
+        for name, unit in (("x", L0), ("y", L0), ("normal", CASE["Fz"]))
+    )
+    x += drag * tau[:, None]
+    contacts = Element(np.ones(len(cases)), 1.0 + load[0], 1.0)
+    force = np.zeros((2, len(cases)))
+    for _ in range(periods):
+        before, total = force, np.zeros_like(force)
+        for i in range(steps):
+            last = force
+            force = np.array(contacts.step(x[i + 1] - x[i], y[i + 1] - y[i], 1.0 + load[i + 1]))
+            total += 0.5 * (last + force)
+    return total / steps, np.hypot(*(force - before))
+
+
+def test_an_independent_march_has_the_same_means() -> None:
+    """Straight steps from rest, the second order extrapolated."""
+    cases = [*random_motions(40, seed=4)]
+    coarse, fine = (marched(cases, n, 12)[0] for n in (800, 1600))
+    settled = marched(cases, 400, 12)[1] < 1e-7
+    assert np.count_nonzero(settled) > 15
+    for i in np.flatnonzero(settled):
+        found = motion(**cases[i])
+        mean = np.array([found.mu_macro, found.mu_lateral]) / CASE["mu0"]
+        # a march errs by less than its last two lengths of step differ
+        off = np.abs(fine[:, i] - coarse[:, i]).max()
+        assert np.abs(mean - fine[:, i]).max() < 2.0 * off + 1e-5
+
+
+def test_friction_of_slow_drag_is_the_static_limit(surrogate: Surrogate) -> None:
+    slow = {**SCENE, "v0": 1e-7}
+    for y0 in (0.5e-6, 2e-6, 2.9e-6):
+        static = surrogate.evaluate(**{**SCENE, "v0": 0.0}, y0=y0).mu_macro
+        assert motion(**slow, y=y0).mu_macro == close(static, abs=1e-4)
+    # M. Popov (2020): the least normal force decides
+    assert motion(**slow, normal=4.0).mu_macro == close(0.3 * 0.6, abs=1e-4)
+    assert motion(**slow, normal=[(1, 2.0, 0.0), (1, 2.0, 0.0)]).mu_macro == close(0.18, abs=1e-4)
+
+
+# --- symmetry, energy -----------------------------------------------------------------------------
+
+
+def test_no_lateral_force_where_there_can_be_none() -> None:
+    for part in (
+        {"x": 4e-6},
+        {"y": [(1, 4e-6, 0.0), (3, 1e-6, 40.0)]},
+        {"normal": 5.0},
+        {"x": 2e-6, "normal": (5.0, 30.0)},
+    ):
+        found = motion(**SCENE, **part)
+        assert abs(found.mu_lateral) <= found.error_estimate
+    assert motion(**SCENE, x=4e-6, y=2e-6).mu_lateral < -0.01
+
+
+def shifted(part: Any, degrees: float) -> Any:
+    return [(n, size, phase + n * degrees) for n, size, phase in part or ()]
+
+
+def test_mirrored_and_delayed_scenes_have_the_same_friction() -> None:
+    for case in random_motions(60, seed=6):
+        a = motion(**case)
+        b = motion(
+            **{**case, "y": [(n, size, phase + 180.0) for n, size, phase in case["y"] or ()]}
+        )
+        off = a.error_estimate + b.error_estimate
+        assert math.hypot(a.mu_macro - b.mu_macro, a.mu_lateral + b.mu_lateral) <= off
+        if case["v0"]:  # at rest the start counts
+            parts = {name: shifted(case[name], 77.0) for name in ("x", "y", "normal")}
+            c = motion(**{**case, **parts})
+            off = a.error_estimate + c.error_estimate
+            assert math.hypot(a.mu_macro - c.mu_macro, a.mu_lateral - c.mu_lateral) <= off
+
+
+def test_a_scene_that_is_turned_has_its_forces_turned() -> None:
+    turn = math.radians(35.0)
+    c, s = math.cos(turn), math.sin(turn)
+    still = {**CASE, "v0": 0.0}
+    x, y = [(1, 9e-6, 0.0), (2, 5e-6, 70.0)], [(1, 6e-6, 60.0), (2, 7e-6, 10.0)]
+
+    def mixed(along: Any, across: Any, a: float, b: float) -> Any:
+        """a x + b y; a negative amplitude is half a turn."""
+        terms = [(n, a * size, p) for n, size, p in along] + [
+            (n, b * size, p) for n, size, p in across
+        ]
+        return [(n, abs(size), p + 180.0 * (size < 0.0)) for n, size, p in terms]
+
+    a = motion(**still, x=x, y=y, normal=(4.0, 20.0))
+    b = motion(**still, x=mixed(x, y, c, -s), y=mixed(x, y, s, c), normal=(4.0, 20.0))
+    assert math.hypot(a.mu_macro, a.mu_lateral) > 0.01
+    off = a.error_estimate + b.error_estimate
+    assert b.mu_macro == close(c * a.mu_macro - s * a.mu_lateral, abs=off)
+    assert b.mu_lateral == close(s * a.mu_macro + c * a.mu_lateral, abs=off)
+
+
+def test_drive_and_shaker_pay_for_the_slip() -> None:
+    for case in random_motions(80, ball=True, seed=8):  # a constant load
+        found = motion(**case)
+        heat = 0.3 * 10.0 * found.slip_path * CASE["omega"] / (2.0 * math.pi)
+        assert found.power + found.power_drive == close(heat, rel=1e-5, abs=1e-6)
+
+
+def test_a_load_in_step_turns_friction_into_a_push() -> None:
+    """No clamp to 0 and mu0: Popov and Li (2017)."""
+    slow, _, fast = (phase_sweep(v0) for v0 in (0.02, 0.1, 0.5))
+    assert slow.min() < -0.4
+    assert slow.max() == close(0.509, abs=2e-3)
+    assert fast.min() > 0.85
+    assert slow[0] == close(float(slow[-1]), abs=1e-6)  # 360 degrees are none
+
+
+# --- the estimate ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("contact", "tolerance", "n"),
+    [("spring", 1e-4, 300), ("spring", 1e-6, 300), ("ball", 1e-4, 20)],
+)
+def test_the_estimate_covers_and_the_tolerance_holds(
+    contact: str, tolerance: float, n: int
+) -> None:
+    error, estimate, most = ratios(contact, tolerance, 1e-3 * tolerance, n, seed=21).T
+    assert (error <= estimate).all()
+    assert (estimate <= most).all()
+
+
+def test_steps_that_are_halved_come_nearer() -> None:
+    case = {**SCENE, "x": (3e-6, 90.0), "y": 4e-6, "normal": (3.0, 45.0)}
+    finest = motion(**case, tolerance=1e-9)
+    found = [motion(**case, tolerance=10.0**-n) for n in (2, 5, 8)]
+    errors = [abs(one.mu_macro - finest.mu_macro) for one in found]
+    assert errors[2] < 1e-9
+    assert all(
+        error <= one.error_estimate + finest.error_estimate
+        for error, one in zip(errors, found, strict=True)
+    )
+
+
+def test_slip_that_hardly_begins_does_not_stop_the_search() -> None:
+    """A stick shorter than rounding followed a slip of no length, for ever."""
+    orders = ((3, 2.78e-3, 339.894), (3, 3.42e-3, 303.088), (2, 8.72e-4, 204.559))
+    across = ((3, 3.11218853e-3, 185.843), (5, 2.62893145e-3, 220.534))
+    case = [*random_motions(56)][-1]
+    assert [n for n, _, _ in case["x"]] == [n for n, _, _ in orders]
+    assert [size / L0 for _, size, _ in case["y"]] == close([s for _, s, _ in across], rel=1e-6)
+    found = motion(**case)
+    assert found.error_estimate <= 3e-7
+    assert 0.0 < found.mu_macro < 0.3
+
+
+def test_far_and_near_ends_have_answers(surrogate: Surrogate) -> None:
+    for y in (1e-9, 1e-3, 1e3, 1e9):
+        for v in (1e-9, 1e-3, 1e3, 1e9):
+            case = {**CASE, "v0": v * L0 * CASE["omega"]}
+            found, there = motion(**case, y=y * L0), surrogate.evaluate(**case, y0=y * L0)
+            off = found.error_estimate + there.error_bound
+            assert abs(found.mu_macro - there.mu_macro) <= off < 4e-7
+
+
+# --- rest -----------------------------------------------------------------------------------------
+
+
+def test_a_contact_that_only_sticks_keeps_what_its_start_gave_it() -> None:
+    rest = {**SCENE, "v0": 0.0}
+    found = motion(**rest, x=(1e-6, 90.0))  # it begins at +1 um without force
+    assert found.mu_macro == close(-1e6 * 1e-6 / 10.0, abs=1e-9)
+    assert found.stick_fraction == close(1.0, abs=1e-12)
+    assert found.periods == math.inf
+    assert found.slip_path == 0.0
+    assert motion(**rest, x=1e-6).mu_macro == close(0.0, abs=1e-9)
+
+
+# --- forms ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+def test_the_cycle_is_closed_has_the_mean_and_stays_below_the_limit(contact: str) -> None:
+    normal = (3.0, 45.0) if contact == "spring" else 0.0
+    found = motion(**SCENE, x=(2e-6, 90.0), y=4e-6, normal=normal, contact=contact)
+    cycle = found.cycle(points=4000)
+    assert cycle.t[-1] == close(1.0 / 20e3, rel=1e-12)
+    assert cycle.x[-1] - cycle.x[0] == close(0.02 / 20e3, rel=1e-9)
+    for force, mu in ((cycle.Fx, found.mu_macro), (cycle.Fy, found.mu_lateral)):
+        assert force[-1] == close(float(force[0]), abs=1e-5)
+        assert float(np.mean(force[1:])) / 10.0 == close(mu, abs=1e-6 if normal else 3e-5)
+    assert (np.hypot(cycle.Fx, cycle.Fy) <= 0.3 * cycle.Fz * (1.0 + 1e-9)).all()
+    assert {column.shape for column in cycle} == {(4001,)}
+
+
+def test_arrays_broadcast_and_have_the_bits_of_single_cases() -> None:
+    v0, phase = np.array([[0.01], [0.1]]), np.array([0.0, 90.0, 200.0])
+    case = {**SCENE, "v0": v0, "x": (2e-6, phase), "y": 2e-6, "normal": [(2, 3.0, 10.0)]}
+    many = motion(**case, threads=1)
+    assert np.shape(many.mu_macro) == (2, 3)
+    for i, j in np.ndindex(2, 3):
+        one = motion(**{**case, "v0": v0[i, 0], "x": (2e-6, phase[j])})
+        assert isinstance(one.mu_macro, float)
+        for name in ("mu_macro", "mu_lateral", "power", "slip_path", "error_estimate", "periods"):
+            assert getattr(many, name)[i, j] == getattr(one, name)
+        assert (many.cycle(3 * i + j).Fx == one.cycle().Fx).all()
+    wide = {**SCENE, "v0": np.geomspace(1e-3, 1.0, 70), "y": 2e-6}
+    assert (motion(**wide, threads=3).mu_macro == motion(**wide, threads=1).mu_macro).all()
+
+
+def test_an_amplitude_a_pair_and_triples_are_one_motion() -> None:
+    a = motion(**SCENE, y=2e-6).mu_macro
+    assert motion(**SCENE, y=(2e-6, 0.0)).mu_macro == a
+    assert motion(**SCENE, y=(2e-6, 720.0)).mu_macro == a
+    assert motion(**SCENE, y=[(1, 2e-6, 0.0)]).mu_macro == a
+    assert motion(**SCENE, y=[(1.0, 2e-6, -360.0), (7, 0.0, 5.0)]).mu_macro == a
+    assert motion(**SCENE, x=[], y=2e-6).mu_macro == a
+    assert motion(**SCENE, y=[[1, 1e-6, 0.0], [1, 1e-6, 0.0]]).mu_macro == close(a, abs=1e-9)
+    omega = 2.0 * math.pi * 20e3
+    case = {name: value for name, value in SCENE.items() if name != "f"}
+    assert motion(**case, omega=omega, y=2e-6).mu_macro == a
+
+
+def test_it_says_what_it_is() -> None:
+    text = repr(motion(**SCENE, y=2e-6))
+    assert text.startswith("<Motion of a spring: mu_macro 0.25")
+    many = motion(**{**SCENE, "v0": [0.01, 0.02]}, y=2e-6)
+    assert repr(many) == "<Motion of a spring, 2 cases of shape (2,)>"
+    assert isinstance(many, Motion)
+
+
+# --- refusals -------------------------------------------------------------------------------------
+
+BAD: tuple[tuple[dict[str, Any], str, str], ...] = (
+    ({"mu0": 0.0}, "mu0", "> 0"),
+    ({"Fz": -1.0}, "Fz", "> 0"),
+    ({"k": math.inf}, "k", "rigid"),
+    ({"k": "rigid"}, "k", "rigid"),
+    ({"k": math.nan}, "k", "a number > 0"),
+    ({"f": 0.0}, "f", "period"),
+    ({"v0": -0.1}, "v0", ">= 0"),
+    ({"v0": 1e-30}, "v0", "0, or at least"),
+    ({"y": -1e-6}, "y, amplitude", ">= 0"),
+    ({"y": (1e-6, math.inf)}, "y, phase", "finite"),
+    ({"y": 1e9}, "speed", "at most"),
+    ({"normal": 10.0}, "normal", "lifts off"),
+    ({"normal": [(1, 7.0, 0.0), (2, 7.0, 90.0)]}, "normal", "lifts off"),
+    ({"v0": 0.0, "y": 0.0}, "v0", "does not move"),
+    ({"v0": 0.0, "y": 0.0, "normal": 3.0}, "v0", "does not move"),
+)
+WRONG: tuple[tuple[dict[str, Any], str, str], ...] = (
+    ({"y": [(1.5, 1e-6, 0.0)]}, "y, harmonic", "whole number"),
+    ({"y": [(0, 1e-6, 0.0)]}, "y, harmonic", "whole number"),
+    ({"y": [("2", 1e-6, 0.0)]}, "y, harmonic", "whole number"),
+    ({"y": [(1, 1e-6)]}, "y", "triples"),
+    ({"y": "2um"}, "y, amplitude", "real number"),
+    ({"y": None}, "y, amplitude", "real number"),
+    ({"normal": 3.0, "contact": "ball"}, "normal", "contact radius"),
+    ({"contact": "cube"}, "contact", "spring, ball"),
+    ({"omega": 1e5}, "omega", "exactly one"),
+    ({"f": None}, "omega", "exactly one"),
+    ({"tolerance": 1e-14}, "tolerance", "1e-09"),
+    ({"tolerance": math.nan}, "tolerance", "1e-09"),
+    ({"threads": 0}, "threads", ">= 1"),
+    ({"v0": [0.1, 0.2], "k": [1e6, 1e6, 1e6]}, "inputs", "broadcast"),
+)
+
+
+@pytest.mark.parametrize(("change", "name", "text"), [*BAD, *WRONG])
+def test_what_has_no_answer_is_refused_with_advice(
+    change: dict[str, Any], name: str, text: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        motion(**{**SCENE, "y": 2e-6, **change})
+    assert caught.value.field == name
+    assert text in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "text"), [bad for bad in BAD if bad[0] != {"k": "rigid"}]
+)
+def test_in_an_array_such_a_case_is_nan_alone(change: dict[str, Any], name: str, text: str) -> None:
+    del name, text
+    good = motion(**SCENE, y=2e-6).mu_macro
+    ((field, value), *rest) = change.items()
+    case = {**SCENE, "y": 2e-6, **dict(rest)}
+    if isinstance(value, list):  # the amplitudes
+        value = [(n, np.array([0.0, size]), phase) for n, size, phase in value]
+    elif isinstance(value, tuple):
+        value = (1e-6 * np.array([2.0, 1.0]), np.array([0.0, value[1]]))
+    else:
+        value = np.array([case.get(field, 0.0) if field != "v0" else 0.02, value])
+    found = motion(**{**case, field: value})
+    if not rest:
+        assert found.mu_macro[0] == close(good, abs=1e-8)  # harmonics set the steps
+    assert math.isnan(found.mu_macro[1])
+    assert math.isnan(found.periods[1])
+    with pytest.raises(InputError, match="with an answer"):
+        found.cycle(1)
+
+
+def test_a_load_that_stays_above_zero_is_no_lift_off() -> None:
+    """The sum of its amplitudes is more than Fz, but not at one time."""
+    found = motion(**SCENE, normal=[(1, 8.0, 0.0), (3, 4.0, 0.0)])
+    assert 0.0 < found.mu_macro < 0.3
+
+
+def test_places_and_points_of_a_cycle_are_checked() -> None:
+    many = motion(**{**SCENE, "v0": [0.01, 0.02]}, y=2e-6)
+    for index in (None, 2, -1, True, 0.5):
+        with pytest.raises(InputError, match="from 0 to 1"):
+            many.cycle(index)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="from 2"):
+        many.cycle(0, points=1)
+
+
+# --- command and pictures -------------------------------------------------------------------------
+
+
+def said(capsys: Capture, code: int, *words: str) -> str:
+    assert main(["motion", *words]) == code
+    found = capsys.readouterr()
+    return found.err if code else found.out
+
+
+def test_the_command_has_the_librarys_answer(capsys: Capture) -> None:
+    words = ("--x", "2um@90deg", "--y", "4um,3:0.5um@0.5rad", "--normal", "3N@45deg")
+    found = json.loads(said(capsys, 0, COMMAND, *words, "--json"))
+    expected = motion(
+        **SCENE,
+        x=(2e-6, 90.0),
+        y=[(1, 4e-6, 0.0), (3, 0.5e-6, math.degrees(0.5))],
+        normal=(3.0, 45.0),
+    )
+    for name in ("mu_macro", "mu_lateral", "power", "slip_path", "periods"):
+        assert found[name] == close(getattr(expected, name), rel=1e-9)
+    text = said(capsys, 0, COMMAND, *words)
+    assert f"{expected.mu_macro:.6g}" in text
+    assert "numerical error" in text
+    ball = json.loads(said(capsys, 0, COMMAND, "--y", "2um", "--contact", "ball", "--json"))
+    assert ball["mu_macro"] == motion(**SCENE, y=2e-6, contact="ball").mu_macro
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ((COMMAND, "--y", "2N"), "give metres"),
+        ((COMMAND, "--y", "2um@90N"), "give degrees"),
+        ((COMMAND, "--y", "2um@"), "amplitude@phase"),
+        ((COMMAND, "--y", "1.5:2um"), "whole number"),
+        ((COMMAND, "--y", "a:2um"), "is no number"),
+        ((COMMAND, "--normal", "2um"), "give newtons"),
+        ((COMMAND, "--normal", "10N"), "lifts off"),
+        ((COMMAND, "--normal", "1N", "--contact", "ball"), "contact radius"),
+        ((f"{COMMAND} y0=2um",), "--y"),
+        ((COMMAND.replace("1N/um", "0.9..1.1N/um"), "--y", "2um"), "one k"),
+        ((COMMAND.replace("1N/um", "rigid"), "--y", "2um"), "rigid"),
+        (("mu0=0.3 Fz=10N", "--y", "2um"), "missing: k"),
+    ],
+)
+def test_the_command_refuses_in_one_line(
+    capsys: Capture, words: tuple[str, ...], text: str
+) -> None:
+    line = said(capsys, 2, *words)
+    assert text in line
+    assert len(line.splitlines()) == 1
+
+
+def test_the_command_writes_pictures_and_csv(capsys: Capture, tmp_path: Any) -> None:
+    pytest.importorskip("matplotlib")
+    words = (COMMAND, "--x", "2um@90deg", "--y", "4um")
+    for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
+        out = tmp_path / f"cycle{ending}"
+        assert f"written: {out}" in said(capsys, 0, *words, "-o", str(out))
+        assert out.read_bytes().startswith(begin)
+    said(capsys, 0, *words, "-o", str(tmp_path / "cycle.csv"))
+    head, *rows = (tmp_path / "cycle.csv").read_text().splitlines()
+    assert head == "t [s],x [m],y [m],Fx [N],Fy [N],Fz [N]"
+    assert len(rows) == 401
+    assert "ends in .png" in said(capsys, 2, *words, "-o", str(tmp_path / "cycle.xyz"))
+
+
+def test_the_picture_has_forces_and_path() -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    forces, path = motion(**SCENE, x=(2e-6, 90.0), y=4e-6).plot(figure.subplots(1, 2))
+    assert len(forces.lines) == 5
+    assert path.lines[0].get_xdata()[0] == close(2.0, abs=1e-9)
+    assert "mumacro motion" in EXAMPLE

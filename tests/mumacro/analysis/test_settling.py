@@ -1,0 +1,197 @@
+"""How fast a disturbance decays: the multiplier and the bound against marching, limits, bad
+input."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from builder.solver.steady import solve, solve_raw, workspace
+from mumacro import InputError, Surrogate
+from mumacro.analysis.settling import settling
+from tests.support import naive
+from tests.support.cases import CASE, UNIT
+from tests.support.comparing import close
+
+STEPS = 40_000
+SLIDING = [(0.3, 0.3), (0.1, 0.2), (0.6, 1.0), (1.0, 0.5)]
+STICKING = [(0.02, 0.3), (0.1, 0.6), (0.05, 1.2), (0.3, 1.0), (0.2, 2.0)]
+
+
+def of(surrogate: Surrogate, v: Any, y: Any, **more: Any) -> Any:
+    return settling(surrogate, **UNIT, y0=y, v0=v, **more)
+
+
+def at_rest_angles(v: float, y: float) -> tuple[float, float]:
+    """Cosine of the angle by which the spring turns during stick, and the stick fraction."""
+    w, out, orbit, res = workspace()
+    assert solve_raw(v, y, y - 1.0, w, out, orbit, res) == 0
+    duration, start = orbit[0], orbit[4]
+    # in stick the spring's end moves with the upper point; start and end are on the unit circle
+    across = y * (math.cos(start + duration) - math.cos(start))
+    return 1.0 - 0.5 * ((v * duration) ** 2 + across * across), res[3]
+
+
+@pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
+def test_the_slip_path_is_the_solvers(surrogate: Surrogate, v: Any, y: Any) -> None:
+    found = of(surrogate, v, y)
+    exact = 2.0 * math.pi * solve(v, y).slip_speed
+    assert found.slip_path == close(exact, rel=1e-10)
+    assert abs(found.periods - math.log(100.0) / exact) <= found.error_bound
+    assert found.periods_any == 2.0 * found.periods
+    assert found.time == close(found.periods * 2.0 * math.pi, rel=1e-14)
+    assert of(surrogate, v, y, remaining=0.1).periods == close(0.5 * found.periods, rel=1e-14)
+
+
+@pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
+def test_a_small_disturbance_decays_as_derived(surrogate: Surrogate, v: Any, y: Any) -> None:
+    start = naive.march(v, y, STEPS, naive.periods_until_steady(v, y))[-1]
+    size = 1e-5
+    here = start / np.hypot(*start) if np.hypot(*start) > 1.0 - 1e-9 else start
+    beside = here + size * np.array([-here[1], here[0]])
+    beside *= min(1.0, 1.0 / np.hypot(*beside))
+    apart = [
+        float(
+            np.hypot(
+                *(
+                    naive.march(v, y, STEPS, n, *beside)[-1]
+                    - naive.march(v, y, STEPS, n, *start)[-1]
+                )
+            )
+        )
+        for n in (1, 2)
+    ]
+    cosine, share = at_rest_angles(v, y) if (v, y) in STICKING else (1.0, 0.0)
+    assert (share > 0.0) == ((v, y) in STICKING)
+    multiplier = math.exp(-of(surrogate, v, y).slip_path) * cosine**2
+    assert apart[1] / apart[0] == close(multiplier, rel=5e-3)
+
+
+@pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (0.004, 0.5), (0.01, 0.95)])
+def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -> None:
+    found = of(surrogate, v, y)
+    steady = naive.march(v, y, 4000, naive.periods_until_steady(v, y))[-1]
+    rng = np.random.default_rng(1)
+    angle, radius = rng.uniform(0.0, 2.0 * math.pi, 12), np.sqrt(rng.uniform(0.0, 1.0, 12))
+    starts = [
+        (0.0, 0.0),
+        (-1.0, 0.0),
+        *zip(radius * np.cos(angle), radius * np.sin(angle), strict=True),
+    ]
+    for start in starts:
+        first = float(np.hypot(*(np.array(start) - steady)))
+        for n in (1, 3, math.ceil(found.periods_any)):
+            left = float(np.hypot(*(naive.march(v, y, 4000, n, *start)[-1] - steady)))
+            # error of the time steps
+            assert left <= first * math.exp(-0.5 * n * found.slip_path) + 2e-3
+            if n >= found.periods_any:
+                assert left <= 0.01 * first + 2e-3
+
+
+@pytest.mark.parametrize(
+    ("changed", "periods"),
+    [
+        ({"v0": 0.0}, math.inf),
+        ({"v0": 0.0, "y0": 0.0}, math.inf),
+        ({"v0": 0.0, "omega": 0.0}, math.inf),
+        ({"k": "rigid", "v0": 0.0, "y0": 0.0}, math.inf),
+        ({"k": "rigid"}, 0.0),
+        ({"k": math.inf}, 0.0),
+    ],
+)
+def test_without_slip_nothing_settles_and_rigid_at_once(
+    surrogate: Surrogate, changed: Any, periods: Any
+) -> None:
+    found = settling(surrogate, **{**CASE, **changed})
+    assert (found.periods, found.time, found.slip_path) == (
+        periods,
+        periods,
+        0.0 if periods else math.inf,
+    )
+
+
+def test_the_frequency_may_be_f(surrogate: Surrogate) -> None:
+    rest = {name: value for name, value in CASE.items() if name != "omega"}
+    expected = settling(surrogate, **rest, omega=2.0 * math.pi * 2e4)
+    assert settling(surrogate, **rest, f=2e4) == expected
+    wrong: list[Any] = [{}, {"f": 2e4, "omega": 1e5}]
+    for told in wrong:
+        with pytest.raises(InputError, match="omega must be given or f"):
+            settling(surrogate, **rest, **told)
+
+
+def test_without_oscillation_the_drag_decides(surrogate: Surrogate) -> None:
+    l0 = 3e-6
+    for changed in ({"y0": 0.0}, {"omega": 0.0}):
+        found = settling(surrogate, **{**CASE, **changed})
+        assert found.time == close(l0 * math.log(100.0) / 0.01, rel=1e-14)
+    dragged = settling(surrogate, **{**CASE, "y0": 0.0})
+    assert dragged.slip_path == close(2.0 * math.pi * 0.01 / (l0 * 1.3e5), rel=1e-14)
+    # the limit of small amplitudes is the same
+    assert settling(surrogate, **{**CASE, "y0": 1e-12}).periods == close(dragged.periods, rel=1e-5)
+
+
+def test_at_zero_speed_only_large_amplitudes_settle(surrogate: Surrogate) -> None:
+    for y, slips in ((0.5, False), (1.0, False), (1.5, True)):
+        found = of(surrogate, 0.0, y)
+        # slip in every half period is the stroke 2 y~ minus the diameter
+        assert found.slip_path == close(4.0 * (y - 1.0) if slips else 0.0, rel=1e-9)
+
+
+def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> None:
+    found = settling(
+        surrogate,
+        **{
+            **CASE,
+            "v0": np.array([[0.0], [1e-300], [0.01], [1e300]]),
+            "y0": np.array([0.0, 2e-6, 1e300]),
+        },
+    )
+    assert found.periods.shape == found.time.shape == found.error_bound.shape == (4, 3)
+    assert not np.isnan(found.periods).any()
+    assert not np.isnan(found.time).any()
+    assert found.periods[2, 1] == settling(surrogate, **CASE).periods
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        *(({"remaining": x}, "remaining must be") for x in (0.0, 1.0, -1.0, math.nan, 2.0)),
+        ({"Fz": -1.0}, "Fz must be"),
+        *(
+            ({"direction": x}, "across: how a disturbance decays is derived for no other")
+            for x in ("along", "normal")
+        ),
+    ],
+)
+def test_bad_input_is_named_with_the_reason(surrogate: Surrogate, changed: Any, said: Any) -> None:
+    with pytest.raises(InputError, match=said):
+        settling(surrogate, **{**CASE, **changed})
+
+
+def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:
+    found = settling(
+        surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.full(3, 0.3)}
+    )
+    assert found.periods[0] == settling(surrogate, **CASE).periods
+    for column in (
+        found.periods,
+        found.periods_any,
+        found.time,
+        found.slip_path,
+        found.error_bound,
+    ):
+        assert np.isnan(column[1:]).all()
+
+
+@pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (1e-3, 30.0), (3.0, 0.1)])
+def test_a_ball_settles_as_its_slowest_spring(surrogate: Surrogate, v: Any, y: Any) -> None:
+    found = of(surrogate, v, y, contact="ball")
+    # a spring with the share s of the middle one's load has l0 that is 1.5 s as long
+    loads = 1.5 * np.linspace(1, 0.01, 50) * UNIT["Fz"]
+    springs = [settling(surrogate, **{**UNIT, "Fz": load}, y0=y, v0=v) for load in loads]
+    assert found.periods == close(max(spring.periods for spring in springs), rel=1e-12)
+    assert found.time == close(springs[0].time, rel=1e-12)
+    assert found.slip_path == close(springs[0].slip_path, rel=1e-12)
+    assert found.periods_any == 2.0 * found.periods

@@ -1,0 +1,778 @@
+"""The command ``mumacro``: answers with units, advice for wrong arguments, exit codes."""
+
+import csv
+import io
+import json
+import math
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mumacro import Surrogate, fit
+from mumacro.analysis.validity import model_rows
+from mumacro.cli.main import COMMANDS, main
+from mumacro.contacts.geometries import GEOMETRIES, contact_of
+from mumacro.inputs.fields import NAMES, SI
+from mumacro.inputs.units import UNITS_OF, read_number, scale_of, split_unit, suggestion
+from tests.support.cases import Capture, Case
+from tests.support.comparing import close
+
+CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
+VALUES: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
+
+
+def said(capsys: Capture, code: Any, *words: Any) -> Any:
+    """The output of ``mumacro WORDS``; from stderr, one line, if it fails."""
+    assert main(words) == code
+    found = capsys.readouterr()
+    if code:
+        lines = found.err.splitlines()
+        assert len(lines) == 1, found.err
+        assert found.out == ""
+        return lines[0]
+    return found.out
+
+
+def test_one_case_is_answered_with_units_regime_bound_and_source(
+    capsys: Capture, surrogate: Surrogate
+) -> None:
+    text = said(capsys, 0, CASE, "--digits", "15")
+    expected = surrogate.evaluate(**VALUES)
+    row = next(line for line in text.splitlines() if line.startswith("mu_macro"))
+    assert float(row.split()[1]) == close(expected.mu_macro, rel=1e-14)
+    assert "[-]" in row
+    assert text.splitlines()[-1] == f"numerical error  {expected.error_bound:.2g}"
+    assert "+-" not in text
+    for part in (expected.regime, expected.source, surrogate.id):
+        assert part in text
+    shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
+    assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
+    told = [f"model  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
+    told = [line.replace("k_range", "k=0.9..1.1N/um") for line in told]
+    assert rows[-len(told) - 1 : -1] == told
+    assert (
+        said(capsys, 0, CASE.replace("k=1e6", "k=0.9..1.1N/um")).splitlines()[1].startswith("from ")
+    )
+    assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(
+        surrogate, VALUES
+    )
+    assert "model" not in json.loads(said(capsys, 0, CASE, "--json"))
+
+
+@pytest.mark.parametrize("name", ["mumacro-1e-4.nc", "mumacro-1e-10.nc"])
+def test_a_table_is_picked_by_path_or_tolerance(
+    capsys: Capture, tables_dir: Path, name: str
+) -> None:
+    tolerance = name.removeprefix("mumacro-").removesuffix(".nc")
+    for which in (str(tables_dir / name), tolerance):
+        assert json.loads(said(capsys, 0, CASE, "--json", "--table", which))["table"][
+            "tolerance"
+        ] == float(tolerance)
+    loose = str(3.0 * float(tolerance))
+    assert json.loads(said(capsys, 0, CASE, "--json", "--table", loose))["table"][
+        "tolerance"
+    ] == float(tolerance)
+
+
+WRONG = {
+    CASE.replace("f=20690", "f=20.69khz"): "f=20.69khz: did you mean 20.69kHz?",
+    CASE.replace("f=20690", "omega=20kHz"): "did you mean f=20kHz? omega is in rad/s",
+    CASE.replace("k=1e6", "k=0.8-1.2N/um"): "write an interval as k=0.8..1.2N/um",
+    CASE.replace("Fz", "Fzz"): "unknown input 'Fzz': did you mean Fz?",
+    CASE.replace("k=", "K="): "did you mean k?",
+    CASE.replace("k=1e6", "stiffness=1e6"): "did you mean k?",
+    CASE + " Fz=11": "Fz is given twice",
+    CASE.replace("k=1e6 ", ""): "missing: k [N/m] (k=rigid for a rigid contact)",
+    CASE.replace("f=20690", ""): "missing: omega [rad/s] or f [Hz]",
+    CASE + " fast": "'fast' is no name=value",
+    CASE + " omega=1": "exactly one of omega [rad/s] and f [Hz]",
+    CASE.replace("0.3", "0_3"): "give a plain number",
+    CASE.replace(
+        "2e-6", "2N"
+    ): "y0=2N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm",
+    CASE.replace("1e6", "1000 N / mm"): "'/' is no name=value",
+    CASE.replace("0.3", "nan"): "mu0 must be finite",
+    CASE.replace("1e6", "1000 furlongs"): "'furlongs' is no name=value",
+    CASE.replace("0.3", "0,3"): "a point, 0.3",
+    CASE.replace("0.3", "-0.3"): "mu0 must be finite and > 0, got -0.3",
+    CASE.replace("0.01", "1e999"): "v0 must be finite and >= 0",
+}
+
+
+@pytest.mark.parametrize("words", WRONG)
+def test_wrong_arguments_get_advice_in_one_line(capsys: Capture, words: str) -> None:
+    assert WRONG[words] in said(capsys, 2, words)
+
+
+def test_everything_that_is_wrong_with_a_case_is_told_at_once(capsys: Capture) -> None:
+    message = said(capsys, 2, "mu0=-0.3 Fzz=10 k=soft v0=nan f=-1 fast")
+    for part in (
+        "mu0 must be finite and > 0",
+        "did you mean Fz?",
+        "k=soft",
+        "v0 must be",
+        "f must be",
+        "'fast'",
+    ):
+        assert message.count(part) == 1
+    assert message.endswith("missing: y0 [m]")
+
+
+def test_a_unit_may_be_given_beside_the_number_or_apart(
+    capsys: Capture, surrogate: Surrogate
+) -> None:
+    expected = surrogate.evaluate(**VALUES).mu_macro
+    for case in (
+        "mu0=30% Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s",
+        "mu0=30 % Fz = 0.01 kN k=1 N/um y0=2 um f=20690Hz, v0=10mm/s",
+    ):
+        assert json.loads(said(capsys, 0, case, "--json"))["mu_macro"] == expected
+    known = CASE.replace("v0=0.01", "")
+    for ends in (("1e-3", "1"), ("1mm/s", "100cm/s")):
+        law = json.loads(
+            said(capsys, 0, "law", known, "--along", "v0", *ends, "--points", "2", "--json")
+        )
+        assert law["v0"] == [1e-3, 1.0]
+    assert "v0=1um" in said(capsys, 2, "law", known, "--along", "v0", "1um", "1")
+    assert "1 to 2 m/s" in said(
+        capsys, 1, "solve-for", "v0", known, "--target", "0.1", "--between", "1", "200cm/s"
+    )
+
+
+def test_no_words_show_three_examples_that_run_and_a_misspelt_command_is_corrected(
+    capsys: Capture,
+) -> None:
+    lines = [line.split(": ", 1)[1].strip() for line in said(capsys, 0).splitlines()]
+    assert len(lines) == 4
+    for line in lines[:3]:
+        assert said(capsys, 0, *shlex.split(line)[1:])
+    assert "unknown command 'evl': did you mean eval?" in said(capsys, 2, "evl", "cases.csv")
+    assert "did you mean solve-for?" in said(capsys, 2, "solve_for", "y0")
+
+
+def test_a_table_that_cannot_be_read_or_does_not_exist(capsys: Capture, tmp_path: Path) -> None:
+    (tmp_path / "text.nc").write_text("no table")
+    assert "text.nc" in said(capsys, 1, CASE, "--table", str(tmp_path / "text.nc"))
+    assert "no such file" in said(capsys, 1, CASE, "--table", str(tmp_path / "none.nc"))
+    assert "tolerance must be >=" in said(capsys, 2, CASE, "--table", "1e-30")
+    assert "tolerance" in said(capsys, 2, CASE, "--table", "-1")
+
+
+def ended(capsys: Capture, code: int, *words: str) -> str:
+    """What is said before the command line itself ends the process."""
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == code
+    return "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize("word", [*COMMANDS, ""])
+def test_every_command_explains_itself(capsys: Capture, word: Any) -> None:
+    if word == "serve":
+        pytest.importorskip("uvicorn")
+    text = ended(capsys, 0, *word.split(), "--help")
+    assert "usage: " in text
+    assert word == "serve" or f"mumacro {word}" in text
+    assert word not in ("", "law", "solve-for", "map") or all(
+        f"[{unit}]" in text for unit, _ in SI.values()
+    )
+
+
+WRONG_OPTIONS = (
+    ("--sideways",),
+    ("law", CASE, "--digits", "0"),
+    ("law", CASE, "--along", "v0", "1"),
+    ("law", CASE),
+    ("map", "--radius", "1"),
+    ("solve-for", "mass", CASE),
+    ("solve-for",),
+)
+
+
+@pytest.mark.parametrize("words", WRONG_OPTIONS)
+def test_wrong_options_are_reported_in_one_line(capsys: Capture, words: Any) -> None:
+    assert len(ended(capsys, 2, *words).splitlines()) == 1
+
+
+def test_a_law_along_the_frequency_is_one_along_omega_and_marks_the_border(capsys: Capture) -> None:
+    known = CASE.replace("f=20690", "")
+    words = ("law", known, "--along", "f", "100", "1e5")
+    over_f = json.loads(said(capsys, 0, *words, "--json"))
+    ends = (repr(math.tau * 100), repr(math.tau * 1e5))
+    over_omega = json.loads(said(capsys, 0, "law", known, "--along", "omega", *ends, "--json"))
+    assert over_f["mu_macro"] == over_omega["mu_macro"]
+    assert np.array(over_f["f"]) * math.tau == close(np.array(over_omega["omega"]), rel=1e-15)
+    assert over_f["border"][0]["f"] * math.tau == close(over_omega["border"][0]["omega"], rel=1e-14)
+    text = said(capsys, 0, *words, "--approximations")
+    assert "small_amplitude" in text
+    assert "border of continuous sliding at f" in text
+
+
+def test_a_range_of_k_is_told_with_that_of_mu_macro_and_checked(capsys: Capture) -> None:
+    words = CASE.replace("1e6", "0.1..100 N/um")
+    found = json.loads(said(capsys, 0, words, "--json"))
+    assert found["inputs"]["k"] == close(math.sqrt(1e5 * 1e8), rel=1e-15)
+    text = said(capsys, 0, words)
+    assert f"{found['k_range']['mu_macro_low']:#.4g}" in text
+    assert "k is known" not in text
+    for wrong in ("2..1", "0..1", "1..inf", "a..2"):
+        assert "k=" in said(capsys, 2, CASE.replace("1e6", wrong))
+    assert "one k is needed" in said(capsys, 2, "map", words, "-o", "x.csv")
+
+
+NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
+KINDS: dict[str, tuple[str, Case, Case]] = {
+    "spring": (CASE, {}, {}),
+    "rigid": (CASE.replace("1e6", "rigid"), {}, {"k": "rigid"}),
+    "ball": (CASE, {"contact": "ball"}, {}),
+    "along": (CASE, {"direction": "along"}, {}),
+    "ball along": (CASE, {"contact": "ball", "direction": "along"}, {}),
+    "normal": (NORMAL, {"direction": "normal"}, {"Fz_amplitude": 1.0}),
+    "range": (
+        CASE.replace("1e6", "0.8..1.2N/um"),
+        {"contact": "ball"},
+        {"k_range": (0.8e6, 1.2e6)},
+    ),
+}
+
+
+def asked(name: str) -> Any:
+    """The words and options of a case, and the keywords of the library."""
+    words, kind, more = KINDS[name]
+    inputs = {**VALUES, **more, **kind}
+    inputs.pop("y0" if "Fz_amplitude" in more else "", None)
+    inputs.pop("k" if "k_range" in more else "", None)
+    return words, [f"--{key}={value}" for key, value in kind.items()], inputs
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_an_answer_is_the_librarys_to_every_bit(
+    capsys: Capture, surrogate: Surrogate, name: str
+) -> None:
+    words, options, inputs = asked(name)
+    expected = surrogate.evaluate(**inputs, gradient=True)
+    apart = (*words.split()[:2], "--json", *words.split()[2:])
+    found = json.loads(said(capsys, 0, *apart, *options, "--gradient"), parse_constant=pytest.fail)
+    for key in ("mu_macro", "regime", "source", "error_bound", "gradient"):
+        assert found[key] == getattr(expected, key)
+    # JSON has no infinity
+    assert found["v_tilde"] == (None if name == "rigid" else expected.v_tilde)
+    assert found["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
+    assert {key: found[key] for key in ("contact", "direction") if key in found} == KINDS[name][1]
+    if "k_range" in inputs:
+        ends = {key: getattr(expected, key) for key in ("mu_macro_low", "mu_macro_high")}
+        assert found["k_range"] == {"k": [0.8e6, 1.2e6], **ends}
+    text = said(capsys, 0, words, *options, "--digits", "15")
+    assert f"{expected.mu_macro:#.15g}" in text
+    assert expected.regime in text
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_law_and_solve_for_know_them_too(
+    capsys: Capture, tmp_path: Path, surrogate: Surrogate, name: str
+) -> None:
+    words, options, inputs = asked(name)
+    words = words.replace("v0=0.01", "")
+    out = tmp_path / "law.csv"
+    said(
+        capsys,
+        0,
+        "law",
+        words,
+        "--along",
+        "v0",
+        "1mm/s",
+        "1m/s",
+        "--points",
+        "5",
+        *options,
+        "-o",
+        str(out),
+    )
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    expected = surrogate.evaluate(
+        **{**inputs, "v0": np.array([float(row["v0 [m/s]"]) for row in rows])}
+    )
+    columns = ["mu_macro"] + ["mu_macro_low", "mu_macro_high"] * ("k_range" in inputs)
+    assert list(rows[0]) == ["v0 [m/s]", *columns, "regime", "error_bound", "source", "mu_static"]
+    for column in columns:
+        assert [float(row[column]) for row in rows] == getattr(expected, column).tolist()
+    assert [row["regime"] for row in rows] == expected.regime.tolist()
+    if "k_range" in inputs:
+        both = json.loads(
+            said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json")
+        )["roots"]
+        assert [root["k"] for root in both][:: len(both) - 1] == list(inputs["k_range"])
+        return
+    found = json.loads(
+        said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json")
+    )
+    for root in found["roots"]:
+        assert surrogate.evaluate(**{**inputs, "v0": root["v0"]}).mu_macro == close(0.29, abs=1e-10)
+    assert found["roots"]
+
+
+ALONG, ALONG_NORMAL = (
+    ("law", CASE.replace("v0=0.01", ""), "--along", "v0"),
+    (NORMAL, "--direction", "normal"),
+)
+UNFIT = {
+    (CASE + " contact=ball",): "contact is an option: --contact ball",
+    (
+        CASE,
+        "--direction",
+        "normal",
+    ): "y0 does not belong to --direction normal, whose amplitude is Fz_amplitude",
+    (NORMAL,): "Fz_amplitude is the amplitude of --direction normal; otherwise it is y0",
+    (*ALONG_NORMAL, "--contact", "ball"): "across or along for a ball",
+    (NORMAL.replace("1N", "10N"), *ALONG_NORMAL[1:]): "lifts off",
+    ("solve-for", "y0", *ALONG_NORMAL, "--target", "0.1"): "y0 does not belong",
+    ("law", NORMAL, "--along", "Fz_amplitude", "1", "2"): "the swept input is one of mu0",
+    ("law", CASE, "--along", "v", "1", "2"): "--along v: the swept input is one of mu0",
+    (*ALONG, "1s", "2s"): "v0=2s: give metres per second",
+    (*ALONG, "1", "2", "--contact", "ball", "--approximations"): "one spring",
+}
+
+
+@pytest.mark.parametrize("words", UNFIT)
+def test_what_does_not_belong_to_a_contact_or_direction_is_named(
+    capsys: Capture, words: tuple[str, ...]
+) -> None:
+    assert UNFIT[words] in said(capsys, 2, *words)
+
+
+@pytest.fixture
+def measured(tmp_path: Path, surrogate: Surrogate) -> Any:
+    """Thirty points of a ball, with scatter, in a file; and the same in SI."""
+    v0 = np.geomspace(1e-3, 1.0, 30)
+    exact = surrogate.evaluate(
+        mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=v0, contact="ball"
+    ).mu_macro
+    mu = exact + 1e-3 * np.cos(17.0 * np.arange(30))
+    rows = [
+        f"{1e3 * v!r},a note,{100.0 * m!r}" for v, m in zip(v0.tolist(), mu.tolist(), strict=True)
+    ]
+    path = tmp_path / "measured.csv"
+    path.write_text("\n".join(["v0 [mm/s],note,mu_macro [%]", *rows, ""]))
+    return path, {"v0": 1e3 * v0 / 1e3, "mu_macro": 100.0 * mu / 100.0}
+
+
+RIG = ("Fz=10N y0=2um", "f=20kHz")
+
+
+@pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)])
+def test_fit_is_the_librarys(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, measured: Any, unknowns: Any
+) -> None:
+    pytest.importorskip("scipy")
+    path, points = measured
+    known: Case = {
+        name: value for name, value in {"k": 1e6, "mu0": 0.3}.items() if name not in unknowns
+    }
+    words = [*RIG, *(f"{name}={value!r}" for name, value in known.items()), "--contact", "ball"]
+    expected = fit(points, unknowns, contact="ball", Fz=10.0, y0=2e-6, f=20e3, **known)
+    found = json.loads(said(capsys, 0, "fit", str(path), "--unknown", *unknowns, *words, "--json"))
+    for name in unknowns:
+        assert found["values"][name] == close(expected.values[name], rel=1e-9)
+        assert found["std"][name] == close(expected.std[name], rel=1e-6)
+        assert found["interval"][name] == close(list(expected.interval[name]), rel=1e-6)
+    assert (found["contact"], found["warnings"]) == ("ball", list(expected.warnings))
+    monkeypatch.setattr(sys, "stdin", io.StringIO(path.read_text()))
+    text = said(capsys, 0, "fit", "-", *words, "--unknown", *unknowns)
+    assert [line.split()[0] for line in text.splitlines()[: len(unknowns)]] == list(unknowns)
+    assert f"+- {expected.std[unknowns[0]]:.2g}" in text
+    assert "95 %" in text
+
+
+def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, measured: Any) -> None:
+    pytest.importorskip("scipy")
+    path, points = measured
+    said(capsys, 0, "fit", str(path), *RIG, "--contact", "ball", "-o", str(tmp_path / "fit.csv"))
+    with (tmp_path / "fit.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["v0 [m/s]"]) for row in rows] == close(points["v0"].tolist(), rel=1e-15)
+    fitted = fit(points, contact="ball", Fz=10.0, y0=2e-6, f=20e3)
+    curve = (points["mu_macro"] - fitted.residuals).tolist()
+    assert [float(row["mu_macro fitted"]) for row in rows] == close(curve, rel=1e-9)
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:3]))
+    assert "warning: as many points as unknowns" in said(
+        capsys, 0, "fit", str(path), *RIG, "--contact", "ball"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "code", "parts"),
+    [
+        ("", RIG, 1, ["line 1: must name the columns"]),
+        ("a\n1\n", RIG, 1, ["no column v0 [m/s]; there are 'a'", "no column mu_macro [-]"]),
+        (
+            "speed,mu_macro\n1,0.2\n",
+            RIG,
+            1,
+            ["no column v0; 'speed' is similar: rename that column to v0 [m/s]"],
+        ),
+        ("v0 [s],mu_macro\n1,0.2\n", RIG, 1, ["'v0 [s]' has a unit that v0 cannot have"]),
+        ("v0,v0 [mm/s],mu_macro\n1,1,0.2\n", RIG, 1, ["v0 is there twice"]),
+        (
+            "v0,mu_macro\n1,\nx,0.2\n1,2,3\n1_0,0.1\n",
+            RIG,
+            1,
+            [
+                "row 1: mu_macro is missing",
+                "row 2: v0 must be a number, got 'x'",
+                "row 3 has 3 cells",
+                "row 4: v0 must",
+            ],
+        ),
+        ("v0;mu_macro\n0,1;0,2\n0,2;0,21\n", RIG, 1, ["give --sep ';' --decimal ','"]),
+        ("v0,mu_macro\n1,0.2\n2,0.21\n", RIG[:1], 2, ["missing: omega [rad/s] or f [Hz]"]),
+        ("v0,mu_macro\n1,0.2\n2,0.21\n", (*RIG, "v0=1"), 2, ["leave v0 out"]),
+        ("v0,mu_macro\n1,0.2\n2,0.21\n", (*RIG, "--unknown", "y0"), 2, ["k, mu0 or both"]),
+        ("v0,mu_macro\n1,nan\n2,0.2\n", RIG, 1, ["row 1: mu_macro is missing"]),
+    ],
+)
+def test_bad_points_are_refused(
+    capsys: Capture, tmp_path: Path, text: str, words: Any, code: Any, parts: Any
+) -> None:
+    (tmp_path / "points.csv").write_text(text)
+    message = said(capsys, code, "fit", str(tmp_path / "points.csv"), *words)
+    assert all(part in message for part in parts), message
+
+
+def test_a_misspelt_choice_gets_the_one_that_was_meant(capsys: Capture) -> None:
+    assert "invalid choice: 'Ball', did you mean ball?" in ended(
+        capsys, 2, CASE, "--contact", "Ball"
+    )
+    assert "choose from" in ended(capsys, 2, CASE, "--contact", "xyz")
+
+
+def test_a_file_in_another_encoding_or_with_an_interval_in_k_gets_a_remedy(
+    capsys: Capture, tmp_path: Path
+) -> None:
+    pytest.importorskip("scipy")
+    pytest.importorskip("pyarrow")
+    path, out = tmp_path / "points.csv", str(tmp_path / "out.csv")
+    path.write_bytes("v0,mu_macro,y0 [µm]\n1,0.2,2\n2,0.21,2\n".encode("cp1252"))
+    assert "line 1 is not in UTF-8; save the file as UTF-8" in said(
+        capsys, 1, "fit", str(path), "Fz=10N", "f=20kHz"
+    )
+    path.write_bytes("mu0,Fz,k,y0 [µm],f,v0\n0.3,10,1e6,2,2e4,0.01\n".encode("cp1252"))
+    assert "line 1 is not in UTF-8; save the file as UTF-8" in said(
+        capsys, 1, "eval", str(path), "-o", out
+    )
+    path.write_text("mu0,Fz,k,y0,f,v0\n0.3,10,0.8..1.2,2e-6,2e4,0.01\n")
+    main(["eval", str(path), "-o", out])
+    capsys.readouterr()
+    assert "columns k_low and k_high in a file" in Path(f"{out}.rejects.csv").read_text()
+
+
+def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measured: Any) -> None:
+    pytest.importorskip("scipy")
+    path, _ = measured
+    (tmp_path / "german.csv").write_text(
+        "\ufeff" + path.read_text().replace(",", ";").replace(".", ","), "utf-8"
+    )
+    words = (*RIG, "--sep", ";", "--decimal", ",", "--json")
+    german = json.loads(said(capsys, 0, "fit", str(tmp_path / "german.csv"), *words))
+    assert (
+        german["values"] == json.loads(said(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
+    )
+
+
+def test_a_german_file_of_two_columns_gets_advice_that_works(
+    capsys: Capture, tmp_path: Path
+) -> None:
+    pytest.importorskip("scipy")
+    path = tmp_path / "german.csv"
+    path.write_text("v0 [mm/s];mu_macro\n1;0,069\n5;0,174\n20;0,247\n100;0,289\n")
+    words = ("fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz")
+    assert "give --sep ';' --decimal ','" in said(capsys, 1, *words)
+    assert said(capsys, 0, *words, "--sep", ";", "--decimal", ",").startswith("k ")
+
+
+def test_a_fit_takes_mu0_of_each_point(capsys: Capture, tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    path = tmp_path / "points.csv"
+    path.write_text(
+        "v0 [mm/s],mu_macro,mu0\n1,0.069,0.31\n5,0.174,0.305\n20,0.247,0.3\n100,0.289,0.295\n"
+    )
+    found = json.loads(said(capsys, 0, "fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz", "--json"))
+    assert [*found["values"]] == ["k"]
+
+
+PICTURES = {
+    "law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s", "1m/s"),
+    "solve-for": ("solve-for", "y0", CASE.replace("y0=2e-6", ""), "--target", "0.15"),
+    "rest": (
+        "solve-for",
+        "v0",
+        CASE.replace("v0=0.01", ""),
+        "--target",
+        "0.25",
+        "--between",
+        "0",
+        "1",
+    ),
+    "map": ("map", CASE),
+    "fit": ("fit", "MEASURED", *RIG, "--contact", "ball"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", PICTURES.values(), ids=PICTURES)
+def test_results_go_into_pictures_and_csv(
+    capsys: Capture, tmp_path: Path, measured: Any, words: Any
+) -> None:
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("scipy")
+    words = [str(measured[0]) if word == "MEASURED" else word for word in words]
+    for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
+        out = tmp_path / f"out{ending}"
+        assert str(out) in said(capsys, 0, *words, "-o", str(out))
+        assert out.read_bytes().startswith(begin)
+    said(capsys, 0, *words, "-o", str(tmp_path / "out.csv"))
+    head, *rows = (tmp_path / "out.csv").read_text().splitlines()
+    assert rows
+    assert {row.count(",") for row in rows} == {head.count(",")}
+    wrong = said(capsys, 2, *words, "-o", str(tmp_path / "out.xyz"))
+    assert "ends in .png, .svg, .pdf, or for the command in .csv" in wrong
+    assert b"<dc:date>" not in (tmp_path / "out.svg").read_bytes()
+
+
+def test_a_picture_names_the_extra_it_needs(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("figure", "pyplot"):
+        monkeypatch.setitem(sys.modules, f"matplotlib.{name}", None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert "pip install 'mumacro[plot]'" in said(capsys, 1, "map", "-o", str(tmp_path / "map.png"))
+
+
+def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path) -> None:
+    out = str(tmp_path / "map.csv")
+    assert "outside" not in said(capsys, 0, "map", CASE, "-o", out)
+    for case in (
+        CASE.replace("1e6", "rigid"),
+        CASE.replace("0.01", "0"),
+        CASE.replace("1e6", "1e30"),
+    ):
+        assert "the case lies outside the map: v~ = " in said(capsys, 0, "map", case, "-o", out)
+
+
+def test_objects_plot_themselves(surrogate: Surrogate) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    from mumacro import law as friction_law
+
+    known = {name: value for name, value in VALUES.items() if name != "v0"}
+    law = friction_law(surrogate, start=1e-3, stop=1.0, points=20, **known)
+    axes = law.plot(figure.add_subplot())
+    np.testing.assert_array_equal(
+        axes.lines[0].get_xydata(), np.column_stack((law.values, law.answer.mu_macro))
+    )
+    assert [line.get_xdata()[0] for line in axes.lines[2:]] == [
+        crossing.value for crossing in law.border
+    ]
+    axes = surrogate.plot(figure.add_subplot(), point=(0.1, 0.5))
+    v, y = axes.lines[0].get_data()
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y))
+    assert axes.lines[1].get_xydata().tolist() == [[0.1, 0.5]]
+    many = surrogate.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
+    axes = many.plot(figure.add_subplot())
+    shown = {line.get_label(): len(line.get_xdata()) for line in axes.lines[:-1]}
+    # v~ = 0 has no place on a logarithmic axis
+    assert shown == {"continuous sliding": 2, "stick and slip": 1}
+
+
+@pytest.mark.parametrize(
+    "kind", [("spring", "across"), ("spring", "along"), ("ball", "across"), ("ball", "along")]
+)
+def test_a_picture_of_cases_has_the_border_of_their_contact(
+    surrogate: Surrogate, kind: Any
+) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    names = dict(zip(("contact", "direction"), kind, strict=True))
+    many = surrogate.evaluate(**{**VALUES, "v0": np.array([1e-3, 1.0])}, **names, groups=True)
+    axes = many.plot(figure.add_subplot())
+    v, y = axes.lines[-1].get_data()
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
+    one = surrogate.evaluate(**VALUES, **names).plot(figure.add_subplot())
+    v, y = one.lines[-1].get_data()
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
+
+
+def test_a_picture_needs_the_groups(surrogate: Surrogate) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    with pytest.raises(AttributeError, match="groups=True"):
+        surrogate.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}).plot(figure.add_subplot())
+
+
+BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3")
+
+
+@pytest.mark.parametrize(
+    ("words", "geometry", "given"),
+    [
+        (BALL, "ball", {}),
+        ((*BALL, "--E2", "3 MPa", "--nu2", "0.5"), "ball", {"E2": 3e6, "nu2": 0.5}),
+        ((*BALL, "--E2", "rigid"), "ball", {"E2": math.inf}),
+        (("flat", *BALL[1:]), "flat", {}),
+        (
+            ("cylinder", *BALL[1:], "--length", "1cm", "--oscillation", "along"),
+            "cylinder",
+            {"length": 0.01, "oscillation": "along"},
+        ),
+    ],
+)
+def test_what_stiffness_prints_goes_into_a_command(
+    capsys: Capture, words: Any, geometry: Any, given: Any
+) -> None:
+    found = json.loads(said(capsys, 0, "stiffness", *words, "--json"))
+    expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **given)
+    assert (found["k"], found["contact"]) == (expected.k, expected.contact)
+    lines = said(capsys, 0, "stiffness", *words).partition("\nwarning")[0].splitlines()
+    assert lines[-2].split() == ["contact", expected.contact]
+    pasted = lines[-1].split()[1:]
+    answer = json.loads(said(capsys, 0, CASE.replace("k=1e6", ""), *pasted, "--json"))
+    assert answer.get("contact", "spring") == expected.contact
+    assert answer["inputs"]["k"] == close(expected.k, rel=1e-3)
+
+
+def test_a_wide_contact_is_told_below_its_stiffness(capsys: Capture) -> None:
+    words = "stiffness", "ball", "--radius", "5mm", "--Fz", "10N", "--nu", "0.3", "--E"
+    assert (
+        said(capsys, 0, *words, "1MPa")
+        .splitlines()[-1]
+        .startswith("warning: the contact's half width 0.00409 m")
+    )
+    assert "did you mean 210 GPa?" in said(capsys, 2, *words, "210")
+    assert "warning" not in said(capsys, 0, *words, "210GPa")
+
+
+def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys: Capture) -> None:
+    message = said(capsys, 2, "stiffness", *BALL[:2], "5mN", "--Fz", "10V", *BALL[5:])
+    assert "radius=5mN" in message
+    assert "Fz=10V" in message
+    assert "nu must be" in said(capsys, 2, "stiffness", *BALL[:-1], "0.7")
+    for geometry, about in GEOMETRIES.items():
+        error = ended(capsys, 2, "stiffness", geometry)
+        assert all(f"--{name}" in error for name in (*about.arguments, "E", "nu"))
+    assert "--length" in ended(capsys, 2, "stiffness", *BALL, "--length", "1")
+
+
+@pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])
+def test_solve_for_finds_what_gives_the_target(capsys: Capture, unknown: Any) -> None:
+    known = " ".join(
+        w
+        for w in CASE.split()
+        if not w.startswith("f=" if unknown in ("f", "omega") else f"{unknown}=")
+    )
+    found = json.loads(said(capsys, 0, "solve-for", unknown, known, "--target", "0.24", "--json"))
+    assert found["roots"]
+    for root in found["roots"]:
+        again = json.loads(said(capsys, 0, f"{known} {unknown}={root[unknown]!r}", "--json"))
+        assert again["mu_macro"] == close(0.24, abs=1e-11)
+        assert root["low"] <= root[unknown] <= root["high"]
+
+
+def test_solve_for_reports_the_reachable_range(capsys: Capture) -> None:
+    known = CASE.replace("v0=0.01", "")
+    assert "to 0.3" in said(capsys, 1, "solve-for", "v0", known, "--target", "0.5")
+    assert "leave v0 out" in said(capsys, 2, "solve-for", "v0", CASE, "--target", "0.2")
+    still = CASE.replace("y0=2e-6", "y0=0").replace("v0=0.01", "")
+    assert "no influence" in said(capsys, 1, "solve-for", "v0", still, "--target", "0.2")
+    words = ("solve-for", "v0", known, "--target")
+    assert json.loads(said(capsys, 0, *words, "0.8", "--ratio", "--json"))["target"] == close(
+        0.24, rel=1e-15
+    )
+    assert "v0 from 0.0001 to 0.001 m/s" in said(
+        capsys, 1, *words, "0.24", "--between", "1e-4", "1e-3"
+    )
+
+
+def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) -> None:
+    found = json.loads(said(capsys, 0, "table", "--json"))
+    expected = (str(surrogate.path), surrogate.checksum, surrogate.max_abs_error)
+    assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
+    assert found["error_distribution"] == surrogate.error_distribution
+    text = said(capsys, 0, "table")
+    assert text.count(".nc") > len(found["bundled"])
+    assert f"{surrogate.error_distribution['border']['0.95']:.2g}" in text
+
+
+def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:
+    out, table = tmp_path / "grid.csv", str(tables_dir / "mumacro-1e-4.nc")
+    words = ("export", "--format", "csv", "--out", str(out), "--table", "1e-4")
+    assert json.loads(said(capsys, 0, *words, "--json"))["table"] == table
+    rows = [line.split() for line in said(capsys, 0, *words).splitlines()]
+    assert rows[:3] == [["table", table], ["format", "csv"], ["out", str(out)]]
+    assert out.read_text().startswith("v_tilde,")
+
+
+@pytest.mark.slow
+def test_a_closed_output_pipe_is_no_error(repository: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "mumacro",
+        "law",
+        CASE.replace("v0=0.01", ""),
+        "--along",
+        "v0",
+        "1e-4",
+        "1",
+    ]
+    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([*command, "--points", "20000"], cwd=repository, **pipes) as process:
+        assert process.stdout
+        assert process.stdout.readline().startswith(b"v0 [m/s]")
+        process.stdout.close()
+        assert process.wait(timeout=120) == 0
+        assert process.stderr
+        assert b"Traceback" not in process.stderr.read()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_input_is_known_by_its_name_in_any_case_and_in_its_si_unit(name: str) -> None:
+    assert suggestion(name) == suggestion(f" {name.lower()} ") == name
+    assert suggestion(name.upper()) == ("Fz" if name == "f" else name)  # F is a force
+    assert scale_of(name, SI[name][0]) == (1.0, 1.0)
+
+
+def test_units_are_turned_into_si_and_powers_of_ten_exactly() -> None:
+    for name, unit, given, si in (
+        ("k", "N/mm", 1e3, 1e6),
+        ("k", "N/um", 1.0, 1e6),
+        ("k", "kN/m", 7.0, 7e3),
+        ("y0", "um", 2.0, 2e-6),
+        ("y0", "nm", 3.0, 3e-9),
+        ("v0", "mm/s", 10.0, 0.01),
+        ("f", "kHz", 20.69, 20690.0),
+        ("Fz", "mN", 5.0, 5e-3),
+        ("v0", "km/h", 36.0, 10.0),
+        ("mu0", "%", 30.0, 0.3),
+        ("omega", "rpm", 30.0, close(math.pi, rel=1e-15)),
+        ("omega", "Hz", 1.0, None),
+        ("y0", "N", 1.0, None),
+    ):
+        scale = scale_of(name, unit)
+        assert (scale and scale.si(given)) == si, (name, unit)
+
+
+def test_headings_and_numbers_are_read_as_they_are_written() -> None:
+    given = {
+        "k [N/mm]": ("k", "N/mm"),
+        " v0(mm/s) ": ("v0", "mm/s"),
+        "mu0": ("mu0", None),
+        "a[0][1]": ("a[0]", "1"),
+    }
+    assert {head: split_unit(head) for head in given} == given
+    assert (read_number("y0", " 2e-6 "), read_number("k", "Rigid")) == (2e-6, math.inf)
+    with pytest.raises(ValueError, match="plain number"):
+        read_number("y0", "0x10")
+    assert all(scale.si(1.0) > 0.0 for units in UNITS_OF.values() for scale in units.values())

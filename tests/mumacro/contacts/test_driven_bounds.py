@@ -1,0 +1,120 @@
+"""Oscillation along and of the normal force: every bound covers its error, and none is much wider
+than that.
+
+The reference is evaluated with more digits, and for a ball with more springs
+(``benchmarks/extended.py``).
+"""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import extended
+from benchmarks.support.driven import answered, hard, ordinary
+from mumacro import Surrogate
+from tests.support.cases import Array, opened, tables
+
+table = tables(1e-7)
+needs_digits = pytest.mark.skipif(
+    not extended.HAS_EXTENDED, reason="numpy.longdouble has the digits of a double here"
+)
+
+#: largest median of bound over error, by row of extended.ROWS
+WIDEST = (400.0, 400.0, 1000.0, 3000.0, 3000.0)
+
+
+def check(
+    s: Surrogate, v: Array, y: Array, contact: str, direction: str, truth: Any, slack: float = 0.0
+) -> Array:
+    """No error is beyond its bound; returns the medians of bound over error, with the last digit as
+    least error."""
+    medians = []
+    for name, (value, bound), true in zip(
+        extended.ROWS, answered(s, v, y, contact, direction), truth, strict=True
+    ):
+        error = np.abs(value.astype(np.longdouble) - true).astype(float)
+        legal = ~np.isnan(value)
+        beyond = legal & (error > bound * (1.0 + slack) + 5e-324)
+        assert not beyond.any(), (name, v[beyond][:3], y[beyond][:3], (error / bound)[beyond][:3])
+        size = np.maximum(error, 5.5e-17 * np.abs(true).astype(float))[legal & (error > 0.0)]
+        medians.append(float(np.median(bound[legal & (error > 0.0)] / size)) if size.size else 0.0)
+    return np.array(medians)
+
+
+@needs_digits
+@pytest.mark.parametrize("direction", ["along", "normal"])
+def test_the_bounds_of_a_spring_hold_and_are_not_wide(table: Surrogate, direction: str) -> None:
+    normal = direction == "normal"
+    v, y = ordinary(2500, 3, normal)
+    assert np.all(
+        check(table, v, y, "spring", direction, extended.spring(v, y, not normal)) < WIDEST
+    )
+    if not normal:
+        v, y = hard(400, 4)
+        check(table, v, y, "spring", direction, extended.spring(v, y))
+
+
+@needs_digits
+@pytest.mark.slow
+def test_the_bounds_of_a_ball_along_hold_and_are_not_wide(table: Surrogate) -> None:
+    v, y = ordinary(800, 5)
+    assert np.all(check(table, v, y, "ball", "along", extended.ball(v, y, 40)) < WIDEST)
+    v, y = hard(60, 6)
+    check(table, v, y, "ball", "along", extended.ball(v, y, 40))
+
+
+@needs_digits
+@pytest.mark.slow
+def test_the_bounds_of_a_ball_along_hold_beside_its_corner(table: Surrogate) -> None:
+    """y~ = 1.5 at creeping speeds: mu~ falls within a part of the ball, and the reference needs
+    many panels there."""
+    rng = np.random.default_rng(7)
+    y = 1.5 * (1.0 + rng.choice([-1.0, 1.0], 60) * 10.0 ** rng.uniform(-15.0, -1.0, 60))
+    v = y * 10.0 ** rng.uniform(-20.0, -0.5, 60)
+    check(table, v, y, "ball", "along", extended.ball(v, y, 10, panels=44), slack=1e-9)
+
+
+# each of these was beyond its bound once: contact, direction, tolerance, quantity, v~, y~, true
+# value
+ONCE_MISSED = [
+    (
+        "ball",
+        "across",
+        1e-10,
+        "mu_ratio",
+        0.030345455605781824,
+        1.879170896054554,
+        0.0863453953187772,
+    ),
+    ("ball", "across", 1e-12, "power", 0.50276, 1.5, 0.3096576630510784),
+    (
+        "ball",
+        "along",
+        1e-12,
+        "mu_ratio",
+        1.0106571086749353e-06,
+        1.5000030521278915,
+        7.344914597412166e-07,
+    ),
+    ("spring", "along", 1e-4, "stick_fraction", 3.133015082036328e-09, 0.5, 0.9999553397339749),
+]
+
+
+@pytest.mark.parametrize("place", ONCE_MISSED, ids=lambda place: " ".join(map(str, place[:4])))
+def test_bounds_that_were_once_exceeded_hold(place: Any) -> None:
+    contact, direction, tolerance, name, v, y, true = place
+    value, bound, _ = opened(tolerance).quantity(name, v, y, contact=contact, direction=direction)
+    assert abs(value - true) <= bound + 1.2e-16 * abs(true)
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+def test_next_to_the_border_the_bounds_reach_over_it(table: Surrogate, contact: str) -> None:
+    """The last digits of v~ = y~ decide whether the contact sticks at all."""
+    y = 10.0 ** np.random.default_rng(8).uniform(-6.0, 12.0, 300)
+    rows = [
+        answered(table, y * (1.0 + digit * 2.0**-52), y, contact, "along") for digit in range(-3, 4)
+    ]
+    values, bounds = np.array(rows)[:, :, 0], np.array(rows)[:, :, 1]
+    step = np.abs(np.diff(values, axis=0))
+    assert np.all(step <= bounds[1:] + bounds[:-1])

@@ -1,0 +1,281 @@
+"""One record batch: the bits of the surrogate, every type of column, units, and ambiguous names."""
+
+import decimal
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
+
+from benchmarks.support.serving import CASE  # noqa: E402
+from mumacro import InputError, Surrogate  # noqa: E402 (after pyarrow was looked for)
+from mumacro.files import ANSWERS, FilesError, answer  # noqa: E402
+from mumacro.files.record_batch import find_columns  # noqa: E402
+
+NAMES = (*CASE,)
+GAP = "is missing; write rigid or a number"
+BEYOND = "is beyond double range"
+
+
+def batch_of(**columns: Any) -> Any:
+    return pa.RecordBatch.from_pydict(
+        {**{name: [value] for name, value in CASE.items()}, **columns}
+    )
+
+
+ODD = [0.0, 1e-300, 5e-324, 1e300, -1.0, math.inf, math.nan, -0.0, 1.0]
+DOUBLES = st.floats(1e-9, 1e9) | st.sampled_from(ODD)
+
+
+@pytest.mark.slow
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.tuples(*[DOUBLES] * 6), min_size=1, max_size=40))
+def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any) -> None:
+    surrogate = Surrogate.open()
+    batch = pa.RecordBatch.from_pylist([dict(zip(NAMES, row, strict=True)) for row in rows])
+    found, rejects = answer(batch, surrogate, include=["gradient"])
+    assert found.num_rows == len(rows)
+    slopes = {name: found.column(f"d_mu_macro_d_{name}").to_pylist() for name in NAMES}
+    bad = {reject["row"]: reject["field"] for reject in rejects.to_pylist()}
+    for i, (row, said) in enumerate(
+        zip(rows, found.select(list(ANSWERS)).to_pylist(), strict=True)
+    ):
+        case = dict(zip(NAMES, row, strict=True))
+        case["k"] = "rigid" if case["k"] == math.inf else case["k"]
+        if i in bad:
+            assert {*said.values(), *(slopes[name][i] for name in NAMES)} == {None}
+            with pytest.raises(InputError) as caught:
+                surrogate.evaluate(**case)
+            assert caught.value.field == bad[i]
+        else:
+            expected = surrogate.evaluate(**case, gradient=True)
+            assert said == {name: getattr(expected, name) for name in ANSWERS}
+            for name, slope in expected.gradient.items():  # a rigid contact has no k
+                assert slopes[name][i] == (
+                    None if name == "k" and case["k"] == "rigid" else slope
+                ), name
+
+
+@pytest.mark.parametrize(
+    ("cell", "k"),
+    [
+        *(
+            (cell, 1e6)
+            for cell in (
+                pa.array([1_000_000], pa.int64()),
+                pa.array([1e6], pa.float32()),
+                pa.array(["1e6"]),
+                pa.array([" +1e6 "]),
+                pa.array([decimal.Decimal("1000000.0")]),
+                pa.array(["1e6"]).dictionary_encode(),
+                pa.array(["1e6"], pa.large_string()),
+            )
+        ),
+        *(
+            (cell, "rigid")
+            for cell in (
+                pa.array(["rigid"]),
+                pa.array([" Rigid"]),
+                pa.array([math.inf]),
+                pa.array(["inf"]),
+            )
+        ),
+        *(
+            (cell, GAP)
+            for cell in (  # a gap is never rigid
+                pa.array([""]),
+                pa.array([" "]),
+                pa.array(["NaN"]),
+                pa.array([None], pa.float64()),
+                pa.nulls(1),
+                pa.array([None], pa.string()),
+                pa.array([math.nan]),
+                pa.array([math.nan], pa.float32()),
+            )
+        ),
+    ],
+)
+def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type(
+    surrogate: Surrogate, cell: Any, k: Any
+) -> None:
+    found, rejects = answer(batch_of(k=cell), surrogate)
+    if k == GAP:
+        assert found.column("mu_macro").null_count == 1
+        assert [(reject["field"], reject["reason"]) for reject in rejects.to_pylist()] == [
+            ("k", GAP)
+        ]
+    else:
+        assert rejects.num_rows == 0
+        assert (
+            found.column("mu_macro")[0].as_py() == surrogate.evaluate(**{**CASE, "k": k}).mu_macro
+        )
+        assert (found.column("source")[0].as_py() == "rigid") == (k == "rigid")
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "reason"),
+    [
+        ("k", "1e400", BEYOND),
+        ("k", "1" + 400 * "0", BEYOND),
+        ("k [N/mm]", "1e306", BEYOND),
+        ("f [MHz]", "1e303", BEYOND),
+        ("f", "1e308", "must be finite and >= 0, and so must be omega = 2 pi f"),
+        ("k", "stiff", "must be a number, or rigid"),
+        ("k", "0", "must be finite and > 0, or rigid"),
+        ("k", "-inf", "must be finite and > 0, or rigid"),
+        ("v0", "nan", "is missing"),
+        ("v0", "", "is missing"),
+        ("v0", "10mm/s", "must be a number: give metres per second, 0.01"),
+        ("mu0", "0x1", "must be a number without a unit: give a plain number"),
+        ("Fz", "inf", "must be finite and > 0"),
+        ("omega", "-1", "must be finite and >= 0"),
+    ],
+)
+def test_a_bad_cell_is_named_with_value_and_reason(
+    surrogate: Surrogate, column: Any, cell: Any, reason: Any
+) -> None:
+    name = column.partition(" ")[0]
+    batch = batch_of(**{column: [cell]})
+    batch = batch.drop_columns(["omega"] if name == "f" else [name] if name != column else [])
+    found, rejects = answer(batch, surrogate)
+    assert rejects.to_pylist() == [{"row": 0, "field": name, "value": cell, "reason": reason}]
+    assert found.column("mu_macro").null_count == found.column("source").null_count == 1
+
+
+ORDER = "must be two stiffnesses [N/m] with 0 < low <= high, both finite"
+LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
+
+
+@pytest.mark.parametrize(
+    ("left_out", "columns", "refused"),
+    [
+        *(
+            ("k", {"k_low [N/um]": low, "k_high [N/um]": high}, refused)
+            for low, high, refused in (
+                ("0.8", "1.2", None),
+                ("1", "1", None),
+                ("", "1.2", ("k_low", "is missing")),
+                ("0.8", "", ("k_high", "is missing")),
+                ("1.2", "0.8", ("k_low", ORDER)),
+                ("0", "1", ("k_low", ORDER)),
+                ("rigid", "2", ("k_low", "must be a number")),
+                ("0.8", "inf", ("k_low", ORDER)),
+            )
+        ),
+        *(
+            ("y0", {"Fz_amplitude": force}, refused)
+            for force, refused in (
+                ("0", None),
+                ("9.99", None),
+                ("10", ("Fz_amplitude", LIFTS)),
+                ("-1", ("Fz_amplitude", LIFTS)),
+                ("", ("Fz_amplitude", "is missing")),
+                ("inf", ("Fz_amplitude", LIFTS)),
+            )
+        ),
+    ],
+)
+def test_ends_of_k_and_amplitudes_are_refused(
+    surrogate: Surrogate, left_out: Any, columns: Any, refused: Any
+) -> None:
+    batch = batch_of(**{name: [cell] for name, cell in columns.items()}).drop_columns(left_out)
+    found, rejects = answer(batch, surrogate, direction="normal" if left_out == "y0" else "across")
+    assert [(reject["field"], reject["reason"]) for reject in rejects.to_pylist()] == (
+        [refused] if refused else []
+    )
+    if not refused and left_out == "k":
+        low, middle, high = (
+            found.column(f"mu_macro{end}")[0].as_py() for end in ("_low", "", "_high")
+        )
+        assert low < middle < high or (low == middle == high and "1" in columns.values())
+
+
+def test_units_in_brackets_are_converted_exactly(surrogate: Surrogate) -> None:
+    columns = {
+        "mu0": [0.3],
+        "Fz [kN]": [0.01],
+        "k [N/mm]": [1000.0],
+        "y0 (um)": [2.0],
+        "f [kHz]": [20.69],
+        "v0 [mm/s]": [10.0],
+    }
+    found, rejects = answer(pa.RecordBatch.from_pydict(columns), surrogate)
+    assert rejects.num_rows == 0
+    assert (
+        found.column("mu_macro")[0].as_py()
+        == surrogate.evaluate(**{**CASE, "omega": math.tau * 20690.0}).mu_macro
+    )
+    assert found.schema.names[: len(columns)] == list(columns)
+
+
+SIMILAR = "{!r} is similar: rename that column to {}"
+
+
+@pytest.mark.parametrize(
+    ("names", "options", "parts"),
+    [
+        ("mu0,Fz,K,y0,omega,v0", {}, ["no column k", SIMILAR.format("K", "k [N/m]")]),
+        *(
+            (f"mu0,Fz,{name},y0,omega,v0", {}, [SIMILAR.format(name, "k")])
+            for name in ("stiffness", "K [N/mm]")
+        ),
+        ("mu0,Fz,k_N_per_mm,y0,f,v0", {}, [SIMILAR.format("k_N_per_mm", "k [N/m]")]),
+        ("mu0,Fz,k,y0,frequency,v0", {}, [SIMILAR.format("frequency", "f [Hz]")]),
+        (
+            "mu0,Fz,k [psi],y0,omega [Hz],v0",
+            {},
+            ["unit that k cannot have", "N/mm", "; ", "a frequency is f [Hz]"],
+        ),
+        ("mu0,Fz,y0,omega,v0,c", {}, ["no column k [N/m]", "'omega', 'v0', 'c'", "--rigid"]),
+        ("mu0,Fz,k,y0,v0", {}, ["omega [rad/s] or f [Hz]"]),
+        *(
+            (f"mu0,Fz,{more},y0,omega,v0", {}, [said])
+            for more, said in (
+                ("k,f", "both f [Hz] and omega"),
+                ("k,k [N/mm]", "k is there twice"),
+                ("k,k_low", "both k and k_low"),
+                ("k,note,note", "'note' is there twice"),
+                ("k,source", "'source' would be written twice"),
+                ("k_low", "no column k_high [N/m]"),
+            )
+        ),
+        ("mu0,Fz,k_low,k_high [s],y0,omega,v0", {}, ["a unit that k_high cannot have"]),
+        (
+            "mu0,Fz,k_low,k_high,y0,omega,v0,mu_macro_low",
+            {},
+            ["'mu_macro_low' would be written twice"],
+        ),
+        (
+            "mu0,Fz,k,Fz_amplitude,omega,v0",
+            {},
+            ["no column y0, but Fz_amplitude: give --direction normal"],
+        ),
+        *(
+            (f"mu0,Fz,{name},y0,omega,v0", {"rigid": True}, ["--rigid is given, but"])
+            for name in ("K", "k [N/mm]", "k", "Stiffness", "k_N_per_mm")
+        ),
+    ],
+)
+def test_a_misnamed_column_is_never_ignored(names: Any, options: Any, parts: Any) -> None:
+    with pytest.raises(FilesError) as caught:
+        find_columns(names.split(","), **options)
+    assert all(part in str(caught.value) for part in parts), caught.value
+
+
+def test_rigid_can_be_given_for_a_batch_without_k(surrogate: Surrogate) -> None:
+    found, _ = answer(batch_of(speed=["slow"]).drop_columns("k"), surrogate, rigid=True)
+    assert found.column("speed").to_pylist() == ["slow"]
+    assert found.column("source")[0].as_py() == "rigid"
+
+
+def test_a_column_without_numbers_is_refused_and_one_without_rows_answered(
+    surrogate: Surrogate,
+) -> None:
+    with pytest.raises(FilesError, match="the column v0 holds bool, not numbers"):
+        answer(batch_of(v0=[True]), surrogate)
+    found, rejects = answer(batch_of().slice(0, 0), surrogate)
+    assert found.num_rows == rejects.num_rows == 0
+    assert tuple(found.schema.names[6:]) == ANSWERS

@@ -1,0 +1,499 @@
+"""``mumacro eval``: what comes in, in which form, what comes out, and which rows are rejected with
+which reason."""
+
+import csv
+import decimal
+import gzip
+import io
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.support.cases import Capture, Case, opened
+
+pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
+import pyarrow.parquet as pq  # noqa: E402
+
+from benchmarks.support.forms import as_csv, as_ndjson  # noqa: E402
+from mumacro.cli.main import main  # noqa: E402
+from mumacro.files import ANSWERS, evaluate_files, reading  # noqa: E402
+
+NAMES, TABLE = ("mu0", "Fz", "k", "y0", "omega", "v0"), opened(1e-12)
+HEADER = ",".join(NAMES)
+GOOD = "0.3,10,1e6,2e-6,1.3e5,0.01"
+CASE: Case = dict(zip(NAMES, map(float, GOOD.split(",")), strict=True))
+KINDS = ("csv", "csv.gz", "ndjson", "jsonl.gz", "parquet")
+MISSING_K = "is missing; write rigid or a number"
+
+
+def cases(n: int, seed: int = 1) -> Any:
+    rng = np.random.default_rng(seed)
+    low, high = np.array([-2, -1, 4, -8, 2, -5]), np.array([0, 3, 8, -4, 6, 1])
+    columns = dict(zip(NAMES, (10.0 ** rng.uniform(low, high, (n, 6))).T, strict=True))
+    columns["k"][::7] = math.inf
+    return pa.table(columns)
+
+
+def write(given: Any, path: Any) -> Any:
+    """Cases in the format of the name; an infinite k is the word rigid, where the format has no
+    infinity."""
+    if path.suffix == ".parquet":
+        pq.write_table(given, path, row_group_size=100)
+        return path
+    rows = [
+        {name: "rigid" if x == math.inf else x for name, x in row.items()}
+        for row in given.to_pylist()
+    ]
+    data = (as_csv if ".csv" in path.name else as_ndjson)(rows).encode()
+    path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else data)
+    return path
+
+
+def read(path: Any, sep: str = ",") -> Any:
+    """Rows of an output as dicts of Python values; cells of CSV as text."""
+    if path.suffix == ".parquet":
+        return pq.read_table(path).to_pylist()
+    data = path.read_bytes()
+    text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
+    if ".csv" in path.name:
+        return list(csv.DictReader(io.StringIO(text, newline=""), delimiter=sep))
+    return [json.loads(line, parse_constant=pytest.fail) for line in text.splitlines()]
+
+
+def rejects_of(path: Any) -> Any:
+    rows = read(path.with_name(path.name + ".rejects.csv"))
+    return [(int(row["row"]), row["field"], row["reason"]) for row in rows]
+
+
+def ran(capsys: Capture, code: Any, *words: Any) -> Any:
+    """The last line of ``mumacro eval WORDS``; the only one if it fails."""
+    assert main(["eval", *map(str, words)]) == code
+    said = capsys.readouterr()
+    assert "Traceback" not in said.err
+    assert code not in (1, 2) or len(said.err.splitlines()) == 1
+    return said.err if code in (1, 2) else said.out
+
+
+@pytest.mark.parametrize("start", KINDS)
+@pytest.mark.parametrize("end", KINDS)
+def test_every_format_goes_into_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: Any, end: Any
+) -> None:
+    monkeypatch.setattr(reading, "ROWS", 70)  # several blocks
+    given = cases(300)
+    source, out = write(given, tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
+    summary = evaluate_files([source], out, TABLE)
+    assert (summary.rows, summary.answered, summary.rejects) == (300, 300, None)
+    found = read(out)
+    columns = {name: given.column(name).to_numpy() for name in NAMES}
+    expected = TABLE.evaluate(**columns)
+    assert list(found[0]) == [*NAMES, *ANSWERS]
+    for name in (*NAMES, "mu_macro", "mu_ratio", "error_bound"):
+        wanted = columns[name] if name in NAMES else getattr(expected, name)
+        assert [
+            math.inf if row[name] == "rigid" else float(row[name]) for row in found
+        ] == wanted.tolist()
+    for name in ("source", "regime"):
+        assert [row[name] for row in found] == getattr(expected, name).tolist()
+
+
+def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path: Path) -> None:
+    others = {
+        "i32": pa.array(range(300), pa.int32()),
+        "f32": pa.array([0.1, math.nan, -math.inf] * 100, pa.float32()),
+        "ns": pa.array([10**18 + i for i in range(300)], pa.timestamp("ns", "UTC")),
+        "words": pa.array(["a", 'b"', None] * 100).dictionary_encode(),
+        "text": pa.array(["µ,\n\\"] * 300),
+        "money": pa.array([decimal.Decimal("1.10")] * 300),
+        "list": pa.array([[1, 2]] * 300),
+        "flag": pa.array([True, None] * 150),
+    }
+    given = cases(300)
+    for name, values in others.items():
+        given = given.append_column(name, values)
+    source = write(given, tmp_path / "cases.parquet")
+    evaluate_files([source], tmp_path / "out.parquet", TABLE)
+    found, before = pq.read_table(tmp_path / "out.parquet"), pq.read_table(source)
+    assert found.select(before.schema.names).schema == before.schema
+    assert found.select(before.schema.names).drop_columns("f32").equals(before.drop_columns("f32"))
+    assert pa.types.is_dictionary(found.schema.field("regime").type)
+    for kind, nothing in (("ndjson", None), ("csv", "")):
+        evaluate_files([source], tmp_path / f"out.{kind}", TABLE)
+        rows = read(tmp_path / f"out.{kind}")
+        assert [row["text"] for row in rows] == ["µ,\n\\"] * 300
+        assert [row["words"] for row in rows[:3]] == ["a", 'b"', nothing]
+        assert [row["f32"] for row in rows[1:3]] == [nothing, nothing]
+    assert json.loads(rows[0]["list"]) == [1, 2]
+
+
+def test_text_comes_out_as_it_came_in(tmp_path: Path) -> None:
+    lines = [
+        '{"mu0":0.30,"Fz":10,"k":1000000,"y0":2e-6,"omega":130000,'
+        '"v0":1E-2,"id":12345678901234567890, "b":[1] }',
+        '{"v0":0.01,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}',
+    ]
+    (tmp_path / "cases.ndjson").write_text("\n".join(lines))
+    evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", TABLE)
+    for line, given in zip((tmp_path / "out.ndjson").read_text().splitlines(), lines, strict=True):
+        assert line.startswith(given.rstrip("} "))
+        json.loads(line)
+    evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.csv", TABLE)
+    assert [(row["id"], row["b"]) for row in read(tmp_path / "out.csv")] == [
+        ("12345678901234567890", "[1]"),
+        ("", ""),
+    ]
+    text = (
+        f'name,{HEADER}\r\n"say ""so"",\nand more",{GOOD}\r\n007,{GOOD}\r\n5" pipe,{GOOD}\n,{GOOD}'
+    )
+    (tmp_path / "cases.csv").write_bytes(text.encode())
+    for kind in ("csv", "parquet", "ndjson"):
+        evaluate_files([tmp_path / "cases.csv"], tmp_path / f"o.{kind}", TABLE)
+        found = read(tmp_path / f"o.{kind}")
+        assert [row["name"] for row in found] == ['say "so",\nand more', "007", '5" pipe', ""]
+    assert (
+        (tmp_path / "o.csv")
+        .read_bytes()
+        .startswith(text.replace("\r", "").encode()[: len(HEADER) + 5])
+    )
+
+
+GERMAN = (
+    "name;mu0;Fz;k [N/mm];y0 [µm];f "
+    '[kHz];v0\n"a;b";0,3;10;1,5e3;0,2;20;0,005\nc;0.3;10;rigid;0,2;20;0,005\n'
+)
+
+
+@pytest.mark.parametrize("text", [GERMAN, "\ufeff" + GERMAN.replace("\n", "\r\n")])
+def test_a_german_file_is_recognised_and_read_with_its_options(
+    tmp_path: Path, capsys: Capture, text: str
+) -> None:
+    (tmp_path / "cases.csv").write_bytes(text.encode())
+    out, words = tmp_path / "out.csv", [tmp_path / "cases.csv", "-o", tmp_path / "out.csv"]
+    assert "give --sep ';' --decimal ','" in ran(capsys, 1, *words)
+    assert "give --sep ';' --decimal ','" in ran(capsys, 1, *words, "--sep", ";")
+    ran(capsys, 3, *words, "--sep", ";", "--decimal", ",")
+    (row,) = read(out, ";")
+    assert out.read_bytes().splitlines()[1].startswith(text.splitlines()[1].encode())
+    assert "," in row["mu_macro"]
+    assert 0.0 < float(row["mu_macro"].replace(",", ".")) < 0.3
+    # 0.3 may be meant for 03
+    assert rejects_of(out) == [(2, "mu0", "must be a number such as 0,5")]
+    (tmp_path / "cases.csv").write_text(f"{HEADER}\n{GOOD}\n".replace(",", "\t"))
+    assert "--sep 'tab' --decimal '.'" in ran(capsys, 1, *words)
+    assert "both ','" in ran(capsys, 1, *words, "--decimal", ",")
+    ran(capsys, 0, *words, "--sep", "tab", "--force")
+
+
+@pytest.mark.parametrize("kind", ["csv", "ndjson", "csv.gz", "parquet"])
+def test_standard_input_output(
+    tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
+) -> None:
+    bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
+    source, wanted = (
+        write(bad, tmp_path / f"cases.{kind}"),
+        tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv"),
+    )
+    rejects = evaluate_files([source], wanted, TABLE).rejects
+    assert rejects
+    with source.open("rb") as stream:
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(stream))
+        monkeypatch.setattr(
+            sys, "stdout", io.TextIOWrapper(written := io.BytesIO(), write_through=True)
+        )
+        assert main(["eval", "-", "-o", "-"]) == 3
+        assert written.getvalue() == wanted.read_bytes()
+    assert capfdbinary.readouterr().err.startswith(rejects.read_bytes() + b"49 of 50 rows")
+
+
+def with_k(cell: Any) -> Any:
+    return GOOD.replace("1e6", cell)
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet", "ndjson"])
+def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
+    tmp_path: Path, capsys: Capture, end: Any
+) -> None:
+    rows = [
+        GOOD,
+        "-" + GOOD,
+        "x" + GOOD,
+        GOOD[:-4],
+        GOOD[:-5],
+        GOOD + ",7",
+        with_k(""),
+        with_k("Rigid"),
+        "",
+        with_k("inf"),
+        with_k("nan"),
+        with_k("1e400"),
+        GOOD.replace("1.3e5", "inf"),
+        GOOD,
+    ]
+    (tmp_path / "cases.csv").write_text("\n".join([HEADER, *rows]))
+    out = tmp_path / f"out.{end}"
+    assert "4 of 13 rows evaluated" in ran(capsys, 3, tmp_path / "cases.csv", "-o", out)
+    assert [row["source"] for row in read(out)] == [
+        "stick_slip_low",
+        "rigid",
+        "rigid",
+        "stick_slip_low",
+    ]
+    if end == "parquet":
+        assert [row["k"] for row in read(out)] == [1e6, math.inf, math.inf, 1e6]
+    assert rejects_of(out) == [
+        (2, "mu0", "must be finite and > 0"),
+        (3, "mu0", "must be a number"),
+        (4, "v0", "is missing"),
+        (5, "", "has 5 cells, the header has 6"),
+        (6, "", "has 7 cells, the header has 6"),
+        (7, "k", MISSING_K),
+        (10, "k", MISSING_K),
+        (11, "k", "is beyond double range"),
+        (12, "omega", "must be finite and >= 0"),
+    ]
+
+
+@pytest.mark.parametrize("end", ["ndjson", "parquet"])
+def test_bad_lines_of_ndjson_land_in_the_side_file(
+    tmp_path: Path, capsys: Capture, end: Any
+) -> None:
+    without_k = {name: value for name, value in CASE.items() if name != "k"}
+    lines = [
+        json.dumps(line) if isinstance(line, dict) else line
+        for line in (
+            {**CASE, "tag": "a"},
+            "",
+            {**CASE, "k": None},
+            "[1]",
+            "{",
+            "null",
+            {**CASE, "v0": True},
+            {**CASE, "Fz": 10**400},
+            json.dumps(CASE).replace("1000000.0", "1e400"),
+            '{"mu0": 0.3}',
+            {**CASE, "k": "rigid"},
+            without_k,
+            {**CASE, "v0": None},
+            '{"mu0": 0.3, "mu0": 0.4}',
+            {**CASE, "k": math.nan},
+            CASE,
+            json.dumps(CASE) * 2,
+            '{"tag": "\\ud800"}',
+            {**CASE, "tag": None, "v0": 1},
+        )
+    ]
+    (tmp_path / "cases.ndjson").write_text("\n".join(lines))
+    out = tmp_path / f"out.{end}"
+    ran(capsys, 3, tmp_path / "cases.ndjson", "-o", out)
+    found = read(out)
+    assert [row.get("tag") for row in found] == ["a", None, None, None]
+    assert [row["source"] for row in found] == [
+        "stick_slip_low",
+        "rigid",
+        "stick_slip_low",
+        "continuous_low",
+    ]
+    assert found[0]["mu_macro"] == TABLE.evaluate(**CASE).mu_macro
+    reasons = {row: (field, reason) for row, field, reason in rejects_of(out)}
+    assert [row for row, (field, _) in reasons.items() if not field] == [3, 4, 5, 13, 14, 16, 17]
+    assert reasons[2] == reasons[11] == ("k", MISSING_K)
+    assert reasons[14] == ("", "is no JSON object: NaN is not in it; write null")
+    assert reasons[6] == ("v0", "must be a number")
+    assert [reasons[i] for i in (7, 8)] == [
+        (name, "is beyond double range") for name in ("Fz", "k")
+    ]
+    assert reasons[12] == ("v0", "is missing")
+    assert reasons[13] == ("", "is no JSON object: repeats the key 'mu0'")
+
+
+@pytest.mark.parametrize("first", ["null", "1", '"a"', "[null]", "{} null"])
+def test_no_first_line_of_ndjson_ends_the_process(tmp_path: Path, first: Any) -> None:
+    (tmp_path / "cases.ndjson").write_text(f"{first}\n{json.dumps(CASE)}\n")
+    summary = evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", TABLE)
+    assert (summary.answered, summary.rejected) == (1, 1)
+
+
+def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "ROWS", 2)  # records that go on in the next block
+    rows = [
+        f'"a\nb",{GOOD}',
+        f"c,{GOOD}",
+        f'"d\n\n",{GOOD},1',
+        f"e,-{GOOD}",
+        f'"f\r\ng",{GOOD}',
+    ] * 3
+    (tmp_path / "cases.csv").write_text(f"name,{HEADER}\n" + "\n".join(rows) + "\n", newline="")
+    evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+    assert [row["name"] for row in read(tmp_path / "out.csv")] == ["a\nb", "c", "f\r\ng"] * 3
+    assert [row for row, *_ in rejects_of(tmp_path / "out.csv")] == [3, 4, 8, 9, 13, 14]
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet"])
+@pytest.mark.parametrize(("rows", "bad"), [(1, '"b'), (1, '"b" c'), (150_000, '"b')])
+def test_an_open_quote_names_its_row(
+    tmp_path: Path, capsys: Capture, end: Any, rows: Any, bad: Any
+) -> None:
+    text = f"name,{HEADER}\n" + f"a,{GOOD}\n" * rows + f"{bad},{GOOD}\n" + f"c,{GOOD}\n" * 50
+    (tmp_path / "cases.csv").write_text(text)
+    message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / f"out.{end}")
+    assert f"row {rows + 1}: a quote is not closed" in message
+    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
+
+
+@pytest.mark.parametrize(
+    ("content", "parts"),
+    [
+        ("", ["must name the columns, and is empty"]),
+        ("a;b;c\n1;2;3\n", ["--sep ';' --decimal '.'"]),
+        ('"mu0,Fz\n', ["line 1: is no header"]),
+        ("mu0,Fz,y0,omega,v0\n", ["no column k", "'Fz'", "--rigid"]),
+        (f"{HEADER}\r{GOOD}", ["line 1: is no header"]),
+    ],
+)
+def test_a_file_without_cases_is_refused_by_name(
+    tmp_path: Path, capsys: Capture, content: Any, parts: Any
+) -> None:
+    (tmp_path / "cases.csv").write_bytes(content.encode())
+    message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "out.csv")
+    assert all(part in message for part in [str(tmp_path / "cases.csv"), *parts])
+    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
+
+
+def test_damaged_and_missing_files_are_reported_in_one_line(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    good = write(cases(2000), tmp_path / "good.parquet")
+    (tmp_path / "text.parquet").write_text("no parquet")
+    (tmp_path / "cut.csv.gz").write_bytes(
+        write(cases(5000), tmp_path / "whole.csv.gz").read_bytes()[:50_000]
+    )
+    (tmp_path / "latin.csv").write_bytes(f"{HEADER},name\n{GOOD},µ\n".encode("latin-1"))
+    flipped = bytearray(good.read_bytes())
+    flipped[2000:60_000:97] = bytes(byte ^ 255 for byte in flipped[2000:60_000:97])
+    (tmp_path / "flipped.parquet").write_bytes(flipped)
+    for name, out, said in (
+        ("none.csv", "o.csv", "no such file"),
+        ("*.none", "o.csv", "no such file"),
+        ("text.parquet", "o.csv", "Is this a 'parquet' file?"),
+        ("cut.csv.gz", "o.csv", "is damaged"),
+        ("latin.csv", "o.parquet", "row 1 is not in UTF-8; save the file as UTF-8"),
+        ("flipped.parquet", "o.csv", ""),
+        ("good.parquet", "o.xlsx", "ends in"),
+        ("good.parquet", "none/o.csv", "No such file or directory"),
+        ("good.parquet", ".", "must be the name of a file"),
+    ):
+        assert said in ran(capsys, 1, tmp_path / name, "-o", tmp_path / out, "--force")
+    assert "several formats" in ran(
+        capsys, 1, good, tmp_path / "latin.csv", "-o", tmp_path / "o.csv"
+    )
+
+
+@pytest.mark.parametrize("bad", [1, 2, 5])
+def test_a_row_in_another_encoding_is_named_with_the_remedy(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, bad: int
+) -> None:
+    monkeypatch.setattr(reading, "ROWS", 2)  # several blocks
+    rows = [f"{GOOD},{'µ' if i == bad else 'u'}" for i in range(1, bad + 2)]
+    text = "\n".join([f"{HEADER},name", *rows])
+    (tmp_path / "german.csv").write_bytes(text.encode("cp1252"))
+    assert (
+        f"german.csv: row {bad} is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
+        in ran(capsys, 1, tmp_path / "german.csv", "-o", tmp_path / "out.parquet")
+    )
+
+
+def test_a_field_that_begins_late_is_not_lost(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "ROWS", 10)
+    lines = [json.dumps(line) for line in [CASE] * 30 + [{**CASE, "x": 1}]]
+    (tmp_path / "cases.ndjson").write_text("\n".join(lines))
+    assert "'x' is in no earlier row" in ran(
+        capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.csv"
+    )
+    ran(capsys, 0, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
+    assert read(tmp_path / "out.ndjson")[-1]["x"] == 1
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_a_file_without_rows_gives_a_file_without_rows(tmp_path: Path, kind: Any) -> None:
+    source = tmp_path / f"cases.{kind}"
+    source.write_text(HEADER) if kind == "csv" else write(cases(0), source)
+    assert evaluate_files([source], tmp_path / f"out.{kind}", TABLE).rows == 0
+    assert read(tmp_path / f"out.{kind}") == []
+
+
+def test_folders_patterns_and_hive_names(tmp_path: Path) -> None:
+    for year in (2023, 2024):
+        (tmp_path / "runs" / f"year={year}").mkdir(parents=True)
+        for name in "ba":
+            write(
+                cases(10, year + ord(name)), tmp_path / "runs" / f"year={year}" / f"{name}.parquet"
+            )
+    (tmp_path / "runs" / "notes.txt").write_text("no cases")
+    evaluate_files([tmp_path / "runs"], tmp_path / "out.parquet", TABLE)
+    found = pq.read_table(tmp_path / "out.parquet")
+    assert found.column("year").to_pylist() == [2023] * 20 + [2024] * 20
+    pattern = str(tmp_path / "runs" / "*" / "a.parquet")
+    assert evaluate_files([pattern], tmp_path / "a.csv", TABLE).rows == 20
+    mixed = cases(10).set_column(0, "mu0", pa.array([1] * 10, pa.int32()))
+    pq.write_table(mixed, tmp_path / "ints.parquet")
+    files = [tmp_path / "ints.parquet", tmp_path / "runs" / "year=2023" / "a.parquet"]
+    evaluate_files(files, tmp_path / "both.parquet", TABLE)
+    assert read(tmp_path / "both.parquet")[0]["mu0"] == 1.0
+    texts = [write(cases(5, i), tmp_path / f"{i}.csv") for i in (1, 2)]
+    texts[1].write_text(texts[1].read_text() + "1,2\n")
+    summary = evaluate_files(texts, tmp_path / "both.csv", TABLE)
+    assert (summary.answered, summary.rejected) == (10, 1)
+    (reject,) = read(summary.rejects)
+    assert (reject["file"], reject["row"]) == (str(texts[1]), "6")
+
+
+ALIKE = {name: value for name, value in CASE.items() if name not in ("k", "y0", "omega")}
+ANSWERED: dict[str, tuple[Case, Case]] = {
+    "ball": ({"contact": "ball"}, {"k": 1e6, "y0": 2e-6}),
+    "along": ({"direction": "along"}, {"k": 1e6, "y0": 2e-6}),
+    "normal": ({"direction": "normal"}, {"k": 1e6, "Fz_amplitude": 1.0}),
+    "range": ({}, {"k_low": 0.8e6, "k_high": 1.2e6, "y0": 2e-6}),
+    "range of a ball": ({"contact": "ball"}, {"k_low": 0.8e6, "k_high": 1.2e6, "y0": 2e-6}),
+}
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet"])
+@pytest.mark.parametrize("start", ["csv", "ndjson", "parquet"])
+@pytest.mark.parametrize("name", ANSWERED)
+def test_files_know_contact_and_ends_of_k(
+    tmp_path: Path, capsys: Capture, start: Any, end: Any, name: str
+) -> None:
+    kind, more = ANSWERED[name]
+    rng = np.random.default_rng(3)
+    given = {
+        field: value * rng.uniform(0.9, 1.1, 40)
+        for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()
+    }
+    source, out = write(pa.table(given), tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
+    options = [f"--{key}={value}" for key, value in kind.items()]
+    ran(capsys, 0, source, "-o", out, *options, "--include", "gradient")
+    found = read(out)
+    expected = TABLE.evaluate(given, gradient=True, **kind)
+    names = [
+        "mu_macro",
+        *(["mu_macro_low", "mu_macro_high"] if "k_low" in given else []),
+        *ANSWERS[1:],
+    ]
+    slopes = [f"d_mu_macro_d_{field}" for field in expected.gradient]
+    assert list(found[0]) == [*given, *names, *slopes]
+    for column in names:
+        read_back = [
+            row[column] if column in ("regime", "source") else float(row[column]) for row in found
+        ]
+        assert read_back == getattr(expected, column).tolist()
+    for field, slope in expected.gradient.items():
+        assert [float(row[f"d_mu_macro_d_{field}"]) for row in found] == slope.tolist()

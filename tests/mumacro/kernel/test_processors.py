@@ -1,0 +1,120 @@
+"""What is measured and built as processors without AVX-512 and without AVX2 see it.
+
+NumPy, OpenBLAS and LLVM choose other instructions there, and last digits of the solves differ.
+The levels of the compiled kernel are compared in test_cells.py, beside this file, and in
+tests/builder/export/test_c_header.py.
+"""
+
+import importlib
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from builder.tables.verify import CASES, draw
+from mumacro import Surrogate
+from mumacro.table.atlas import QUANTITY_NAMES
+from tests.support.cases import opened
+from tests.support.places import ROOT
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        platform.machine().lower() not in ("x86_64", "amd64"),
+        reason="no x86 processor: its levels are not there",
+    ),
+]
+
+#: beginnings of the features of NumPy that are switched off, and what OpenBLAS and numba are told
+PROCESSORS = {
+    "AVX2": ("X86_V4", "AVX512"),
+    "neither AVX2 nor AVX-512": ("X86_V3", "AVX2", "FMA3", "X86_V4", "AVX512"),
+}
+OTHERS = {
+    "AVX2": {"OPENBLAS_CORETYPE": "Haswell", "NUMBA_CPU_NAME": "haswell"},
+    "neither AVX2 nor AVX-512": {"OPENBLAS_CORETYPE": "Nehalem", "NUMBA_CPU_NAME": "x86-64"},
+}
+_SHOW = (
+    "from numpy._core._multiarray_umath import __cpu_features__ as f; print(*(k for k, v in "
+    "f.items() if v))"
+)
+
+
+def on(processor: str, *words: str) -> str:
+    """What ``python`` with these words prints there; it must end well."""
+    known = importlib.import_module("numpy._core._multiarray_umath").__cpu_dispatch__
+    off = [name for name in known if name.startswith(PROCESSORS[processor])]
+    switches = {
+        "NPY_DISABLE_CPU_FEATURES": " ".join(off),
+        "NUMBA_CPU_FEATURES": "",
+        **OTHERS[processor],
+    }
+    env = {**os.environ, **switches}
+    done = subprocess.run(
+        [sys.executable, *words],
+        cwd=ROOT,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=900,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    return done.stdout
+
+
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_the_switches_work(processor: str) -> None:
+    have = on(processor, "-c", _SHOW).split()
+    assert "X86_V2" in have or "SSE42" in have
+    assert not {"X86_V4", "AVX512_SKX"} & {*have}
+    assert processor == "AVX2" or not {"X86_V3", "FMA3_AVX2"} & {*have}
+
+
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_what_a_table_states_is_measured_there_too(processor: str) -> None:
+    on(
+        processor,
+        "-m",
+        "pytest",
+        "-q",
+        "-n",
+        "0",
+        "-m",
+        "",
+        "tests/builder/tables/test_verify.py",
+        "-k",
+        "stated or states",
+    )
+
+
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_a_table_that_is_built_there_differs_within_what_both_state(
+    processor: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "other.nc"
+    on(
+        processor,
+        "-m",
+        "builder",
+        "build",
+        "--tolerance",
+        "1e-4",
+        "--workers",
+        "2",
+        "--out",
+        str(out),
+    )
+    here, there = opened(1e-4), Surrogate.open(out)
+    assert there.tolerance == here.tolerance
+    for case in CASES:
+        v, y = draw(case, 2000, here, seed=5)
+        for name in QUANTITY_NAMES:
+            (one, of_one, _), (two, of_two, _) = (
+                table.quantity(name, v, y) for table in (here, there)
+            )
+            assert np.all(np.abs(one - two) <= of_one + of_two), (case, name)

@@ -1,0 +1,260 @@
+"""The committed tables: tolerance, bounds, seams and slopes against fresh solves and references;
+size and contents."""
+
+import csv
+import importlib
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from builder.solver.steady import solve
+from builder.solver.sweep import Sweep
+from builder.tables.build import STEPS, build_table, to_step
+from builder.tables.measure import SEAMS
+from builder.tables.quantities import ABS_TO_REL, STICK_NOISE, solver_noise
+from builder.tables.verify import holds, monotony, seam_jumps, seam_slope_jumps, verify
+from mumacro import Surrogate, TableError
+from mumacro.inputs.fields import FIELDS
+from mumacro.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP
+from mumacro.table.atlas import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE, REGIMES
+from mumacro.table.netcdf import read_table
+from tests.support.cases import Array, tables
+from tests.support.comparing import close
+from tests.support.places import ROOT
+
+#: the most bytes of a file
+BYTES = {
+    "mumacro-1e-4": 135_000,
+    "mumacro-1e-7": 215_000,
+    "mumacro-1e-10": 360_000,
+    "mumacro-1e-12": 451_000,
+}
+PATHS = [ROOT / "tables" / f"{name}.nc" for name in BYTES]
+CHECK_VALUES = ROOT / "tests" / "data" / "check_values.csv"
+table = tables()
+fine = tables(1e-10)
+
+
+# --- against fresh solves -------------------------------------------------------------------------
+
+
+def compare(table: Surrogate, sweep: Sweep, v: Array, y: Array) -> Array:
+    """Assert that fresh solves lie within tolerance and bounds; the bounds of the stick
+    fraction."""
+    solved = sweep.solve("full", v, y)
+    for name in QUANTITY_NAMES:
+        value, bound, source = table.quantity(name, v, y)
+        error = np.abs(value - solved[name])
+        assert np.all(
+            error
+            <= bound + solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
+        )
+        if name == "mu_ratio":
+            assert error.max() <= table.tolerance
+            assert (error / solved[name]).max() <= ABS_TO_REL * table.tolerance
+    return np.asarray(bound)
+
+
+@pytest.mark.slow
+def test_fresh_solves_lie_within_tolerance_and_bounds(table: Surrogate, sweep: Sweep) -> None:
+    """Values and slopes of every quantity, at points of every kind.
+
+    tests/builder/tables/test_verify.py tries the verifier itself.
+    """
+    report = verify(table, sweep, 40_000, seed=77)
+    assert holds(report, table.tolerance)
+    # the stated errors are those at other points: of slopes ten lie beyond 99 %, and the median is
+    # where closed forms answer
+    assert report["distribution"].keys() == table.error_distribution.keys()
+    for name, part in report["distribution"].items():
+        stated = table.error_distribution[name]
+        for found, share in zip(part["error_quantiles"][1:3], ("0.95", "0.99"), strict=True):
+            assert stated[share] / 2.5 - 1e-13 <= found <= 2.5 * stated[share] + 1e-13, name
+
+
+def test_bounds_hold_on_the_border_in_the_corner_and_at_creeping_speeds(
+    table: Surrogate, sweep: Sweep
+) -> None:
+    y = np.geomspace(1e-4, 1e12, 40)
+    crit = table.v_tilde_crit(y)
+    for distance in (0.0, 1e-15, 1e-13, 1e-10, 1e-7, 1e-4, 1e-2):
+        for side in (-1.0, 1.0):
+            of_stick = compare(table, sweep, crit * (1.0 + side * distance), y)
+            assert (
+                of_stick.max()
+                <= 0.7 * math.sqrt(table.border.max_rel_error + 2e-15) + 30.0 * table.tolerance
+            )
+    assert table.stick_fraction_with_bound(2.0 * crit, y)[1].max() == 0.0
+    v = np.geomspace(1e-12, 1e-2, 30)[:, None]
+    gaps = np.concatenate([-np.geomspace(1e-12, 0.2, 12), [0.0], np.geomspace(1e-12, 0.4, 12)])
+    compare(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, 1.0 + gaps)))
+    compare(
+        table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, np.geomspace(1e-2, 1e12, 30)))
+    )
+    # one digit of y~ changes mu~ by at most the root of two digits, also at the cusp
+    assert (
+        table.ratio_with_bound(np.geomspace(1e-300, 1e-9, 400), 1.0)[1].max()
+        <= 1e-7 + table.tolerance
+    )
+
+
+def test_the_reference_lies_within_tolerance_and_bounds(table: Surrogate, reference: Any) -> None:
+    """The independent solver, in quadruple precision."""
+    mu, bound, source = table.ratio_with_bound(reference.v, reference.y)
+    error = np.abs(mu - reference.mu_ratio)
+    assert error.max() <= table.tolerance
+    assert (error / reference.mu_ratio).max() <= ABS_TO_REL * table.tolerance
+    assert np.all(error <= bound)
+    wrong = np.array(REGIMES)[REGIME_OF_SOURCE[source]] != reference.regime
+    # the label can be wrong only within the error of the stored border
+    distance = np.abs(reference.v / table.v_tilde_crit(reference.y) - 1.0)
+    assert np.all(distance[wrong] <= table.border.max_rel_error)
+    stick, bound = table.stick_fraction_with_bound(reference.v, reference.y)
+    assert np.all(np.abs(stick - reference.stick_fraction) <= bound + STICK_NOISE)
+
+
+def test_the_check_values_for_ports_are_made_by_their_script_of_references() -> None:
+    pytest.importorskip("mpmath")
+    assert (
+        CHECK_VALUES.read_text("utf-8") == importlib.import_module("benchmarks.check_values").text()
+    )
+
+
+def test_a_table_meets_the_check_values_of_six_inputs_within_its_bounds(table: Surrogate) -> None:
+    with CHECK_VALUES.open(newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["quantity"] == "mu_macro"]
+    assert rows
+    for row in rows:  # the others are the reference itself
+        case = {name: math.inf if row[name] == "rigid" else float(row[name]) for name in FIELDS}
+        found = table.evaluate(case)
+        assert abs(found.mu_macro - float(row["value"])) <= found.error_bound + float(
+            row["tolerance"]
+        ), row
+
+
+def test_known_answers_are_the_models_and_a_wrong_table_does_not_meet_them() -> None:
+    assert solve(0.1, 0.5).mu_ratio == close(KNOWN_STICK_SLIP, abs=2e-16)
+    assert solve(2.0, 1.0).mu_ratio == close(KNOWN_CONTINUOUS, abs=2e-16)
+    for path in PATHS:
+        Surrogate.open(path).self_check()
+    wrong = read_table(PATHS[1])
+    for block in wrong.blocks:
+        block.nodes["mu_ratio"] *= 1.001
+    with pytest.raises(TableError, match="known answer"):
+        Surrogate(wrong, PATHS[1]).self_check()
+
+
+# --- seams, limits, slopes ------------------------------------------------------------------------
+
+
+def test_seams_are_invisible_and_mu_rises_with_speed_and_falls_with_amplitude(
+    table: Surrogate,
+) -> None:
+    assert seam_jumps(table) <= 2.0 * ABS_TO_REL * table.tolerance
+    # along lines 1e-2.7 apart in the logarithm, across all seams; smaller steps are not resolved
+    assert monotony(table) <= 1e-15 + (table.tolerance if table.tolerance > 1e-9 else 0.0)
+    for y in SEAMS:  # one digit on either side
+        v = np.array([1e-9, 1e-3, 0.1, 0.5, 3.0, 40.0, 1e4])
+        mu = np.stack(
+            [table.mu_ratio(v, b) for b in (math.nextafter(y, 0.0), y, math.nextafter(y, math.inf))]
+        )
+        assert np.all(
+            np.ptp(mu, axis=0) <= 2.0 * ABS_TO_REL * table.tolerance * mu.max(axis=0) + 1e-14
+        )
+
+
+def test_slopes_go_on_across_seams_and_stay_bounded_down_to_the_border(fine: Surrogate) -> None:
+    assert seam_slope_jumps(fine, n=20_000) <= 1e-7
+    y = np.geomspace(1e-3, 1e4, 300)
+    crit = fine.v_tilde_crit(y)
+    above = np.array(fine.slopes(crit * (1.0 + 1e-12), y)[1:])
+    for distance in (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15):
+        below = np.array(fine.slopes(crit * (1.0 - distance), y)[1:])
+        assert np.abs(below - above).max() <= 3e-6 + 3.0 * distance
+
+
+# --- the files ------------------------------------------------------------------------------------
+
+
+def test_every_committed_file_is_tested() -> None:
+    assert sorted((ROOT / "tables").glob("*.nc")) == sorted(PATHS)
+
+
+def test_the_stated_shares_of_errors_end_at_the_largest(table: Surrogate) -> None:
+    told: Any = table.attributes
+    largest = {name: part["1"] for name, part in table.error_distribution.items()}
+    assert largest["mu_ratio"] == told["verified_max_abs_error"] <= table.tolerance
+    assert largest["power"] == told["verified_max_rel_power_error"]
+    assert largest["stick_fraction"] == told["verified_max_stick_error"]
+    slopes = largest["slope_along_v"], largest["slope_along_y"]
+    assert max(slopes) == told["verified_max_slope_error"]
+    assert largest["border"] <= table.border.max_rel_error
+    for part in table.error_distribution.values():
+        assert part["0.5"] <= part["0.95"] <= part["0.99"] <= part["1"]
+        assert 1.0 <= part["least"] < part["median"] < part["largest"]
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_files_are_small(path: Path) -> None:
+    variables: list[h5py.Dataset] = []
+    with h5py.File(path) as root:
+        root.visititems(
+            lambda _, item: variables.append(item) if isinstance(item, h5py.Dataset) else None
+        )
+        numbers = sum(variable.id.get_storage_size() for variable in variables)
+    assert path.stat().st_size <= BYTES[path.stem]
+    # names, units, links, groups: contents other than numbers
+    assert path.stat().st_size - numbers <= 2_300 * len(variables)
+
+
+def test_nodes_are_rounded_to_what_their_block_was_built_for(table: Surrogate) -> None:
+    targets = json.loads(table.table.attributes["builder_options"])["block_targets"]
+    for block, target in zip(table.table.blocks, targets, strict=True):
+        for nodes in block.nodes.values():
+            assert np.array_equal(nodes, to_step(nodes, target))
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: Sweep) -> None:
+    with xr.open_dataset(path) as data:
+        mu, stick, error = (
+            data.mu_ratio.values,
+            data.stick_fraction.values,
+            data.error_estimate.values,
+        )
+        assert np.all((mu > 0.0) & (mu <= 1.0))
+        # along v~; in the static limit neighbours are equal to rounding
+        assert np.all(np.diff(mu, axis=0) >= -1e-15)
+        assert np.all(np.diff(mu, axis=1) <= 1e-15)
+        sliding = data.v_tilde.values[:, None] >= data.v_tilde_crit.values
+        assert np.all((stick >= 0.0) & (stick < 1.0))
+        assert np.all((stick == 0.0) == sliding)
+        assert np.all((error > 0.0) & (error < 1e-14 + mu * data.tolerance / STEPS))
+        assert np.all(np.diff(data.v_tilde_crit.values) > 0.0)
+        assert float(data.attrs["tolerance"]) == float(path.stem.removeprefix("mumacro-"))
+        for axis in (data.v_tilde.values, data.y_tilde.values):
+            assert axis == close(np.geomspace(1e-3, 1e3, axis.size), rel=1e-13)
+        solved = sweep.solve("full", data.v_tilde.values[::7, None], data.y_tilde.values[None, ::7])
+        # to the digits stored in the file, with the error stated there
+        assert np.all(np.abs(mu[::7, ::7] - solved["mu_ratio"]) <= error[::7, ::7])
+        np.testing.assert_allclose(
+            stick[::7, ::7], solved["stick_fraction"], rtol=data.tolerance / STEPS, atol=1e-9
+        )
+
+
+@pytest.mark.slow
+def test_the_smallest_table_is_what_the_builder_makes(tmp_path: Path, sweep: Sweep) -> None:
+    again = build_table(tmp_path / "again.nc", 1e-4, sweep)
+    for old, new in zip(read_table(PATHS[0]).blocks, again.table.blocks, strict=True):
+        assert old.cells == new.cells
+        # the last digits depend on the processor's instructions
+        for name in old.nodes:
+            np.testing.assert_allclose(new.nodes[name], old.nodes[name], rtol=1e-12, atol=1e-14)
+            # of the differences between cells and model: 3 binary digits, rounded up
+            np.testing.assert_allclose(new.cell_errors[name], old.cell_errors[name], rtol=0.26)

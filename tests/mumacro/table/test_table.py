@@ -1,0 +1,474 @@
+"""The table file: every number comes back, everything else is refused by name, and a failed write
+loses nothing."""
+
+import os
+import shutil
+import signal
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+
+from builder.tables.build import STEPS, bits, to_bits, to_step
+from mumacro import InputError, Surrogate, TableError
+from mumacro.table import atlas
+from mumacro.table.atlas import BLOCK_NAMES, BORDER_PIECES, CHARTS
+from mumacro.table.atomic import BusyError, alone_in, write_whole
+from mumacro.table.blocks import Table
+from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, _digest, read_table, write_table
+from mumacro.table.polynomials import nodes
+from tests.support.cases import Array
+from tests.support.places import ROOT
+
+Edit = Callable[..., object]
+CORNER, BLOCK = BLOCK_NAMES.index("corner"), "border/blocks/corner"
+PLAIN = ("v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit")
+TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
+
+
+@pytest.fixture
+def sound() -> Table:
+    return read_table(TABLE)
+
+
+# --- refused files --------------------------------------------------------------------------------
+
+
+def group_renamed(path: str) -> Edit:
+    parent, _, last = path.rpartition("/")
+    return lambda root: root[parent].renameGroup(last, "elsewhere")
+
+
+def put(name: str, value: Any, group: str = BLOCK) -> Edit:
+    return lambda root: (root[group] if group else root).setncattr(name, value)
+
+
+def infinite(name: str) -> Edit:
+    return lambda root: root[name].__setitem__((0,) * root[name].ndim, np.inf)
+
+
+GROUPS = [
+    *(f"border/{name}" for name, *_ in BORDER_PIECES),
+    *(f"border/blocks/{name}" for name in BLOCK_NAMES),
+]
+OF_BLOCK = ("cells", "errors", "verified_max_abs_error", "verified_max_rel_error")
+#: what is changed in the file, without a new checksum -> why it is refused
+EDITS: dict[str, tuple[Edit, str]] = {
+    **{
+        f"no group {path}": (group_renamed(path), r"group '\w+' is missing in /border")
+        for path in GROUPS
+    },
+    **{
+        f"no {name}": (
+            lambda root, name=name: root.renameVariable(name, "renamed"),
+            f"variable '{name}' (is missing in /|in / is no float64 array)",
+        )
+        for name in PLAIN
+    },
+    "no value of the border": (
+        lambda root: root["border/low"].renameVariable("value", "values"),
+        "'value' is missing",
+    ),
+    **{
+        f"infinite {name}": (infinite(name), "holds non-finite values")
+        for name in ("mu_ratio", "border/mid/value", f"{BLOCK}/stick", "border/blocks/cell_errors")
+    },
+    **{
+        f"twice {name}": (
+            lambda root, name=name: put(name, 2 * np.asarray(root[BLOCK].getncattr(name)))(root),
+            r"the shape of 'cell_errors' is \(3, 40, 3\)" if name == "cells" else "checksum",
+        )
+        for name in OF_BLOCK
+    },
+    "an error that is not finite": (
+        put(OF_BLOCK[2], np.nan),
+        f"'{OF_BLOCK[2]}' of /{BLOCK} is not 1 finite",
+    ),
+    **{
+        f"no attribute {name}": (
+            lambda root, name=name: root[BLOCK].delncattr(name),
+            f"attribute '{name}' of /{BLOCK} is missing",
+        )
+        for name in OF_BLOCK
+    },
+    **{
+        f"{name} = {value}": (
+            put(name, value),
+            f"'{name}' of /{BLOCK} is not|cells must be|'errors' is negative",
+        )
+        for name in ("cells", "errors")
+        for value in ("many", 1.5, [1.0, 2.0, 3.0], np.nan, -1.0)
+    },
+    **{
+        f"quantities {names}": (
+            put("quantities", names, ""),
+            "'quantities' is .*this program knows mu_ratio, power",
+        )
+        for names in ("power mu_ratio", "mu_ratio mu_ratio", "mu_ratio warmth")
+    },
+    "no quantities": (
+        put("quantities", "", ""),
+        "'quantities' is .*this program knows mu_ratio, power",
+    ),
+    "no attribute quantities": (
+        lambda root: root.delncattr("quantities"),
+        "'quantities' is .*program knows mu_ratio",
+    ),
+    "no cell_errors": (
+        lambda root: root["border/blocks"].renameVariable("cell_errors", "gone"),
+        "is missing in",
+    ),
+    **{
+        f"version {version}": (
+            put("format_version", version, ""),
+            r"format version .*, this program reads 3",
+        )
+        for version in (np.int32(0), np.int32(2), np.int32(99), "one", np.array([1, 2]))
+    },
+    **{
+        f"{name} = {value}": (put(name, value, ""), f"'{name}'.* (has a negative number|is not)")
+        for name in ("verified_error_quantiles", "verified_bound_over_error")
+        for value in ("many", [1.0, 2.0], np.full(64, -1.0))
+    },
+    "a negative error among the shares": (
+        put("verified_error_quantiles", np.full(24, -1.0), ""),
+        "'verified_error_quantiles' has a negative number",
+    ),
+    "shares of errors without the shares": (
+        lambda root: root.delncattr("verified_quantiles"),
+        "'verified_quantiles' of / is missing",
+    ),
+    "no version": (lambda root: root.delncattr("format_version"), "not a mumacro table"),
+    "a changed value": (lambda root: root[f"{BLOCK}/value"].__setitem__((0, 0), 0.5), "checksum"),
+    "a smaller tolerance": (put("tolerance", 1e-15, ""), "checksum"),
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edited_file_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    change, reason = EDITS[name]
+    path = Path(shutil.copy(TABLE, tmp_path / "copy.nc"))
+    with netCDF4.Dataset(str(path), "a") as root:
+        change(root)
+    with pytest.raises(TableError, match=reason) as caught:
+        Surrogate.open(path)
+    assert str(path) in str(caught.value)
+
+
+def of_axis(index: int, axis: str) -> Edit:
+    # the last digit may be that of another mathematical library
+    own = getattr(CHARTS[index], axis)
+    off = 2e-15 * max(abs(own.low), abs(own.high))
+    return lambda table: getattr(table.blocks[index], axis).__setitem__(
+        0, getattr(table.blocks[index], axis)[0] + off
+    )
+
+
+CELLS = f"cells must be whole numbers from 1 to {MOST_CELLS}"
+#: what is changed before the file is written with a checksum that fits -> why it is refused
+SIGNED: dict[str, tuple[Edit, str]] = {
+    **{
+        f"{axis} of {chart.name}": (
+            of_axis(i, axis),
+            f"{chart.name}: the nodes of '{getattr(chart, axis).name}' are not those of this "
+            "program's",
+        )
+        for i, chart in enumerate(CHARTS)
+        for axis in ("a", "b")
+    },
+    **{
+        f"nodes of the border {name}": (
+            lambda table, i=i: table.border[i].nodes.__imul__(1.0 + 2e-14),
+            r"the nodes of .* are not those of this",
+        )
+        for i, (name, *_) in enumerate(BORDER_PIECES)
+    },
+    **{
+        f"{cells} cells of the border": (
+            lambda table, n=cells: setattr(table.border[1], "cells", n),
+            CELLS,
+        )
+        for cells in (0, -1, 5000, 10**9)
+    },
+    **{
+        f"{cells} cells of a block": (
+            lambda table, n=cells: setattr(table.blocks[CORNER], "cells", (2, n)),
+            CELLS,
+        )
+        for cells in (0, -1, 5000, 10**9)
+    },
+    "a negative error": (
+        lambda table: table.blocks[CORNER].cell_errors["power"].__setitem__((0, 1), -1e-300),
+        "an error in 'cell_errors' is negative",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SIGNED)
+def test_what_this_program_does_not_use_is_refused_if_signed(
+    tmp_path: Path, sound: Table, name: str
+) -> None:
+    change, reason = SIGNED[name]
+    change(sound)
+    write_table(sound, tmp_path / "foreign.nc")
+    with pytest.raises(TableError, match=reason):
+        read_table(tmp_path / "foreign.nc")
+
+
+MID = CHARTS[BLOCK_NAMES.index("stick_slip_mid")]
+#: a chart of another release -> what this one says of its table
+ATLASES = {
+    "moved seam": (
+        replace(MID, a=replace(MID.a, high=MID.a.high * 1.25)),
+        "stick_slip_mid: range_of_a is",
+    ),
+    "another quantity": (
+        replace(MID, quantity="mu_ratio^2"),
+        "stick_slip_mid: quantity is 'mu_ratio.2'",
+    ),
+    "another regime": (
+        replace(MID, regime=1 - MID.regime),
+        "stick_slip_mid: regime is 'continuous'",
+    ),
+    "another name": (
+        replace(MID, name="middle"),
+        "group 'stick_slip_mid' is missing in /border/blocks",
+    ),
+    "another axis": (replace(MID, b=replace(MID.b, name="inverse_y")), "variable .* is missing"),
+}
+
+
+@pytest.mark.parametrize("change", [*ATLASES, "another border"])
+def test_another_atlas_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sound: Table, change: str
+) -> None:
+    """A release with other charts writes a table that is valid there; this one refuses it and names
+    the difference."""
+    path, index = tmp_path / "other.nc", CHARTS.index(MID)
+    new, told = ATLASES.get(change, (MID, "high: range is"))
+    part, (name, axis, quantity) = sound.blocks[index], BORDER_PIECES[2]
+    for held in (part.nodes, part.cell_errors):  # the stick fraction, in stick-slip only
+        if not new.holds(atlas.QUANTITIES[2]):
+            del held["stick_fraction"]
+    part.a, part.b = (
+        nodes(x.size, axis.low, axis.high) for x, axis in ((part.a, new.a), (part.b, new.b))
+    )
+    with monkeypatch.context() as other:
+        other.setattr(atlas, "CHARTS", (*CHARTS[:index], new, *CHARTS[index + 1 :]))
+        other.setattr(atlas, "BLOCK_NAMES", tuple(chart.name for chart in atlas.CHARTS))
+        if change == "another border":
+            wider = replace(axis, high=2.0 * axis.high)
+            sound.border[2].nodes = nodes(sound.border[2].nodes.size, wider.low, wider.high)
+            other.setattr(atlas, "BORDER_PIECES", (*BORDER_PIECES[:2], (name, wider, quantity)))
+        checksum = write_table(sound, path)
+        assert read_table(path).attributes["content_sha256"] == checksum
+    with pytest.raises(TableError, match=told):
+        read_table(path)
+
+
+def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
+    kinds: Any = (("foreign.nc", "NETCDF4"), ("classic.nc", "NETCDF3_CLASSIC"))
+    for name, kind in kinds:
+        with netCDF4.Dataset(str(tmp_path / name), "w", format=kind) as root:
+            root.createDimension("x", 2)
+    (tmp_path / "text.nc").write_text("mu_macro,0.3\n")
+    with (tmp_path / "large.nc").open("wb") as stream:
+        stream.truncate(MOST_BYTES + 1)
+    for name, reason in (
+        ("text.nc", "not a readable"),
+        ("foreign.nc", "not a mumacro table"),
+        ("no.nc", "no such file"),
+        ("", "no such file"),
+        ("classic.nc", "not a (mumacro|readable netCDF-4) table"),
+        ("large.nc", "more than any"),
+    ):
+        with pytest.raises(TableError, match=reason):
+            Surrogate.open(tmp_path / name)
+
+
+# --- the checksum, older tables -------------------------------------------------------------------
+
+
+def test_one_checksum_covers_every_number_that_takes_part(sound: Table) -> None:
+    def shift(x: Array) -> None:
+        x.flat[x.size // 2] = np.nextafter(x.flat[x.size // 2], np.inf)
+
+    def changes() -> Iterator[Edit]:
+        for name in PLAIN:
+            yield lambda t, name=name: shift(getattr(t, name))
+        yield lambda t: t.attributes.update(tolerance=2e-4)
+        for i in range(len(BORDER_PIECES)):
+            yield lambda t, i=i: shift(t.border[i].values)
+            yield lambda t, i=i: setattr(t.border[i], "cells", t.border[i].cells + 1)
+            yield lambda t, i=i: setattr(t.border[i], "max_rel_error", 1e-3)
+        for i in range(len(CHARTS)):
+            for name in sound.blocks[i].nodes:
+                yield lambda t, i=i, name=name: shift(t.blocks[i].nodes[name])
+                yield lambda t, i=i, name=name: shift(t.blocks[i].cell_errors[name])
+            for name in sound.quantities:
+                for k in range(3):
+                    yield (
+                        lambda t, i=i, name=name, k=k: (
+                            t.blocks[i].errors[name].__setitem__(k, 0.123)
+                        )
+                    )
+            yield lambda t, i=i: setattr(
+                t.blocks[i], "cells", (t.blocks[i].cells[0], t.blocks[i].cells[1] + 1)
+            )
+            yield lambda t, i=i: setattr(t.blocks[i], "max_abs_error", 0.5)
+            yield lambda t, i=i: setattr(t.blocks[i], "max_rel_error", 0.5)
+
+    seen = {_digest(sound)}
+    sound.attributes["title"] = "a corrected title"
+    assert seen == {_digest(sound)}
+    for count, change in enumerate(changes(), 2):
+        table = deepcopy(sound)
+        change(table)
+        seen.add(_digest(table))
+        assert len(seen) == count
+    assert len(seen) > 150
+
+
+def test_an_older_table_that_states_no_distribution_of_its_errors_opens(
+    tmp_path: Path, sound: Table
+) -> None:
+    assert Surrogate(sound, TABLE).error_distribution.keys() >= {"mu_ratio", "border"}
+    for name in ("quantiles", "quantities", "error_quantiles", "bound_over_error"):
+        del sound.attributes[f"verified_{name}"]
+    write_table(sound, tmp_path / "older.nc")
+    older = Surrogate.open(tmp_path / "older.nc")
+    assert older.error_distribution == {}
+    assert older.checksum == Surrogate.open(TABLE).checksum
+
+
+def test_tables_with_fewer_quantities_open(tmp_path: Path, sound: Table) -> None:
+    fewer = deepcopy(sound)
+    fewer.attributes["quantities"] = "mu_ratio stick_fraction"
+    for block in fewer.blocks:
+        del block.nodes["power"], block.cell_errors["power"]
+    rng, now = np.random.default_rng(4), Surrogate.open(TABLE)
+    v, y = 10.0 ** rng.uniform(-6.0, 4.0, 3000), 10.0 ** rng.uniform(-4.0, 6.0, 3000)
+    write_table(fewer, tmp_path / "other.nc")
+    opened = Surrogate.open(tmp_path / "other.nc")
+    assert opened.table.quantities == ["mu_ratio", "stick_fraction"]
+    for name in opened.table.quantities:
+        for ours, theirs in zip(opened.quantity(name, v, y), now.quantity(name, v, y), strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+        np.testing.assert_array_equal(
+            opened.slopes(v, y, name, bounds=True), now.slopes(v, y, name, bounds=True)
+        )
+    with pytest.raises(InputError, match="name must be one of mu_ratio, stick_fraction"):
+        opened.power(0.1, 0.5)
+    with pytest.raises(InputError, match="of must be one of mu_ratio, stick_fraction"):
+        opened.slopes(0.1, 0.5, of="power")
+
+
+# --- writing --------------------------------------------------------------------------------------
+
+
+def test_every_number_comes_back_and_the_same_numbers_give_the_same_bytes(
+    tmp_path: Path, sound: Table
+) -> None:
+    one, two = tmp_path / "one.nc", tmp_path / "two.nc"
+    before = sound.attributes["content_sha256"]
+    assert write_table(sound, one) == before
+    assert write_table(read_table(TABLE), two) == before
+    assert one.read_bytes() == two.read_bytes()
+    # with the checksum, which covers every number, see above
+    np.testing.assert_equal(read_table(one).attributes, sound.attributes)
+    assert one.stat().st_mode & 0o777 == 0o644
+
+
+def test_a_write_that_fails_half_way_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, sound: Table
+) -> None:
+    """A limit on file sizes simulates a full disk."""
+    resource = pytest.importorskip("resource")
+    path = tmp_path / "table.nc"
+    path.write_bytes(b"before")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        with pytest.raises(TableError, match=r"table\.nc: cannot be (made|written)"):
+            write_table(sound, path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("table.nc", b"before")]
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_an_interrupted_write_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    def stop(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    write_whole(tmp_path / "a", b"old")
+    with monkeypatch.context() as patch:
+        patch.setattr(os, call, stop)
+        with pytest.raises(KeyboardInterrupt):
+            write_whole(tmp_path / "a", b"new")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a", b"old")]
+
+
+def test_where_no_table_can_be_written_nothing_is_left(tmp_path: Path, sound: Table) -> None:
+    (tmp_path / "taken.nc").mkdir()
+    for out in ("taken.nc", "no/such/table.nc"):
+        with pytest.raises(TableError, match="cannot be written"):
+            write_table(sound, tmp_path / out)
+    assert [path.name for path in tmp_path.rglob("*")] == ["taken.nc"]
+
+
+def test_a_folder_of_unfinished_work_has_one_user_and_is_given_back_at_the_end(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "work"
+    with alone_in(folder):
+        with pytest.raises(BusyError, match="another process is at work here"), alone_in(folder):
+            pass
+        (folder / "part").touch()
+    assert folder.is_dir()  # unfinished work is kept
+    with alone_in(folder):
+        (folder / "part").unlink()
+    assert not folder.exists()
+
+
+# --- rounding -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def values() -> Array:
+    rng = np.random.default_rng(3)
+    return np.concatenate(
+        [rng.uniform(-6.0, 6.0, 500), 10.0 ** rng.uniform(-9.0, 0.0, 500), [0.0, 1.0, -1.0]]
+    )
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 3.3e-8, 1e-12])
+def test_steps_are_powers_of_two_within_the_tolerance(values: Array, tolerance: float) -> None:
+    step = 2.0 ** -bits(tolerance)
+    assert step <= tolerance / STEPS < 2.0 * step
+    rounded = to_step(values, tolerance)
+    assert np.abs(rounded - values).max() <= 0.5 * step
+    assert np.all(rounded / step == np.rint(rounded / step))
+    assert np.array_equal(to_step(-rounded, tolerance), -rounded)
+
+
+@pytest.mark.parametrize("digits", [3, 22, 48])
+def test_digits_are_kept_at_every_size(values: Array, digits: int) -> None:
+    near, above = to_bits(values, digits), to_bits(values, digits, up=True)
+    size = np.abs(values)
+    assert np.all(np.abs(near - values) <= 2.0**-digits * size)
+    assert np.all((np.abs(above) >= size) & (np.abs(above) <= size * (1.0 + 2.0 ** (1 - digits))))
+    assert np.all(np.sign(above) == np.sign(values))
+    for rounded in (near, above):
+        mantissa = np.ldexp(np.frexp(rounded)[0], digits)
+        assert np.array_equal(mantissa, np.rint(mantissa))
+    assert np.all(np.diff(near[np.argsort(values)]) >= 0.0)

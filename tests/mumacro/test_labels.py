@@ -1,0 +1,393 @@
+"""Labels are kept: pandas, xarray and Dask objects in, the same types out; Dask stays lazy until
+compute()."""
+
+import math
+import os
+import signal
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from mumacro import REGIMES, SOURCES, InputError, Surrogate
+from mumacro.inputs.fields import FIELDS
+from tests.support.cases import CASE, Case, tables
+
+N = 60
+VALUES = (
+    "mu_macro",
+    "mu_ratio",
+    "error_bound",
+    "source_code",
+    "v_tilde",
+    "y_tilde",
+    "length_scale",
+)
+ALL = (*VALUES, "regime", "source", "regime_code", "regime_certain")
+table = tables(1e-7)
+
+
+def columns(n: int = N) -> Case:
+    """Cases of every regime, including rigid and illegal ones."""
+    rng = np.random.default_rng(5)
+    found = {name: np.full(n, value) for name, value in CASE.items()}
+    found["v0"] = 10.0 ** rng.uniform(-4.0, 0.0, n)
+    found["y0"] = 10.0 ** rng.uniform(-7.0, -5.0, n)
+    found["k"][::7] = math.inf
+    found["v0"][::11] = 0.0
+    found["mu0"][3] = -0.3
+    found["v0"][5] = math.nan
+    return found
+
+
+def same(found: Any, expected: Any) -> None:
+    """Two answers have the same values, for any array type; the expected ones are plain arrays."""
+    for name in (*VALUES, "regime_code", "regime_certain"):
+        np.testing.assert_array_equal(
+            np.asarray(getattr(found, name)), getattr(expected, name), err_msg=name
+        )
+    for name in ("gradient", "gradient_bound"):
+        for field in FIELDS:
+            np.testing.assert_array_equal(
+                np.asarray(getattr(found, name)[field]), getattr(expected, name)[field]
+            )
+
+
+# --- pandas ---------------------------------------------------------------------------------------
+
+
+def test_series_give_series_with_their_index(table: Surrogate) -> None:
+    index = pd.Index([f"case {i}" for i in range(N)], name="which")
+    frame = pd.DataFrame(columns(), index=index)
+    expected = table.evaluate(columns(), gradient=True)
+    found = table.evaluate(**{name: frame[name] for name in FIELDS}, gradient=True)
+    same(found, expected)
+    for name in ALL:
+        values = getattr(found, name)
+        assert isinstance(values, pd.Series), name
+        assert values.index.equals(index), name
+    assert found.gradient["v0"].index.equals(index)
+    assert found.source_code.dtype == found.regime_code.dtype == np.int8
+    assert found.regime_certain.dtype == bool
+
+
+def test_regime_and_source_of_pandas_are_categories_without_one_for_illegal_cases(
+    table: Surrogate,
+) -> None:
+    found = table.evaluate(pd.DataFrame(columns()))
+    expected = table.evaluate(columns())
+    assert list(found.columns) == ["mu_macro", "mu_ratio", "regime", "error_bound", "source"]
+    for name, kinds in (("regime", REGIMES), ("source", SOURCES)):
+        assert isinstance(found[name].dtype, pd.CategoricalDtype)
+        assert list(found[name].cat.categories) == list(kinds)
+        assert found[name].astype(object).fillna("").tolist() == getattr(expected, name).tolist()
+        assert found[name].isna().tolist() == (expected.source_code == -1).tolist()
+    np.testing.assert_array_equal(found["mu_macro"], expected.mu_macro)
+    assert found.groupby("regime", observed=True)["mu_ratio"].count().sum() == N - 2
+
+
+@pytest.mark.parametrize("index", ["dates", "two levels", "repeated", "empty"])
+def test_a_frame_gives_a_frame_with_its_index(table: Surrogate, index: str) -> None:
+    n = 0 if index == "empty" else N
+    at = {
+        "dates": pd.date_range("2020-01-01", periods=N, freq="h"),
+        "two levels": pd.MultiIndex.from_product(
+            [range(N // 2), ["left", "right"]], names=["trial", "side"]
+        ),
+        "repeated": pd.Index([1] * N),
+        "empty": pd.RangeIndex(0),
+    }[index]
+    frame = pd.DataFrame(
+        {**{name: values[:n] for name, values in columns().items()}, "note": ["x"] * n}, index=at
+    )
+    found = table.evaluate(frame)
+    assert found.index.equals(at)
+    np.testing.assert_array_equal(found["mu_ratio"], table.evaluate(columns()).mu_ratio[:n])
+    assert "note" in frame  # ignored
+    assert "note" not in found
+
+
+def test_numbers_and_arrays_go_beside_series(table: Surrogate) -> None:
+    index = pd.Index(range(10, 10 + N))
+    given = columns()
+    v0 = pd.Series(given["v0"], index=index)
+    expected = table.evaluate({**CASE, "v0": given["v0"], "k": given["k"], "mu0": 0.3})
+    found = table.evaluate(**{**CASE, "v0": v0, "k": given["k"]})
+    np.testing.assert_array_equal(found.mu_macro.to_numpy(), expected.mu_macro)
+    assert found.mu_macro.index.equals(index)
+    rigid = table.evaluate(**{**CASE, "v0": v0, "k": "rigid"})
+    np.testing.assert_array_equal(
+        rigid.mu_macro, table.evaluate({**CASE, "v0": given["v0"], "k": "rigid"}).mu_macro
+    )
+    frequency = table.evaluate(pd.DataFrame({"v0": v0, "f": 2e4}), mu0=0.3, Fz=10.0, k=1e6, y0=2e-6)
+    expected = table.evaluate(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=2e4, v0=given["v0"])
+    np.testing.assert_array_equal(frequency["mu_macro"], expected.mu_macro)
+
+
+def test_integers_and_missing_values_of_pandas(table: Surrogate) -> None:
+    for v0 in (pd.Series([1, None, 3], dtype="Int64"), pd.Series([1.0, None, 3.0])):
+        found = table.evaluate(**{**CASE, "v0": v0})
+        assert (
+            found.mu_macro.isna().tolist()
+            == (found.source_code == -1).tolist()
+            == [False, True, False]
+        )
+        assert found.mu_macro[0] == table.evaluate(**{**CASE, "v0": 1.0}).mu_macro
+
+
+def test_indexes_that_differ_are_refused(table: Surrogate) -> None:
+    one, two = pd.Series([0.01, 0.02]), pd.Series([10.0, 10.0], index=[1, 2])
+    with pytest.raises(InputError, match="indexed as the other inputs") as caught:
+        table.evaluate(**{**CASE, "Fz": two, "v0": one})
+    assert caught.value.field == "v0"
+    with pytest.raises(InputError):
+        table.evaluate(**{**CASE, "Fz": pd.Series([1.0, 2.0, 3.0]), "v0": one})
+    with pytest.raises(InputError):
+        table.evaluate(**{**CASE, "Fz": np.ones(3), "v0": one})
+
+
+def test_policies_hold_for_labels_too(table: Surrogate) -> None:
+    frame = pd.DataFrame(columns())
+    with pytest.raises(InputError, match=r"mu0 at index 3 must be finite and > 0, got -0.3"):
+        table.evaluate(frame, illegal="raise")
+    with pytest.raises(InputError, match=r"^Fz must be given"):
+        table.evaluate(frame.drop(columns="Fz"))
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
+        table.evaluate(frame, v0=1.0)
+    with pytest.raises(InputError, match=r"^v0 must be a real number"):
+        table.evaluate(frame.assign(v0="fast"))
+    with pytest.raises(InputError, match="objects of one library"):
+        table.evaluate(**{**CASE, "v0": pd.Series([0.1]), "Fz": xr.DataArray([1.0])})
+
+
+# --- xarray ---------------------------------------------------------------------------------------
+
+
+def plane() -> dict[str, xr.DataArray]:
+    given = columns()
+    v0 = xr.DataArray(
+        given["v0"],
+        dims="speed",
+        coords={"speed": np.arange(N), "hour": ("speed", np.arange(N) / 4)},
+    )
+    k = xr.DataArray([1e5, 1e6, math.inf, -1.0], dims="spring", coords={"spring": list("abcd")})
+    return {"v0": v0, "k": k}
+
+
+def test_data_arrays_broadcast_by_name_and_keep_their_coordinates(table: Surrogate) -> None:
+    given = plane()
+    found = table.evaluate(**{**CASE, **given}, gradient=True)
+    expected = table.evaluate(
+        {**CASE, "v0": given["v0"].values[:, None], "k": given["k"].values[None, :]}, gradient=True
+    )
+    dims = found.mu_macro.dims
+    assert set(dims) == {"speed", "spring"}
+
+    def turned(x: xr.DataArray) -> Any:
+        return x.transpose("speed", "spring").values
+
+    np.testing.assert_array_equal(turned(found.gradient["v0"]), expected.gradient["v0"])
+    np.testing.assert_array_equal(turned(found.gradient_bound["k"]), expected.gradient_bound["k"])
+    for name in ALL:
+        values = getattr(found, name)
+        np.testing.assert_array_equal(turned(values), getattr(expected, name))
+        assert values.dims == dims
+        assert values.spring.values.tolist() == list("abcd")
+        assert "hour" in values.coords
+
+
+def test_a_dataset_gives_a_dataset(table: Surrogate) -> None:
+    data = xr.Dataset(
+        {**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane(), "note": 1.0}
+    )
+    found = table.evaluate(data)
+    assert isinstance(found, xr.Dataset)
+    assert set(found) == {"mu_macro", "mu_ratio", "regime", "error_bound", "source"}
+    assert dict(found.sizes) == {"speed": N, "spring": 4}
+    one = found.sel(speed=7, spring="b")
+    expected = table.evaluate(**{**CASE, "v0": float(data.v0[7]), "k": 1e6})
+    assert float(one.mu_macro) == expected.mu_macro
+    assert str(one.source.values) == expected.source
+
+
+def test_coordinates_and_chunks_that_do_not_fit_are_refused(table: Surrogate) -> None:
+    da = pytest.importorskip("dask.array")
+    with pytest.raises(InputError, match="align them first"):
+        table.evaluate(**{**CASE, "v0": da.ones(3), "Fz": da.ones(2)})
+    one = xr.DataArray([0.01, 0.02, 0.03], dims="x", coords={"x": [0, 1, 2]})
+    two = xr.DataArray([10.0, 20.0, 30.0], dims="x", coords={"x": [1, 2, 3]})
+    with pytest.raises(InputError, match="align them first"):
+        table.evaluate(**{**CASE, "v0": one, "Fz": two})
+
+
+# --- Dask -----------------------------------------------------------------------------------------
+
+
+def no_compute(*_: Any, **__: Any) -> Any:
+    raise AssertionError("computed before it was asked to")
+
+
+def test_dask_arrays_stay_lazy_and_keep_their_chunks(table: Surrogate) -> None:
+    da = pytest.importorskip("dask.array")
+    dask = pytest.importorskip("dask")
+    given = columns()
+    chunks = (17, 20, 23)
+    lazy = {name: da.from_array(values, chunks=(chunks,)) for name, values in given.items()}
+    expected = table.evaluate(given, gradient=True)
+    with dask.config.set(scheduler=no_compute):
+        found = table.evaluate(**lazy, gradient=True)
+        for name in ALL:
+            assert isinstance(getattr(found, name), da.Array), name
+            assert getattr(found, name).chunks == (chunks,), name
+            assert getattr(found, name).shape == (N,)
+        with pytest.raises(AssertionError, match="computed before"):
+            found.mu_macro.compute()
+    with dask.config.set(scheduler="threads"):
+        same(found, expected)
+        assert found.mu_macro.dtype == np.float64
+        assert found.source_code.dtype == np.int8
+        assert found.source.compute().tolist() == expected.source.tolist()
+        assert found.regime.compute().tolist() == expected.regime.tolist()
+
+
+def test_a_dask_dataset_stays_lazy(table: Surrogate) -> None:
+    dask = pytest.importorskip("dask")
+    data = xr.Dataset(
+        {**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane()}
+    ).chunk(speed=13)
+    with dask.config.set(scheduler=no_compute):
+        found = table.evaluate(data)
+        assert found.mu_macro.chunks is not None
+        assert found.source.chunks is not None
+    whole = table.evaluate(data.compute())
+    with dask.config.set(scheduler="threads"):
+        xr.testing.assert_identical(found.compute(), whole)
+
+
+def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surrogate) -> None:
+    da = pytest.importorskip("dask.array")
+    v0 = da.from_array(np.array([0.01, -1.0, 0.02]), chunks=2)
+    found = table.evaluate(**{**CASE, "v0": v0}, illegal="raise")
+    with pytest.raises(InputError, match="v0 at index 1"):
+        found.mu_macro.compute(scheduler="threads")
+    assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [
+        False,
+        True,
+        False,
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_loses_a_worker_gives_the_same_bits(table: Surrogate) -> None:
+    dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
+    v0 = xr.DataArray(np.geomspace(1e-4, 1.0, 40_000), dims="case")
+    whole = table.evaluate(**{**CASE, "v0": v0})
+    lazy = table.evaluate(**{**CASE, "v0": v0.chunk(case=1000)}).mu_macro
+    options = {
+        "n_workers": 2,
+        "threads_per_worker": 1,
+        "dashboard_address": None,
+        "host": "127.0.0.1",
+    }
+    # forked workers need not load everything again
+    start = "fork" if hasattr(os, "fork") else "spawn"
+    with (
+        dask.config.set({"distributed.worker.multiprocessing-method": start}),
+        distributed.LocalCluster(processes=True, **options) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        numbers = client.run(os.getpid)
+        chunks = distributed.futures_of(begun := client.persist(lazy))
+        distributed.wait(chunks, timeout=300, return_when="FIRST_COMPLETED")
+        (keeper, *_), *_ = (places for places in client.who_has(chunks).values() if places)
+        assert not all(chunk.done() for chunk in chunks)
+        os.kill(numbers[keeper], signal.SIGKILL)  # what it has computed so far is lost
+        np.testing.assert_array_equal(begun.compute().values, whole.mu_macro.values)
+        assert keeper not in client.run(os.getpid)
+
+
+# --- names and units; other tables ----------------------------------------------------------------
+
+
+def test_results_of_xarray_have_names_and_units_of_their_own(table: Surrogate) -> None:
+    v0 = xr.DataArray(
+        [0.01, 0.02], dims="t", name="v0", attrs={"units": "m/s", "long_name": "sliding speed"}
+    )
+    found = table.evaluate(**{**CASE, "v0": v0}, gradient=True)
+    names = ALL
+    arrays = {name: getattr(found, name) for name in names}
+    arrays |= {f"d_mu_macro_d_{name}": slope for name, slope in found.gradient.items()}
+    arrays |= {f"d_mu_macro_d_{name}_bound": bound for name, bound in found.gradient_bound.items()}
+    for name, array in arrays.items():
+        assert array.name == name
+        assert set(array.attrs) == {"units", "long_name"}
+        assert array.attrs["long_name"] != "sliding speed"
+    units = {
+        name: array.attrs["units"] for name, array in arrays.items() if array.attrs["units"] != "1"
+    }
+    per = {"Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}
+    expected = {
+        f"d_mu_macro_d_{name}{end}": unit for name, unit in per.items() for end in ("", "_bound")
+    }
+    assert units == {**expected, "length_scale": "m"}
+    data = table.evaluate(xr.Dataset({**CASE, "v0": v0}))
+    assert data.mu_macro.attrs == found.mu_macro.attrs
+    assert v0.attrs["units"] == "m/s"  # the input is as it was
+
+
+def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
+    frames = pytest.importorskip("dask.dataframe")
+    frame = pd.DataFrame({**columns(), "note": "x"}).drop(columns="Fz")
+    lazy = frames.from_pandas(frame, npartitions=3)
+    found = table.evaluate(lazy, Fz=10.0)
+    assert isinstance(found, frames.DataFrame)
+    assert found.npartitions == 3
+    pd.testing.assert_frame_equal(
+        found.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0)
+    )
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
+        table.evaluate(lazy, Fz=10.0, v0=0.01)
+    with pytest.raises(InputError, match=r"^Fz must be given"):
+        table.evaluate(lazy)
+    with pytest.raises(InputError, match=r"^v0 must be a Dask array: .to_dask_array"):
+        table.evaluate(**{**CASE, "v0": lazy["v0"]})
+
+
+@pytest.mark.parametrize("kind", ["pyarrow.table", "pyarrow.record_batch"])
+def test_columns_of_arrow_tables_give_arrays(table: Surrogate, kind: str) -> None:
+    library, name = kind.split(".")
+    make: Any = getattr(pytest.importorskip(library), name)
+    given = {name: values.tolist() for name, values in columns().items()}
+    given["v0"][7] = None
+    given["omega"] = [130_000] * N
+    expected = columns()
+    expected["v0"][7] = math.nan
+    want = table.evaluate(expected, gradient=True)
+    found = table.evaluate(make(given), gradient=True)
+    same(found, want)
+    same(table.evaluate(**{name: make(given)[name] for name in given}, gradient=True), want)
+    assert isinstance(found.mu_macro, np.ndarray)
+    words = make({**given, "k": ["rigid"] * N})
+    np.testing.assert_array_equal(
+        table.evaluate(words).mu_macro, table.evaluate({**expected, "k": math.inf}).mu_macro
+    )
+    rigid = table.evaluate(**{**given, "k": words["k"], "v0": 0.01}).mu_macro
+    np.testing.assert_array_equal(
+        rigid, table.evaluate({**expected, "k": math.inf, "v0": 0.01}).mu_macro
+    )
+    gap = make({"k": [None, 1e6]})["k"]
+    assert np.isnan(table.evaluate(**{**CASE, "k": gap}).mu_macro).tolist() == [True, False]
+
+
+def test_a_stream_of_arrow_is_read_once(table: Surrogate) -> None:
+    pa = pytest.importorskip("pyarrow")
+    rows = pa.table(
+        {**{name: [value] * 3 for name, value in CASE.items()}, "v0": [0.01, 0.02, None]}
+    )
+    found = table.evaluate(rows.to_reader(max_chunksize=2)).mu_macro
+    np.testing.assert_array_equal(
+        found, table.evaluate({**CASE, "v0": np.array([0.01, 0.02, math.nan])}).mu_macro
+    )

@@ -1,0 +1,133 @@
+"""The scripts of benchmarks/: each runs, its tables are right, and results are stored where they
+belong."""
+
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks import measuring, tables_readme
+from tests.support.cases import Capture
+from tests.support.places import ROOT
+
+Row = dict[str, str]
+
+
+def run(script: str, *arguments: str) -> list[list[Row]]:
+    """The tables that a script of benchmarks/ prints, in a separate process, from the root."""
+    command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), *arguments]
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return tables(done.stdout)
+
+
+def tables(text: str) -> list[list[Row]]:
+    """Every Markdown table in ``text``, rows as mappings from the header; unequal lengths are an
+    error."""
+    found: list[list[Row]] = []
+    for block in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE):
+        header, rule, *rows = (
+            [cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines()
+        )
+        assert all(re.fullmatch(r"-+:?", cell) for cell in rule)
+        found.append([dict(zip(header, row, strict=True)) for row in rows])
+    return found
+
+
+def test_a_result_is_put_between_its_markers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- begin times -->\n\nold\n\n<!-- end times -->\nafter\n", "utf-8")
+    monkeypatch.setattr(measuring, "PAGES", (page,))
+    monkeypatch.setattr(measuring, "RESULTS", tmp_path / "results")
+    monkeypatch.setattr(sys, "argv", ["benchmarks/trial.py", "--write", "--points", "7"])
+    sections = {"times": lambda points: f"{points} points", "other": lambda points: "elsewhere"}  # noqa: ARG005
+    measuring.main(None, sections, points=5)
+    stored = (tmp_path / "results" / "trial-times.md").read_text("utf-8")
+    assert stored.startswith("7 points\n\nTook 0.0 min. Machine: ")
+    assert (
+        page.read_text("utf-8")
+        == f"before\n<!-- begin times -->\n\n{stored}\n<!-- end times -->\nafter\n"
+    )
+    assert (tmp_path / "results" / "trial-other.md").exists()
+    assert "## other\n\nelsewhere" in capsys.readouterr().out
+    for short in ("--quick", "--share=0.5"):  # short runs are never stored
+        monkeypatch.setattr(sys, "argv", ["trial.py", "--write", short])
+        with pytest.raises(SystemExit):
+            measuring.main(None, {}, quick=False, share=1.0)
+        assert "--write stores full runs only" in capsys.readouterr().err
+
+
+def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
+    page = (ROOT / "tables" / "README.md").read_text("utf-8")
+    section = page.split("<!-- begin tables -->")[1].split("<!-- end tables -->")[0]
+    assert tables_readme.tables(build=False, workers=2).strip() in section
+
+
+SLOW = {"model", "angles", "stiffness", "cusp", "creep"}
+SECTIONS = [
+    pytest.param(section, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
+    for script in ("validation", "validity", "model_facts", "hard_cases")
+    for name, section in importlib.import_module(f"benchmarks.{script}").SECTIONS.items()
+]
+
+
+def check(found: list[list[Row]]) -> None:
+    assert found
+    assert all(found)
+    assert not {"nan", "inf", "-inf"} & {
+        cell for table in found for row in table for cell in row.values()
+    }
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_section_is_a_table_of_finite_numbers(section: Any) -> None:
+    check(tables(section()))
+
+
+SCRIPTS = ["calls --quick", "c_header --quick", "solver --quick"]
+SCRIPTS += ["error_distribution --share 0.002"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_a_script_prints_tables_of_finite_numbers(script: str) -> None:
+    check(run(*script.split()))
+
+
+@pytest.mark.slow
+def test_tables_keep_their_tolerance_where_plain_grids_do_not() -> None:
+    (comparison,) = run("speed_against_error", "--quick", "--rounds", "1")
+    check([comparison])
+    seen = []
+    for row in comparison:
+        if row["max abs error"] == "-":
+            continue
+        name, error = row["method"].strip("*"), float(row["max abs error"])
+        if name.startswith("mumacro-"):
+            assert 0.0 < error <= float(name.removeprefix("mumacro-"))
+            seen.append(name)
+        assert " x " not in row["data"] or error > 1e-3, (
+            "24 and 48 nodes a side cannot follow the border"
+        )
+    assert sorted(seen) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
+
+
+@pytest.mark.slow
+def test_picture_of_the_surface_is_drawn(tmp_path: Path) -> None:
+    assert run("surface", str(tmp_path / "surface.png")) == []
+    assert (tmp_path / "surface.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_picture_of_the_set_ups_is_the_sketch_of_the_page(tmp_path: Path) -> None:
+    """It is written anew where the sketch has changed: python benchmarks/setups.py."""
+    assert run("setups", str(tmp_path / "setups.svg")) == []
+    drawn = (tmp_path / "setups.svg").read_bytes()
+    assert drawn == (ROOT / "docs" / "img" / "setups.svg").read_bytes()

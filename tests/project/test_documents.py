@@ -1,0 +1,252 @@
+"""Documents: links lead somewhere, formulas survive GitHub, metadata and stated figures agree with
+the code."""
+
+import math
+import re
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import error_distribution, extended, validation, validity
+from mumacro import Surrogate, __version__
+from mumacro.analysis.approximations import APPROXIMATIONS, BORDERS, borders
+from tests.project.test_benchmarks import tables
+from tests.support.comparing import close
+from tests.support.documents import PAGES
+from tests.support.places import ROOT
+
+DOCS = ROOT / "docs"
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+CODE = re.compile(
+    r"^```.*?^```$|^(?:    .*\n)+|<!-- begin .*?<!-- end|`[^`\n]+`|<!--.*?-->",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+def name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub and the site make them."""
+    heads = re.findall(r"^#+ (.+)$", page.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_within_the_project_lead_somewhere(page: Path) -> None:
+    for link in LINK.findall(CODE.sub("", page.read_text("utf-8"))):
+        if link.startswith(("http://", "https://", "mailto:")):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{page.name}: {link}"
+        if anchor:
+            assert anchor in anchors(target), f"{page.name}: {link}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_github_strikes_nothing_through_and_eats_nothing(page: Path) -> None:
+    text = CODE.sub("", page.read_text("utf-8"))
+    assert re.findall(r".*~.*", text) == [], "a tilde outside of code and formulas"
+    assert re.findall(r"<(?!https?://|->)[\w/][^>\n]*>", text) == [], "a tag"
+    for formula in re.findall(r"\$([^$\n]+)\$", text):
+        assert not re.search(r"\\[^a-zA-Z]|\}_|\*|(?<!\\)<\w", formula), (
+            f"Markdown changes {formula}"
+        )
+
+
+def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Surrogate) -> None:
+    page = (DOCS / "python.md").read_text("utf-8")
+    seen = set()
+    for column, given, errors in re.findall(
+        r"^\| `(\w+)` \| .+ \| (.+) \| (.+ %.*) \|$", page, re.MULTILINE
+    ):
+        seen.add(column)
+        whole = (
+            (1e-4, 1.0) if r"\le 1" in given else (1.0, 1e8) if r"\ge 1" in given else (1e-4, 1e8)
+        )
+        for told in errors.split("; "):
+            ends = [*whole]
+            if inner := re.search(r"(up to|from) \$\\tilde\{y\} = ([\d.]+)\$", told):
+                ends[inner[1] == "up to"] = float(inner[2])
+            y = np.geomspace(ends[0], ends[1], 4001)
+            y[[0, -1]] = ends
+            off = np.abs(borders(y)[column] / surrogate.v_tilde_crit(y) - 1.0).max()
+            figure = float(re.findall(r"\d[\d.e-]*", told)[0])  # "12.6 %" is 0.126
+            assert (100.0 * off if "%" in told else off) == close(figure, rel=0.03), (
+                f"{column}: {told}"
+            )
+    assert seen == BORDERS.keys() - {"exact"}
+
+
+def cells(page: str, head: str) -> dict[str, list[str]]:
+    """The rows of the table whose first head begins so, by their first cells."""
+    (found,) = (table for table in tables(page) if next(iter(table[0])).startswith(head))
+    return {title: cells for title, *cells in (row.values() for row in found)}
+
+
+def test_the_deviations_of_the_border_are_those_of_the_page_on_validation() -> None:
+    shown = cells((DOCS / "validation.md").read_text("utf-8"), "deviation")
+    made = cells(validation.deviations(), "deviation")
+    for title, told in shown.items():
+        compared = [
+            (float(one), float(other))
+            for one, other in zip(told, made.pop(title), strict=True)
+            if one
+        ]
+        assert len(compared) >= 4, title  # the page leaves out what is far beyond a formula's range
+        for one, other in compared:
+            assert one == close(other, rel=6e-3, abs=5e-5), title
+    assert made.keys() == {"*exact v~crit*"}
+
+
+def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate: Surrogate) -> None:
+    page = (DOCS / "validity.md").read_text("utf-8")
+    pattern = r"the ball has ([\d.]+), one spring with \$k\$ ([\d.]+), with .* ([\d.]+): the ball"
+    ball, spring, softer = map(float, re.findall(pattern, page)[0])
+    assert surrogate.ratio_with_bound(0.05, 0.4, contact="ball")[0] == close(ball, abs=5e-5)
+    assert surrogate.mu_ratio(0.05, 0.4) == close(spring, abs=5e-5)
+    assert surrogate.mu_ratio(0.05 / 1.5, 0.4 / 1.5) == close(softer, abs=5e-5)
+    heads, told = re.findall(r"^\| (?:\$\\tilde\{y\}\$|difference) \| (.*) \|$", page, re.MULTILINE)
+    made = cells(validity.partial_slip(), "y~")
+    assert heads.split(" | ") == list(made)
+    assert [float(one) for one in told.split(" | ")] == close(
+        [float(one) for (one,) in made.values()], rel=0.15
+    )
+
+
+def test_the_folds_along_k_are_those_on_the_page(surrogate: Surrogate) -> None:
+    page = (DOCS / "http.md").read_text("utf-8")
+    pattern = r"above ([\d.]+) it has a minimum \(\$\\tilde\{y\}\$ from ([\d.]+) to ([\d.]+)\)"
+    born, first, last = map(float, re.findall(pattern, page)[0])
+    y = np.geomspace(2.0, 20.0, 4001)
+
+    def minimum(r: float) -> float:
+        rises = np.flatnonzero(np.diff(surrogate.mu_ratio(y / r, y)) > 0.0)
+        return float(y[rises[0]]) if rises.size else math.nan
+
+    found = np.array([minimum(r) for r in born + np.linspace(-0.005, 0.005, 101)])
+    assert np.isnan(found[0])
+    assert found[np.isfinite(found)][0] == close(last, abs=0.05)
+    assert minimum(1e8) == close(first, abs=0.05)
+
+
+def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(
+    surrogate: Surrogate,
+) -> None:
+    y = np.geomspace(1e-4, 1e8, 20_001)
+    text = (DOCS / "accuracy.md").read_text("utf-8")
+    told = re.findall(
+        r"up to ([\d.e-]+) with the tightest table, ([\d.e-]+\d) with the coarsest", text
+    )[0]
+    for table, bound in zip((surrogate, Surrogate.open(1e-4)), told, strict=True):
+        shares = (1.0, 1.0 - 1e-15, 1.0 + 1e-15)
+        largest = max(
+            table.stick_fraction_with_bound(share * table.v_tilde_crit(y), y)[1].max()
+            for share in shares
+        )
+        assert largest == close(float(bound), rel=0.05)
+
+
+def shown_distribution() -> dict[tuple[str, str, str], list[str]]:
+    """The figures of the page on accuracy by contact, quantity and table."""
+    page = (DOCS / "accuracy.md").read_text("utf-8")
+    (found,) = (table for table in tables(page) if "bound/error, median" in table[0])
+    rows = (list(row.values()) for row in found)
+    return {(contact, name, table): figures for contact, name, table, *figures in rows}
+
+
+def test_the_distribution_of_errors_on_the_page_is_what_the_tables_state() -> None:
+    shown = shown_distribution()
+    made = {(row[0], row[1], row[2]): row[3:] for row in error_distribution.spring_across()}
+    assert len(made) == 24
+    assert {place: shown[place] for place in made} == made
+    assert {contact for contact, *_ in shown} == {
+        "spring across",
+        "ball across",
+        "spring along",
+        "ball along",
+        "spring normal",
+    }
+    for place, (half, most, nearly, largest, least, *_) in shown.items():
+        assert float(half) <= float(most) <= float(nearly) <= float(largest), place
+        assert float(least.replace(",", "")) >= 1.0, place
+
+
+@pytest.mark.skipif(not extended.HAS_EXTENDED, reason="longdouble has the digits of a double here")
+@pytest.mark.parametrize("direction", ["along", "normal"])
+def test_the_distribution_of_a_springs_errors_is_that_on_the_page(direction: str) -> None:
+    shown = shown_distribution()
+    for contact, name, table, *figures in error_distribution.driven("spring", direction, 0.2):
+        compared = zip(figures[:2], shown[contact, name, table][:2], strict=True)
+        for one, other in compared:
+            assert float(one) == close(float(other), rel=0.3), name
+
+
+@pytest.mark.slow
+def test_the_distribution_of_a_balls_errors_is_that_on_the_page() -> None:
+    shown = shown_distribution()
+    for contact, name, table, *figures in error_distribution.ball_across(0.2):
+        there = shown[contact, name, table]
+        assert float(figures[3]) <= 10.0 * float(there[3]), (name, table)
+        assert float(figures[3]) > float(there[0]), (name, table)
+
+
+def test_every_test_that_the_threats_name_exists_and_every_line_names_one() -> None:
+    text = (DOCS / "operations.md").read_text("utf-8").partition("## Threats")[2]
+    named = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", text)
+    assert len(named) >= 30
+    for path, test in named:
+        assert re.search(rf"^def {test}\(", (ROOT / path).read_text("utf-8"), re.MULTILINE), (
+            f"{path}::{test}"
+        )
+    lines = [line for line in text.splitlines() if line.startswith("| ")]
+    assert len(lines) >= 20
+    assert [line for line in lines[2:] if "::" not in line] == []
+
+
+def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.MonkeyPatch) -> None:
+    from service.app import create_app
+    from service.settings import Settings
+
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(DOCS / "_ext")
+    from interface import _operations
+
+    text = "\n".join(_operations(create_app(Settings(tables=(ROOT / "tables",))).openapi()))
+    rows = re.findall(r"^\| `(\S+?)`(?:, required)? \| (.*?) \|", text, re.MULTILINE)
+    wanted = {
+        "power.saved",
+        "results[].roots[].settling.periods",
+        "border[].value",
+        "errors[].reason",
+    }
+    assert wanted <= {field for field, _ in rows}
+    # an object is followed by its fields, unless the description does not fix them
+    objects = (
+        (one, other)
+        for (one, kind), (other, _) in pairwise(rows)
+        if re.search(r"\bobject\b(?! of)", kind)
+    )
+    bare = {one for one, other in objects if not other.startswith(one)}
+    assert bare == {"attributes", "blocks"}
+
+
+def test_metadata_agrees_with_the_package() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    said = (
+        f"version: {__version__}\n",
+        f"license: {project['license']}\n",
+        f"title: {project['name']}\n",
+    )
+    assert [text for text in said if text not in citation] == []
+
+
+def test_the_columns_of_a_law_are_all_described() -> None:
+    page = (DOCS / "python.md").read_text("utf-8")
+    assert [column for column in (*APPROXIMATIONS, *BORDERS) if f"`{column}`" not in page] == []

@@ -1,0 +1,397 @@
+"""What the documents tell a reader to run is run, or the page says that it is not
+(tests/support/documents.py).
+
+Commands and sessions run unchanged, those of a page in one scratch folder and in its order.
+README and tutorial have what `pip install .` gives; the other pages, and commands that start the
+service, have the wheel and the packages of the running environment, for extras.
+What another check runs is in ``ELSEWHERE``.
+"""
+
+import importlib.metadata
+import os
+import re
+import shutil
+import site
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.support.serving import CASE, running
+from tests.project.test_wheel import CORE, build
+from tests.support.comparing import close
+from tests.support.documents import (
+    MANIFESTS,
+    PAGES,
+    Block,
+    Mention,
+    blocks,
+    comments,
+    mentions,
+    plain,
+)
+from tests.support.places import ROOT
+
+posix = pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
+
+BARE = {"README", "tutorial"}
+NUMBER = re.compile(r"-?\d+\.?\d*(?:e[-+]?\d+)?")
+SERVICE = "http://127.0.0.1:8000"
+SESSION = """
+import doctest, sys
+name = sys.argv[1]
+test = doctest.DocTestParser().get_doctest(open(name, encoding="utf-8").read(), {}, name, name, 0)
+result = doctest.DocTestRunner(verbose=False).run(test)
+sys.exit(0 if result.attempted and not result.failed else 1)
+"""
+#: these make the environments
+INSTALLS = {"bare": "pip install .", "service": "pip install '.[service]'"}
+#: the file that runs a command, perhaps with smaller numbers, and the words there that do
+ELSEWHERE = {
+    "python3 dev.py test": (".ci/run", "python3 dev.py test"),
+    "python3 dev.py wheels": (".ci/run", "python3 dev.py wheels"),
+    "python3 dev.py check": ("dev.py", "failed = check()"),  # by dev.py test
+    "python3 dev.py docs": ("dev.py", "return docs() or"),  # by dev.py wheels
+    'python3 dev.py exec pytest -m "" tests/mumacro/analysis/test_law.py': (
+        ".ci/run",
+        "dev.py exec pytest",
+    ),
+    "bash deploy/container.sh": (".ci/container", "bash deploy/container.sh"),
+    "docker build -t mumacro .": ("deploy/container.sh", '"$engine" build'),
+    "python -m builder build --tolerance 1e-8 --out my-table.nc": (
+        "tests/builder/test_builder_cli.py",
+        'run_builder("build", "--tolerance", "1e-3", "--out", out',
+    ),
+    "python -m builder verify my-table.nc --points 20000": (
+        "tests/builder/test_builder_cli.py",
+        'run_builder("verify", out, "--points", 300',
+    ),
+    "python -m builder solve --v 0.1 --y 0.5": (
+        "tests/builder/test_builder_cli.py",
+        'run_builder("solve", "--v", 0.1, "--y", 0.5)',
+    ),
+    "python -m builder figures --out figures": (
+        "tests/builder/test_figures.py",
+        '["figures", "--out"',
+    ),
+    "python -m mumacro.builder": ("tests/project/test_wheel.py", "python -m mumacro.builder solve"),
+    "python benchmarks/hard_cases.py": ("tests/project/test_benchmarks.py", '"hard_cases")'),
+    "python benchmarks/validation.py": ("tests/project/test_benchmarks.py", '("validation", '),
+    "python benchmarks/validity.py": ("tests/project/test_benchmarks.py", '"validity", '),
+    "python benchmarks/measured.py": (
+        "tests/mumacro/analysis/test_measured.py",
+        "measured.SECTIONS",
+    ),
+    "python benchmarks/error_distribution.py": (
+        "tests/project/test_benchmarks.py",
+        '"error_distribution --share',
+    ),
+    "python -m builder verify TABLE --write": (
+        "tests/builder/test_builder_cli.py",
+        'here(*words, "--write")',
+    ),
+    "python -m builder verify my-table.nc --seed 2 --write": (
+        "tests/builder/test_builder_cli.py",
+        'here(*words, "--write")',
+    ),
+    "mumacro law --approximations": (
+        "tests/mumacro/cli/test_command.py",
+        '*words, "--approximations")',
+    ),
+    "python benchmarks/tables_readme.py": (
+        "tests/project/test_benchmarks.py",
+        "tables_readme.tables(",
+    ),
+    "gcc -O2 -c mumacro.c mumacro_table.c && gfortran mumacro.f90 friction.f90 mumacro.o "
+    "mumacro_table.o -lm": ("tests/builder/export/test_c_languages.py", '"mumacro.f90"'),
+    "mkoctfile --mex": (
+        "tests/builder/export/test_c_languages.py",
+        "test_octave_has_the_same_answers",
+    ),
+}  # fmt: skip
+#: pages whose Python programs another file runs
+PROGRAMS_ELSEWHERE = {"docs/how-to/scale.md": "tests/project/test_recipes.py"}
+SHELL = ("bash", "console")
+#: what the reader of a page has, and ports and folders of this machine
+HERE = (
+    (r"--host \S+", "--host 127.0.0.1"),
+    (r"--port \d+", "--port 0"),
+    (r"/srv/mumacro/", f"{ROOT}/tables/"),
+)
+TOLD = "put it into a ```bash block, name in ELSEWHERE what runs it, or say Not run by the checks"
+
+
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def having(*languages: str) -> list[Path]:
+    return [page for page in PAGES if any(not block.marked for block in blocks(page, *languages))]
+
+
+# --- nothing is left out --------------------------------------------------------------------------
+
+
+def run_here() -> set[str]:
+    """Every command that this file runs."""
+    return {
+        plain(command)
+        for page in PAGES
+        for block in blocks(page, *SHELL)
+        if not block.marked
+        for command, _ in block.entries()
+    }
+
+
+def is_run(mention: Mention, commands: set[str]) -> bool:
+    """Whether a command begins so; "..." stands for anything."""
+    begins = re.compile(".*".join(map(re.escape, mention.command.split("..."))) + r"(?: .*)?")
+    return any(begins.fullmatch(command) for command in commands)
+
+
+def is_covered(block: Block) -> bool:
+    """Whether a block is run, is marked, or is no program."""
+    if block.marked or block.language in (*SHELL, "pycon"):
+        return True
+    if block.language == "python":
+        return name(block.page) in PROGRAMS_ELSEWHERE
+    if block.language == "c":  # the program of the page's own commands
+        return any("program.c" in other.text for other in blocks(block.page, *SHELL))
+    return block.language in ("math", "text", "toctree") or block.language.startswith("{")
+
+
+@pytest.mark.parametrize("page", [*PAGES, *MANIFESTS], ids=name)
+def test_every_command_and_program_is_run_or_said_not_to_be(page: Path) -> None:
+    commands = run_here() | ELSEWHERE.keys() | {*INSTALLS.values()}
+    found = comments(page) if page in MANIFESTS else mentions(page)
+    missing = [
+        f"{name(page)}:{one.line}: {one.command}"
+        for one in found
+        if not one.marked and (one.indented or not is_run(one, commands))
+    ]
+    if page not in MANIFESTS:
+        missing += [
+            f"{name(page)}:{block.line}: a block of {block.language or 'no language'}"
+            for block in blocks(page)
+            if not is_covered(block)
+        ]
+    assert missing == [], TOLD
+
+
+def test_what_runs_elsewhere_is_there_and_is_still_told() -> None:
+    told = run_here() | {one.command for page in PAGES for one in mentions(page)}
+    assert {*INSTALLS.values()} <= told
+    for command, (file, words) in ELSEWHERE.items():
+        assert command in told, f"no document has it any more: {command}"
+        assert words in (ROOT / file).read_text("utf-8"), f"{file} does not run {command}"
+    for page, file in PROGRAMS_ELSEWHERE.items():
+        assert Path(page).name in (ROOT / file).read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "covered"),
+    [
+        ("```bash\nmumacro new\n```\n", True),
+        ("    mumacro new  # in an indented block\n", False),
+        ("Use `mumacro new-command`.\n", False),
+        ("Use `mumacro new-command` (not run by\nthe checks).\n", True),
+        ("- `mumacro new-command` (not run by the checks)\n- `mumacro other`\n", False),
+        ("Not run by the checks:\n\n| `mumacro new-command` |\n", True),
+        ("Not run by the checks:\n\nBut `mumacro new-command`:\n\n`mumacro other`\n", False),
+        ("```python\nimport mumacro\n```\n", False),
+        ("Not run by the checks:\n\n```python\nimport mumacro\n```\n", True),
+        ("```sh\nmumacro new\n```\n", False),
+    ],
+)
+def test_a_new_command_must_be_run_or_said_not_to_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, covered: bool
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(text, "utf-8")
+    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
+    if covered:
+        test_every_command_and_program_is_run_or_said_not_to_be(page)
+    else:
+        with pytest.raises(AssertionError, match="Not run by the checks"):
+            test_every_command_and_program_is_run_or_said_not_to_be(page)
+
+
+# --- environments ---------------------------------------------------------------------------------
+
+
+def environment(programs: Path, **more: str) -> dict[str, str]:
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHON", "MUMACRO_"))
+    }
+    path = f"{programs}{os.pathsep}/usr/local/bin{os.pathsep}/usr/bin{os.pathsep}/bin"
+    return {**kept, "PATH": path, "COLUMNS": "120", "MPLBACKEND": "agg", **more}
+
+
+def run(programs: Path, folder: Path, *words: str | Path, **more: str) -> str:
+    done = subprocess.run(
+        words,
+        cwd=folder,
+        env=environment(programs, **more),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, f"{words}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def pip(programs: Path, place: Path, command: str, **settings: str) -> None:
+    quiet = {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_COMPILE": "1"}
+    run(programs, place, "sh", "-c", command, **quiet, **settings)
+
+
+def venv(folder: Path) -> Path:
+    """The programs of a new virtual environment."""
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    return folder / "bin"
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What ``pip install .`` gives in a copy of this tree."""
+    folder = tmp_path_factory.mktemp("bare")
+    unwanted = shutil.ignore_patterns(".*", "build", "dist", "_kernel.*", "__pycache__", "tests")
+    shutil.copytree(ROOT, folder / "tree", ignore=unwanted)
+    programs = venv(folder / "venv")
+    # the tested versions, probably in pip's cache
+    pins = folder / "pins.txt"
+    pins.write_text("".join(f"{name}=={importlib.metadata.version(name)}\n" for name in CORE))
+    pip(programs, folder / "tree", INSTALLS["bare"], PIP_CONSTRAINT=str(pins))
+    shutil.rmtree(folder / "tree")
+    return programs
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with the wheel and the packages of this one, which meet the extra service."""
+    wheel = build(tmp_path_factory.mktemp("wheel"))
+    programs = venv(tmp_path_factory.mktemp("full") / "venv")
+    pip(programs, ROOT, f"pip install --no-deps {wheel}")
+    (packages,) = programs.parent.glob("lib/python*/site-packages")
+    # behind the wheel, and without the links to this tree that an installation in place has
+    (packages / "more.pth").write_text("\n".join(site.getsitepackages()), "utf-8")
+    # with a wheel file in place of the dot, as the pages allow
+    pip(programs, ROOT, INSTALLS["service"].replace(".", str(wheel), 1), PIP_NO_INDEX="1")
+    return programs
+
+
+@pytest.fixture(scope="module")
+def service(full: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a service with every extra."""
+    log = tmp_path_factory.mktemp("service") / "log.jsonl"
+    with running([str(full / "mumacro"), "serve", "--port", "0"], log, PYTHONPATH="") as process:
+        process.wait_until_ready()
+        yield process.url
+
+
+@pytest.fixture
+def reader(tmp_path: Path) -> Path:
+    """A folder with the files of cases and of measured points that the commands name."""
+    import pandas as pd
+
+    cases = pd.DataFrame({**CASE, "v0": [1e-3, 1e-2]})
+    cases.to_csv(tmp_path / "cases.csv", index=False)
+    cases.to_csv(tmp_path / "german.csv", index=False, sep=";", decimal=",")
+    cases.to_parquet(tmp_path / "cases.parquet")
+    (tmp_path / "runs").mkdir()
+    cases.to_parquet(tmp_path / "runs" / "one.parquet")
+    v0 = np.geomspace(1e-3, 1.0, 8)
+    mu = [0.162, 0.197, 0.242, 0.268, 0.283, 0.294, 0.302, 0.299]
+    pd.DataFrame({"v0": v0, "mu_macro": mu}).to_csv(tmp_path / "measured.csv", index=False)
+    return tmp_path
+
+
+# --- running --------------------------------------------------------------------------------------
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.parametrize("page", having("pycon"), ids=name)
+def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    programs = request.getfixturevalue("bare" if page.stem in BARE else "full")
+    session = "\n".join(block.text for block in blocks(page, "pycon") if not block.marked)
+    (tmp_path / "session.txt").write_text(session, "utf-8")
+    run(programs, tmp_path, programs / "python", "-c", SESSION, "session.txt")
+
+
+def number_parts(text: str) -> tuple[list[str], list[str]]:
+    return NUMBER.sub("#", text).split(), NUMBER.findall(text)
+
+
+def last_place(number: str) -> float:
+    """What one unit is in the last digit of a printed number."""
+    digits, _, exponent = number.partition("e")
+    return 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
+
+
+def test_a_number_of_the_guide_has_a_last_place() -> None:
+    assert [last_place(text) for text in ("8.444e-16", "0.2400", "-12", "1e-12")] == [
+        1e-19,
+        1e-4,
+        1.0,
+        1e-12,
+    ]
+
+
+def compare(found: str, shown: str, command: str) -> None:
+    """What a command printed, with what the page shows."""
+    (words, numbers), (shown_words, shown_numbers) = number_parts(found), number_parts(shown)
+    assert words == shown_words, f"{command}\n{found}"
+    for number, shown_number in zip(numbers, shown_numbers, strict=True):
+        # the last of sixteen digits depend on the processor
+        expected = close(float(shown_number), rel=1e-9, abs=1.01 * last_place(shown_number))
+        assert float(number) == expected, f"{command}\n{found}"
+
+
+def serve(programs: Path, log: Path, command: str) -> None:
+    """A command that runs until a signal: it gets ready, and ends with 0."""
+    for theirs, ours in HERE:
+        command = re.sub(theirs, ours, command)
+    path = f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin"
+    words = ["sh", "-c", f"exec env {command}"]
+    with running(words, log, PATH=path, PYTHONPATH="", MUMACRO_PORT="0") as process:
+        process.wait_until_ready()
+        assert process.stop() == 0
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.parametrize("page", having(*SHELL), ids=name)
+def test_commands(page: Path, reader: Path, request: pytest.FixtureRequest) -> None:
+    for program in blocks(page, "c"):
+        (reader / "program.c").write_text(program.text, "utf-8")
+    entries = [
+        entry for block in blocks(page, *SHELL) if not block.marked for entry in block.entries()
+    ]
+    for line, shown in entries:
+        command, more = plain(line), {}
+        if command in ELSEWHERE or command in INSTALLS.values():
+            continue
+        in_checkout = "dev.py" in command
+        runs_until_a_signal = re.search(r"\bserve\b(?! healthcheck)", command) is not None
+        if SERVICE in command or "healthcheck" in command:
+            if shutil.which("curl") is None:
+                pytest.skip("curl is not installed")
+            url = request.getfixturevalue("service")
+            command, more = command.replace(SERVICE, url), {"MUMACRO_PORT": url.rpartition(":")[2]}
+        if in_checkout:
+            programs = Path(sys.executable).parent
+        else:
+            bare = page.stem in BARE and not runs_until_a_signal
+            programs = request.getfixturevalue("bare" if bare else "full")
+        if runs_until_a_signal:
+            serve(programs, reader / "log.jsonl", command)
+            continue
+        found = run(programs, ROOT if in_checkout else reader, "sh", "-c", command, **more)
+        if shown:
+            compare(found, shown, command)

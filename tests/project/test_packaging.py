@@ -1,0 +1,252 @@
+"""The distribution: one version, tables with the library, a one-line message if something is
+missing."""
+
+import importlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mumacro
+import service
+from mumacro.errors import missing
+from mumacro.table import bundled
+from service.settings import load_settings
+
+
+def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository: Path) -> None:
+    assert service.__version__ == mumacro.__version__
+    for name, pattern in (
+        ("CITATION.cff", r"^version: (.+)$"),
+        ("Dockerfile", r'image\.version="(.+?)"'),
+        ("deploy/compose.yaml", r"image: mumacro:(\S+)"),
+        ("deploy/kubernetes.yaml", r'(?:image: mumacro:|kubernetes\.io/version: ")([^"\s]+)'),
+    ):
+        found = re.findall(pattern, (repository / name).read_text("utf-8"), re.MULTILINE)
+        assert set(found) == {mumacro.__version__}, name
+
+
+def test_the_parts_of_the_manifest_belong_together(repository: Path) -> None:
+    yaml = pytest.importorskip("yaml", reason="the PyPI package PyYAML is not installed")
+    text = (repository / "deploy" / "kubernetes.yaml").read_text("utf-8")
+    found = {one["kind"]: one for one in yaml.safe_load_all(text)}
+    pod = found["Deployment"]["spec"]["template"]["spec"]
+    labels = found["Deployment"]["spec"]["template"]["metadata"]["labels"]
+    for kind in ("NetworkPolicy", "PodDisruptionBudget", "Service"):
+        spec = found[kind]["spec"]
+        selector = spec.get("podSelector") or spec["selector"]
+        assert selector.get("matchLabels", selector).items() <= labels.items(), kind
+    scaled = found["HorizontalPodAutoscaler"]["spec"]
+    assert scaled["scaleTargetRef"]["name"] == found["Deployment"]["metadata"]["name"]
+    assert scaled["minReplicas"] > found["PodDisruptionBudget"]["spec"]["minAvailable"]
+    assert pod["terminationGracePeriodSeconds"] > load_settings().shutdown_grace_s + 3.0  # preStop
+
+
+@pytest.mark.slow
+def test_the_image_was_built_and_tried() -> None:
+    """.ci/run has done it before the tests; where it could not, this is a skip that has a name."""
+    if "container-engine" in os.environ.get("CI_MISSING", "").split():
+        pytest.skip("container-engine is not here: the image was neither built nor tried")
+    if "CI_CONTAINER" not in os.environ:
+        pytest.skip("the image is built and tried by .ci/run, or by bash deploy/container.sh")
+    assert os.environ["CI_CONTAINER"] == "0"
+
+
+def test_the_manifests_give_each_worker_the_memory_that_was_tried(repository: Path) -> None:
+    def read(name: str) -> str:
+        return (repository / name).read_text("utf-8")
+
+    (tried,) = re.findall(r"^WORKER_MB=(\d+) ", read("deploy/container.sh"), re.MULTILINE)
+    assert re.findall(r"limits: \{memory: (\d+)Mi\}", read("deploy/kubernetes.yaml")) == [tried]
+    assert re.findall(r"mem_limit: (\d+)m", read("deploy/compose.yaml")) == [tried]
+    assert f"{tried} MiB for each worker" in read("docs/operations.md")
+    (largest,) = re.findall(r"^LARGEST_MB=\S+:-(\d+)\}", read("deploy/container.sh"), re.MULTILINE)
+    assert f"at most {largest} MB over its base" in read("docs/operations.md")
+
+
+BUILD = "import runpy; runpy.run_path('hatch_build.py', run_name='__main__')"
+REQUIREMENTS = "import hatchling.build as b; print(*b.get_requires_for_build_wheel())"
+
+
+def python(folder: Path, program: Any, *arguments: Any, **variables: Any) -> Any:
+    env = {name: value for name, value in os.environ.items() if name != "CC"} | variables
+    command = [sys.executable, "-c", program, *map(str, arguments)]
+    return subprocess.run(
+        command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=300
+    )
+
+
+@pytest.mark.parametrize("where", ["nothing", "without headers", "another platform", "here"])
+def test_zig_is_a_build_requirement_only_where_no_compiler_works(
+    repository: Path, tmp_path: Path, where: Any
+) -> None:
+    if where == "without headers":
+        (tmp_path / "cc").write_text(
+            "#!/bin/sh\necho 'fatal error: math.h: No such file' >&2; exit 1\n"
+        )
+        (tmp_path / "cc").chmod(0o755)
+    other = {"MUMACRO_BUILD_PLATFORM": "win_amd64"}
+    variables = {"another platform": other, "here": {}}.get(where, {"PATH": str(tmp_path)})
+    done = python(repository, REQUIREMENTS, **variables)
+    assert done.returncode == 0, done.stderr
+    assert ("ziglang>=" in done.stdout) == (where != "here" or not shutil.which("cc"))
+    assert len(done.stderr.splitlines()) == ("PATH" in variables)
+    assert "PATH" not in variables or "ziglang" in done.stderr
+
+
+def test_a_build_that_cannot_be_made_says_so_in_one_line(repository: Path, tmp_path: Path) -> None:
+    for variables, code, words in (
+        ({"PATH": ""}, "import sys; sys.modules['ziglang'] = None", "pip install ziglang"),
+        ({"CC": "no-such-compiler"}, "", "CC=no-such-compiler"),
+        ({"MUMACRO_BUILD_DEBUG": "1", "PATH": ""}, "", "needs gcc or clang"),
+    ):
+        done = python(repository, f"{code}\n{BUILD}", tmp_path, **variables)
+        assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+        assert words in done.stderr
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_platform_without_a_wheel_is_refused_by_name(repository: Path) -> None:
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel"]
+    env = {**os.environ, "MUMACRO_BUILD_PLATFORM": "amiga"}
+    done = subprocess.run(
+        command, cwd=repository, env=env, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert re.search("MUMACRO_BUILD_PLATFORM=amiga is not one of .*win_amd64", done.stderr)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
+def test_a_failed_compilation_keeps_the_shared_object_that_was_there(
+    repository: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(repository / "mumacro" / "kernel", tmp_path / "mumacro" / "kernel")
+    for name in ("hatch_build.py", "pyproject.toml"):
+        shutil.copy(repository / name, tmp_path)
+    before = tmp_path / "mumacro" / "_kernel.so"
+    before.write_bytes(b"a shared object")
+    (tmp_path / "mumacro" / "kernel" / "kernel.c").write_text("#error broken\n")
+    done = python(tmp_path, BUILD)
+    assert done.returncode == 1
+    assert "broken" in done.stderr
+    assert before.read_bytes() == b"a shared object"
+    assert {path.name for path in (tmp_path / "mumacro").iterdir()} == {"kernel", before.name}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    sys.platform != "linux" or not shutil.which("gcc"), reason="needs Linux and gcc"
+)
+def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: Path) -> None:
+    done = python(repository, BUILD, tmp_path, CC="gcc", MUMACRO_BUILD_DEBUG="1")
+    assert done.returncode == 0, done.stderr
+    for folder, debug in ((tmp_path, True), (repository / "mumacro", False)):
+        made = (folder / "_kernel.so").read_bytes()
+        assert (b"libasan" in made, b"libubsan" in made) == (debug, debug)
+
+
+def test_dev_py_sees_a_changed_c_source(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(repository)
+    dev = importlib.import_module("dev")
+    monkeypatch.setattr(dev, "ROOT", tmp_path)
+    kernel = tmp_path / "mumacro" / "kernel"
+    kernel.mkdir(parents=True)
+    for path in ("hatch_build.py", "mumacro/kernel/kernel.c", "mumacro/_kernel.so"):
+        (tmp_path / path).write_text(path)
+    shutil.copytree(repository / "requirements", tmp_path / "requirements")
+    seen = {dev.current()["kernel"]}
+    (kernel / "kernel.c").touch()
+    assert seen == {dev.current()["kernel"]}
+    for change in (
+        lambda: (kernel / "kernel.c").write_text("other"),
+        lambda: (kernel / "new.h").write_text("new"),
+        lambda: (tmp_path / "hatch_build.py").write_text("other flags"),
+        lambda: (tmp_path / "mumacro" / "_kernel.so").unlink(),
+    ):
+        change()
+        seen.add(dev.current()["kernel"])
+    assert len(seen) == 5
+
+
+@pytest.mark.slow
+def test_the_source_distribution_builds_and_its_tests_collect(
+    repository: Path, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)]
+    subprocess.run(command, cwd=repository, check=True, capture_output=True)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as opened:
+        opened.extractall(tmp_path, filter="data")
+    source = tmp_path / archive.name.removesuffix(".tar.gz")
+    assert not list((source / "mumacro").glob("_kernel.*"))
+    done = python(source, BUILD)
+    assert done.returncode == 0, done.stderr
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-m", "", "-rs"]
+    command += ["-p", "no:cacheprovider"]
+    env = {**os.environ, "PYTHONPATH": str(source)}
+    done = subprocess.run(command, cwd=source, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:]
+    collected = {line.partition("::")[0] for line in done.stdout.splitlines() if "::" in line}
+    peers = set(re.findall(r"^SKIPPED .* (\S+):\d+: .*requirements/peers\.txt", done.stdout, re.M))
+    files = {
+        path.relative_to(repository).as_posix()
+        for path in (repository / "tests").rglob("test_*.py")
+    }
+    assert collected | peers == files
+
+
+def test_a_package_finds_its_own_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tables_dir: Path
+) -> None:
+    assert bundled.bundled_tables() == sorted(tables_dir.glob("*.nc"))  # a checkout
+    package = tmp_path / "mumacro"
+    for folder in (package, tmp_path / "tables"):
+        folder.mkdir()
+    (tmp_path / "tables" / "hdf5-table.nc").touch()
+    monkeypatch.setattr(bundled, "_PACKAGE", package)
+    assert bundled.bundled_tables() == []
+    (package / "data").mkdir()
+    (package / "data" / "mumacro-1e-10.nc").touch()
+    assert bundled.bundled_tables() == [package / "data" / "mumacro-1e-10.nc"]
+
+
+PARTS = ("service", "builder", "mumacro")
+LACKS = [(name, "packages", r".*(\w+) is not installed: pip install 'mumacro.*") for name in PARTS]
+LACKS += [
+    (name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*")
+    for name in PARTS[1:]
+]
+
+
+@pytest.mark.parametrize(("module", "lacks", "said"), LACKS)
+def test_one_line_says_what_is_missing(
+    repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any
+) -> None:
+    ignored = shutil.ignore_patterns("__pycache__", *(["_kernel.*"] if lacks == "kernel" else []))
+    for name in {"mumacro", module}:
+        shutil.copytree(repository / name, tmp_path / name, ignore=ignored)
+    # without site-packages: the standard library alone
+    options = ["-S"] if lacks == "packages" else []
+    command = [sys.executable, *options, "-m", module]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert re.fullmatch(said, done.stderr.strip())
+
+
+def test_a_missing_module_of_the_project_itself_is_not_explained_away() -> None:
+    with pytest.raises(ModuleNotFoundError):
+        missing(
+            "builder",
+            ModuleNotFoundError("No module named 'builder.nothing'", name="builder.nothing"),
+        )

@@ -1,0 +1,167 @@
+"""One table of cases through every way of asking the service: values, names, order, gaps, rigid
+contact, reasons."""
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from benchmarks.support.forms import BATCH, Row, asked, number
+from benchmarks.support.serving import CASE
+from mumacro import Surrogate
+
+COLUMNS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+NAMES = tuple(CASE)
+GOOD: tuple[Row, ...] = (
+    CASE,
+    {**CASE, "k": "rigid"},
+    {**CASE, "v0": 1.0},  # continuous sliding
+    {**CASE, "v0": 0.0},  # the static limit
+    *({**CASE, **change} for change in ({"y0": 0.0}, {"omega": 0.0}, {"v0": 5e-324, "y0": 1e-300})),
+    {**CASE, "y0": 3e-6, "v0": 1e-9},  # the corner
+    {"mu0": 1e-5, "Fz": 1e5, "k": 123456789.0, "y0": 1e-3, "omega": 6.283185307179586, "v0": 0.1},
+)
+GAP = "is missing; write rigid or a number"
+BAD: dict[str, tuple[str, str]] = {  # JSON of the value, and the reason
+    "y0": ("-1.0", "must be finite and >= 0"),
+    "mu0": ("0.0", "must be finite and > 0"),
+    "k": ("null", GAP),
+}
+ROWS = (
+    *GOOD[:4],
+    *({**CASE, name: json.loads(value)} for name, (value, _) in BAD.items()),
+    *GOOD[4:],
+)
+REASONS = (
+    [None] * 4
+    + [f"{name}: {reason}" for name, (_, reason) in BAD.items()]
+    + [None] * (len(GOOD) - 4)
+)
+
+
+@pytest.fixture(scope="module")
+def good(surrogate: Surrogate) -> list[Row]:
+    """The library, case by case."""
+    answers = [
+        surrogate.evaluate({name: number(value) for name, value in row.items()}) for row in GOOD
+    ]
+    return [{name: getattr(answer, name) for name in COLUMNS} for answer in answers]
+
+
+@pytest.fixture(scope="module")
+def expected(good: list[Row]) -> list[Row]:
+    """The same for all rows; a bad one has empty columns and its reason."""
+    empty, rest = dict.fromkeys(COLUMNS), iter(good)
+    return [{**(empty if reason else next(rest)), "error": reason} for reason in REASONS]
+
+
+def of_one(document: Row) -> Row:
+    """An answer to one case, or its refusal."""
+    if "errors" in document:
+        (error,) = document["errors"]
+        assert document["detail"] == f"{error['field']}: {error['reason']}"
+        return {**dict.fromkeys(COLUMNS), "error": document["detail"]}
+    assert tuple(document) == (*COLUMNS, "table", "api_version")
+    return {**{name: document[name] for name in COLUMNS}, "error": None}
+
+
+def with_errors(columns: Row, document: Row) -> list[Row]:
+    assert tuple(document)[-4:] == ("errors", "n_errors", "table", "api_version")
+    assert document["n_errors"] == len(BAD)
+    reasons = {
+        error["index"]: f"{error['field']}: {error['reason']}" for error in document["errors"]
+    }
+    rows = zip(*(columns[name] for name in COLUMNS), strict=True)
+    return [
+        {**dict(zip(COLUMNS, row, strict=True)), "error": reasons.get(i)}
+        for i, row in enumerate(rows)
+    ]
+
+
+def by_get(client: Any, row: Row) -> Row:
+    query = "&".join(f"{name}={'' if value is None else value}" for name, value in row.items())
+    return of_one(client.get(f"/v1/mu-macro?{query}").json())
+
+
+def by_rows(client: Any) -> list[Row]:
+    document = client.post(BATCH, json=list(ROWS)).json()
+    assert all(row is None or tuple(row) == COLUMNS for row in document["results"])
+    return with_errors(
+        {name: [row and row[name] for row in document["results"]] for name in COLUMNS}, document
+    )
+
+
+def by_columns(client: Any) -> list[Row]:
+    document = client.post(BATCH, json={name: [row[name] for row in ROWS] for name in NAMES}).json()
+    assert tuple(document)[:-4] == COLUMNS
+    return with_errors(document, document)
+
+
+WAYS: dict[str, Callable[[Any], list[Row]]] = {
+    "POST": lambda client: [of_one(client.post("/v1/mu-macro", json=row).json()) for row in ROWS],
+    "GET": lambda client: [by_get(client, row) for row in ROWS],
+    "rows": by_rows,
+    "columns": by_columns,
+    "lines": lambda client: list(map(of_one, asked(client, "ndjson", ROWS))),
+    "CSV": lambda client: asked(client, "csv", ROWS),
+    "Arrow": lambda client: asked(client, "arrow", ROWS),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_service_answers_in_every_format_what_the_library_does(
+    client: Any, expected: list[Row], way: str
+) -> None:
+    found = WAYS[way](client)
+    i = REASONS.index(f"k: {GAP}")
+    if way == "GET":  # an empty value is no number there
+        assert found[i]["error"]
+    if way == "GET":
+        found[i] = expected[i]
+    assert found == expected
+    assert {tuple(row) for row in found} == {(*COLUMNS, "error")}
+
+
+INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "std"]
+
+
+def flat(document: Row, path: str = "") -> Row:
+    """Leaves of nested objects by their paths; JSON has no number that is not finite, and says
+    null."""
+    found: Row = {}
+    for name, value in document.items():
+        if isinstance(value, dict):
+            found |= flat(value, f"{path}{name}.")
+        else:
+            found[path + name] = (
+                None if isinstance(value, float) and not math.isfinite(value) else value
+            )
+    return found
+
+
+def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any) -> None:
+    good, std = list(GOOD), {"v0": 1e-3, "mu0": 0.01}
+    asked_for = {"include": INCLUDED, "std": std}
+    single = [flat(client.post("/v1/mu-macro", json={**row, **asked_for}).json()) for row in good]
+    names = [name for name in single[0] if not name.startswith(("table", "api"))]
+    assert names[: len(COLUMNS)] == list(COLUMNS)
+    assert len(names) > 30
+    single = [{name: row[name] for name in names} for row in single]
+    columns = client.post(
+        BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **asked_for}
+    ).json()
+    listed = {name: values for name, values in flat(columns).items() if name in names}
+    assert [
+        dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)
+    ] == single
+    query = {"include": ",".join(INCLUDED), **{f"std_{name}": value for name, value in std.items()}}
+    of_query = flat(client.get("/v1/mu-macro", params={**CASE, **query}).json())
+    assert {name: of_query[name] for name in names} == single[0]
+    reply = client.post(BATCH, params=query, json=good).json()
+    assert [{name: flat(row)[name] for name in names} for row in reply["results"]] == single
+    for form in ("arrow", "csv", "ndjson"):
+        rows = asked(client, form, GOOD, **query)
+        assert form == "ndjson" or list(rows[0]) == [*names, "error"]
+        assert [{name: row[name] for name in names} for row in map(flat, rows)] == single

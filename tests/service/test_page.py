@@ -1,0 +1,317 @@
+"""The pages: their headers, whether they fit the screen, accessibility, and the API key."""
+
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from benchmarks.support.browser import START
+from mumacro import Surrogate, plotting
+from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS
+from mumacro.inputs.units import UNITS_OF
+from service.app import create_app
+from service.settings import Settings
+from tests.support.comparing import close
+
+pytestmark = pytest.mark.slow
+KINDS = [
+    (contact, direction)
+    for contact in CONTACTS
+    for direction in DIRECTIONS
+    if (contact, direction) != ("ball", "normal")
+]
+AXE = "tests/data/axe-core/axe.min.js"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate, kind: Any) -> None:
+    names = dict(zip(("contact", "direction"), kind, strict=True))
+    address = f"/static/page/map.json?contact={kind[0]}&direction={kind[1]}"
+    response = client.get(address)
+    data = response.json()
+    v, y = (
+        (np.geomspace if axis["log"] else np.linspace)(axis["start"], axis["stop"], axis["n"])
+        for axis in (data["v_tilde"], data["y_tilde"])
+    )
+    grid = data["unit"] * np.array(data["mu_ratio"]).reshape(y.size, v.size)
+    ratio, _, _ = surrogate.quantity("mu_ratio", v[None, :], y[:, None], **names)
+    assert np.max(np.abs(grid - ratio)) <= 0.5001 * data["unit"]
+    border = np.array(data["border"])
+    assert border[:, 0] == close(surrogate.v_tilde_crit(border[:, 1], **names), rel=1e-5, abs=1e-12)
+    # a number stands on its line
+    for level, along, up in data["labels"]:
+        place = plotting.place(along, up, kind[1] == "normal")
+        assert surrogate.quantity("mu_ratio", *place, **names)[0] == close(level, rel=0.06)
+    assert len(data["labels"]) >= 7
+    for along, up, words in data["areas"]:
+        v_there, y_there = plotting.place(along, up, kind[1] == "normal")
+        slides = v_there > surrogate.v_tilde_crit(y_there, **names)
+        assert (words == "continuous sliding") is bool(slides)
+    etag = response.headers["etag"]
+    assert client.get(address, headers={"If-None-Match": etag}).status_code == 304
+    other = client.get("/static/page/map.json", headers={"If-None-Match": etag})
+    assert other.status_code == (304 if kind == ("spring", "across") else 200)
+
+
+def test_there_is_no_map_of_what_is_not_modelled(client: Any, problem: Any) -> None:
+    path = "/static/page/map.json"
+    assert (
+        "contact radius"
+        in problem(client.get(f"{path}?contact=ball&direction=normal"), 422)["detail"]
+    )
+    problem(client.get(f"{path}?contact=box"), 422)
+    told = client.get("/static/page/names.json").json()
+    assert [*told["impossible"]] == ["ball normal"]
+
+
+def test_units_and_geometries_are_the_librarys(client: Any) -> None:
+    def scales(units: Any) -> Any:
+        return {unit: list(scale) for unit, scale in units.items()}
+
+    told = client.get("/static/page/names.json").json()
+    expected = {
+        name: scales(units) for name, units in {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}.items()
+    }
+    cycles = {
+        unit: [2 * math.pi * times, over] for unit, (times, over) in expected.pop("f").items()
+    }
+    # a unit of both says neither
+    expected["omega"] |= cycles | dict.fromkeys(expected["omega"].keys() & cycles)
+    assert {name: one["units"] for name, one in told["inputs"].items()} == expected
+    assert all(set(one["offered"]) <= set(one["units"]) for one in told["inputs"].values())
+    assert [list(words) for words in told["choices"].values()] == [list(CONTACTS), list(DIRECTIONS)]
+    assert {
+        name: (one["meaning"], one["arguments"]) for name, one in told["geometries"].items()
+    } == {name: (one.meaning, [*one.arguments, *BODIES]) for name, one in GEOMETRIES.items()}
+    for name, one in ARGUMENTS.items():
+        assert told["arguments"][name] == {
+            **one._asdict(),
+            "units": scales(one.units),
+            "choices": list(one.choices),
+        }
+    # what is offered is what a request may hold
+    described = client.get("/openapi.json").json()
+    fields = described["components"]["schemas"]["CaseRequest"]["properties"]
+    assert {*told["inputs"], *told["choices"], "k_range"} <= fields.keys()
+    assert {"/v1/solve-for", "/v1/stiffness", "/v1/fit"} <= described["paths"].keys()
+    assert told["guide"] is False
+
+
+def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, problem: Any) -> None:
+    with TestClient(create_app(Settings(tables=(tmp_path,)))) as client:
+        assert client.get("/").status_code == 200
+        problem(client.get("/static/page/map.json"), 503)
+
+
+def test_built_documentation_is_served_if_named(
+    tmp_path: Path, tables_dir: Path, client: Any, problem: Any
+) -> None:
+    (tmp_path / "how-to").mkdir()
+    (tmp_path / "index.html").write_text("<h1>Guide</h1>")
+    (tmp_path / "how-to" / "index.html").write_text("<h1>How to</h1>")
+    settings = Settings(tables=(tables_dir,), guide=tmp_path, api_key="open-sesame")
+    with TestClient(create_app(settings)) as guided:  # it needs no key
+        assert (
+            guided.get("/guide/").text == guided.get("/guide/index.html").text == "<h1>Guide</h1>"
+        )
+        assert guided.get("/guide/how-to/").text == "<h1>How to</h1>"
+        assert guided.get("/guide").url.path == "/guide/"
+        assert guided.get("/static/page/names.json").json()["guide"] is True
+        for path in ("/guide/none.html", "/guide/..%2Fsecret"):
+            problem(guided.get(path), 404)
+        problem(guided.post("/guide/", headers={"X-API-Key": "open-sesame"}), 405)
+    problem(client.get("/guide/"), 404)
+
+
+def test_a_wheel_holds_the_built_documents_where_there_are_any(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import hatch_build
+    from service import settings
+
+    monkeypatch.setattr(hatch_build, "ROOT", tmp_path)
+    assert hatch_build.guide() == {}
+    site = tmp_path / "build" / "docs"
+    for name in (
+        "index.html",
+        "how-to/index.html",
+        "_static/a.css",
+        "_static/a.css.map",
+        ".doctrees/index.doctree",
+        "_sources/index.md.txt",
+        "objects.inv",
+        ".buildinfo",
+    ):
+        (site / name).parent.mkdir(parents=True, exist_ok=True)
+        (site / name).write_text(name)
+    places = {"index.html", "how-to/index.html", "_static/a.css"}
+    assert hatch_build.guide() == {
+        str(site / name): f"mumacro/service/guide/{name}" for name in places
+    }
+    # which is where the installed service looks for it
+    monkeypatch.setattr(settings, "__file__", str(tmp_path / "settings.py"))
+    assert settings.Settings().guide is None
+    site.rename(tmp_path / "guide")
+    assert settings.Settings().guide == tmp_path / "guide"
+
+
+def test_what_is_typed_and_asked_without_a_browser(
+    client: Any, repository: Path, tmp_path: Path
+) -> None:
+    """The tests of the modules in node: texts, numbers, addresses, questions."""
+    node = shutil.which("node")
+    if node is None or tuple(
+        map(int, re.findall(r"\d+", subprocess.check_output([node, "-v"], text=True)))
+    ) < (20, 19):
+        pytest.skip("node 20.19 or newer is not installed")
+    told = tmp_path / "names.json"
+    told.write_text(json.dumps(client.get("/static/page/names.json").json()))
+    done = subprocess.run(
+        [node, "--test", "tests/service/page"],
+        cwd=repository,
+        env={**os.environ, "PAGE_NAMES": str(told)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert int(re.findall(r"^(?:#|ℹ) pass (\d+)$", done.stdout, re.MULTILINE)[0]) > 50
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (320, 640), (1024, 768), (1440, 900)])
+def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
+    page = open_page(width=width, height=height)
+    drawn, law, mu, inputs = (page.find(f"#{name}").rect for name in ("map", "law", "mu", "inputs"))
+    assert min(drawn["width"], law["width"]) >= 0.25 * width
+    # the result is seen without scrolling, on a small phone on the second screen; beside the
+    # inputs, or below them and above the law, which is above the map
+    assert 0 < mu["y"] < height * (2 if width < 390 else 1)
+    if width > 760:
+        assert drawn["y"] + drawn["height"] <= height
+        assert inputs["x"] < drawn["x"] - 50
+    else:
+        assert inputs["y"] + inputs["height"] < mu["y"] < law["y"] < drawn["y"]
+    page = open_page("#k=rigid&digits=all&bad=1", width=width, height=height)
+    assert page.run("return document.documentElement.scrollWidth;") <= width
+    # no section lies on another, and controls are large enough for a finger
+    overlaps = page.run(
+        "const all = [...document.querySelectorAll('section, header, .notice')]"
+        ".map((one) => one.getBoundingClientRect()).filter(({ width }) => width > 0);"
+        "return all.flatMap((a, i) => all.slice(i + 1).filter((b) => a.left < b.right && b.left < "
+        "a.right && a.top < b.bottom && b.top < a.bottom)).length"
+        " + [...document.querySelectorAll('*')].filter((one) => ['sticky', 'fixed'].includes("
+        "getComputedStyle(one).position)).length;"
+    )
+    assert overlaps == 0
+    small = page.run(
+        "return [...document.querySelectorAll('input, select, button, summary, nav "
+        "a')].map((element) => [element.id || element.outerHTML,"
+        " (element.closest('.switch, .choice label') ?? element).getBoundingClientRect().height])"
+        ".filter(([, height]) => height > 0 && height < 40);"
+    )
+    assert small == [] or width > 760
+    # no text is cut in its field, and the choices stand in one row each
+    page = open_page("#k=0.8..1.2N/um&along=k", width=width, height=height)
+    cut = page.run(
+        "return ['field-k', 'range'].map((id) => document.getElementById(id)).filter((field) => {"
+        " const pen = new OffscreenCanvas(1, 1).getContext('2d'); pen.font = "
+        "getComputedStyle(field).font; return pen.measureText(field.value || "
+        "field.placeholder).width > field.clientWidth - 16; }).length;"
+    )
+    rows = (
+        "return ['contact', 'direction'].map((id) => new "
+        "Set([...document.getElementById(id).querySelectorAll('label')].map((one) =>"
+    )
+    assert (cut, page.run(f"{rows} one.getBoundingClientRect().y)).size);")) == (0, [1, 1])
+
+
+def inaccessible(page: Any, repository: Path) -> Any:
+    """Violations found by axe-core, in the light and dark schemes: rules and elements."""
+    found = {}
+    page.browser.execute_script((repository / AXE).read_text("utf-8"))
+    for scheme, rules in (("light", "{}"), ("dark", "{ runOnly: ['color-contrast'] }")):
+        page.scheme(scheme)
+        broken = page.run(
+            f"const found = await axe.run(document, {{ resultTypes: ['violations'], ...{rules} }});"
+            "return found.violations.map((one) => [one.id, one.nodes.map((node) => "
+            "node.target.join(' '))]);"
+        )
+        found.update({(scheme, rule): places[:5] for rule, places in broken})
+    page.scheme("light")
+    return found
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) -> None:
+    page = open_page("#bad=1&v0=1e6&digits=all", width=width)
+    page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
+    assert inaccessible(page, repository) == {}
+    page = open_page("#contact=ball&direction=along&k=0.8..1.2N/um", width=width)
+    for name, text in (("radius", "5 mm"), ("E", "210 GPa"), ("nu", "0.3")):
+        page.type(f"#argument-{name}", text, commit=False)
+    page.choose("#points", "0.001 0.1\n0.1 0.2", "input")
+    for panel in ("solve", "stiffness", "fit"):
+        page.click(f"#{panel}-form button:not([type])")
+        assert page.find(f"#{panel}-result").is_displayed()
+    assert inaccessible(page, repository) == {}
+    assert page.run("return document.documentElement.scrollWidth;") <= width
+
+
+def test_the_description_is_accessible_and_leads_back(
+    open_page: Any, repository: Path, surrogate: Surrogate
+) -> None:
+    page = open_page(path="docs")
+    page.wait_for("#swagger-ui", "The value of one input that gives a wanted mu_macro")
+    assert not page.find("#key-form").is_displayed()
+    # with one GET and one POST operation open
+    page.run(
+        "for (const call of ['get', 'post'])"
+        " document.querySelector(`.opblock-${call} .opblock-summary-control`).click();"
+    )
+    page.wait_for("#swagger-ui", "Coulomb friction coefficient of the contact")
+    assert inaccessible(page, repository) == {}
+    page.find("#back").click()
+    page.settle()
+    assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
+
+
+def test_the_pages_ask_for_the_key_and_use_it(
+    open_page: Any, serving: Any, tables_dir: Path, tmp_path: Path
+) -> None:
+    def enter(key: Any) -> None:
+        page.type("#key", key, commit=False)
+        page.find("#key-form button").click()
+
+    with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
+        page = open_page(url=server.url, path="docs")
+        page.until(page.find("#key-form").is_displayed, lambda: "#key-form")
+        enter("open-sesame")
+        page.wait_for("#swagger-ui", "mu_macro over a range of one input")
+        assert not page.find("#key-form").is_displayed()
+        page.find("#back").click()  # the tab keeps the key until it is deleted
+        page.wait_for("#mu", r"^0\.\d+$")
+        page.find("#forget").click()
+        page.wait_for("#mu", "^…$")
+        page.until(page.find("#key-form").is_displayed, lambda: "#key-form")
+        assert page.run("return sessionStorage.length;") == 0
+        for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
+            enter(wrong)
+            page.wait_for("#key-status", said)
+            assert page.text("#mu") == "…"
+        enter("open-sesame")
+        page.wait_for("#mu", r"^0\.\d+$")
+        page.settle()
+        assert not page.find("#key-form").is_displayed()
+        assert "k=1N/um" in page.address()
+        assert "sesame" not in page.browser.current_url
+        assert len(page.download("#csv", tmp_path, "friction-law-v0.csv")) > 10_000
+        page.run("sessionStorage.clear();")

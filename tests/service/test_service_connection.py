@@ -1,0 +1,327 @@
+"""HTTP/1.1 as bytes on a socket: the limits of a connection, and that one client cannot keep others
+out."""
+
+import http.client
+import json
+import socket
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+
+from benchmarks.support.serving import CASE, chunk, connect, head, to_end
+from mumacro import Surrogate
+
+SINGLE, BATCH, NDJSON = "/v1/mu-macro", "/v1/mu-macro/batch", "application/x-ndjson"
+GET = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
+LAST = b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+WAIT_S = 1  # the client timeout of the strict service
+FULL = 40  # its connections
+PATIENCE_S = 60  # longest wait in a test
+LINE = json.dumps(CASE).encode() + b"\n"
+END = chunk(b"")
+
+
+def columns(n: int, **more: Any) -> Any:
+    return json.dumps({**CASE, "v0": [1e-6 * i for i in range(1, n + 1)], **more}).encode()
+
+
+@pytest.fixture(scope="module")
+def strict(serving: Any, surrogate: Surrogate) -> Any:
+    """A service with short times, few connections, and two batches at a time."""
+    with serving(
+        surrogate.path,
+        MUMACRO_CLIENT_TIMEOUT_S=str(WAIT_S),
+        MUMACRO_TIME_LIMIT_S="4",
+        MUMACRO_KEEP_ALIVE_S="60",
+        MUMACRO_MAX_CONNECTIONS=str(FULL),
+        MUMACRO_MAX_BATCHES="2",
+    ) as server:
+        yield server
+
+
+@pytest.fixture
+def raw(live_server: Any) -> Any:
+    with connect(live_server) as made:
+        yield made
+
+
+def answer(raw: Any) -> Any:
+    response = http.client.HTTPResponse(raw, method="POST")
+    response.begin()
+    return response.status, response.read()
+
+
+def posted(path: Any, body: Any) -> Any:
+    return head(path, len(body)) + body
+
+
+def test_a_connection_is_kept_over_errors_and_ends_when_asked(raw: Any) -> None:
+    for text, status in (
+        (GET, 200),
+        (b"GET /x HTTP/1.1\r\nHost: x\r\n\r\n", 404),
+        (posted(SINGLE, b"{"), 400),
+        (posted(BATCH, b"[]"), 200),
+        (LAST, 200),
+    ):
+        raw.sendall(text)
+        assert answer(raw)[0] == status
+    assert to_end(raw) == b""
+
+
+def test_a_second_request_before_the_answer_is_dropped_and_the_connection_closes(raw: Any) -> None:
+    raw.sendall(posted(SINGLE, b"{}") + GET * 5000)
+    received = to_end(raw)
+    assert received.count(b"HTTP/1.1 ") == 1
+    assert received.startswith(b"HTTP/1.1 422 ")
+    assert b"connection: close" in received
+
+
+def test_a_half_closed_client_gets_the_whole_answer(raw: Any) -> None:
+    raw.sendall(posted(BATCH, columns(50_000)))
+    raw.shutdown(socket.SHUT_WR)
+    received = to_end(raw)
+    assert b'"n_errors":0' in received[-2000:]
+    assert received.endswith(END)
+
+
+TWO_LENGTHS = (
+    b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n" + END
+)
+HEADS = [
+    (b"GET /livez HTTP/1.1\r\n\r\n", 400),
+    (GET[:-2] + b"Host: y\r\n\r\n", 400),
+    (b"nonsense\r\n\r\n", 400),
+    (TWO_LENGTHS, 400),
+    (GET[:-2] + b"a: b\r\n" * 99 + b"\r\n", 200),
+    (GET[:-2] + b"a: b\r\n" * 100 + b"\r\n", 431),
+    (GET[:-2] + b"A: " + b"b" * 65_000 + b"\r\n\r\n", 200),
+    (GET[:-2] + b"A: " + b"b" * 66_000 + b"\r\n\r\n", 431),
+    (b"GET /" + b"b" * 66_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", 431),
+    (head(SINGLE, 300_000_000), 413),
+    (head(BATCH, 300_000_000), 413),
+    (b"GET /livez\r\n\r\n", 400),
+    (GET[:-2] + b"Transfer-Encoding: gzip, chunked\r\n\r\n" + END, 400),
+    (posted(SINGLE, b"{}").replace(b": 2\r\n", b": 2\t\r\n"), 422),
+]
+
+
+@pytest.mark.parametrize(("text", "status"), HEADS, ids=range(len(HEADS)))
+def test_a_head_is_refused_with_its_status(raw: Any, text: bytes, status: Any) -> None:
+    raw.sendall(text)
+    found, content = answer(raw)
+    assert found == status
+    assert status == 200 or json.loads(content)["status"] == status
+
+
+#: what a client sends, what it sends again and again, and what is in the answer before the
+#: connection ends
+SLOW = {
+    "silent": (b"", b"", b""),
+    "empty lines": (b"\r\n", b"\r\n", b""),
+    "a head without an end": (GET[:-4] + b"\r\nA: ", b"", b" 408 "),
+    "a head, byte by byte": (GET[:-4] + b"\r\nA: ", b"x", b""),
+    "a head after an answer": (GET + GET[:9], b"x", b" 200 "),
+    "a body that stops": (head(SINGLE, 90) + b"x", b"", b" 408 "),
+    "a batch that stops": (head(BATCH, 90) + b"x", b"", b" 408 "),
+    "a body, byte by byte": (head(SINGLE, 5000), b" ", b""),
+    "a batch, byte by byte": (head(BATCH, 60_000), b" ", b""),
+    "chunks": (head(SINGLE, None), chunk(b" "), b""),
+    "a line, byte by byte": (head(BATCH, None, NDJSON) + chunk(LINE), chunk(b" "), b'"mu_macro"'),
+    "lines until the deadline": (head(BATCH, None, NDJSON), chunk(LINE), b'"mu_macro"'),
+}
+
+
+def given_up(server: Any, text: bytes, drop: Any) -> Any:
+    """All that a client gets until it is disconnected."""
+    received, until = b"", time.monotonic() + PATIENCE_S
+    with connect(server) as raw, suppress(ConnectionError):
+        raw.settimeout(0.1)
+        raw.sendall(text)
+        while time.monotonic() < until:
+            with suppress(TimeoutError):
+                if not (piece := raw.recv(65536)):
+                    return received
+                received += piece
+            time.sleep(0.05)
+            raw.sendall(drop)
+        pytest.fail("the connection was never closed")
+    return received
+
+
+def test_a_client_that_stops_or_drips_is_given_up(strict: Any) -> None:
+    with ThreadPoolExecutor(len(SLOW)) as pool:
+        found = pool.map(lambda slow: given_up(strict, *slow[:2]), SLOW.values())
+        assert strict.ask("GET", "/livez")[0] == 200
+        received = dict(zip(SLOW, found, strict=True))
+    assert {name: text for name, text in received.items() if SLOW[name][2] not in text} == {}
+    assert not received["lines until the deadline"].endswith(END)
+
+
+def test_a_client_that_does_not_read_is_disconnected_and_takes_little_memory(strict: Any) -> None:
+    with connect(strict, receive_buffer=4096) as raw:
+        raw.sendall(posted(BATCH, columns(100_000, include=["groups", "limits"])))
+        time.sleep(3 * WAIT_S)
+        received = to_end(raw)
+    assert received.startswith(b"HTTP/1.1 200")
+    assert not received.endswith(END)  # the answer, of some 20 MB, was not finished
+    assert len(received) < 8_000_000
+
+
+def test_a_client_that_leaves_within_a_body_frees_its_place(strict: Any) -> None:
+    for sent in (300_000, 3_000_000, 3_000_000):  # one more than the batches allowed
+        with connect(strict) as raw:
+            raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * sent)
+    deadline = time.monotonic() + PATIENCE_S
+    while strict.ask("POST", BATCH, columns(20_000))[0] != 200:
+        assert time.monotonic() < deadline
+
+
+def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(strict: Any) -> None:
+    status, headers, content = strict.ask("POST", SINGLE, b"x" * 3_000_000)
+    assert (status, headers["connection"]) == (413, "close")
+    assert json.loads(content)["max_bytes"] == 65536
+
+
+def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
+    strict: Any,
+) -> None:
+    large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
+    compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
+    assert len(compact) < 64 * 1024
+    with ExitStack() as held:
+        idle = [held.enter_context(connect(strict)) for _ in range(3)]
+        for raw in idle:
+            raw.sendall(head(BATCH, None, NDJSON))
+            assert raw.recv(65536).startswith(b"HTTP/1.1 200 ")  # before its first line
+        assert strict.ask("POST", BATCH, large)[0] == 200
+        for raw in 2 * idle[:2]:  # now they have a slot each
+            raw.sendall(chunk(LINE))
+            while b"mu_macro" not in raw.recv(65536):  # while the request is being sent
+                pass
+        status, headers, _ = strict.ask("POST", BATCH, large)
+        assert (status, headers["retry-after"], headers["connection"]) == (503, "1", "close")
+        unread = held.enter_context(connect(strict))
+        unread.sendall(head(BATCH, 10_000_000))
+        assert answer(unread)[0] == 503
+        assert strict.ask("POST", BATCH, iter([large]), encode_chunked=True)[0] == 503
+        assert strict.ask("POST", BATCH, compact)[0] == 503  # it asks for much
+        assert strict.ask("POST", BATCH, large, {"Content-Type": NDJSON})[0] == 503
+        # questions have their own
+        assert strict.ask("POST", "/v1/law", orjson.dumps(law))[0] == 200
+        assert strict.ask("POST", BATCH, json.dumps([CASE]))[0] == 200
+
+
+def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
+    query = "&".join(f"{name}={value}" for name, value in CASE.items())
+    with ExitStack() as held:
+        for _ in range(3 * FULL):  # silent ones: the oldest gives way
+            held.enter_context(connect(strict))
+        assert strict.ask("GET", f"{SINGLE}?{query}")[0] == 200
+    with ExitStack() as held:
+        for _ in range(FULL):  # busy ones
+            held.enter_context(connect(strict)).sendall(head(SINGLE, 90) + b"x")
+        time.sleep(0.2)
+        assert [strict.ask("GET", path)[0] for path in ("/livez", "/readyz", "/v1/table")] == [
+            200,
+            200,
+            503,
+        ]
+    time.sleep(2 * WAIT_S)
+    assert strict.ask("GET", "/v1/table")[0] == 200
+
+
+@pytest.mark.parametrize(("kind", "step"), [("application/json", 1000), (NDJSON, 300_000)])
+def test_a_body_is_read_in_any_pieces_after_100_continue(
+    live_server: Any, raw: Any, kind: Any, step: Any
+) -> None:
+    body = columns(20_000)
+    raw.sendall(head(BATCH, len(body), kind, "Expect: 100-continue\r\n"))
+    said = b""
+    while not said.endswith(b"\r\n\r\n"):
+        said += raw.recv(4096)
+    assert said.startswith(b"HTTP/1.1 100 ")  # and nothing else before the body
+    assert said.count(b"HTTP/1.1") == 1
+    for start in range(0, len(body), step):
+        raw.sendall(body[start : start + step])
+    status, received = answer(raw)
+    assert status == 200
+    assert received.strip() == live_server.ask("POST", BATCH, body)[2]
+
+
+@pytest.mark.slow
+def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server: Any) -> None:
+    line, sizes = columns(1000) + b"\n", []
+    received: list[Any] = [0, b""]
+    with connect(live_server) as raw:
+
+        def read() -> None:
+            while received[1] != END and (piece := raw.recv(1 << 20)):
+                received[:] = received[0] + len(piece), (received[1] + piece)[-5:]
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        raw.sendall(head(BATCH, None, NDJSON))
+        for _ in range(80):
+            raw.sendall(50 * chunk(line))
+            sizes.append(live_server.memory())
+        raw.sendall(END)
+        reader.join(PATIENCE_S)
+    assert received[0] > 250e6  # bytes of answers
+    assert received[1] == END
+    assert max(sizes[30:]) < max(sizes[:30]) + 8  # MB, after all buffers are full
+
+
+@pytest.mark.slow
+def test_short_requests_are_answered_while_a_large_batch_is(
+    serving: Any, surrogate: Surrogate
+) -> None:
+    n = 1_000_000
+    body = json.dumps(
+        {**{name: [value] * n for name, value in CASE.items()}, "v0": [1e-7 * i for i in range(n)]}
+    )
+    with (
+        serving(
+            surrogate.path, MUMACRO_MAX_BATCH=str(n), MUMACRO_MAX_BODY_BYTES="200000000"
+        ) as server,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        large = pool.submit(server.ask, "POST", BATCH, body)
+        between = 0
+        while not large.done():
+            assert server.ask("GET", "/livez")[0] == 200
+            assert server.ask("POST", SINGLE, json.dumps(CASE))[0] == 200
+            between += 1
+        assert between >= 10
+        status, _, received = large.result()
+        assert (status, len(json.loads(received)["mu_macro"])) == (200, n)
+        # threads for batches have a lower priority
+        found = {
+            int(task.name): int((task / "stat").read_text().rpartition(")")[2].split()[16])
+            for task in Path(f"/proc/{server.process.pid}/task").iterdir()
+        }
+        assert found.pop(server.process.pid) < max(found.values())
+
+
+@pytest.mark.slow
+def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(
+    serving: Any, surrogate: Surrogate
+) -> None:
+    places, n = 6, 100_000
+    rows = json.dumps([{**CASE, "v0": 1e-7 * i} for i in range(1, n + 1)]).encode()
+    assert len(rows) > 8_000_000
+    with (
+        serving(surrogate.path, MUMACRO_MAX_BATCHES=str(places)) as server,
+        ThreadPoolExecutor(places) as pool,
+    ):
+        base = server.memory("VmHWM")
+        answers = list(pool.map(lambda _: server.ask("POST", BATCH, rows), range(places)))
+        assert [status for status, _, _ in answers] == [200] * places
+        assert len({body for _, _, body in answers}) == 1
+        # A case takes 90 bytes of text, 56 while it is evaluated, 33 until its answer is sent.
+        assert 1e6 * (server.memory("VmHWM") - base) < places * (len(rows) + 90 * n) + 20_000_000

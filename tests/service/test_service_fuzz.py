@@ -1,0 +1,34 @@
+"""Strange requests, damaged framing, many clients at once: short forms of trials in fuzz/."""
+
+import pytest
+
+from benchmarks.support.serving import Server
+from fuzz import attacks, framing, strange
+
+SHARE = 0.2
+MOST_MB, MOST_S = 512, 2.0  # the aim for the wait is 0.25 s, on a machine that does nothing else
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", attacks.ATTACKS)
+def test_an_attack_takes_little_memory_and_keeps_nobody_waiting(name: str) -> None:
+    memory, wait = attacks.tried(attacks.ATTACKS[name], SHARE)
+    assert memory < MOST_MB
+    assert wait < MOST_S
+
+
+def test_a_strange_request_is_answered_or_refused_and_never_an_error(live_server: Server) -> None:
+    found = strange.Found()
+    found.ask(live_server, 1, 1000)
+    assert found.bad == []
+    assert set(found.counts) == set(strange.KINDS)
+    assert {200, 400, 404, 422} <= set(found.statuses)
+    assert live_server.errors() == []
+
+
+def test_a_connection_is_divided_into_the_same_requests_as_by_h11(live_server: Server) -> None:
+    assert {framing.compared(live_server, seed) for seed in range(2000)} == {
+        "the same",
+        "fewer here",
+    }
+    assert live_server.errors() == []

@@ -1,0 +1,348 @@
+"""Common to all requests: errors, request ids, keys, body limits, headers, files, the interface's
+description."""
+
+import json
+import re
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+
+from mumacro.inputs.fields import FIELDS, SI
+from tests.support.cases import Case
+from tests.support.places import ROOT
+
+STATIC = ROOT / "service" / "static"
+FILES = {
+    f"/static/{folder.name}/{path.name}": {".js": "text/javascript", ".css": "text/css"}[
+        path.suffix
+    ]
+    for folder in (STATIC / "page", STATIC / "swagger-ui")
+    for path in folder.iterdir()
+    if path.suffix in (".js", ".css")
+}
+PATHS = {
+    **dict.fromkeys(
+        ("/v1/mu-macro/batch", "/v1/solve-for", "/v1/law", "/v1/stiffness", "/v1/fit"), "POST"
+    ),
+    **dict.fromkeys(
+        (
+            "/v1/mu-macro.txt",
+            "/v1/law.csv",
+            "/v1/table",
+            "/v1/table.nc",
+            "/livez",
+            "/readyz",
+            "/healthz",
+            "/metrics",
+            "/docs",
+            "/openapi.json",
+        ),
+        "GET, HEAD",
+    ),
+    "/v1/mu-macro": "GET, HEAD, POST",
+}
+UNITS = {name: SI[name][0] for name in FIELDS}
+KEY = {"X-API-Key": "s3cret-key"}
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/nowhere",
+        "/static/page/",
+        "/v1",
+        "/v1/mu-macro/",
+        "/v2/mu-macro",
+        "/static/../settings.py",
+        "/%00",
+    ],
+)
+def test_an_unknown_path_is_not_found(client: Any, problem: Any, path: Any) -> None:
+    problem(client.get(path), 404)
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
+def test_a_wrong_method_is_answered_with_the_right_ones(
+    client: Any, problem: Any, path: Any, method: Any
+) -> None:
+    response = client.request(method, path)
+    problem(response, 405)
+    assert response.headers["allow"] == PATHS[path]
+
+
+@pytest.mark.parametrize(
+    "offered", ["abc-123", "A.b_c:9", "x" * 128, "", "x" * 129, "a b", "a;b", 'a"b', "ä"]
+)
+def test_an_ill_formed_request_id_is_replaced(client: Any, offered: Any) -> None:
+    given = client.get("/livez", headers={"X-Request-ID": offered.encode("latin-1")}).headers[
+        "x-request-id"
+    ]
+    if offered in ("abc-123", "A.b_c:9", "x" * 128):
+        assert given == offered
+    else:
+        assert len(given) == 32
+        assert int(given, 16) >= 0
+
+
+def test_an_unexpected_error_is_logged_and_not_shown(
+    client: Any,
+    case: Case,
+    problem: Any,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for error, status, kind, wait in (
+        (RuntimeError, 500, "unexpected", None),
+        (MemoryError, 503, "out-of-memory", "1"),
+    ):
+        monkeypatch.setattr(
+            "mumacro.Surrogate.evaluate_case", Mock(side_effect=error("secret detail"))
+        )
+        for response in (
+            client.post("/v1/mu-macro", json=case),
+            client.get("/v1/mu-macro", params=case),
+        ):
+            assert problem(response, status)["type"].endswith(kind)
+            assert response.headers.get("retry-after") == wait
+            assert "secret" not in response.text
+    assert caplog.text.count("RuntimeError: secret detail") == 2
+    assert "MemoryError: secret" not in caplog.text  # too little memory is no fault
+
+
+@pytest.fixture(scope="module")
+def closed(started: Any) -> Any:
+    with started(api_key=KEY["X-API-Key"]) as client:
+        yield client
+
+
+NO_KEY = [
+    {},
+    {"X-API-Key": "wrong"},
+    {"X-API-Key": ""},
+    {"X-API-Key": b"s3cret-key\xe4"},
+    {"Authorization": "Bearer wrong"},
+    {"Authorization": "Basic s3cret-key"},
+    {"Authorization": "s3cret-key"},
+]
+
+
+def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed: Any, problem: Any) -> None:
+    open_to_all = {"/livez", "/readyz", "/healthz", "/", "/docs", "/static/page/names.json", *FILES}
+    described = closed.get("/openapi.json", headers=KEY).json()
+    assert described["security"] == [{"key": []}, {"bearer": []}]
+    assert set(described["paths"]) <= set(PATHS)
+    for path in {*PATHS, "/static/page/map.json", "/nowhere"} | open_to_all:
+        for method in ("GET", "HEAD", "POST", "PUT"):
+            response = closed.request(method, path)
+            assert (response.status_code != 401) == (path in open_to_all), (
+                f"{method} {path}: {response.status_code}"
+            )
+            assert closed.request(method, path, headers=KEY).status_code != 401
+    for path in (
+        "/livez/",
+        "/docs/../v1/table",
+        "/static/page/../../v1/table",
+        "/V1/TABLE",
+        "/%2fv1/table",
+    ):
+        assert closed.get(path).status_code == 401
+    for headers in NO_KEY:
+        for method, path in (
+            ("GET", "/v1/mu-macro"),
+            ("POST", "/v1/mu-macro/batch"),
+            ("GET", "/nowhere"),
+        ):
+            response = closed.request(method, path, headers=headers)
+            problem(response, 401)
+            assert "s3cret" not in response.text
+            assert response.headers["www-authenticate"] == "Bearer"
+
+
+@pytest.mark.parametrize("headers", [KEY, {"Authorization": "bearer s3cret-key"}])
+def test_the_key_gives_access(closed: Any, case: Case, headers: Any) -> None:
+    response = closed.get("/v1/mu-macro", params=case, headers=headers)
+    assert response.status_code == 200
+    assert response.headers["cache-control"] == "private, max-age=3600"
+    assert response.headers["vary"] == "X-API-Key, Authorization"
+
+
+def test_a_key_given_twice_and_an_upgrade_with_a_body_are_refused(
+    closed: Any, case: Case, problem: Any
+) -> None:
+    for name, value in (("X-API-Key", "s3cret-key"), ("Authorization", "Bearer s3cret-key")):
+        problem(
+            closed.get("/v1/mu-macro", params=case, headers=[(name, value), (name, "wrong")]), 400
+        )
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", **KEY}
+    response = closed.post("/v1/mu-macro", json=case, headers=upgrade)
+    problem(response, 400)
+    assert response.headers["connection"] == "close"
+
+
+def test_a_large_body_is_refused_with_and_without_a_length(
+    started: Any, case: Case, problem: Any
+) -> None:
+    body = json.dumps(case).encode()
+    with started(max_body_bytes=1024) as narrow:
+        assert narrow.post("/v1/mu-macro", content=body.ljust(1024)).status_code == 200
+        for path in ("/v1/mu-macro", "/v1/mu-macro/batch"):
+            for content in (body.ljust(1025), b"x" * 100_000, iter([b" " * 100] * 10_000)):
+                response = narrow.post(path, content=content)
+                assert problem(response, 413)["max_bytes"] == 1024
+                assert response.headers["connection"] == "close"
+
+
+def test_the_description_is_whole(client: Any) -> None:
+    document = client.get("/openapi.json").json()
+    schemas = document["components"]["schemas"]
+    inputs = {*UNITS, "f", "Fz_amplitude"}
+    assert set(schemas["Case"]["properties"]) == {*inputs, "k_low", "k_high", "k_range"}
+    assert set(schemas["CaseColumns"]["properties"]) == set(schemas["CaseRequest"]["properties"])
+    assert all(
+        f"[{UNITS[name]}]" in schemas["Case"]["properties"][name]["description"] for name in UNITS
+    )
+    parameters = {
+        one["name"]: one["required"]
+        for one in document["paths"]["/v1/mu-macro"]["get"]["parameters"]
+    }
+    options = {
+        "k_low",
+        "k_high",
+        "include",
+        "tolerance",
+        "contact",
+        "direction",
+        *(f"std_{name}" for name in inputs),
+    }
+    assert parameters.keys() == inputs | options
+    required = {name for name, needed in parameters.items() if needed}
+    assert required == set(schemas["Case"]["required"]) == {"mu0", "Fz", "v0"}
+
+
+def examples_of(operation: Any, schemas: Any) -> Any:
+    """Arguments of the requests that an operation shows; one without input has the empty one."""
+    bodies = operation.get("requestBody", {}).get("content", {})
+    for media_type, content in bodies.items():
+        schema = schemas.get(content["schema"].get("$ref", "").rpartition("/")[2], {})
+        found = [
+            *schema.get("examples", []),
+            *([content["example"]] if "example" in content else []),
+        ]
+        assert found or "arrow" in media_type, f"{media_type} has no example"
+        for example in found:
+            text = example if isinstance(example, str) else json.dumps(example)
+            yield {"content": text, "headers": {"Content-Type": media_type}}
+    if not bodies:
+        kinds = {each["name"]: each["schema"] for each in operation.get("parameters", [])}
+        yield {
+            "params": {
+                name: kind["examples"][0] for name, kind in kinds.items() if "examples" in kind
+            }
+        }
+
+
+def test_the_described_examples_are_answered(client: Any) -> None:
+    document = client.get("/openapi.json").json()
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            examples = list(examples_of(operation, document["components"]["schemas"]))
+            assert examples
+            for asked in examples:
+                answer = client.request(method, path, **asked)
+                assert answer.status_code == 200, f"{method} {path}: {answer.text}"
+                assert b"urn:problem-type" not in answer.content
+
+
+def test_the_page_loads_nothing_from_elsewhere(client: Any) -> None:
+    for path in ("/", "/docs"):
+        page = client.get(path)
+        assert page.headers["content-type"].startswith("text/html")
+        assert not re.search(r"<script(?![^>]*src=)|<style|style=|\son\w+=|https?:|//", page.text)
+    for path, media_type in FILES.items():
+        assert path[1:] in page.text or "swagger" not in path
+        asset = client.get(path)
+        assert (asset.status_code, asset.headers["content-type"].split(";")[0]) == (200, media_type)
+        if "swagger" not in path:  # every part is served; a name of XML is no address
+            assert "://" not in asset.text.replace("http://www.w3.org/2000/svg", "")
+            assert {
+                f"/static/page/{name}" for name in re.findall(r'from "\./([^"]+)"', asset.text)
+            } <= FILES.keys()
+
+
+@pytest.mark.parametrize("path", ["/", "/docs", "/v1/table.nc", *FILES])
+def test_a_page_that_the_client_has_is_not_sent_again(client: Any, path: Any) -> None:
+    first = client.get(path)
+    tag = first.headers["etag"]
+    for offered in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+        again = client.get(path, headers={"If-None-Match": offered})
+        assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
+        for name in ("cache-control", "content-security-policy"):
+            assert again.headers.get(name) == first.headers.get(name)
+    assert client.get(path, headers={"If-None-Match": '"other"'}).content == first.content
+    assert client.head(path, headers={"If-None-Match": tag}).status_code == 304
+
+
+@pytest.mark.parametrize(
+    ("given", "status"),
+    [
+        ("bytes=99999999-", 416),
+        ("bytes=-0", 416),
+        ("bytes=0-1,99999999-", 416),
+        ("bytes=5-2", 400),
+        ("lines=1-2", 400),
+        ("nonsense", 400),
+        ("bytes=", 400),
+        ("bytes=a-b", 400),
+        ("bytes=\xff-", 400),
+    ],
+)
+@pytest.mark.parametrize("path", ["/v1/table.nc", "/", "/static/page/main.js"])
+def test_a_range_beyond_the_file_is_a_problem(
+    client: Any, problem: Any, path: Any, given: Any, status: Any
+) -> None:
+    response = client.get(path, headers={"Range": given.encode("latin-1")})
+    problem(response, status)
+    size = client.get(path).headers["content-length"]
+    assert response.headers.get("content-range") == (f"bytes */{size}" if status == 416 else None)
+
+
+def test_every_answer_has_the_security_headers(client: Any, case: Case) -> None:
+    for path in ("/", "/docs"):
+        page = client.get(path)
+        policy = page.headers["content-security-policy"]
+        assert page.headers["referrer-policy"] == "no-referrer"
+        assert all(
+            f"{name} 'none'" in policy for name in ("default-src", "frame-ancestors", "base-uri")
+        )
+        assert all(f"{name} 'self'" in policy for name in ("script-src", "connect-src"))
+        assert "unsafe" not in policy or path == "/docs"
+    for response in (
+        client.get("/v1/mu-macro", params=case),
+        client.post("/v1/mu-macro/batch", json=[case]),
+        client.get("/nowhere"),
+        client.post("/v1/mu-macro", content=b"{"),
+        client.put("/livez"),
+        client.get("/v1/table.nc"),
+        client.get("/docs"),
+    ):
+        assert response.headers["x-content-type-options"] == "nosniff"
+        assert not {"access-control-allow-origin", "server", "set-cookie"} & response.headers.keys()
+    assert client.get("/nowhere").headers["cache-control"] == "no-store"
+
+
+def test_pages_of_other_hosts_are_answered_only_where_a_setting_allows_them(started: Any) -> None:
+    asked = {"Origin": "https://tool.example", "Access-Control-Request-Method": "POST"}
+    with started(cors_origins=("https://tool.example",)) as client:
+        allowed, answer = (
+            client.options("/v1/mu-macro", headers=asked),
+            client.get("/livez", headers=asked),
+        )
+        for response in (allowed, answer):
+            assert response.headers["access-control-allow-origin"] == "https://tool.example"
+        assert allowed.headers["access-control-allow-methods"] == "GET, HEAD, POST"
+        refused = client.options(
+            "/v1/mu-macro", headers={**asked, "Origin": "https://other.example"}
+        )
+        assert "access-control-allow-origin" not in refused.headers

@@ -1,0 +1,129 @@
+"""Counters: their values, over all code paths and all workers."""
+
+import json
+import time
+from typing import Any
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from mumacro import Surrogate
+from tests.support.cases import Case
+
+PATH = "/v1/mu-macro"
+
+
+def samples(text: str) -> Any:
+    return {
+        (sample.name, *sorted(sample.labels.values())): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+
+
+@pytest.fixture
+def fresh(started: Any) -> Any:
+    with started() as client:
+        yield client
+
+
+def scrape(fresh: Any) -> Any:
+    response = fresh.get("/metrics")
+    assert response.status_code == 200
+    assert response.headers["content-type"] == "text/plain; version=1.0.0; charset=utf-8"
+    assert response.headers["cache-control"] == "no-store"
+    return samples(response.text)
+
+
+def test_requests_are_counted_by_route_method_and_status(fresh: Any, case: Case) -> None:
+    for _ in range(3):
+        fresh.post(PATH, json=case)
+    fresh.get(PATH, params=case)
+    fresh.post(PATH, json={**case, "mu0": -1})
+    fresh.post(f"{PATH}/batch", json=[case])
+    fresh.get("/nowhere/at/all")
+    fresh.request("BREW", "/livez")
+    found = scrape(fresh)
+    for route, method, status, number in (
+        (PATH, "POST", "200", 3),
+        (PATH, "GET", "200", 1),
+        (PATH, "POST", "422", 1),
+        (f"{PATH}/batch", "POST", "200", 1),
+        ("other", "GET", "404", 1),
+        ("/livez", "other", "405", 1),
+    ):
+        assert found["mumacro_requests_total", *sorted((route, method, status))] == number
+    assert found["mumacro_request_duration_seconds_count", PATH] == 5
+    assert found["mumacro_request_duration_seconds_bucket", *sorted((PATH, "+Inf"))] == 5
+    assert found["mumacro_request_duration_seconds_sum", PATH] > 0
+    for path in fresh.get("/openapi.json").json()["paths"]:
+        fresh.put(path)
+    found = scrape(fresh)
+    for path in fresh.get("/openapi.json").json()["paths"]:  # by its own name
+        assert found["mumacro_requests_total", *sorted((path, "other", "405"))] >= 1
+
+
+def test_clients_cannot_add_labels(fresh: Any, case: Case) -> None:
+    """The number of series does not depend on the paths, methods and names that clients send."""
+
+    def ask(i: Any) -> None:
+        fresh.get(f"/nowhere/{i}")
+        fresh.request(f"BREW{i}", f"/v1/{i}")
+        fresh.get("/v1/table", params={"id": f"t{i}"})
+        fresh.post(PATH, json=case, headers={"X-Request-ID": f"id{i}", "User-Agent": f"agent{i}"})
+
+    ask(0)
+    scrape(fresh)
+    before = scrape(fresh).keys()  # now it counts the first request to /metrics, too
+    for i in range(1, 200):
+        ask(i)
+    assert scrape(fresh).keys() == before
+
+
+def test_cases_are_counted_by_source_and_regime(
+    fresh: Any, case: Case, surrogate: Surrogate
+) -> None:
+    rows = [{**case, "v0": v0} for v0 in (0, 1e-4, 0.01, 0.1, 10.0)] + [{**case, "v0": -1}] * 4
+    answers = [fresh.post(PATH, json=row).json() for row in rows[:5]]
+    fresh.post(f"{PATH}/batch", json=rows)
+    fresh.get(PATH, params=rows[1])
+    fresh.post(PATH, json={**rows[2], "include": ["limits"]})
+    fresh.post(
+        f"{PATH}/batch",
+        content="\n".join(map(json.dumps, rows)),
+        headers={"Content-Type": "application/jsonl"},
+    )
+    fresh.post(f"{PATH}/batch", json={**case, "v0": [rows[4]["v0"]] * 1000})
+    found = scrape(fresh)
+    expected: dict[tuple[str, ...], int] = {}
+    for answer in [*answers * 3, answers[1], answers[2], *[answers[4]] * 1000]:
+        key = ("mumacro_cases_total", *sorted((surrogate.id, answer["source"], answer["regime"])))
+        expected[key] = expected.get(key, 0) + 1
+    assert {
+        key: value for key, value in found.items() if key[0] == "mumacro_cases_total"
+    } == expected
+    # of the batch; bad lines are not counted here
+    assert found["mumacro_bad_cases_total", surrogate.id] == 4
+    assert found["mumacro_table_info", *sorted((surrogate.id, f"{surrogate.tolerance:g}"))] == 1
+
+
+@pytest.mark.slow
+def test_several_workers_behind_a_key_count_together_and_stop(
+    serving: Any, surrogate: Surrogate, case: Case
+) -> None:
+    body, asked, key = json.dumps(case), 40, {"X-API-Key": "k3y"}
+    with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
+        server.wait_until_ready(2)
+        assert server.ask("GET", "/metrics")[0] == 401
+        for _ in range(asked):
+            assert server.ask("POST", PATH, body, key)[0] == 200
+        counted = ("mumacro_requests_total", *sorted((PATH, "POST", "200")))
+        deadline = time.monotonic() + 60
+        in_a_row = 0
+        while in_a_row < 20:  # more scrapes than one worker would get by chance
+            found = samples(server.ask("GET", "/metrics", headers=key)[2].decode())
+            assert found.get(counted, 0) <= asked
+            in_a_row = in_a_row + 1 if found.get(counted) == asked else 0
+            assert time.monotonic() < deadline
+        assert server.stop() == 0
+    assert all(json.loads(line) for line in server.lines)

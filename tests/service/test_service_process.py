@@ -1,0 +1,350 @@
+"""The service as a process: its start and end, its health check, and its log, which no client and
+no reader harms."""
+
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mumacro import Surrogate
+from service.observe import for_people
+from tests.support.cases import Case
+
+SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
+#: texts that a client behind a proxy can send in place of its address
+NO_ADDRESS = [
+    'a"b',
+    "a\\",
+    '1.2.3.4" "level": "error',
+    "\t1.2.3.4",
+    "{}",
+    "\u00e9\u00ff",
+    "a" * 64 + "b" * 5000,
+]
+NO_PATH = ("/%0a%7B%22level%22%3A%22error%22%7D", "/%22", "/%00", "/%ff", "/%E2%80%A8", "/a%0d%0ab")
+
+
+def fields_of(lines: Any) -> Any:
+    """Every line as an object; a line that is not JSON, or has a name twice, fails the test."""
+
+    def once(pairs: Any) -> Any:
+        names = [name for name, _ in pairs]
+        assert len(names) == len(set(names)), names
+        return dict(pairs)
+
+    found = [json.loads(line, object_pairs_hook=once) for line in lines]
+    assert all({"time", "level", "logger", "message"} <= line.keys() for line in found)
+    return found
+
+
+def accesses(lines: Any) -> Any:
+    return [line for line in fields_of(lines) if line["logger"] == "mumacro.access"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_requested_stop_is_a_success(
+    serving: Any, surrogate: Surrogate, case: Case, number: Any
+) -> None:
+    with serving(surrogate.path, MUMACRO_ROOT_PATH="/friction") as server:
+        status, headers, _ = server.ask(
+            "POST", SINGLE, json.dumps(case), {"X-Request-ID": "the-last"}
+        )
+        assert (status, headers["x-request-id"]) == (200, "the-last")
+        assert "server" not in headers
+        assert server.stop(number) == 0
+    (line,) = accesses(server.lines)  # probes of health are not logged
+    assert line.pop("duration_ms") > 0.0
+    del line["time"]
+    assert line == {
+        "level": "info",
+        "logger": "mumacro.access",
+        "message": "request",
+        "request_id": "the-last",
+        "method": "POST",
+        "path": SINGLE,
+        "status": 200,
+        "client": "127.0.0.1",
+    }
+
+
+#: run before the service: sends SIGTERM to the own process when the module of this name is about to
+#: be imported
+STOPPED_AT = """
+import os, signal, sys
+
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == os.environ["STOPPED_AT"]:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+
+sys.meta_path.insert(0, Finder())
+"""
+
+
+def begun(repository: Path, surrogate: Surrogate, **variables: str) -> Any:
+    """A service that has only been started."""
+    words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
+    return subprocess.Popen(
+        words,
+        cwd=repository,
+        env={**os.environ, **variables},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("module", "workers"),
+    [
+        ("argparse", "1"),
+        ("pydantic", "1"),
+        ("uvicorn", "1"),
+        ("uvicorn", "2"),
+        ("service.observe", "2"),
+        ("service.app", "1"),
+    ],
+)
+def test_a_stop_at_an_import_of_the_start_is_a_success(
+    repository: Path, surrogate: Surrogate, tmp_path: Path, module: str, workers: str
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(STOPPED_AT)
+    path = os.pathsep.join([str(tmp_path), os.getcwd()])
+    variables = {"PYTHONPATH": path, "STOPPED_AT": module, "MUMACRO_WORKERS": workers}
+    with begun(repository, surrogate, **variables) as process:
+        told = process.communicate(timeout=60)[0].decode()
+    assert process.returncode == 0, told
+    assert "Traceback" not in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("after", [0.05, 0.2, 0.5, 1.0])
+def test_a_stop_soon_after_the_start_is_a_success(
+    repository: Path, surrogate: Surrogate, after: float, workers: str
+) -> None:
+    with begun(repository, surrogate, MUMACRO_WORKERS=workers) as process:
+        status, caught = Path(f"/proc/{process.pid}/status"), 0
+        # before, it is not yet the service, but Python, that starts
+        while not caught >> (signal.SIGTERM - 1) & 1:
+            caught = int(re.findall(r"^SigCgt:\s*(\w+)$", status.read_text(), re.MULTILINE)[0], 16)
+        time.sleep(after)
+        process.terminate()
+        told = process.communicate(timeout=60)[0].decode()
+    assert process.returncode == 0, told
+    assert "Traceback" not in told
+
+
+@pytest.mark.slow
+def test_without_a_table_or_pyarrow_it_starts_and_says_so(
+    serving: Any, tmp_path: Path, case: Case
+) -> None:
+    (tmp_path / "damaged.nc").write_bytes(b"damaged")
+    (tmp_path / "sitecustomize.py").write_text('import sys\n\nsys.modules["pyarrow"] = None\n')
+    path = os.pathsep.join([str(tmp_path), os.getcwd()])
+    with serving(tmp_path, PYTHONPATH=path) as server:
+        assert server.ask("GET", "/livez")[0] == 200
+        status, _, body = server.ask("GET", "/readyz")
+        assert (status, "damaged.nc" in json.loads(body)["detail"]) == (503, True)
+        arrow = {"Content-Type": "application/vnd.apache.arrow.stream"}
+        assert server.ask("POST", BATCH, b"", arrow)[0] == 415
+        assert server.ask("POST", BATCH, json.dumps([case]))[0] == 503
+        assert server.stop() == 0
+
+
+def command(repository: Path, *arguments: Any) -> Any:
+    return subprocess.run(
+        [sys.executable, "-m", "service", *arguments],
+        cwd=repository,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=180,
+        env={**os.environ, "http_proxy": "http://[::1]:9"},
+    )
+
+
+@pytest.mark.slow
+def test_the_health_check_and_a_port_that_is_taken(
+    live_server: Any, repository: Path, surrogate: Surrogate
+) -> None:
+    found = command(repository, "healthcheck", "--port", str(live_server.port))
+    assert found.returncode == 0, found.stderr
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        assert (
+            command(repository, "healthcheck", "--port", str(unused.getsockname()[1])).returncode
+            == 1
+        )
+    failed = command(repository, "--tables", str(surrogate.path), "--port", str(live_server.port))
+    assert failed.returncode == 1
+    assert "Traceback" not in failed.stdout + failed.stderr
+
+
+def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
+    serving: Any, surrogate: Surrogate, case: dict[str, Any]
+) -> None:
+    alice, bob, wrong = "k3y-of-alice", "k3y-of-bob", "wr0ng-key"
+    body, told = json.dumps(case), []
+    known = "&".join(f"{name}={value}" for name, value in case.items())
+    with serving(
+        surrogate.path, "--log-level", "debug", MUMACRO_API_KEYS=f"alice={alice},bob={bob}"
+    ) as server:
+        for text in NO_ADDRESS:
+            said = {"X-API-Key": alice, "X-Forwarded-For": text.encode("latin-1")}
+            assert server.ask("POST", SINGLE, body, said)[0] == 200
+            assert server.ask("GET", f"{SINGLE}?{known}", headers=said)[0] == 200
+            assert server.ask("POST", BATCH, f"[{body}]", said)[0] == 200
+            assert server.ask("GET", "/nowhere", headers=said)[0] == 404
+        for path in NO_PATH:
+            assert server.ask("GET", path, headers={"X-API-Key": alice})[0] == 404
+        asked = [
+            ("POST", SINGLE, body),
+            ("POST", BATCH, f"[{body}]"),
+            ("POST", SINGLE, "{"),
+            ("GET", "/metrics", None),
+        ]
+        for headers in (
+            {"X-API-Key": alice},
+            {"X-API-Key": wrong},
+            *({"Authorization": text} for text in (f"Bearer {bob}", f"Basic {wrong}", bob)),
+        ):
+            told += [
+                str(server.ask(*request, headers))
+                for request in (*asked, ("GET", "/openapi.json", None))
+            ]
+        assert server.stop() == 0
+    for text in (alice, bob, wrong):
+        assert text not in "".join(server.lines)
+        assert text not in "".join(told)
+    lines = accesses(server.lines)
+    assert {line.get("key") for line in lines} == {None, "alice", "bob"}
+    shown = [line["client"] for line in lines if line["path"] == "/nowhere"]
+    assert shown == [text.strip()[:64] for text in NO_ADDRESS]
+    assert all(len(line["client"]) <= 64 for line in lines)
+    assert {line["level"] for line in fields_of(server.lines)} <= {"debug", "info", "warning"}
+
+
+@contextmanager
+def unread(repository: Path, surrogate: Surrogate) -> Any:
+    """A service whose standard output is read up to the line with its port only: process, port,
+    lines."""
+    words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
+    variables = {
+        name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")
+    }
+    process = subprocess.Popen(
+        words, cwd=repository, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    assert process.stdout is not None
+    try:
+        lines: list[bytes] = []
+        while not (
+            found := re.search(rb"running on http://[^ ]+:(\d+) ", lines[-1] if lines else b"")
+        ):
+            lines.append(process.stdout.readline())
+            assert lines[-1], b"".join(lines)
+        yield process, int(found[1]), lines
+        process.terminate()
+        assert process.wait(60) == 0
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def statuses(port: Any, path: Any, many: Any) -> Any:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    found = []
+    for _ in range(many):
+        connection.request("GET", path)
+        response = connection.getresponse()
+        response.read()
+        found.append(response.status)
+    connection.close()
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("then", ["reads", "stays", "leaves"])
+def test_a_log_reader_that_stalls_delays_no_request(
+    repository: Path, surrogate: Surrogate, case: Case, then: Any
+) -> None:
+    query = f"{SINGLE}?" + "&".join(f"{name}={value}" for name, value in case.items())
+    many = 3000 if then == "reads" else 500
+    with unread(repository, surrogate) as (process, port, lines):
+        if then == "leaves":
+            process.stdout.close()
+        # Some 250 bytes a line: a pipe holds 64 kB, and the service a megabyte.
+        with ThreadPoolExecutor(4) as pool:
+            answered = [
+                pool.submit(statuses, port, *asked) for asked in 4 * [(query, many), ("/x", 500)]
+            ]
+        assert [one.result() for one in answered] == 4 * [many * [200], 500 * [404]]
+        if then != "reads":
+            return
+        reader = threading.Thread(target=lambda: lines.extend(process.stdout))
+        reader.start()
+        process.terminate()
+        assert process.wait(60) == 0
+        reader.join(60)
+    told = [line for line in fields_of(lines) if "were dropped" in line["message"]]
+    assert {line["level"] for line in told} == {"warning"}
+    lost = sum(int(line["message"].split()[0]) for line in told)
+    assert lost > 0
+    assert lost + len(accesses(lines)) >= 14_000
+
+
+@pytest.mark.slow
+def test_at_a_terminal_it_speaks_to_a_person(repository: Path) -> None:
+    import pty
+
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    reader, writer = pty.openpty()
+    command = [sys.executable, "-m", "mumacro", "serve", "--port", str(port)]
+    with subprocess.Popen(command, cwd=repository, stdout=writer, stderr=writer) as process:
+        os.close(writer)
+        shown, until = b"", time.monotonic() + 180.0
+        try:
+            while b"Open http" not in shown and time.monotonic() < until:
+                shown += os.read(reader, 65536)
+            address = f"http://127.0.0.1:{port}"
+            assert f"Open {address} ".encode() in shown
+            with urllib.request.urlopen(f"{address}/v1/table", timeout=30):
+                pass
+            while b"/v1/table" not in shown and time.monotonic() < until:
+                shown += os.read(reader, 65536)
+        finally:
+            process.terminate()
+            while True:  # a terminal that nobody reads would hold the process
+                try:
+                    shown += os.read(reader, 65536)
+                except OSError:
+                    break
+    os.close(reader)
+    assert re.search(rb"\d\d:\d\d:\d\d  GET /v1/table 200 [\d.]+ ms\r\n", shown)
+    assert b"{" not in shown
+
+
+def test_a_line_for_people_moves_no_cursor_and_forges_no_line() -> None:
+    now = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+    line = {"time": now, "level": "warning", "logger": "x", "message": "a\x1b[2J\nb µ", "n": 1}
+    assert for_people(line) == "03:04:05  warning: a\\x1b[2J\\x0ab µ n=1\n".encode()

@@ -1,0 +1,244 @@
+"""Solve-for, law (JSON and CSV), stiffness and fit over HTTP: values and formats."""
+
+import csv
+import io
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mumacro
+from benchmarks.support.serving import CASE
+from mumacro import Surrogate
+from mumacro.contacts.geometries import contact_of
+from tests.support.cases import Case
+from tests.support.comparing import close
+
+SOLVE = {
+    "unknown": "y0",
+    "target": 0.15,
+    **{name: value for name, value in CASE.items() if name != "y0"},
+}
+LAW = {
+    "start": 1e-4,
+    "stop": 10.0,
+    "points": 33,
+    **{name: value for name, value in CASE.items() if name != "v0"},
+}
+
+
+def answered(client: Any, path: Any, given: Any, **changed: Any) -> Any:
+    given = {name: value for name, value in {**given, **changed}.items() if value is not ...}
+    response = client.post(f"/v1/{path}", json=given)
+    assert response.status_code == 200, response.text
+    return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+
+
+def test_a_root_gives_its_target_back(client: Any) -> None:
+    answer = answered(client, "solve-for", SOLVE)
+    ((root,),) = [result["roots"] for result in answer["results"]]
+    forward = answered(client, "mu-macro", CASE, y0=root["value"])
+    assert (forward["mu_macro"], forward["regime"]) == (root["mu_macro"], root["regime"])
+    assert root["mu_macro"] == close(0.15, rel=1e-14)
+    assert root["low"] < root["value"] < root["high"] < (1.0 + 1e-9) * root["low"]
+
+
+def test_a_frequency_is_solved_for_by_a_ratio_with_what_is_included(client: Any) -> None:
+    ratio = {
+        **SOLVE,
+        "unknown": "f",
+        "y0": 2e-6,
+        "omega": ...,
+        "target": 0.8,
+        "quantity": "mu_ratio",
+    }
+    answer = answered(client, "solve-for", ratio, include=["power"])
+    assert (answer["unit"], answer["quantity"]) == ("Hz", "mu_ratio")
+    (root,) = answer["results"][0]["roots"]
+    there = answered(client, "mu-macro", CASE, omega=..., f=root["value"], include=["power"])
+    assert there["mu_ratio"] == close(0.8, rel=1e-14)
+    assert root["power"] == close(there["power"], rel=1e-13)
+    assert root["low"] < root["value"] < root["high"]
+
+
+def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any) -> None:
+    targets = [0.25, 0.1, 0.29, 0.4]
+    answer = answered(
+        client, "solve-for", SOLVE, unknown="v0", target=targets, y0=CASE["y0"], v0=None
+    )
+    assert [result["target"] for result in answer["results"]] == targets
+    assert [len(result["roots"]) for result in answer["results"]] == [1, 0, 1, 0]
+    reach = answer["reachable"]
+    assert reach["min"] == close(0.3 * math.sqrt(5) / 3, rel=1e-9)
+    assert (reach["max"], reach["min_included"], reach["max_included"]) == (0.3, True, False)
+    told = f"is not in the reachable range [{reach['min']!r}, 0.3)"
+    assert [result.get("reason") for result in answer["results"]] == [
+        None,
+        f"0.1 {told}",
+        None,
+        f"0.4 {told}",
+    ]
+    (result,) = answered(client, "solve-for", SOLVE, unknown="v0", y0=0.0, v0=None)["results"]
+    assert result["roots"] == []
+    assert "no influence" in result["reason"]
+
+
+def test_both_ends_of_an_interval_of_k_are_solved_for(client: Any) -> None:
+    rest = {name: value for name, value in SOLVE.items() if name != "k"}
+    whole = answered(client, "solve-for", {**rest, "k_range": [8e5, 1.25e6]})
+    for k, one in zip((8e5, 1.25e6), whole.pop("ends"), strict=True):
+        alone = answered(client, "solve-for", {**rest, "k": k})
+        assert one == {"k": k, **{name: alone[name] for name in ("results", "range", "reachable")}}
+    assert whole["results"][0]["roots"][0]["value"] == close(
+        answered(client, "solve-for", {**rest, "k": 1e6})["results"][0]["roots"][0]["value"],
+        rel=1e-9,
+    )
+
+
+def test_folded_roots_are_all_returned_within_the_range(client: Any) -> None:
+    request = {
+        **SOLVE,
+        "unknown": "k",
+        "target": 0.3 * 0.0023,
+        "v0": 1e-4,
+        "y0": CASE["y0"],
+        "k": None,
+    }
+    values = [
+        root["value"] for root in answered(client, "solve-for", request)["results"][0]["roots"]
+    ]
+    assert len(values) == 3
+    within = [0.5 * values[0], 2.0 * values[0]]
+    answer = answered(client, "solve-for", request, range=within)
+    assert [root["value"] for root in answer["results"][0]["roots"]] == [close(values[0], rel=1e-9)]
+    assert answer["range"] == within
+
+
+def test_a_law_is_single_answers_in_a_row(client: Any) -> None:
+    law = answered(client, "law", LAW, points=33.0)  # an integer may be written so
+    assert (law["along"], law["unit"]) == ("v0", "m/s")
+    assert (law["values"][0], law["values"][-1], len(law["values"])) == (1e-4, 10.0, 33)
+    for i in (0, 16, 32):
+        alone = answered(client, "mu-macro", CASE, v0=law["values"][i])
+        for name in ("mu_macro", "mu_ratio", "regime", "error_bound", "source"):
+            expected = close(alone[name], rel=1e-14) if name.startswith("mu") else alone[name]
+            assert law[name][i] == expected
+    limits = answered(client, "mu-macro", CASE, include=["limits"])["limits"]
+    (border,) = law["border"]
+    assert border["value"] == close(limits["v0_crit"], rel=1e-9)
+    assert border["mu_macro"] == close(limits["mu_crit"], rel=1e-9)
+    assert law["mu_static"] == [close(limits["mu_static"], rel=1e-14)] * 33
+
+
+@pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega", "f"])
+def test_a_law_goes_along_any_input(client: Any, along: Any) -> None:
+    name, per = ("omega", 2 * math.pi) if along == "f" else (along, 1.0)
+    middle = CASE[name] / per
+    asked = {
+        "along": along,
+        "start": 0.1 * middle,
+        "stop": 10 * middle,
+        "scale": "linear",
+        name: None,
+    }
+    law = answered(client, "law", {**CASE, **asked})
+    assert len(law["values"]) == 201
+    there = answered(client, "mu-macro", CASE, **{name: law["values"][77] * per})
+    assert law["mu_macro"][77] == close(there["mu_macro"], rel=1e-14)
+    for mark in law["border"]:
+        at = answered(client, "mu-macro", CASE, **{name: mark["value"] * per}, include=["limits"])
+        assert at["limits"]["v0_crit"] == close(CASE["v0"], rel=1e-6)
+
+
+def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
+    law = answered(client, "law", LAW, y0=1e-5, include=["power"])
+    response = client.get("/v1/law.csv", params={**LAW, "y0": 1e-5, "include": "power"})
+    assert response.headers["content-type"].startswith("text/csv")
+    assert 'filename="friction-law-v0.csv"' in response.headers["content-disposition"]
+    columns = {
+        "v0 [m/s]": law["values"],
+        **{f"{name} [-]": law[name] for name in ("mu_macro", "mu_ratio", "error_bound")},
+        **{
+            f"{name}.{part} [W]": law[name][part]
+            for name in ("power", "power_bound")
+            for part in law[name]
+        },
+        "mu_static [-]": law["mu_static"],
+        "regime": law["regime"],
+        "source": law["source"],
+    }
+    header, *rows = csv.reader(io.StringIO(response.text))
+    assert header == list(columns)
+    for name, cells in zip(header, zip(*rows, strict=True), strict=True):
+        assert cells == tuple(
+            "" if x is None else x if isinstance(x, str) else repr(x) for x in columns[name]
+        )
+    assert response.text.count("\r\n") == 34
+    head = client.head("/v1/law.csv", params=LAW)
+    assert (head.status_code, head.content) == (200, b"")
+
+
+STEEL = {"E": 210e9, "nu": 0.3, "Fz": 10.0}
+BODIES = [
+    ("ball", {"radius": 5e-3}),
+    ("flat", {"radius": 1e-3}),
+    ("ball", {"radius": 5e-3, "E2": "rigid"}),
+    ("cylinder", {"radius": 5e-3, "length": 1e-2, "oscillation": "along"}),
+]
+
+
+def test_a_wide_contact_is_told_with_its_stiffness(client: Any) -> None:
+    soft = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "nu": 0.3}
+    (told,) = answered(client, "stiffness", {**soft, "E": 1e6})["warnings"]
+    assert "0.82 of the radius" in told
+    refused = client.post("/v1/stiffness", json={**soft, "E": 210})
+    assert refused.status_code == 422
+    assert "did you mean 210 GPa?" in refused.text
+
+
+@pytest.mark.parametrize(("geometry", "given"), BODIES)
+def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, given: Any) -> None:
+    found = contact_of(
+        geometry, **STEEL, **{name: np.inf if x == "rigid" else x for name, x in given.items()}
+    )
+    answer = answered(client, "stiffness", {"geometry": geometry, **STEEL, **given})
+    assert answer == {"geometry": geometry, **vars(found), "warnings": [], "api_version": "1"}
+
+
+def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:
+    v0 = np.geomspace(1e-3, 1.0, 20)
+    mu = surrogate.evaluate({**CASE, "v0": v0}, contact="ball").mu_macro + 1e-3 * np.cos(
+        17.0 * np.arange(20)
+    )
+    rig: Case = {"Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
+    found = mumacro.fit({"v0": v0, "mu_macro": mu}, contact="ball", surrogate=surrogate, **rig)
+    body = {"v0": v0.tolist(), "mu_macro": mu.tolist(), **rig, "contact": "ball"}
+    answer = answered(client, "fit", body)
+    assert (answer["values"], answer["std"], answer["chi2"]) == (
+        found.values,
+        found.std,
+        found.chi2,
+    )
+    for name in ("covariance", "residuals"):
+        assert answer[name] == getattr(found, name).tolist()
+    curve = answer["curve"]
+    assert (curve["v0"][0], curve["v0"][-1]) == (v0[0], v0[-1])
+    assert all(
+        low < mid < high
+        for low, mid, high in zip(curve["low"], curve["mu_macro"], curve["high"], strict=True)
+    )
+    assert answered(client, "fit", body, unknowns=["k"], mu0=0.3, std=1e-3)["values"].keys() == {
+        "k"
+    }
+    assert answered(client, "fit", body, Fz=[10.0] * 19 + [11.0])["curve"] is None
+
+
+def test_stiff_points_fit_a_rigid_contact_in_words(client: Any, surrogate: Surrogate) -> None:
+    v0 = np.geomspace(0.05, 2.0, 12)
+    mu = surrogate.evaluate({**CASE, "k": np.inf, "v0": v0}).mu_macro
+    body = {"v0": v0.tolist(), "mu_macro": mu.tolist(), "Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
+    answer = answered(client, "fit", body)
+    assert answer["interval"]["k"][1] == "rigid"
+    assert answer["warnings"]

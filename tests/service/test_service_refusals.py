@@ -1,0 +1,577 @@
+"""What is refused, by its place and with a reason: one table for all questions; bodies that cannot
+be read."""
+
+import json
+from typing import Any
+from urllib.parse import urlencode
+
+import pyarrow as pa
+import pytest
+
+from benchmarks.support.forms import BATCH, as_arrow, as_csv, as_table, asked, posted, stream_of
+from benchmarks.support.serving import CASE
+
+SINGLE = "/v1/mu-macro"
+FIVE = {name: value for name, value in CASE.items() if name != "v0"}
+BALL = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3}
+POINTS = {
+    "v0": [0.01, 0.1, 0.3],
+    "mu_macro": [0.2, 0.25, 0.29],
+    "Fz": 10.0,
+    "y0": 2e-6,
+    "omega": 1.3e5,
+}
+NORMAL = {"y0": ..., "Fz_amplitude": 1.0, "direction": "normal"}
+RANGE = {"k": ..., "k_range": [1e6, 2e6]}
+#: a question that is answered, by its path; the table changes it
+ASKED = {
+    "mu-macro": CASE,
+    "mu-macro.txt": CASE,
+    "mu-macro/batch": {**CASE, "v0": [0.1, 0.2]},
+    "stiffness": BALL,
+    "law": {**FIVE, "start": 1e-4, "stop": 10.0},
+    "law.csv": {**FIVE, "start": 1e-4, "stop": 10.0},
+    "fit": POINTS,
+    "solve-for": {**FIVE, "y0": ..., "v0": 0.01, "unknown": "y0", "target": 0.15},
+    "table": {},
+    "table.nc": {},
+}
+#: request, what is changed (...: left out), where the fault is (# in the body, ? in the query), and
+#: words of its reason
+REFUSED = [
+    # names
+    ("POST mu-macro", {"k": ...}, "#/k", "rigid"),
+    ("GET mu-macro", {"k": ...}, "?k", "rigid"),
+    *(
+        (f"POST {path}", {"k": None}, "#/k", "is missing; write rigid or a number")
+        for path in ("mu-macro", "law")
+    ),
+    ("POST solve-for", {"k": None}, "#/k", "is missing; write rigid or a number"),
+    ("POST fit", {"k": None, "unknowns": ["mu0"]}, "#/k", "is missing; write rigid or a number"),
+    ("POST mu-macro", {"v0": ...}, "#/v0", "is required"),
+    ("POST mu-macro", {"omega": ...}, "#/omega", "is required: omega [rad/s], or f [Hz]"),
+    ("POST mu-macro", {"f": 1.0}, "#/f", "exactly one of omega"),
+    (
+        "POST mu-macro",
+        {"f/~z": 1},
+        "#/f~1~0z",
+        "mu0, Fz, k, y0, omega, f, v0, Fz_amplitude, k_range, k_low, k_high",
+    ),
+    ("POST mu-macro", {"\ud800": 1}, "#/?", "unknown"),
+    ("POST mu-macro?v0=1", {}, "?v0", "belongs in the body"),
+    *(
+        ("GET mu-macro", {name: 1}, f"?{name}", f"mean {meant}?")
+        for name, meant in (("fz", "Fz"), ("K", "k"), ("stiffness", "k"), ("frequency", "f"))
+    ),
+    ("GET mu-macro?v0=1", {}, "?v0", "is given more than once"),
+    ("GET mu-macro.txt", {"value": "power"}, "?value", "is not in the answer"),
+    ("GET table", {"id": "../x"}, "?id", "unknown"),
+    ("GET table?tolerance=1", {"tolerance": 1}, "?tolerance", "is given more than once"),
+    ("GET table.nc", {"tolerance": "x"}, "?tolerance", "must be a number"),
+    # numbers
+    *(
+        ("POST mu-macro", {name: value}, f"#/{name}", "must be a number")
+        for name in ("mu0", "k", "v0", "tolerance")
+        for value in ("0.3", True, [0.3], {"value": 0.3}, "")
+    ),
+    *(
+        ("GET mu-macro", {"k": text}, "?k", "must be a number")
+        for text in ("abc", "", " ", "1_000", "0x10", "１", "1e", "1,5", "--1", "1 2", "null")
+    ),
+    *(
+        (f"POST {path}", {name: zero}, f"#/{name}", "finite and > 0")
+        for path in ("mu-macro", "mu-macro/batch")
+        for name in ("mu0", "Fz", "k", "tolerance")
+        for zero in (0, -0.0)
+    ),
+    *(
+        ("GET mu-macro", {name: text}, f"?{name}", words)
+        for name, text, words in (
+            ("k", "0", "finite and > 0"),
+            ("k", "", "rigid"),
+            ("v0", "0,01", "0.01"),
+            ("y0", "2um", "give metres, 2e-06"),
+            ("v0", "5 mm/s", "give metres per second, 0.005"),
+        )
+    ),
+    *(
+        (
+            f"POST {path}",
+            {"tolerance": 1e-30},
+            "#/tolerance",
+            "must be >= 1e-12: no loaded table is tighter",
+        )
+        for path in ("mu-macro", "mu-macro/batch", "law", "solve-for", "fit")
+    ),
+    *(
+        (f"GET {path}", {"tolerance": 1e-30}, "?tolerance", "no loaded table is tighter")
+        for path in ("mu-macro", "law.csv", "table", "table.nc")
+    ),
+    ("POST mu-macro/batch?tolerance=1e-30", {}, "?tolerance", "no loaded table is tighter"),
+    # include and std
+    *(
+        ("POST mu-macro", {"include": [name]}, "#/include/0", "groups, limits")
+        for name in ("curvature", "Groups", 1)
+    ),
+    *(
+        ("POST mu-macro", {"include": value}, "#/include", "a list of names")
+        for value in ("groups", 3, {"groups": 1})
+    ),
+    *(
+        ("GET mu-macro", {"include": name}, "?include", "groups, limits")
+        for name in ("curvature", "")
+    ),
+    *(
+        (f"POST {path}", {"include": ["std"]}, "#/std", "given if")
+        for path in ("mu-macro", "mu-macro/batch")
+    ),
+    *(
+        (f"POST {path}", {"include": ["groups"], "std": {}}, "#/std", "no effect")
+        for path in ("mu-macro", "mu-macro/batch")
+    ),
+    *(
+        ("POST mu-macro", {"include": ["std"], "std": {name: value}}, f"#/std/{name}", words)
+        for name, value, words in (
+            ("mu0", -1, "finite and >= 0"),
+            ("mu0", "0.1", "number"),
+            ("speed", 1, "unknown"),
+        )
+    ),
+    ("POST mu-macro", {"include": ["std"], "std": [1, 2]}, "#/std", "an object of numbers"),
+    (
+        "POST mu-macro",
+        {"include": ["std"], "std": {"omega": 1.0, "f": 1.0}},
+        "#/std/f",
+        "not of both",
+    ),
+    ("GET mu-macro", {"include": "std"}, "?std_mu0", "given if"),
+    ("GET mu-macro", {"std_v0": 1}, "?std_mu0", "no effect"),
+    ("GET mu-macro", {"include": "std", "std_v0": -1}, "?std_v0", "finite and >= 0"),
+    ("GET mu-macro", {"include": "std", "std_omega": 1.0, "std_f": 1.0}, "?std_f", "not of both"),
+    ("POST mu-macro/batch?include=std", {}, "?std_mu0", "given if"),
+    # contact, direction, interval
+    *(
+        ("POST mu-macro", changed, f"#/{place}", words)
+        for changed, place, words in (
+            ({"contact": "cone"}, "contact", "spring, ball"),
+            ({"direction": "up"}, "direction", "across, along, normal"),
+            ({"contact": "ball", "direction": "normal"}, "direction", "contact radius"),
+            ({"direction": "normal"}, "y0", "Fz_amplitude"),
+            ({"Fz_amplitude": 1.0}, "Fz_amplitude", "amplitude is y0"),
+            ({**NORMAL, "Fz_amplitude": 10.0}, "Fz_amplitude", "lifts off"),
+            ({"k_range": [1e6, 2e6]}, "k", "interval"),
+            ({**RANGE, "k_low": 1e6}, "k_low", "beside k_range"),
+            ({"k": ..., "k_low": 1e6}, "k_high", "required"),
+            ({**RANGE, "k_range": [2e6, 1e6]}, "k_range", "low <= high"),
+            ({**RANGE, "k_range": [1e6]}, "k_range", "two stiffnesses"),
+            ({**RANGE, "k_range": [1e6, "rigid"]}, "k_high", "number"),
+            ({**NORMAL, "include": ["power"]}, "include", "load"),
+            ({"direction": "along", "include": ["settling"]}, "include", "across"),
+            ({**RANGE, "include": ["std"], "std": {"v0": 1e-3}}, "include", "one k"),
+            ({**NORMAL, "include": ["std"], "std": {"y0": 1e-6}}, "std", "y0"),
+        )
+    ),
+    # columns
+    *(
+        ("POST mu-macro/batch", changed, f"#/{place}", words)
+        for changed, place, words in (
+            ({"v0": [1, 2, 3], "y0": [1e-6, 2e-6]}, "v0", "one length; given y0: 2, v0: 3"),
+            ({"y0": [1e-6]}, "v0", "one length"),
+            ({"y0": []}, "v0", "one length"),
+            ({"Fz": ...}, "Fz", "is required"),
+            ({"k": None}, "k", "is missing; write rigid or a number"),
+            ({"speed": [1]}, "speed", "unknown"),
+            ({"y0": {}}, "y0", "must be a number"),
+            ({"include": ["model"]}, "include", "one case"),
+        )
+    ),
+    ("POST mu-macro/batch?nonsense=1", {}, "?nonsense", "is no option"),
+    ("POST mu-macro/batch?mu0=1", {}, "?mu0", "inputs belong in the body"),
+    (
+        "POST mu-macro/batch?include=limits",
+        {"include": ["groups"]},
+        "#/include",
+        "in the query and in the body",
+    ),
+    # law
+    *(
+        (request, {name: value}, place + name, words)
+        for request, place in (("POST law", "#/"), ("GET law.csv", "?"))
+        for name, value, words in (
+            ("along", "x", "one of mu0"),
+            ("start", 0.0, "> 0 on a logarithmic"),
+            ("stop", 0.0, "finite and > 0"),
+            ("stop", 1e-5, "> start"),
+            ("points", 1, "from 2 to 10001"),
+            ("points", 10_002, "from 2 to 10001"),
+            ("scale", "cubic", "log or linear"),
+            ("v0", 0.01, "must be left out"),
+            ("mu0", -1.0, "finite and > 0"),
+            ("extra", 1.0, "unknown"),
+        )
+    ),
+    *(
+        ("POST law", {"points": value}, "#/points", "a whole number")
+        for value in (5.5, True, "5", 1e30)
+    ),
+    ("POST law", {"include": ["curvature"]}, "#/include/0", "settling"),
+    ("POST law", {"include": ["approximations"]}, "#/include", "mumacro law --approximations"),
+    ("GET law.csv", {"include": "curvature"}, "?include", "settling"),
+    ("GET law.csv", {"include": "power,approximations"}, "?include", "--approximations"),
+    ("GET law.csv?mu0=0.4", {}, "?mu0", "is given more than once"),
+    ("GET law.csv", {"omega": ...}, "?omega", "is required"),
+    *(
+        ("GET law.csv", {"Fz": text}, "?Fz", "")
+        for text in ("", "ten", "nan", "inf", "1e999", "0x10", "1_000")
+    ),
+    ("POST law?mu0=1", {}, "?mu0", "belongs in the body"),
+    # solve-for
+    *(
+        ("POST solve-for", {name: value}, f"#/{name}", words)
+        for name, value, words in (
+            ("unknown", "w0", "one of mu0"),
+            ("unknown", None, "one of mu0"),
+            ("y0", 1e-6, "must be left out"),
+            ("mu0", ..., "is required"),
+            ("target", [], "a list of 1 to 10000"),
+            ("target", [0.1] * 10_001, "10000"),
+            ("Fz", 0, "finite and > 0"),
+            ("Fz", "10", "must be a number"),
+            ("range", [1], "two numbers"),
+            ("range", [2, 1], "ascending"),
+            ("extra", 1, "unknown"),
+            ("omega", -1, "finite and >= 0"),
+        )
+    ),
+    ("POST solve-for", {"target": -0.1}, "#/target/0", "finite and >= 0"),
+    *(
+        ("POST solve-for", {"target": [0.1, value]}, "#/target/1", "must be a number")
+        for value in ("0.1", True)
+    ),
+    ("POST solve-for", {"range": [0, -1]}, "#/range/1", "finite and >= 0"),
+    # stiffness and fit
+    *(
+        ("POST stiffness", {name: value}, f"#/{name}", words)
+        for name, value, words in (
+            ("radius", -1.0, "> 0"),
+            ("nu", 0.7, ""),
+            ("E", "210GPa", ""),
+            ("a", 1, ""),
+            ("Fz", None, ""),
+            ("geometry", "cone", "ball"),
+            ("geometry", 3, "one of"),
+        )
+    ),
+    *(
+        ("POST fit", {name: value}, f"#/{place}", words)
+        for name, value, place, words in (
+            ("mu_macro", [0.2], "data", ""),
+            ("y0", "2um", "y0", "number"),
+            ("include", ["power"], "include", "unknown"),
+            ("v0", [0.1, 0.2, None], "v0/2", "number"),
+            ("contact", "cone", "contact", "spring, ball"),
+            ("mu0", 0.3, "mu0", "among the unknowns"),
+            ("v0", [0.1] * 1001, "v0", "up to 1000 points, this has 1001"),
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("request_line", "changed", "place", "words"), REFUSED)
+def test_a_bad_field_is_refused_by_its_place(
+    client: Any, problem: Any, request_line: Any, changed: Any, place: Any, words: Any
+) -> None:
+    method, _, path = request_line.partition(" ")
+    path, _, query = path.partition("?")
+    given = {name: value for name, value in {**ASKED[path], **changed}.items() if value is not ...}
+    body, query = (
+        ("", f"{urlencode(given)}&{query}") if method == "GET" else (json.dumps(given), query)
+    )
+    document = problem(client.request(method, f"/v1/{path}?{query}", content=body), 422)
+    faults = {
+        fault.get("pointer", f"?{fault.get('parameter')}"): fault for fault in document["errors"]
+    }
+    assert place in faults, document
+    assert words in f"{faults[place]['reason']}; {faults[place].get('bound')}"
+    first = document["errors"][0]
+    assert document["detail"].startswith(f"{first['field']}")
+    assert document["n_errors"] == len(document["errors"])
+    if "tighter" in words:
+        assert document["tightest_available"] == 1e-12
+
+
+BEYOND = {
+    "NaN": "NaN",
+    "Infinity": "Infinity",
+    "-Infinity": "-Infinity",
+    "1e999": "Infinity",
+    "-1e999": "-Infinity",
+    "-1": -1,
+    "-1e-300": -1e-300,
+    "1" + "0" * 400: "an integer beyond double range",
+    "1" + "0" * 5000: "Infinity",
+    "1." + "0" * 5000 + "e999": "Infinity",
+}
+
+
+@pytest.mark.parametrize("text", BEYOND, ids=lambda text: text[:12])
+@pytest.mark.parametrize("name", CASE)
+def test_a_number_out_of_bounds_is_refused_and_shown(
+    client: Any, problem: Any, name: str, text: str
+) -> None:
+    body = json.dumps({**CASE, name: "@"}).replace('"@"', text)
+    bound = f"finite and {'>' if name in ('mu0', 'Fz', 'k') else '>='} 0"
+    reason = f"must be {bound}{', or rigid' if name == 'k' else ''}"
+    if (name, text) == ("k", "NaN"):
+        reason = "is missing; write rigid or a number"
+    (fault,) = problem(client.post(SINGLE, content=body), 422)["errors"]
+    expected = {"pointer": f"#/{name}", "field": name, "value": BEYOND[text], "reason": reason}
+    assert fault == {**expected, "bound": bound}
+    if len(text) < 500:
+        (fault,) = problem(client.get(SINGLE, params={**CASE, name: text}), 422)["errors"]
+        assert (fault["parameter"], fault["field"]) == (name, name)
+    listed = json.dumps({**CASE, name: [CASE[name], "@"]}).replace('"@"', text)
+    for batch in (listed, f"[{json.dumps(CASE)}, {body}]"):
+        found = client.post(BATCH, content=batch).json()
+        assert found["errors"] == [{"index": 1, "field": name, "reason": reason}]
+    other = "Fz" if name == "v0" else "v0"
+    scalar = json.dumps({**CASE, name: "@", other: [CASE[other]] * 2}).replace('"@"', text)
+    (fault,) = problem(client.post(BATCH, content=scalar), 422)["errors"]
+    assert (fault["pointer"], fault["bound"]) == (f"#/{name}", bound)
+
+
+def test_all_faults_are_reported_at_once_and_their_list_is_bounded(
+    client: Any, problem: Any
+) -> None:
+    body = {"mu0": -1, "Fz": "10", "amplitude": 3, "omega": None}
+    faults = problem(client.post(SINGLE, json=body), 422)["errors"]
+    assert sorted(fault["field"] for fault in faults) == [
+        "Fz",
+        "amplitude",
+        "k",
+        "mu0",
+        "omega",
+        "v0",
+        "y0",
+    ]
+    faults = problem(client.get(SINGLE, params=body), 422)["errors"]
+    assert sorted(fault["field"] for fault in faults) == [
+        "amplitude",
+        "k",
+        "mu0",
+        "omega",
+        "v0",
+        "y0",
+    ]
+    both = {**CASE, "f": 1.0, "include": ["std"], "std": {"omega": 1.0, "f": 1.0}}
+    assert len(problem(client.post(SINGLE, json=both), 422)["errors"]) == 2
+    document = problem(
+        client.post(SINGLE, json={f"x{i}": "y" * 100 if i == 0 else i for i in range(4000)}), 422
+    )
+    assert (len(document["errors"]), document["n_errors"]) == (100, 4006)
+    assert len(document["errors"][0]["value"]) == 80
+    problem(client.get(SINGLE + "?" + "&".join(f"a{i}=1" for i in range(200))), 422)
+
+
+TWICE = (
+    '{"mu0":0.3,"Fz":10,"k":1e6,"y0":2e-6,"omega":1e5,"v0":%s,"mu0":0.2}',
+    '{"mu0":0.3,"Fz":10,"k":null,"y0":2e-6,"f":1e4,"v0":%s,"\\u006du0":0.2}',
+    '{"mu0":0.3,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":1e5,"f":null,"v0":%s}',
+    '{"mu0":-1,"mu0":0.3,"Fz":10,"k":1e6,"y0":2e-6,"omega":1e5,"v0":%s}',
+)
+
+
+@pytest.mark.parametrize("text", TWICE)
+def test_a_name_given_twice_is_refused(client: Any, problem: Any, text: str) -> None:
+    bodies = {
+        text % "0.1": SINGLE,
+        text % "[0.1, 0.2]": BATCH,
+        f"[{text % '0.1'},{text % '1'}]": BATCH,
+    }
+    for body, path in bodies.items():
+        (fault,) = problem(client.post(path, content=body), 422)["errors"]
+        assert (fault["field"], fault["reason"]) == ("mu0", "is given more than once")
+    lines = posted(client, "ndjson", "\n".join(bodies)).text.splitlines()
+    assert [json.loads(line)["status"] for line in lines] == [422] * 3
+    options = json.dumps({**CASE, "include": ["std"]})[:-1] + ',"std":{"mu0":0.1,"mu0":0.2}}'
+    for path in (SINGLE, BATCH):
+        assert (
+            "more than once"
+            in problem(client.post(path, content=options), 422)["errors"][0]["reason"]
+        )
+
+
+def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_name(
+    client: Any, problem: Any
+) -> None:
+    case = {**CASE, "f": 1.7e308}
+    del case["omega"]
+    for answer in (
+        client.post(SINGLE, json=case),
+        client.get(SINGLE, params=case),
+        client.post(BATCH, json={**case, "v0": [0.1, 0.2]}),
+    ):
+        assert problem(answer, 422)["errors"][0]["field"] == "f"
+    for body in ([case, {**case, "f": 1.0}], {**case, "f": [1.7e308, 1.0]}):
+        (fault,) = client.post(BATCH, json=body).json()["errors"]
+        assert (fault["index"], fault["field"]) == (0, "f")
+    assert asked(client, "ndjson", [case])[0]["errors"][0]["field"] == "f"
+    assert asked(client, "csv", [case])[0]["error"].startswith("f: must be finite")
+    held = {name: value for name, value in case.items() if name != "v0"}
+    for path, more in (
+        ("law", {"start": 0.1, "stop": 1.0}),
+        ("solve-for", {"unknown": "v0", "target": 0.1}),
+    ):
+        assert (
+            problem(client.post(f"/v1/{path}", json={**held, **more}), 422)["errors"][0]["field"]
+            == "f"
+        )
+
+
+@pytest.mark.parametrize(
+    ("form", "columns", "words"),
+    [
+        ("arrow", {"v0": ...}, "v0: is required"),
+        ("arrow", {"speed": [1.0]}, "speed: unknown"),
+        ("arrow", {"v0": ["0.1"]}, "v0: must be a column of numbers"),
+        ("arrow", {"mu0": [True]}, "mu0: must be a column of numbers"),
+        ("csv", "speed", "speed: unknown"),
+        ("csv", "k [N/s]", "unit that k cannot have; known are N/m"),
+        ("csv", "mu0,mu0", "mu0: is given more than once"),
+        ("csv", "mu0,Fz,k,y0,omega,f,v0", "f: omega is given, too: give exactly one of omega"),
+    ],
+)
+def test_columns_that_do_not_fit_are_refused(
+    client: Any, problem: Any, form: Any, columns: Any, words: Any
+) -> None:
+    body: Any = f"{columns}\r\n1\r\n"
+    if form == "arrow":
+        given = {**{name: [value] for name, value in CASE.items()}, **columns}
+        body = stream_of(
+            pa.record_batch({name: pa.array(x) for name, x in given.items() if x is not ...})
+        )
+    document = problem(posted(client, form, body), 422)
+    assert any(words in f"{fault['field']}: {fault['reason']}" for fault in document["errors"]), (
+        document
+    )
+
+
+CASES = "must be an object of columns or a list of rows"
+
+
+@pytest.mark.parametrize(
+    "path", ["mu-macro", "mu-macro/batch", "solve-for", "law", "stiffness", "fit"]
+)
+@pytest.mark.parametrize("body", ["[]", "3", "null", '"text"', "true"])
+def test_json_of_another_kind_is_refused(client: Any, problem: Any, path: Any, body: Any) -> None:
+    response = client.post(f"/v1/{path}", content=body)
+    if path == "mu-macro/batch" and body == "[]":  # no rows
+        assert response.json()["results"] == []
+        return
+    (fault,) = problem(response, 422)["errors"]
+    assert (fault["pointer"], fault["field"]) == ("#", "body")
+    assert fault["reason"] == (CASES if path == "mu-macro/batch" else "must be a JSON object")
+
+
+NO_JSON = (
+    b"",
+    b" ",
+    b"{",
+    b"[1,]",
+    b"{'mu0': 1}",
+    b"\xff\xfe",
+    b"{} {}",
+    b"[" * 50_000,
+    b"\xff" * 60_000,
+)
+
+
+@pytest.mark.parametrize("path", ["mu-macro", "mu-macro/batch", "solve-for", "law"])
+@pytest.mark.parametrize("body", NO_JSON, ids=range(9))
+def test_a_body_that_is_not_json_is_malformed(
+    client: Any, problem: Any, path: Any, body: Any
+) -> None:
+    assert problem(client.post(f"/v1/{path}", content=body), 400)["type"].endswith("malformed-body")
+
+
+def test_a_body_that_is_no_plain_arrow_stream_or_no_csv_is_malformed(
+    client: Any, problem: Any
+) -> None:
+    good = stream_of(as_table([CASE]))
+    named = stream_of(
+        pa.record_batch({**{name: [value] for name, value in CASE.items()}, "friction": [1.0]})
+    )
+    for body in (
+        b"nonsense",
+        b"\xff" * 100,
+        good[:100],
+        good[: len(good) // 2],
+        named.replace(b"friction", b"fric\xff\xfe\x00n"),
+    ):
+        problem(posted(client, "arrow", body), 400)
+    # it states its unpacked size, so a small body could fill the memory
+    for codec in ("lz4", "zstd"):
+        packed = stream_of(as_table([CASE] * 10_000), compression=codec)
+        assert "compressed" in problem(posted(client, "arrow", packed), 400)["detail"]
+    text = as_csv([CASE])
+    for csv in (text.encode("utf-16"), text + '"', text + "1" * 70_000):
+        problem(posted(client, "csv", csv), 400)
+
+
+@pytest.mark.parametrize("path", ["mu-macro", "mu-macro/batch", "solve-for", "law"])
+def test_other_media_types_and_a_compressed_body_are_refused(
+    client: Any, problem: Any, path: Any
+) -> None:
+    for kind in (
+        "text/plain",
+        "application/x-www-form-urlencoded",
+        "application/json; charset=utf-16",
+    ):
+        response = client.post(f"/v1/{path}", content="{}", headers={"Content-Type": kind})
+        assert "application/json" in problem(response, 415)["detail"]
+        assert "application/json" in response.headers["accept-post"]
+    response = client.post(f"/v1/{path}", content=b"\x1f\x8b", headers={"Content-Encoding": "gzip"})
+    assert "without Content-Encoding" in problem(response, 415)["detail"]
+
+
+@pytest.mark.parametrize(
+    "kind", ["Application/JSON; charset=UTF-8", 'application/json; charset="utf-8"', None]
+)
+def test_json_is_read_whatever_the_case_of_its_type_and_without_one(client: Any, kind: Any) -> None:
+    headers = {} if kind is None else {"Content-Type": kind}
+    response = client.post(SINGLE, content=json.dumps(CASE), headers=headers)
+    assert response.request.headers.get("content-type") == kind
+    assert response.json() == client.post(SINGLE, json=CASE).json()
+
+
+@pytest.fixture(scope="module")
+def few(started: Any) -> Any:
+    with started(max_batch=3) as client:
+        yield client
+
+
+FORMS: dict[str, tuple[str, Any]] = {
+    "CSV": ("csv", as_csv),
+    "CSV, CR": ("csv", lambda rows: as_csv(rows).replace("\r\n", "\r")),
+    "CSV, LF": ("csv", lambda rows: as_csv(rows).replace("\r\n", "\n")),
+    "rows": ("json", json.dumps),
+    "rows with words": ("json", lambda rows: json.dumps([{**row, "k": "Rigid"} for row in rows])),
+    "columns": ("json", lambda rows: json.dumps({**CASE, "v0": [0.1] * len(rows)})),
+    "a line": ("ndjson", lambda rows: json.dumps({**CASE, "v0": [0.1] * len(rows)})),
+    "Arrow": ("arrow", as_arrow),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_batch_over_the_limit_is_refused_in_every_form(few: Any, problem: Any, name: str) -> None:
+    form, written = FORMS[name]
+    fine, over = (posted(few, form, written([CASE] * many)) for many in (3, 4))
+    assert (fine.status_code, b"max_batch" in fine.content) == (200, False)
+    assert (over.json() if form == "ndjson" else problem(over, 413))["max_batch"] == 3
+
+
+def test_values_are_counted_before_they_are_made(few: Any, problem: Any) -> None:
+    for body in ("[" + "0," * 20_000 + "0]", "[" + "[]," * 400 + "0]"):
+        problem(few.post(BATCH, content=body), 413)
+    members = ",".join(f'"a{i}":1' for i in range(200))
+    assert "more members" in problem(few.post(BATCH, content=f"{{{members}}}"), 422)["detail"]

@@ -1,0 +1,131 @@
+"""Settings: sources, bounds, error messages, and completeness of the manual."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+
+from service.__main__ import main
+from service.settings import Settings, SettingsError, load_settings
+
+BAD = {
+    "MUMACRO_TABLES": ("", os.pathsep),
+    "MUMACRO_HOST": ("",),
+    "MUMACRO_WORKERS": ("0", "257", "two"),
+    "MUMACRO_PORT": ("", "http", "-1", "65536", "80.5", "tcp://10.0.0.1:80"),
+    "MUMACRO_LOG_LEVEL": ("", "loud"),
+    "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)),
+    "MUMACRO_MAX_BATCH": ("0", "10000001"),
+    "MUMACRO_MAX_BATCHES": ("0", "1025"),
+    "MUMACRO_MAX_CONNECTIONS": ("0", "many", "1000001"),
+    "MUMACRO_KEEP_ALIVE_S": ("0", "3601"),
+    "MUMACRO_CLIENT_TIMEOUT_S": ("0", "3601"),
+    "MUMACRO_API_KEYS": ("alice", "alice=", "two words=x", "a=same,b=same"),
+    "MUMACRO_API_KEY": ("", "two words", "schlüssel", "x" * 513, "line\nbreak"),
+    "MUMACRO_ROOT_PATH": ("friction", "/a/", "/a b"),
+    "MUMACRO_GUIDE": ("no/such/directory", __file__),
+    "MUMACRO_TIME_LIMIT_S": ("0", "86401"),
+    "MUMACRO_SHUTDOWN_GRACE_S": ("-1", "3601", "soon"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in list(os.environ):
+        if name.startswith("MUMACRO_"):
+            monkeypatch.delenv(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [(name, value) for name, values in BAD.items() for value in values]
+)
+def test_a_bad_setting_is_named_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: Any
+) -> None:
+    monkeypatch.setenv(name, value)
+    with pytest.raises(SettingsError, match=rf"^{name} must be [^\n]*$") as error:
+        load_settings()
+    assert name != "MUMACRO_API_KEY" or not value or value not in str(error.value)
+
+
+def test_settings_come_from_the_environment(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name, value in (
+        ("TABLES", f"{tmp_path}{os.pathsep}other.nc"),
+        ("PORT", "81"),
+        ("LOG_LEVEL", "WARNING"),
+    ):
+        monkeypatch.setenv(f"MUMACRO_{name}", value)
+    settings = load_settings(host="::1")
+    assert settings.tables == (tmp_path, Path("other.nc"))
+    assert (settings.host, settings.port, settings.log_level) == ("::1", 81, "warning")
+    monkeypatch.setenv("MUMACRO_PORT", "x")
+    monkeypatch.setenv("MUMACRO_WORKERS", "y")
+    with pytest.raises(SettingsError, match=r"MUMACRO_PORT .*; MUMACRO_WORKERS "):
+        load_settings()
+
+
+def test_a_misspelt_variable_is_noticed(
+    started: Any, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    monkeypatch.setenv("MUMACRO_TABLE", "x")
+    monkeypatch.setenv("MUMACRO_PORT", "81")
+    with started():
+        told = [message for message in caplog.messages if "not a setting" in message]
+    assert told == ["MUMACRO_TABLE is not a setting and has no effect"]
+
+
+def test_the_key_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUMACRO_API_KEY", "s3cret")
+    monkeypatch.setenv("MUMACRO_API_KEYS", "alice=s3cret-too")
+    assert "s3cret" not in repr(load_settings())
+
+
+def test_the_health_check_asks_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.environ", os.environ.copy())  # main writes its options there
+    monkeypatch.setattr(
+        "urllib.request.OpenerDirector.open", opened := Mock(side_effect=LookupError)
+    )
+    for host, asked in (("0.0.0.0", "127.0.0.1"), ("::", "[::1]"), ("10.1.2.3", "10.1.2.3")):  # noqa: S104
+        with pytest.raises(LookupError):
+            main(["healthcheck", "--host", host])
+        assert opened.call_args.args == (f"http://{asked}:8000/readyz",)
+
+
+def test_the_manual_and_the_settings_agree(repository: Path) -> None:
+    names = {f"MUMACRO_{name.upper()}" for name in Settings.model_fields}
+    # any text is allowed
+    assert set(BAD) | {"MUMACRO_CORS_ORIGINS", "MUMACRO_TRUSTED_PROXIES"} == names
+    text = (repository / "docs" / "operations.md").read_text()
+    told = dict(re.findall(r"^\| `(MUMACRO_\w+)` \| (.*?) \| ", text, re.MULTILINE))
+    assert told.keys() == names
+    for name, field in Settings.model_fields.items():
+        default = "none" if field.default is None else f"`{field.default}`"
+        assert field.default_factory or told[f"MUMACRO_{name.upper()}"] == default
+    assert load_settings().tables == (repository / "tables",)
+
+
+@pytest.mark.parametrize(
+    ("option", "told"),
+    [
+        (["--port", "70000"], "MUMACRO_PORT must be"),
+        (["--workers=0"], "MUMACRO_WORKERS must be"),
+        (["--log-level", "x"], "MUMACRO_LOG_LEVEL must be"),
+        (["--nonsense"], "usage"),
+        (["fly"], "usage"),
+    ],
+)
+def test_a_bad_argument_ends_the_process_without_a_traceback(
+    repository: Path, option: Any, told: Any
+) -> None:
+    words = [sys.executable, "-m", "service", *option]
+    process = subprocess.run(words, cwd=repository, capture_output=True, text=True, check=False)
+    assert (process.returncode, process.stdout) == (2, "")
+    assert process.stderr.startswith(told)
+    assert "Traceback" not in process.stderr

@@ -1,0 +1,174 @@
+"""One case over HTTP: its answer, and all that ``include`` adds to it; the other forms are those of
+test_formats.py."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mumacro import Surrogate
+from mumacro.analysis.settling import settling
+from tests.support.cases import Case
+from tests.support.comparing import close
+
+DEFAULT = {"mu_macro", "mu_ratio", "regime", "error_bound", "source", "table", "api_version"}
+PATH = "/v1/mu-macro"
+STD = {"mu0": 0.01, "Fz": 0.5, "k": 5e4, "y0": 1e-7, "omega": 1e3, "v0": 1e-3}
+
+positive = st.floats(min_value=5e-324, max_value=1.7e308) | st.floats(1e-6, 1e6)
+not_negative = st.just(0.0) | positive
+cases = st.fixed_dictionaries(
+    {
+        "mu0": positive,
+        "Fz": positive,
+        "k": positive | st.just("rigid"),
+        "y0": not_negative,
+        "omega": not_negative,
+        "v0": not_negative,
+    }
+)
+
+
+def ask(client: Any, case: Case, **options: Any) -> Any:
+    response = client.post(PATH, json={**case, **options})
+    assert response.status_code == 200, response.text
+    return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+
+
+@settings(max_examples=200, deadline=None)
+@given(given_case=cases)
+def test_the_answer_is_the_surrogates_and_always_json(
+    client: Any, surrogate: Surrogate, given_case: Any
+) -> None:
+    answer = ask(client, given_case, include=["groups", "limits", "stick_fraction"])
+    expected = surrogate.evaluate(**given_case)
+    assert answer["error_bound"] == (
+        expected.error_bound if math.isfinite(expected.error_bound) else None
+    )
+    for name in ("mu_macro", "mu_ratio", "regime", "source"):
+        assert answer[name] == getattr(expected, name)
+    assert 0.0 <= answer["mu_ratio"] <= 1.0
+    assert list(answer["groups"]) == ["v_tilde", "y_tilde", "l0"]
+    assert list(answer["limits"]) == ["mu_static", "v0_crit", "mu_crit"]
+    if answer["groups"]["y_tilde"] == 0.0 < given_case["y0"] * given_case["omega"]:
+        assert answer["stick_fraction_bound"] == 1.0  # the groups do not show whether it sticks
+    plain = {name: answer[name] for name in DEFAULT}
+    assert ask(client, given_case) == plain
+    query = {name: value if value == "rigid" else repr(value) for name, value in given_case.items()}
+    assert client.get(PATH, params=query).json() == plain
+
+
+@pytest.mark.parametrize(
+    "include", ["groups,limits", "limits, groups,groups", "groups&include=limits"]
+)
+@pytest.mark.parametrize("k", ["1e+6", "1000000", "rigid", "Rigid"])
+def test_a_query_may_have_other_words(
+    client: Any, case: Case, surrogate: Surrogate, include: Any, k: Any
+) -> None:
+    expected = ask(
+        client, {**case, "k": 1e6 if "1" in k else "rigid"}, include=["limits", "groups"]
+    )
+    assert expected["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
+    query = "&".join(
+        f"{name}={value}" for name, value in {**case, "k": k, "include": include}.items()
+    )
+    assert client.get(f"{PATH}?{query}&tolerance={surrogate.tolerance}").json() == expected
+    assert "1" in k or ask(client, {**case, "k": k}, include=["groups", "limits"]) == expected
+
+
+def test_a_frequency_and_its_deviation_are_given_in_either_unit(client: Any, case: Case) -> None:
+    by_omega = ask(client, case, include=["std"], std={"omega": 2e3 * math.pi})
+    named = {**case, "f": case["omega"] / (2 * math.pi)}
+    del named["omega"]
+    by_f = ask(client, named, include=["std"], std={"f": 1e3})
+    assert by_f["mu_macro"] == close(by_omega["mu_macro"], rel=1e-13)
+    assert by_f["std"] == close(by_omega["std"], rel=1e-12)
+    assert client.get(PATH, params={**named, "include": "std", "std_f": 1e3}).json() == by_f
+
+
+def test_one_value_is_returned_as_text_and_answers_may_be_cached(client: Any, case: Case) -> None:
+    answer = ask(client, case, include=["power"])
+    plain = client.get(f"{PATH}.txt", params=case)
+    assert (float(plain.text), plain.headers["content-type"]) == (
+        answer["mu_macro"],
+        "text/plain; charset=utf-8",
+    )
+    asked = {**case, "include": "power", "value": "power.saved"}
+    assert float(client.get(f"{PATH}.txt", params=asked).text) == answer["power"]["saved"]
+    assert client.get(f"{PATH}.txt", params={**case, "value": "regime"}).text == "stick_slip"
+    head, get = client.head(PATH, params=case), client.get(PATH, params=case)
+    assert (head.status_code, head.content, head.headers["content-length"]) == (
+        200,
+        b"",
+        str(len(get.content)),
+    )
+    assert get.headers["cache-control"] == plain.headers["cache-control"] == "public, max-age=3600"
+
+
+@pytest.mark.parametrize(
+    ("change", "limits", "power"),
+    [
+        *(
+            ({name: 0, **rest}, (0.3, 0.0, 0.3), 0.0)
+            for name in ("y0", "omega")
+            for rest in ({}, {"k": "rigid"})
+        ),
+        ({"k": "rigid"}, (0.0, 0.0, 0.0), None),
+    ],
+)
+def test_nothing_sticks_without_oscillation_or_k(
+    client: Any, case: Case, change: Any, limits: Any, power: Any
+) -> None:
+    answer = ask(client, {**case, **change}, include=["limits", "power", "stick_fraction"])
+    assert tuple(answer["limits"].values()) == limits
+    assert (answer["mu_macro"] == 0.3) == (limits[0] == 0.3)
+    assert answer["power"]["oscillation"] == answer["power_bound"]["oscillation"] == power
+    assert answer["power"]["saved"] == close(
+        (0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300
+    )
+    assert answer["stick_fraction"] == answer["stick_fraction_bound"] == 0.0
+    assert (
+        0.0
+        <= answer["power_bound"]["saved"]
+        <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
+    )
+
+
+@pytest.mark.parametrize("k", [1e6, "rigid"])
+def test_the_standard_deviation_is_the_root_of_squares(client: Any, case: Case, k: Any) -> None:
+    case["k"] = k
+    answer = ask(client, case, include=["gradient", "std"], std=STD)
+    slopes = {name: slope for name, slope in answer["gradient"].items() if slope is not None}
+    # rigid contact has no slope in k
+    assert case.keys() - slopes.keys() == ({"k"} if k == "rigid" else set())
+    assert answer["std"] == close(
+        math.hypot(*(slopes[name] * STD[name] for name in slopes)), rel=1e-12
+    )
+    only = ask(client, case, include=["std"], std={"mu0": 0.01})
+    assert "gradient" not in only
+    assert only["std"] == close(0.01 * abs(slopes["mu0"]), rel=1e-12)
+    assert ask(client, case, include=["std"], std={})["std"] == 0.0
+
+
+def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate) -> None:
+    for change in (
+        {},
+        {"v0": 1e-4, "y0": 1e-7},
+        {"v0": 5.0, "y0": 1e-4},
+        {"omega": 0},
+        {"k": "rigid"},
+        {"v0": 0},
+    ):
+        at: Case = {**case, **change}
+        answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
+        for name, value in {
+            **answer["settling"],
+            "error_bound": answer["settling_bound"]["periods"],
+        }.items():
+            assert value == (
+                getattr(expected, name) if math.isfinite(getattr(expected, name)) else None
+            ), name
+        assert (answer["settling"]["time"] is None) == (at["v0"] == 0)  # it never slips
