@@ -812,7 +812,7 @@ class Surrogate:
                 "contact",
                 "ball",
                 f"spring: the table {self.path.name} has no ball, which a table of this program's "
-                "builder has; python -m builder build makes one",
+                "builder has; python -m builder ball adds it to a table",
             )
         found = self._ball
         if found is None:

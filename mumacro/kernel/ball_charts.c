@@ -48,9 +48,14 @@ MU_INLINE mu_lanes mu_folded(mu_mask half, mu_lanes root) {
     return mu_select(half, mu_cube_root(root), 2.0 * MU_FOLD_KNOT - MU_FOLD_SCALE * root);
 }
 
+/* The steepest ray as the table's border has it: where the two touch, a digit of one is the root of a digit in Y. */
+static double mu_steepest_of(const mumacro_data *data) {
+    return mu_border(data, MU_STEEPEST_Y, NULL, NULL) / MU_STEEPEST_Y;
+}
+
 /* As mu_place_common, of a ball. */
-MU_INLINE mu_places mu_place_ball(mu_lanes v, mu_lanes y, mu_lanes crit, mu_lanes ln_y) {
-    const mu_lanes rho = v / crit, t = v / (MU_STEEPEST * y), one = mu_all(1.0), zero = mu_all(0.0);
+MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_lanes crit, mu_lanes ln_y) {
+    const mu_lanes rho = v / crit, t = v / (steepest * y), one = mu_all(1.0), zero = mu_all(0.0);
     const mu_mask above = MU_WHERE(rho >= 1.0), low = MU_WHERE(y <= MU_STEEPEST_Y);
     const mu_mask slides = above & (~low | MU_WHERE(t >= 1.0)), ring = above & ~slides;
     const mu_mask slow = slides & low & MU_WHERE(v < MU_SLOW), fast_low = slides & low & ~slow;
@@ -114,7 +119,8 @@ static mu_place mu_locate_ball(const mumacro_data *data, double v, double y) {
         at.block = rho >= 1.0 ? MU_B_TAIL : MU_B_S_TAIL;
         at.b = rho >= 1.0 ? mu_log1(rho) : rho < 0.5 ? sqrt(rho) : MU_SQRT2 - sqrt(1.0 - rho);
     } else {
-        const mu_places found = mu_place_ball(mu_all(v), mu_all(y), mu_all(at.crit), mu_all(ln_y));
+        const mu_places found = mu_place_ball(mu_steepest_of(data), mu_all(v), mu_all(y), mu_all(at.crit),
+                                              mu_all(ln_y));
         at.block = (int)mu_first_whole(found.block);
         at.a = mu_first(found.a);
         at.b = mu_first(found.b);
@@ -134,7 +140,9 @@ MU_INLINE double mu_fold_slope(double b) {
 }
 
 static mu_turn mu_turn_of_ring(const mu_place *at) {
-    const double t = at->v / (MU_STEEPEST * at->y), root = sqrt(mu_max(1.0 - t, 1e-18));
+    const double cube = at->a * at->a * at->a, left = (2.0 * MU_FOLD_KNOT - at->a) / MU_FOLD_SCALE;
+    const double t = at->a < MU_FOLD_KNOT ? cube * cube : 1.0 - left * left;
+    const double root = at->a < MU_FOLD_KNOT ? sqrt(1.0 - t) : mu_max(left, 1e-9);
     double of_root;
     const double tilt = mu_entry_slope(t, root, &of_root), a = mu_fold_slope(at->a), b = mu_fold_slope(at->b);
     const mu_turn out = {a, -a, -tilt * b, (1.0 + tilt) * b, 0.0, 0.0, -tilt, 1.0 + tilt, 2.0 * MU_FOLD_KNOT, MU_FOLD_SCALE};

@@ -57,7 +57,8 @@ MU_INLINE void mu_pass_borders(const mumacro_data *data, int contact, int n, con
 }
 
 /* Blocks, coordinates and forms of mu~; returns how many points are left to be answered one by one. */
-MU_INLINE int mu_pass_places(int contact, int n, mu_chunk *c) {
+MU_INLINE int mu_pass_places(const mumacro_data *data, int contact, int n, mu_chunk *c) {
+    const double steepest = contact == MU_BALL ? mu_steepest_of(data) : 0.0;
     mu_mask left = mu_all_whole(0);
     int count = 0;
     for (int i = n; i % MU_LANES; ++i) c->crit[i] = 1.0;
@@ -66,7 +67,7 @@ MU_INLINE int mu_pass_places(int contact, int n, mu_chunk *c) {
         const mu_lanes v = mu_load(c->v + i), y = mu_load(c->y + i);
         const mu_lanes crit = mu_load(c->crit + i), ln_y = mu_load(c->ln_y + i);
         const mu_places found =
-            contact == MU_BALL ? mu_place_ball(v, y, crit, ln_y) : mu_place_common(v, y, crit, ln_y);
+            contact == MU_BALL ? mu_place_ball(steepest, v, y, crit, ln_y) : mu_place_common(v, y, crit, ln_y);
         memcpy(&known, c->block + i, sizeof known);
         block = mu_select_whole(MU_WHERE(known == 0), found.block, known);
         left |= MU_WHERE(block == mu_all_whole(contact == MU_BALL ? MU_B_CORNER : MU_CORNER)) |
@@ -222,7 +223,7 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, c
     const double *errors = data->quantities[MU_MU_RATIO].errors;
     int left;
     mu_pass_borders(data, contact, n, v, y, c);
-    left = mu_pass_places(contact, n, c);
+    left = mu_pass_places(data, contact, n, c);
     mu_pass_cells(data, n, c);
     if (slope) mu_pass_slopes(data, n, c, slope);
     mu_pass_values(data, n, c, slope, value);
@@ -247,7 +248,7 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, c
 MU_INLINE void mu_chunk_of_others(const mumacro_data *data, int contact, int quantity, int n, const double *v,
                                   const double *y, mu_chunk *c, double *value, double *bound, int8_t *source) {
     mu_pass_borders(data, contact, n, v, y, c);
-    mu_pass_places(contact, n, c);
+    mu_pass_places(data, contact, n, c);
     for (int i = 0; i < n; ++i) {
         mu_answer found;
         if (mu_is_left(c->block[i])) found = mu_answer_left(data, contact, quantity, c, i, v[i], y[i]);
@@ -310,7 +311,7 @@ MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int q
         mu_chunk c;
         mu_slope slope[MU_CHUNK];
         mu_pass_borders(data, contact, few, v + i, y + i, &c);
-        mu_pass_places(contact, few, &c);
+        mu_pass_places(data, contact, few, &c);
         if (quantity == MU_MU_RATIO) {
             mu_pass_cells(data, few, &c);
             mu_pass_slopes(data, few, &c, slope);
