@@ -89,8 +89,9 @@ static mu_across mu_across_rays(const mumacro_cells *cells, const double *block,
     (void)mu_entry_slope(t, root, &of_root);
     (void)mu_entry_slope(1.0, 0.0, &of_edge);
     out.slope = 0.5 * t / root * (MU_FOLD_SCALE * (q_a - q_a_edge) + of_root * per_z - of_edge * at_edge);
-    out.reach_a = mu_min(0.5 * MU_FOLD_SCALE * t / root, 0.5 * block[MU_STEP_A]);
-    out.reach_b = 2.0 * fabs(of_root) * mu_min(0.5 * t / root, block[MU_STEP_A]);
+    /* both ends have an error, and the way to the steepest ray goes through cells along b, too: four times either */
+    out.reach_a = 4.0 * mu_min(0.5 * MU_FOLD_SCALE * t / root, 0.5 * block[MU_STEP_A]);
+    out.reach_b = 8.0 * fabs(of_root) * mu_min(0.5 * t / root, block[MU_STEP_A]);
     return out;
 }
 
