@@ -30,7 +30,7 @@ from .compiled import solver_kernel
 CORNER = atlas.BLOCK_NAMES.index("corner")
 POINTS = 73  # on either side of the middle of a piece
 #: tolerance from which as many are enough
-FEWER_POINTS = {1e-5: 34, 1e-8: 46, 1e-11: 60}
+FEWER_POINTS = {1e-5: 34, 1e-8: 46}
 LAST = 3.3  # of the rule's variable: beyond, weights are below 1e-17
 BISECTIONS = 62  # of an interval of less than e^64 to its last digit
 LONGEST = 4.0  # piece, in ln s

@@ -112,7 +112,10 @@ static double mu_ball_ratio_slack(const mumacro_data *data, const mu_place *at, 
 
 static double mu_ball_power_slack(const mumacro_data *data, const mu_place *at, double value, double factor) {
     const double share = mu_min(at->v / MU_LEAST_FAST, 1.0), least = mu_max(at->v, MU_LEAST_FAST);
-    const double missed = MU_NEXT_ORDER * share * share / (least * least * least * least);
+    const double most = MU_NEXT_ORDER / (MU_LEAST_FAST * MU_LEAST_FAST * MU_LEAST_FAST * MU_LEAST_FAST);
+    /* nodes that have it spread a part of it over the block of all speeds */
+    const double spread = at->block == MU_B_LOW ? 0.125 * most : 0.0;
+    const double missed = mu_max(spread, MU_NEXT_ORDER * share * share / (least * least * least * least));
     (void)data, (void)factor;
     return (2.0 * MU_POWER_ROUNDING + missed) * value + MU_DENORMAL;
 }

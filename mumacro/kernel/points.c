@@ -120,7 +120,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
          * interpolant has one of the size of its error, which the chain rule would divide by root.  Taken out of the
          * last cell, where 1 - w = 2 step root, it leaves the slope bounded. */
         const double step = block[MU_STEP_B], last = (double)mu_whole_of(mu_fma1(turn.end, step, block[MU_OFFSET_B]));
-        reach = mu_min(reach, 0.5 * step);
+        reach = mu_min(reach, 0.5 * step * (turn.scale * turn.scale)); /* what it is one cell from the border */
         if (mu_fma1(at->b, step, block[MU_OFFSET_B]) >= last) {
             along_b = mu_without_edge(cell, spot, turn.end - at->b, step, &turn);
             along_b_y = turn.edge_y * along_b;
@@ -156,6 +156,10 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     out.bound_y = more > 0.0 ? scale * (errors[0] * fabs(form.factor_y) + errors[2] * share_b * reach) + more + noise
                              : scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y,
                                                       share_b * turn.b_y * ratio) + noise;
+    if (at->block == MU_B_RING) { /* beside the ridge it is not T_8 that interpolation leaves out: shares are less sure */
+        out.bound_v *= 2.0;
+        out.bound_y *= 2.0;
+    }
     out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (!about->about.smooth_at_border && mu_has_edge(at->block)) {
         /* a root of the distance to the border: |1/sqrt(1 - d) - 1| <= d / (1 - d) for the error d of that distance */
