@@ -204,6 +204,11 @@ MU_INLINE mu_turn mu_turn_of_ball(const mu_place *at) {
     return out;
 }
 
+/* Whether a place of a ball is next to the ridge, where the steepest ray touches the border. */
+MU_INLINE int mu_is_ridge(const mu_place *at) {
+    return fabs(at->y - MU_STEEPEST_Y) < 0.01 && fabs(at->v - MU_SLOW) < 0.01;
+}
+
 MU_INLINE mu_turn mu_turn_of(const mu_place *at) {
     return mu_is_ball(at->block) ? mu_turn_of_ball(at) : mu_turn_of_spring(at);
 }

@@ -123,9 +123,8 @@ static double mu_ball_power_slack(const mumacro_data *data, const mu_place *at, 
 /* Next to the border the share that sticks changes with the distance d by d ln d at most, at the ridge by d^(3/4). */
 static double mu_ball_stick_slack(const mumacro_data *data, const mu_place *at, double value, double factor) {
     const double off = mu_border_error(data), root = sqrt(off);
-    const int ridge = fabs(at->y - MU_STEEPEST_Y) < 0.01 && fabs(at->v - MU_SLOW) < 0.01;
     (void)value;
-    return 4.0 * MU_ROUNDING * factor + (ridge ? 2.0 * root * sqrt(root) : 32.0 * off);
+    return 4.0 * MU_ROUNDING * factor + (mu_is_ridge(at) ? 2.0 * root * sqrt(root) : 32.0 * off);
 }
 
 /* Meanings are those of one spring. */

@@ -157,8 +157,9 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
                              : scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y,
                                                       share_b * turn.b_y * ratio) + noise;
     if (at->block == MU_B_RING) { /* beside the ridge it is not T_8 that interpolation leaves out: shares are less sure */
-        out.bound_v *= 2.0;
-        out.bound_y *= 2.0;
+        const double unsure = mu_is_ridge(at) ? 8.0 : 2.0;
+        out.bound_v *= unsure;
+        out.bound_y *= unsure;
     }
     out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (!about->about.smooth_at_border && mu_has_edge(at->block)) {
