@@ -117,8 +117,9 @@ def beside_table(contact: str, direction: str, n: int, seed: int = 2) -> tuple[A
     name = {"across": "y", "along": "x", "normal": "normal"}[direction]
     size = y * (CASE["Fz"] if direction == "normal" else L0)
     field = "Fz_amplitude" if direction == "normal" else "y0"
-    a = motion(**case, **{name: size}, contact=contact)
-    b = Surrogate.open().evaluate(**case, **{field: size}, contact=contact, direction=direction)
+    moving: Any = {**case, name: size, "contact": contact}
+    tabulated: Any = {**case, field: size, "contact": contact, "direction": direction}
+    a, b = motion(**moving), Surrogate.open().evaluate(**tabulated)
     error = np.hypot(a.mu_macro - b.mu_macro, a.mu_lateral)
     return error / CASE["mu0"], (a.error_estimate + b.error_bound) / CASE["mu0"]
 
@@ -176,7 +177,7 @@ SPEEDS = (0.02, 0.1, 0.5)  # m/s
 
 def phase_sweep(v0: float) -> Array:
     """mu_macro/mu0 over the phase between an oscillation along and that of the load, (73,)."""
-    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": v0}
+    case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": v0}
     return np.asarray(motion(**case, x=4e-6, normal=(5.0, PHASES)).mu_macro) / 0.3
 
 
@@ -184,7 +185,7 @@ def pictures(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
     """Writes the pictures of docs/how-to/motion.md, and prints the phase sweep at its ends."""
     from matplotlib.figure import Figure
 
-    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
+    case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
     figure = Figure(figsize=(10.0, 4.2), layout="constrained")
     motion(**case, x=(2e-6, 90), y=4e-6).plot(figure.subplots(1, 2))
     figure.savefig(IMAGES / "motion-ellipse.png", dpi=110)

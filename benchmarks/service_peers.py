@@ -34,8 +34,8 @@ def fastapi() -> Any:
     from fastapi import FastAPI
 
     from mumacro import Surrogate
-    from service.models import CaseAnswer
-    from service.options import Case
+    from service.models.answers import CaseAnswer
+    from service.models.inputs import Case
 
     surrogate = Surrogate.open(FINEST)
     label = {"id": surrogate.id, "tolerance": surrogate.tolerance}

@@ -84,7 +84,8 @@ def rigs() -> str:
             ]
             rows.append([name, *cells, *groups, f"{found.periods:.2g}"])
         axes.plot(*zip(*places, strict=True), shape, color=INK, mec="white", ms=9, label=name)
-    axes.get_legend().remove()
+    if (legend := axes.get_legend()) is not None:
+        legend.remove()
     figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     figure.savefig(IMAGES / "contacts.png", dpi=100, metadata={"Software": None})
     header = (

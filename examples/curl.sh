@@ -15,3 +15,6 @@ ask "$base/v1/solve-for" --json '{"unknown": "y0", "target": 0.15, "mu0": 0.3, "
 
 echo "The friction law as a table:"
 ask "$base/v1/law.csv?along=v0&start=1e-4&stop=10&points=6&mu0=0.3&Fz=10&k=1e6&y0=2e-6&f=20e3"
+
+echo "Shaken in an ellipse, not only across:"
+ask "$base/v1/motion" --json '{"x": [1e-6, 90], "y": 2e-6, "mu0": 0.3, "Fz": 10, "k": 1e6, "f": 20e3, "v0": 0.01}'

@@ -58,6 +58,12 @@ QUESTIONS = {
     **{f"1,000 rows as {form}": batch(form) for form in WRITERS},
     "a law": posted("/v1/law", **RIG, start=1e-4, stop=1.0),
     "an inverse": posted("/v1/solve-for", **RIG, unknown="v0", target=0.1),
+    "a motion": posted(
+        "/v1/motion",
+        **{name: x for name, x in CASE.items() if name != "y0"},
+        x=[1e-6, 90.0],
+        y=2e-6,
+    ),
     "a fit": posted(
         "/v1/fit",
         mu0=0.3,

@@ -130,6 +130,16 @@ def document(chance: random.Random) -> tuple[str, Any]:
                 },
             ),
             ("/v1/stiffness", bodies),
+            (
+                "/v1/motion",
+                {
+                    **{name: x for name, x in one.items() if name != "y0"},
+                    "x": chance.choice([0, 1e-6, [1e-6, 90.0]]),
+                    "y": [{"harmonic": chance.choice([1, 2, 3.0]), "amplitude": 2e-6}],
+                    "normal": chance.choice([0.0, [1e-3, 45]]),
+                    "cycle": chance.random() < 0.1,
+                },
+            ),
         )
     )
 

@@ -108,7 +108,8 @@ def _serve(settings: Settings) -> int:
     # Imported here: a health check must not load the server.
     import uvicorn
 
-    from .observe import log_config, shared_counters
+    from .metrics import shared_counters
+    from .observe import log_config
 
     # The server shuts down gracefully, then raises the signal again, which by default would end the
     # process with the signal's exit status.  From here on there are things to clean up.

@@ -1,4 +1,4 @@
-"""The application: ``create_app(settings)`` builds it from settings, tables and endpoints.
+"""The application: ``create_app(settings)`` builds it from settings, routers and middlewares.
 
 The import of this module does no work.  ``uvicorn --factory service.app:create_app`` works: without
 an argument the settings are read from the environment.
@@ -6,133 +6,176 @@ an argument the settings are read from the environment.
 
 import gc
 import logging
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
+import orjson
 from fastapi import FastAPI
 from fastapi.openapi.constants import REF_TEMPLATE
+from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
-from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
-from starlette.requests import Request
-from starlette.responses import RedirectResponse, Response
+from starlette.responses import RedirectResponse
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
-from .limits import Work
-from .models import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
-from .observe import Metrics, Observe
-from .options import Case, CaseColumns
-from .problems import problem_of
-from .routes import Routes, batch, case, contact, page, questions, table
+from .limits import Room, Work
+from .metrics import Metrics
+from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
+from .models.inputs import Case
+from .models.options import CaseColumns, CaseRequest
+from .observe import Observe
+from .problems import HANDLERS, Failures
+from .routers import batch, case, contact, health, motion, page, questions, table
+from .security import HEALTH_PATHS, SCHEMES, Heads, Keys
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
-from .wire.json import dump
 
-ENDPOINTS = [
-    endpoint
-    for module in (case, batch, questions, contact, table, page)
-    for endpoint in module.ENDPOINTS
-]
+ROUTERS = (
+    case.router, batch.router, questions.router, motion.router, contact.router, table.router,
+    health.router,
+)  # fmt: skip
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and "
-    "oscillates across the sliding direction. Inputs in SI units; answers come from a table "
-    "verified against the full model. Errors are problem details (RFC 9457)."
+    "oscillates across or along the sliding direction, or its normal force does; the contact is "
+    "one spring or a ball. Inputs in SI units; answers come from a table verified against the full "
+    "model. Errors are problem details (RFC 9457)."
 )
-#: models that are described by name only
-_MORE: Any = [(Case, "validation"), (CaseColumns, "validation"), (CaseAnswer, "serialization")]
-_MORE += [(model, "serialization") for model in (ColumnsAnswer, RowsAnswer, Problem)]
-_KEYS = {
-    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
-    "bearer": {"type": "http", "scheme": "bearer"},
-}
+_TAGS = [
+    {
+        "name": "answers",
+        "description": "The friction of one case and of many; questions about a "
+        "range of one input; any periodic motion; what a contact is, from materials or from "
+        "measured points",
+    },
+    {"name": "table", "description": "The verified table that the answers come from"},
+    {"name": "health", "description": "For those who run the service: probes and counters"},
+]
 _log = logging.getLogger("mumacro.app")
 
 
 @asynccontextmanager
-async def _lifespan(app: Any) -> AsyncIterator[dict[str, Any]]:
+async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     for name in unknown_variables():
         _log.warning("%s is not a setting and has no effect", name)
-    app.tables.load()
-    app.metrics.start(app.tables)
+    app.state.tables.load()
+    app.state.metrics.start(app.state.tables)
+    app.openapi()  # which FastAPI keeps: no request waits until it is made
     # A full collection visits a hundred thousand objects of the libraries, and no request is
     # answered meanwhile.
     gc.collect()
     gc.freeze()
-    yield {"settings": app.settings}
-    app.work.close()
+    yield {"settings": app.state.settings}
+    app.state.work.close()
 
 
-async def _problem(request: Request, error: Exception) -> Response:
-    return problem_of(error, request.scope)
+class HeadAsGet:
+    """Middleware: HEAD is answered as GET, without the body."""
 
-
-class Application(FastAPI):
-    """The whole service; the endpoints share its settings, tables, metrics and work.
-
-    FastAPI describes the endpoints, starts and ends the application, and answers what is none of
-    them (the guide). Requests to endpoints do not pass its layers (docs/decisions.md).
-    """
-
-    def __init__(self, settings: Settings) -> None:
-        super().__init__(
-            title="mumacro",
-            version=__version__,
-            description=_DESCRIPTION,
-            docs_url=None,
-            redoc_url=None,
-            openapi_url=None,
-            redirect_slashes=False,
-            lifespan=_lifespan,
-            exception_handlers={HTTPException: _problem},
-            servers=[{"url": settings.root_path}] if settings.root_path else None,
-        )
-        self.settings, self.tables, self.work = settings, Tables(settings.tables), Work(settings)
-        self.metrics = Metrics(frozenset(endpoint.path for endpoint in ENDPOINTS))
-        for endpoint in ENDPOINTS:
-            endpoint.describe_to(self)
-        described = self.openapi()  # which FastAPI keeps
-        described["components"]["schemas"] |= models_json_schema(_MORE, ref_template=REF_TEMPLATE)[
-            1
-        ]["$defs"]
-        if settings.keys():
-            described |= {"security": [{name: []} for name in _KEYS]}
-            described["components"]["securitySchemes"] = _KEYS
-        self.described = dump(described)
-        # The pages are the same for everyone and hold no number.  They ask for the key and send it
-        # with every request.
-        opened = {endpoint.path for endpoint in ENDPOINTS if endpoint.open}
-        if settings.guide is not None:
-            self.add_route("/guide", lambda _: RedirectResponse("guide/"))
-            self.mount("/guide", StaticFiles(directory=settings.guide, html=True))
-            opened.add("/guide")
-        self._front: ASGIApp = Observe(
-            Routes(ENDPOINTS), super().__call__, self.metrics, settings, opened
-        )
-        if settings.cors_origins:
-            self._front = CORSMiddleware(
-                self._front,
-                allow_origins=list(settings.cors_origins),
-                allow_methods=["GET", "HEAD", "POST"],
-                allow_headers=[
-                    "Content-Type",
-                    "X-API-Key",
-                    "Authorization",
-                    "If-None-Match",
-                    "X-Request-ID",
-                ],
-                expose_headers=["ETag", "X-Request-ID", "Retry-After"],
-            )
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request; the events of start and end are FastAPI's."""
-        scope["app"] = self
-        await (self._front if scope["type"] == "http" else super().__call__)(scope, receive, send)
+        """Answer one request."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_head(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                await send(message)
+                # at once: the client may already send its next request
+                await send({"type": "http.response.body", "body": b""})
+
+        await self._app({**scope, "method": "GET"}, receive, send_head)
 
 
-def create_app(settings: Settings | None = None) -> Application:
+def create_app(settings: Settings | None = None) -> FastAPI:
     """The application, whose tables are loaded when it starts; settings are read from the
     environment if left out."""
-    return Application(load_settings() if settings is None else settings)
+    settings = load_settings() if settings is None else settings
+    app = FastAPI(
+        title="mumacro",
+        version=__version__,
+        description=_DESCRIPTION,
+        openapi_tags=_TAGS,
+        servers=[{"url": settings.root_path}] if settings.root_path else None,
+        docs_url=None,  # the page of routers/page.py loads nothing from elsewhere
+        redoc_url=None,
+        redirect_slashes=False,
+        lifespan=_lifespan,
+        exception_handlers=HANDLERS,
+        # it would ask for a provider of OpenTelemetry at every request
+        telemetry={"tracing": False, "metrics": False, "logs": False},
+    )
+    for router in (*ROUTERS, page.router):
+        # include_router would look for the route of every request twice (docs/decisions.md)
+        app.router.routes.extend(router.routes)
+    opened = {*HEALTH_PATHS, *page.OPEN}
+    if settings.guide is not None:
+        app.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)
+        app.mount("/guide", StaticFiles(directory=settings.guide, html=True))
+        opened.add("/guide")
+    methods: dict[str, set[str]] = {}
+    for route in app.routes:
+        methods.setdefault(getattr(route, "path", ""), set()).update(
+            getattr(route, "methods", None) or ()
+        )
+    state = app.state
+    state.methods = {
+        path: ", ".join(sorted(allowed | ({"HEAD"} if "GET" in allowed else set())))
+        for path, allowed in methods.items()
+    }
+    state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
+    state.metrics = Metrics({*methods, *page.OPEN})
+    app.openapi = lambda: _described(app, closed=bool(settings.keys()))  # type: ignore[method-assign]
+    # the last one is the outermost
+    app.add_middleware(HeadAsGet)
+    if keys := settings.keys():
+        app.add_middleware(Keys, keys=keys, open_paths=opened)
+    app.add_middleware(Heads)
+    app.add_middleware(Room)
+    app.add_middleware(Failures)
+    app.add_middleware(Observe, metrics=state.metrics, trusted_proxies=settings.trusted_proxies)
+    if settings.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=list(settings.cors_origins),
+            allow_methods=["GET", "HEAD", "POST"],
+            allow_headers=[
+                "Content-Type", "X-API-Key", "Authorization", "If-None-Match", "X-Request-ID",
+            ],
+            expose_headers=["ETag", "X-Request-ID", "Retry-After"],
+        )  # fmt: skip
+    return app
+
+
+#: models that are described by name only
+_MORE: Any = [(model, "validation") for model in (Case, CaseRequest, CaseColumns)]
+_MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
+
+
+def _described(app: FastAPI, closed: bool) -> dict[str, Any]:
+    """FastAPI's description, with what it cannot know."""
+    if app.openapi_schema:
+        return app.openapi_schema
+    described = get_openapi(
+        title=app.title,
+        version=app.version,
+        description=app.description,
+        routes=app.routes,
+        tags=app.openapi_tags,
+        servers=app.servers,
+    )
+    models = models_json_schema(_MORE, ref_template=REF_TEMPLATE)[1]["$defs"]
+    described["components"]["schemas"] |= models
+    if closed:
+        described |= {"security": [{name: []} for name in SCHEMES]}
+        described["components"]["securitySchemes"] = SCHEMES
+    # pydantic names a generic model by its parameter
+    text = re.sub(r"_list_Union_float__NoneType___", "Columns", orjson.dumps(described).decode())
+    app.openapi_schema = orjson.loads(text.replace("_Union_float__NoneType__", ""))
+    return app.openapi_schema

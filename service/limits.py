@@ -1,4 +1,4 @@
-"""Limits: API keys, the head and the body of a request, slots for large requests, time.
+"""Limits: the body of a request, slots for large requests, time.
 
 A request that may take longer than one case needs a slot and runs in a thread.  Batches and streams
 share the slots of ``MUMACRO_MAX_BATCHES``; the questions of a person (law, solve-for, the page)
@@ -8,20 +8,21 @@ have slots and threads of their own.
 import asyncio
 import os
 import re
-import secrets
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from functools import partial
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
+from fastapi import Depends, Request
 from starlette.requests import ClientDisconnect
-from starlette.types import Receive, Scope
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from mumacro.kernel.threads import processors
 
-from .problems import Kind, RequestError
+from .problems import Kind, RequestError, path_in
+from .security import HEALTH_PATHS
 from .settings import Settings
 
 T = TypeVar("T")
@@ -30,56 +31,7 @@ SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
 AT_ONCE = 4000.0
 QUESTIONS = 8  # questions that are answered at the same time
 _NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
-# how long, and how many bytes of a refused body are read
-_LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
-_PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
 _OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
-_ONCE = (
-    b"host",
-    b"x-api-key",
-    b"authorization",
-    b"content-type",
-    b"content-encoding",
-    b"transfer-encoding",
-    b"x-request-id",
-)
-
-
-def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
-    """The name of the holder of the request's key; ``keys`` are the names by key."""
-    offered = headers.get(b"x-api-key")
-    if offered is None:
-        scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
-        offered = credentials.strip() if scheme.lower() == b"bearer" else b""
-    # compares all keys: the time does not depend on the key sent
-    found = [
-        name for key, name in keys.items() if secrets.compare_digest(offered, key.encode("ascii"))
-    ]
-    if not found:
-        told = "send the API key as X-API-Key or as Authorization: Bearer"
-        raise RequestError(Kind.UNAUTHORIZED, told, headers={"WWW-Authenticate": "Bearer"})
-    return found[0]
-
-
-def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
-    """Refuse a head that says two things, or asks for another protocol, as which its body would be
-    read."""
-    version = scope["http_version"]
-    if version not in ("1.0", "1.1") or (version == "1.1" and b"host" not in headers):
-        raise RequestError(Kind.MALFORMED_HTTP, "a request is of HTTP/1.1 and has one Host")
-    if headers.get(b"transfer-encoding", b"chunked").lower().strip(b" \t,") != b"chunked":
-        raise RequestError(Kind.MALFORMED_HTTP, "the only transfer coding is chunked")
-    if len(headers) != len(scope["headers"]):
-        names = [name for name, _ in scope["headers"]]
-        for name in _ONCE:
-            if names.count(name) > 1:
-                raise RequestError(
-                    Kind.MALFORMED_HTTP, f"the header {name.decode()} is given more than once"
-                )
-    if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
-        raise RequestError(
-            Kind.MALFORMED_HTTP, "this service does not upgrade connections: send no Upgrade"
-        )
 
 
 def form_of(headers: Mapping[bytes, bytes], known: Mapping[str, T]) -> T:
@@ -126,18 +78,6 @@ async def read_body(
         body += message.get("body", b"")
         more = message.get("more_body", False)
         size = len(body)
-
-
-async def drained(receive: Receive) -> None:
-    """Read and drop the rest of a body that is refused, for a while: else many clients see a reset
-    and no reason."""
-    count, more = 0, True
-    with suppress(TimeoutError):
-        async with asyncio.timeout(_LINGER_S):
-            while more and count < _LINGER:
-                message = await asyncio.wait_for(receive(), _PAUSE_S)
-                count += len(message.get("body", b""))
-                more = message.get("more_body", False)
 
 
 class Slots:
@@ -191,6 +131,15 @@ class Work:
             return await move
 
 
+async def _work(request: Request) -> Work:
+    work: Work = request.app.state.work
+    return work
+
+
+#: the slots and threads of the application, for endpoints
+Working = Annotated[Work, Depends(_work)]
+
+
 @asynccontextmanager
 async def within(limit: int, late: Kind = Kind.TOOK_TOO_LONG) -> AsyncIterator[None]:
     """A time limit: of a whole answer, its reading, computing and sending, or of a client's next
@@ -200,3 +149,17 @@ async def within(limit: int, late: Kind = Kind.TOOK_TOO_LONG) -> AsyncIterator[N
             yield
     except TimeoutError:
         raise RequestError(late, f"this may take up to {limit} s") from None
+
+
+class Room:
+    """Middleware: while more connections are open than the settings allow, only the probes are
+    answered."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request pass if there is room for it."""
+        if "full" in scope.get("state", ()) and path_in(scope) not in HEALTH_PATHS:
+            raise RequestError(Kind.OVERLOADED, "too many connections are open")
+        await self._app(scope, receive, send)

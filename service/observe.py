@@ -1,9 +1,6 @@
-"""What is seen of a request from outside: its id, its log line, its counters, and the answer to an
-exception.
+"""What is seen of a request from outside: its id, its log line, its counters.
 
-Logs are JSON lines on standard output, written by a thread.  Counters are those of
-prometheus_client; several workers share them through its multiprocess mode, in a private folder
-that is made at the start.
+Logs are JSON lines on standard output, written by a thread.
 """
 
 import asyncio
@@ -11,75 +8,34 @@ import itertools
 import logging
 import os
 import re
-import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
-from collections.abc import Set as AbstractSet
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
-from functools import cache, partial
+from functools import partial
 from typing import Any, ClassVar
 
-import numpy as np
 import orjson
-from prometheus_client import (
-    CollectorRegistry,
-    Counter,
-    Gauge,
-    Histogram,
-    disable_created_metrics,
-    generate_latest,
-)
-from prometheus_client.multiprocess import MultiProcessCollector
-from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from mumacro.errors import MumacroError
-from mumacro.table.atlas import SOURCES
+from .metrics import Metrics
+from .problems import path_in
+from .security import HEALTH_PATHS, NOSNIFF
 
-from .answers import REGIME_NAMES
-from .limits import check_head, drained, holder_of
-from .problems import Kind, RequestError, problem_of
-from .routes import Routes
-from .settings import Settings
-from .tables import LoadedTable, Tables
-
-HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
-_METHODS = frozenset({"GET", "HEAD", "POST"})
-_SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
-_BUCKETS_S = (
-    1e-4,
-    2.5e-4,
-    5e-4,
-    1e-3,
-    2.5e-3,
-    5e-3,
-    0.01,
-    0.025,
-    0.05,
-    0.1,
-    0.25,
-    0.5,
-    1.0,
-    2.5,
-    5.0,
-    10.0,
-)
+_GONE = 499  # the usual status for a client that disconnected before the answer
 _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs
 _MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
 _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
 _WRITE_EVERY_S = 0.05
-_NO_SNIFF = (b"x-content-type-options", b"nosniff")
 
 _ESCAPED = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
 
 _log = logging.getLogger(__name__)
 _access = logging.getLogger("mumacro.access")
-_errors = logging.getLogger("mumacro.error")
 
 
 def for_people(line: Mapping[str, Any]) -> bytes:
@@ -177,127 +133,22 @@ def log_config(level: str) -> dict[str, Any]:
     }
 
 
-@contextmanager
-def shared_counters() -> Iterator[None]:
-    """A private folder for the counters of all workers, in memory if possible; it is empty, and
-    removed at the end.
-
-    Without a writable folder every worker reports its own counters.
-    """
-    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108  (a folder of its own is made there)
-    with ExitStack() as stack:
-        with suppress(OSError):
-            made = tempfile.TemporaryDirectory(
-                prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True
-            )
-            os.environ[_SHARED] = stack.enter_context(made)
-        yield
-
-
-class Metrics:
-    """Counters of requests and cases."""
-
-    def __init__(self, paths: frozenset[str]) -> None:
-        disable_created_metrics()  # type: ignore[no-untyped-call]
-        self._paths = paths
-        self.registry = own = CollectorRegistry()
-        requests = Counter(
-            "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own
-        )
-        told = "From the head of a request to the end of its answer"
-        seconds = Histogram(
-            "mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own
-        )
-        cases = Counter(
-            "mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own
-        )
-        bad = Counter(
-            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own
-        )
-        labels = ["id", "tolerance"]
-        self._info = Gauge(
-            "mumacro_table_info",
-            "Loaded tables",
-            labels,
-            registry=own,
-            multiprocess_mode="mostrecent",
-        )
-        # a look-up of labels takes longer than counting
-        self._of_request = cache(
-            lambda *labels: (requests.labels(*labels).inc, seconds.labels(labels[0]).observe)
-        )
-        self._of_source = cache(
-            lambda table, code: (
-                bad.labels(table)
-                if code < 0
-                else cases.labels(table, SOURCES[code], REGIME_NAMES[code])
-            )
-        )
-
-    def start(self, tables: Tables) -> None:
-        """Name the loaded tables."""
-        for table in tables.loaded:
-            self._info.labels(table.id, format(table.surrogate.tolerance, "g")).set(1)
-            self._of_source(table.id, -1)
-
-    def request(self, path: str, method: str, status: int, seconds: float) -> None:
-        """Count one request."""
-        path, method = (
-            path if path in self._paths else "other",
-            method if method in _METHODS else "other",
-        )
-        count, observe = self._of_request(path, method, status)
-        count()
-        observe(seconds)
-
-    def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
-        """Count answered cases of one source code; -1 are bad ones."""
-        self._of_source(table.id, source).inc(number)
-
-    def cases(self, table: LoadedTable, source: Any) -> None:
-        """Count the cases of a batch by their source codes, bad ones among them."""
-        for code, number in enumerate(np.bincount(source + 1).tolist()):
-            if number:
-                self.case(table, code - 1, number)
-
-    def text(self) -> bytes:
-        """The exposition format of Prometheus; with several workers, the sum over all."""
-        registry = self.registry
-        if _SHARED in os.environ:
-            registry = CollectorRegistry()
-            MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
-        return generate_latest(registry)
-
-
 class Observe:
-    """Around every answer: id, key, log line, counters, and problem details for every exception.
+    """Middleware around every answer: its request id, its log line, its counters."""
 
-    Endpoints are found by ``routes``, ``others`` answers what is none.  ``open_paths``, and what is
-    below ``/guide/``, need no key.
-    """
-
-    def __init__(
-        self,
-        routes: Routes,
-        others: ASGIApp,
-        metrics: Metrics,
-        settings: Settings,
-        open_paths: AbstractSet[str],
-    ) -> None:
-        self._routes, self._others, self._metrics = routes, others, metrics
-        self._keys, self._open_paths = settings.keys(), open_paths
+    def __init__(self, app: ASGIApp, metrics: Metrics, trusted_proxies: str) -> None:
+        self._app, self._metrics = app, metrics
         # in scope
-        self._proxies: Any = ProxyHeadersMiddleware(
-            lambda *_: asyncio.sleep(0), settings.trusted_proxies
-        )
-        self._stem, self._numbers = (
-            os.urandom(8).hex(),
-            itertools.count(int.from_bytes(os.urandom(6))),
-        )
+        self._proxies: Any = ProxyHeadersMiddleware(lambda *_: asyncio.sleep(0), trusted_proxies)
+        self._stem = os.urandom(8).hex()
+        self._numbers = itertools.count(int.from_bytes(os.urandom(6)))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request."""
-        started = time.perf_counter()
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        started, method = time.perf_counter(), scope["method"]
         headers: dict[bytes, bytes] = dict(scope["headers"])
         offered = headers.get(b"x-request-id", b"")
         identity = (
@@ -308,7 +159,7 @@ class Observe:
         scope["request_id"] = identity
         if b"x-forwarded-for" in headers or b"x-forwarded-proto" in headers:
             await self._proxies(scope, receive, send)
-        path, status, holder = str(scope["path"]).removeprefix(scope.get("root_path", "")), 0, None
+        path, status = path_in(scope), _GONE
 
         async def send_marked(message: Message) -> None:
             nonlocal status
@@ -317,39 +168,22 @@ class Observe:
                 message["headers"] = [
                     *message["headers"],
                     (b"x-request-id", identity.encode()),
-                    _NO_SNIFF,
+                    NOSNIFF,
                 ]
             await send(message)
 
         try:
-            if "full" in scope.get("state", ()) and path not in HEALTH_PATHS:
-                raise RequestError(Kind.OVERLOADED, "too many connections are open")
-            check_head(scope, headers)
-            if self._keys and path not in self._open_paths and not path.startswith("/guide/"):
-                holder = holder_of(headers, self._keys)
-            answer = self._routes.find(path, scope["method"])
-            response = self._others if answer is None else await answer(Request(scope, receive))
-            await response(scope, receive, send_marked)
-        except ClientDisconnect:
-            status = 499  # the usual status for a client that disconnected before the answer
-        except Exception as error:
-            if not isinstance(error, (MumacroError, HTTPException, MemoryError)):
-                fields = {"request_id": identity, "path": scope["path"]}
-                _errors.exception("unexpected error", extra={"fields": fields})
-            if status:  # the answer has begun: end the connection without its end
-                status = 499
-                raise ClientDisconnect from error
-            problem = problem_of(error, scope)
-            late = getattr(error, "kind", None) in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
-            if "connection" in problem.headers and not late and b"expect" not in headers:
-                await drained(receive)
-            await problem(scope, receive, send_marked)
+            await self._app(scope, receive, send_marked)
+        except ClientDisconnect as error:
+            status = _GONE
+            if error.__cause__ is not None:  # the answer has failed: the server ends the connection
+                raise
         finally:
             seconds = time.perf_counter() - started
-            self._metrics.request(path, scope["method"], status, seconds)
+            self._metrics.request(path, method, status, seconds)
             quiet, lines = status == 200 and path in HEALTH_PATHS, LogLines.running
             if lines is not None and _access.isEnabledFor(logging.DEBUG if quiet else logging.INFO):
-                client = scope.get("client")
+                client, holder = scope.get("client"), scope.get("key_holder")
                 lines.put(
                     {
                         "time": datetime.now(UTC),
@@ -357,7 +191,7 @@ class Observe:
                         "logger": "mumacro.access",
                         "message": "request",
                         "request_id": identity,
-                        "method": scope["method"],
+                        "method": method,
                         "path": path,
                         "status": status,
                         "duration_ms": round(1e3 * seconds, 3),

@@ -6,28 +6,42 @@ parameter (queries), the value, and what it must be.  All faults of a request ar
 No traceback reaches a user.
 """
 
+import asyncio
 import json
+import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NoReturn
 
 import orjson
+from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
-from starlette.types import Scope
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from mumacro.analysis.motion import PARTS
 from mumacro.errors import InputError, MumacroError, TableError
-from mumacro.inputs.fields import BOUNDS
+from mumacro.inputs.fields import BOUNDS, LIKE, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
+from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.units import number_hint, unknown_name
 
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()
 CLOSE = {"Connection": "close"}
+# the members of an object within a body; of std the inputs
+_WITHIN = dict.fromkeys(PARTS, ("harmonic", "amplitude", "phase"))
+# how long, and how many bytes of a refused body are read
+_LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
+_PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
+_log = logging.getLogger("mumacro.error")
 
 
 @dataclass(frozen=True)
@@ -84,11 +98,11 @@ def _shown(value: object) -> object:
     return "an object" if isinstance(value, Mapping) else "a list"
 
 
-def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
-    """Raise the error that reports all of these faults."""
+def refused(faults: Sequence[FieldFault], **members: Any) -> "RequestError":
+    """The error that reports all of these faults."""
     first = faults[0]
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    raise RequestError(
+    return RequestError(
         Kind.INVALID_VALUE,
         f"{first.as_json(False)['field']}: {first.reason}{more}",
         faults,
@@ -96,40 +110,112 @@ def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
     )
 
 
+def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
+    """Raise the error that reports all of these faults."""
+    raise refused(faults, **members)
+
+
 def faults_of(
+    errors: Iterable[Any], known: Iterable[str], parameter: bool | None = None
+) -> list[FieldFault]:
+    """Pydantic's errors as faults, one per place; ``known`` are the names that may be given."""
+    faults: dict[tuple[str | int, ...], FieldFault] = {}
+    for error in errors:
+        path, value = error["loc"], error["input"]
+        cause = error.get("ctx", {}).get("error")
+        if isinstance(cause, InputError):  # a relation: it names the input to change
+            path, value = (*path, cause.field), _NO_VALUE
+        elif error["type"] == "missing":
+            value = _NO_VALUE
+        names = [str(step) for step in path if isinstance(step, str)]
+        name = names[-1] if names else "body"
+        allowed = _WITHIN.get(names[0], INPUTS) if len(names) > 1 else known
+        reason = _reason(error, name, allowed)
+        faults.setdefault(path, FieldFault(path, reason, value, parameter))
+    return list(faults.values())
+
+
+def reason_of(error: InputError) -> str:
+    """Why an input is refused, in the words of an answer over HTTP."""
+    if error.field in BOUNDS and error.bound in (BOUNDS[error.field], STIFFNESS):
+        value = error.value if isinstance(error.value, (int, float)) else math.nan
+        return refusal(error.field, value)
+    return f"must be {error.bound}".replace(" or math.inf", "")
+
+
+def _reason(error: Any, name: str, known: Iterable[str]) -> str:
+    """What is wrong with a value, in the words of the library where it has some."""
+    kind, value = error["type"], error["input"]
+    cause = error.get("ctx", {}).get("error")
+    if isinstance(cause, InputError):
+        return reason_of(cause)
+    if kind == "missing":
+        return "is required"
+    if kind == "extra_forbidden":
+        return unknown_name(name, known)
+    if kind == "float_type" and type(value) is int and name in BOUNDS:  # beyond double range
+        return refusal(name, math.inf)
+    if kind == "float_type":
+        return number_hint(name.removeprefix("std_"), value)
+    if kind in _OUT_OF_BOUNDS and name in BOUNDS and len(error["loc"]) == 1:
+        return refusal(name, math.inf if abs(value) > _LARGE else float(value))
+    if kind == "finite_number":
+        return "must be finite"
+    if kind in _LEAST:
+        sign, bound = _LEAST[kind]
+        return f"must be finite and {sign} {error['ctx'][bound]:g}"
+    if kind == "literal_error":
+        return f"must be one of {error['ctx']['expected'].replace(' or ', ', ')}".replace("'", "")
+    if kind in ("model_type", "model_attributes_type"):
+        return "must be an object"
+    if kind in ("too_short", "too_long"):
+        least, most = (error["ctx"].get(end) for end in ("min_length", "max_length"))
+        return f"must have at least {least} entries" if most is None else (
+            f"may have up to {most} entries"
+        )  # fmt: skip
+    message: str = error["msg"]
+    return message.replace("Input should be", "must be").replace("Input should", "must")
+
+
+_OUT_OF_BOUNDS = ("finite_number", "greater_than", "greater_than_equal", "less_than_equal")
+_LEAST = {"greater_than": (">", "gt"), "greater_than_equal": (">=", "ge")}
+_LARGE = 1e308
+
+
+def names_of(model: type[BaseModel]) -> tuple[str, ...]:
+    """What a model may be given: inputs first, options after them."""
+    fields = model.model_fields
+    inputs = [name for name in (*INPUTS, *LIKE, "k_range") if name in fields]
+    return tuple(dict.fromkeys([*inputs, *fields]))
+
+
+def invalid(
     error: ValidationError,
     model: type[BaseModel],
-    known: Iterable[str],
+    members: Mapping[str, Any],
     parameter: bool | None = None,
-) -> list[FieldFault]:
-    """Pydantic's entries as faults, one per place.
+) -> "RequestError":
+    """The error that reports what a model refuses in the members of a body or query."""
+    faults = faults_of(error.errors(include_url=False), names_of(model), parameter)
+    if "mu0" in model.model_fields and model.model_fields["mu0"].is_required():
+        known = {fault.path for fault in faults}
+        faults += [fault for fault in _absent_in(members) if fault.path not in known]
+    return refused(faults)
 
-    A field of ``model`` says in its ``json_schema_extra`` what it must be (``bound``); ``known``
-    are the names that the request may have.
-    """
-    found: dict[tuple[str | int, ...], FieldFault] = {}
-    for entry in error.errors(include_url=False):
-        path, kind, value = entry["loc"], entry["type"], entry["input"]
-        if kind == "missing":
-            value, reason = _NO_VALUE, "is required"
-        elif kind == "extra_forbidden":
-            reason = unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS)
-        elif (
-            kind == "value_error"
-        ):  # in the relation of several fields: InputError names the one to change
-            fault: InputError = entry["ctx"]["error"]
-            path, value, reason = (*path, fault.field), _NO_VALUE, f"must be {fault.bound}"
-        elif kind == "float_type":
-            reason = number_hint(str(path[0]), value)
-        elif (
-            kind in ("greater_than_equal", "finite_number") and len(path) > 1
-        ):  # one of several numbers
-            reason = f"must be {BOUNDS['v0']}"
-        else:
-            extra: Any = model.model_fields[str(path[0])].json_schema_extra
-            reason = f"must be {extra['bound']}"
-        found.setdefault(path, FieldFault(path, reason, value, parameter))
-    return list(found.values())
+
+def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
+    """The faults of inputs of which one of several is required: the library would tell the first
+    of them, when everything else is right."""
+    amplitude = AMPLITUDE if members.get("direction") == "normal" else "y0"
+    for names in (("k", "k_range", *ENDS), (amplitude,), ("omega", "f")):
+        if all(members.get(name) is None for name in names):
+            yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))
+
+
+_ALTERNATIVES = {
+    "omega": "is required: omega [rad/s], or f [Hz] in its place",
+    "k": f"is required: the tangential stiffness [N/m], or {RIGID}",
+}
 
 
 class Kind(Enum):
@@ -176,33 +262,72 @@ class RequestError(MumacroError):
         super().__init__(detail)
 
 
-def _request_error(error: Exception) -> RequestError:
+def path_in(scope: Scope) -> str:
+    """The path without what a proxy has put before it."""
+    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
+
+
+# --- exceptions of the application ----------------------------------------------------------------
+
+
+def _of_fastapi(error: RequestValidationError, scope: Scope) -> RequestError:
+    """What FastAPI refuses: a body, or a query, that is not as its endpoint declares it."""
+    dependant = scope["route"].dependant
+    declared = (dependant.body_params or dependant.query_params)[0].field_info.annotation
+    errors = [{**fault, "loc": fault["loc"][1:]} for fault in error.errors()]
+    return refused(faults_of(errors, names_of(declared)))
+
+
+def _of_http(error: HTTPException, scope: Scope) -> RequestError:
+    """What Starlette refuses: no such path, method or part of a file."""
+    if error.status_code == 405:  # Starlette names the methods of one route of the path
+        allowed = scope["app"].state.methods.get(path_in(scope), "GET, HEAD")
+        detail = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
+        return RequestError(Kind.METHOD_NOT_ALLOWED, detail, headers={"Allow": allowed})
+    kinds = (Kind.MALFORMED_BODY, Kind.NOT_FOUND, Kind.RANGE_NOT_SATISFIABLE)
+    kind = next((one for one in kinds if one.status == error.status_code), Kind.UNEXPECTED)
+    detail = "no such path: /docs describes all of them" if kind is Kind.NOT_FOUND else error.detail
+    return RequestError(kind, detail, headers=error.headers)
+
+
+def _of_input(error: InputError, _: Scope) -> RequestError:
+    """What the library refuses, such as a relation between inputs."""
+    value = _NO_VALUE if error.value is None else error.value
+    return refused([FieldFault.of(error.field, reason_of(error), value)])
+
+
+def _of_table(error: TableError, _: Scope) -> RequestError:
+    return RequestError(Kind.NOT_READY, f"table {error.path.name}: {error.reason}")
+
+
+def _of_memory(_error: MemoryError, _: Scope) -> RequestError:
+    return RequestError(Kind.OUT_OF_MEMORY, "send a smaller request, or send it later")
+
+
+#: exception -> what it means for its request
+_MEANINGS: dict[type[Exception], Any] = {
+    RequestError: lambda error, _: error,
+    RequestValidationError: _of_fastapi,
+    HTTPException: _of_http,
+    InputError: _of_input,
+    TableError: _of_table,
+    MemoryError: _of_memory,
+}
+
+
+def meaning(error: Exception, scope: Scope) -> RequestError:
     """What an exception means for its request; nothing of an unknown one is told."""
-    if isinstance(error, RequestError):
-        return error
-    if isinstance(error, HTTPException):  # of Starlette: no such path, method or part of a file
-        named = {
-            Kind.MALFORMED_BODY,
-            Kind.NOT_FOUND,
-            Kind.METHOD_NOT_ALLOWED,
-            Kind.RANGE_NOT_SATISFIABLE,
-        }
-        kind = next((kind for kind in named if kind.status == error.status_code), Kind.UNEXPECTED)
-        return RequestError(kind, error.detail, headers=error.headers)
-    if isinstance(error, InputError):
-        fault = FieldFault.of(error.field, f"must be {error.bound}", error.value)
-        return RequestError(Kind.INVALID_VALUE, f"{error.field} must be {error.bound}", [fault])
-    if isinstance(error, TableError):
-        return RequestError(Kind.NOT_READY, f"table {error.path.name}: {error.reason}")
-    if isinstance(error, MemoryError):
-        return RequestError(Kind.OUT_OF_MEMORY, "send a smaller request, or send it later")
+    for kind, means in _MEANINGS.items():
+        if isinstance(error, kind):
+            known: RequestError = means(error, scope)
+            return known
     detail = "The request could not be answered; the log has the reason under its request id."
     return RequestError(Kind.UNEXPECTED, detail)
 
 
 def document_of(error: Exception, scope: Scope) -> dict[str, Any]:
     """The problem document of an exception."""
-    found = _request_error(error)
+    found = meaning(error, scope)
     slug = found.kind.name.lower().replace("_", "-")
     body: dict[str, Any] = {"type": f"urn:problem-type:mumacro:{slug}", "title": found.kind.title}
     body |= {"status": found.kind.status, "detail": found.detail, "instance": scope["path"]}
@@ -217,9 +342,71 @@ def document_of(error: Exception, scope: Scope) -> dict[str, Any]:
 
 def problem_of(error: Exception, scope: Scope) -> Response:
     """The response to an exception."""
-    found = _request_error(error)
+    found = meaning(error, scope)
     headers = {"Cache-Control": "no-store", **found.kind.headers, **found.headers}
     content = orjson.dumps(document_of(found, scope))
     return Response(
         content, found.kind.status, headers=headers, media_type="application/problem+json"
     )
+
+
+async def handle(request: Request, error: Exception) -> Response:
+    """FastAPI's handler of all of them."""
+    found = meaning(error, request.scope)
+    await drained(found, request)
+    return problem_of(found, request.scope)
+
+
+#: exception -> its handler: the one table of the application
+HANDLERS: Any = dict.fromkeys(_MEANINGS, handle)
+
+
+async def drained(error: RequestError, request: Request) -> None:
+    """Read and drop the rest of a body that is refused, for a while: else many clients see a reset
+    and no reason."""
+    late = error.kind in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
+    if "Connection" not in error.kind.headers or late or "expect" in request.headers:
+        return
+    count, more = 0, True
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_LINGER_S):
+            while more and count < _LINGER:
+                message = await asyncio.wait_for(request.receive(), _PAUSE_S)
+                count += len(message.get("body", b""))
+                more = message.get("more_body", False)
+
+
+class Failures:
+    """Middleware: every exception that the handlers leave becomes a problem document; an unexpected
+    one goes to the log."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        begun = False
+
+        async def send_noting(message: Message) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        try:
+            await self._app(scope, receive, send_noting)
+        except ClientDisconnect:
+            raise
+        except Exception as error:
+            if not isinstance(error, (RequestError, MemoryError)) and not _expected(error):
+                fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
+                _log.exception("unexpected error", extra={"fields": fields})
+            if begun:  # end the connection without the end of the answer
+                raise ClientDisconnect from error
+            response = await handle(Request(scope, receive), error)
+            await response(scope, receive, send)
+
+
+def _expected(error: Exception) -> bool:
+    """Whether Starlette raised this in place of an exception that has a handler: the answer had
+    begun."""
+    return isinstance(error.__cause__, tuple(_MEANINGS))

@@ -1,181 +1,334 @@
-"""The quantities that ``include`` can add to an answer: one entry of the registry each.
+"""The answer to cases: the default outputs, and the quantities that ``include`` can add.
 
-Equation numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse
-oscillations" (Friction, 2018).
+A quantity is one function here, a member of ``models/answers.py`` with its unit and meaning, and a
+name in ``models/options.py``.  It takes one case in plain numbers, or many in columns, and gives
+its outputs by path: ``power.saved`` is ``saved`` within ``power``.  Equation numbers are those of
+Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations" (Friction,
+2018).
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from mumacro import Surrogate
 from mumacro.analysis.settling import settling as decay
-from mumacro.inputs.fields import FIELDS, PER_UNIT
-from mumacro.kernel.arrays import Array
-from mumacro.table.atlas import ROUNDING
+from mumacro.errors import InputError
+from mumacro.inputs.cases import Cases, by_name
+from mumacro.inputs.kind import SPRING, Kind
+from mumacro.kernel.arrays import Array, Codes
+from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, ROUNDING
+from mumacro.table.atlas import SOURCES as _SOURCES
 
-from .answers import QUANTITIES, Cases, Part, register, where
-
-
-@register(
-    2,
-    Part("groups.v_tilde", "-", "v0/(l0 omega)"),
-    Part("groups.y_tilde", "-", "y0/l0; for direction normal Fz_amplitude/Fz"),
-    Part("groups.l0", "m", "Length scale mu0 Fz/k; 0 for rigid contact"),
-)
-def groups(cases: Cases) -> Sequence[Array]:
-    """Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double
-    range)."""
-    return cases.v_tilde, cases.y_tilde, cases.length_scale
+SOURCES = tuple(_SOURCES)
+#: name of the regime of every source code
+REGIME_OF = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
+Outputs = dict[str, Any]  # by path
 
 
-@register(
-    8,
-    Part(
-        "limits.mu_static",
-        "-",
-        "Static limit, v0 -> 0, eq. (38): mu0 sqrt(1 - y~^2), or 0 for y~ >= 1",
-    ),
-    Part("limits.v0_crit", "m/s", "Velocity at the border of continuous sliding"),
-    Part("limits.mu_crit", "-", "mu_macro at that border"),
-)
-def limits(cases: Cases) -> Sequence[Array]:
-    """Marks on the friction law of this case; null: beyond double range."""
+@dataclass
+class Answered:
+    """Cases with their answer, for which a quantity is computed: plain numbers, or columns (n,).
+
+    k = inf is rigid contact.  The slopes are there if a requested quantity needs them.  What is not
+    legal is NaN.
+    """
+
+    surrogate: Surrogate
+    kind: Kind
+    columns: Mapping[str, Any]
+    answer: Any
+    std: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        self.mu_macro, self.error_bound = self.answer.mu_macro, self.answer.error_bound
+        self.v_tilde, self.y_tilde = self.answer.v_tilde, self.answer.y_tilde
+        self.length_scale = self.answer.length_scale
+        amplitude = self.columns["Fz_amplitude" if self.kind.normal else "y0"]
+        self.moving = (amplitude != 0.0) & (self.columns["omega"] != 0.0)
+        self.rigid = self.columns["k"] == math.inf
+        #: elastic, oscillating, with groups within double range
+        self.usable = (self.y_tilde < math.inf) & self.moving
+        self.words: dict[str, Any] = self.kind.names
+
+    def at_speed(self, v0: Any) -> Array:
+        """mu_macro at another v0, in the same shape; NaN where that is not legal."""
+        columns = {
+            name: np.atleast_1d(column) for name, column in {**self.columns, "v0": v0}.items()
+        }
+        mu_macro = self.surrogate.evaluate(columns, **self.words).mu_macro
+        shape = np.shape(self.mu_macro)
+        return np.broadcast_to(mu_macro, shape or (1,)).reshape(shape)
+
+    def slopes(self) -> tuple[Outputs, Outputs]:
+        """d mu_macro / d input and the bounds, NaN along k where contact is rigid."""
+        no_slope = where(self.rigid, np.nan, 0.0)
+        slopes, bounds = self.answer.gradient, self.answer.gradient_bound
+        return {**slopes, "k": slopes["k"] + no_slope}, {**bounds, "k": bounds["k"] + no_slope}
+
+
+def where(condition: Any, one: Any, other: Any) -> Any:
+    """``np.where``, which takes a microsecond for a single number."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, one, other)
+    return one if condition else other
+
+
+class Quantity(NamedTuple):
+    """One name that ``include`` may hold."""
+
+    compute: Callable[[Answered], Outputs]
+    cost: float  # time of a case, in times of a plain answer
+    slopes: bool  # whether it needs the gradient
+    lacks: Mapping[str, str]  # direction or k_range that it cannot be computed for -> why
+
+
+QUANTITIES: dict[str, Quantity] = {}
+
+
+def quantity(cost: float, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
+    """Register the decorated function under its name."""
+
+    def register(compute: Callable[[Answered], Outputs]) -> Callable[[Answered], Outputs]:
+        QUANTITIES[compute.__name__] = Quantity(compute, cost, slopes, lacks)
+        return compute
+
+    return register
+
+
+@quantity(cost=2)
+def groups(cases: Answered) -> Outputs:
+    """Dimensionless groups."""
+    return {
+        "groups.v_tilde": cases.v_tilde,
+        "groups.y_tilde": cases.y_tilde,
+        "groups.l0": cases.length_scale,
+    }
+
+
+@quantity(cost=8)
+def limits(cases: Answered) -> Outputs:
+    """Marks on the friction law."""
     if cases.words["direction"] == "along":  # where the contact begins to slide backwards
         speed = cases.columns["y0"] * cases.columns["omega"]
     else:  # rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0
         crit = cases.surrogate.v_tilde_crit(where(cases.usable, cases.y_tilde, 0.0), **cases.words)
         speed = where(cases.usable, cases.length_scale * crit * cases.columns["omega"], np.nan)
         speed = where(cases.moving, where(cases.rigid, 0.0, speed), 0.0)
-    return cases.at_speed(0.0), speed, cases.at_speed(speed)
+    return {
+        "limits.mu_static": cases.at_speed(0.0),
+        "limits.v0_crit": speed,
+        "limits.mu_crit": cases.at_speed(speed),
+    }
 
 
-# --- sensitivity and uncertainty ------------------------------------------------------------------
+@quantity(cost=6, slopes=True)
+def gradient(cases: Answered) -> Outputs:
+    """d mu_macro / d input, with bounds."""
+    slopes, bounds = cases.slopes()
+    fields = cases.kind.fields
+    return {f"gradient.{name}": slopes[name] for name in fields} | {
+        f"gradient_bound.{name}": bounds[name] for name in fields
+    }
 
 
-@register(
-    6,
-    *(Part(f"gradient.{name}", PER_UNIT[name], f"d mu_macro / d {name}") for name in FIELDS),
-    *(
-        Part(
-            f"gradient_bound.{name}", PER_UNIT[name], "Bound of its absolute error; null: not known"
-        )
-        for name in FIELDS
-    ),
-    slopes=True,
-)
-def gradient(cases: Cases) -> Sequence[Array]:
-    """d mu_macro / d input; null: not finite, or no such input (k of rigid contact)."""
-    return [found[name] for found in cases.slopes() for name in cases.kind.fields]
-
-
-@register(
-    8,
-    Part("std", "-", "To first order, from the gradient"),
-    Part(
-        "std_bound",
-        "-",
-        "The part of std that comes from the gradient's own bound; null: not known",
-    ),
-    *(
-        Part(f"std_share.{name}", "-", f"Share of {name} in the variance, 0 to 1")
-        for name in FIELDS
-    ),
+@quantity(
+    cost=8,
     slopes=True,
     k_range="it needs one k: give k with its standard deviation, or k_range without std",
 )
-def std(cases: Cases) -> Sequence[Array]:
+def std(cases: Answered) -> Outputs:
     """Standard deviation of mu_macro from independent standard deviations of the inputs."""
-    given = {name: cases.std.get(name, 0.0) for name in cases.kind.fields}
+    spreads = {name: cases.std.get(name, 0.0) for name in cases.kind.fields}
     # k has no effect where contact is rigid, nor has an infinite slope where the input is exact
     exact = {
-        name: (cases.rigid & (name == "k")) | (spread == 0.0) for name, spread in given.items()
+        name: (cases.rigid & (name == "k")) | (spread == 0.0) for name, spread in spreads.items()
     }
     terms, doubts = (
-        [where(exact[name], 0.0, found[name] * spread) for name, spread in given.items()]
-        for found in cases.slopes()
+        [where(exact[name], 0.0, slopes[name] * spread) for name, spread in spreads.items()]
+        for slopes in cases.slopes()
     )
     with np.errstate(all="ignore"):
-        total, doubt = (reduce(np.hypot, found) for found in (terms, doubts))
-        return [total, doubt, *(where(total > 0.0, (term / total) ** 2, 0.0) for term in terms)]
+        total, doubt = (reduce(np.hypot, parts) for parts in (terms, doubts))
+        shares = [where(total > 0.0, (term / total) ** 2, 0.0) for term in terms]
+    outputs = {"std": total, "std_bound": doubt}
+    return outputs | {
+        f"std_share.{name}": share for name, share in zip(spreads, shares, strict=True)
+    }
 
 
-# --- stick fraction, power and settling -----------------------------------------------------------
-
-
-@register(
-    4,
-    Part("stick_fraction", "-", "Share of the period during which the contact sticks"),
-    Part(
-        "stick_fraction_bound",
-        "-",
-        "Bound of its absolute error, larger at the border; null: not known",
-    ),
-)
-def stick_fraction(cases: Cases) -> Sequence[Array]:
+@quantity(cost=4)
+def stick_fraction(cases: Answered) -> Outputs:
     """Share of the period during which the contact sticks."""
     value, bound = cases.surrogate.stick_fraction_with_bound(
         cases.v_tilde, cases.y_tilde, **cases.words
     )
     # y~ below double range: the groups do not show whether such a contact sticks
     lost = (cases.y_tilde == 0.0) & (cases.v_tilde < np.inf) & cases.moving
-    return value, where(lost, 1.0, bound)
+    return {"stick_fraction": value, "stick_fraction_bound": where(lost, 1.0, bound)}
 
 
-@register(
-    5,
-    Part(
-        "power.oscillation",
-        "W",
-        "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; null: rigid",
-    ),
-    Part("power.saved", "W", "Power that the drive saves: (mu0 - mu_macro) Fz v0"),
-    Part("power_bound.oscillation", "W", "Bound of the absolute error; null also where not known"),
-    Part("power_bound.saved", "W", "Bound of the absolute error of saved"),
-    normal="how far the load moves is not modelled",
-)
-def power(cases: Cases) -> Sequence[Array]:
-    """Mean powers; null: not finite in double precision."""
+@quantity(cost=5, normal="how far the load moves is not modelled")
+def power(cases: Answered) -> Outputs:
+    """Mean powers of the shaker and of the drive."""
     mu0, load, omega, v0 = (cases.columns[name] for name in ("mu0", "Fz", "omega", "v0"))
     unit = where(cases.usable, mu0 * load * (cases.length_scale * omega), np.nan)
     v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
-    found = cases.surrogate.power_with_bound(v, y, **cases.words)
-    shaker, bound = (where(cases.moving, number * unit, 0.0) for number in found)
+    with_bound = cases.surrogate.power_with_bound(v, y, **cases.words)
+    shaker, bound = (where(cases.moving, number * unit, 0.0) for number in with_bound)
     saved = (mu0 - cases.mu_macro) * load * v0
-    return shaker, saved, bound, cases.error_bound * load * v0 + ROUNDING * abs(saved)
+    return {
+        "power.oscillation": shaker,
+        "power.saved": saved,
+        "power_bound.oscillation": bound,
+        "power_bound.saved": cases.error_bound * load * v0 + ROUNDING * abs(saved),
+    }
 
 
 _DERIVED = "how a disturbance decays is derived for across only"
 
 
-@register(
-    5,
-    Part(
-        "settling.periods",
-        "-",
-        "For a small disturbance: ln(100)/slip_path; in stick-slip at most as many",
-    ),
-    Part("settling.periods_any", "-", "For a disturbance of any size: twice as many"),
-    Part("settling.time", "s", "periods as a time; also without oscillation"),
-    Part(
-        "settling.slip_path",
-        "-",
-        "Path of the foot in a period over l0; null also for rigid contact",
-    ),
-    Part(
-        "settling_bound.periods",
-        "-",
-        "Bound of the absolute error of periods; null also: not known",
-    ),
-    along=_DERIVED,
-    normal=_DERIVED,
-)
-def settling(cases: Cases) -> Sequence[Array]:
-    """Periods until a disturbed contact is within 1 % of its steady cycle; null: infinite, it never
-    slips."""
+@quantity(cost=5, along=_DERIVED, normal=_DERIVED)
+def settling(cases: Answered) -> Outputs:
+    """Periods until a disturbed contact is within 1 % of its steady cycle."""
     found = decay(cases.surrogate, **cases.columns, **cases.words)
-    return found.periods, found.periods_any, found.time, found.slip_path, found.error_bound
+    return {
+        "settling.periods": found.periods,
+        "settling.periods_any": found.periods_any,
+        "settling.time": found.time,
+        "settling.slip_path": found.slip_path,
+        "settling_bound.periods": found.error_bound,
+    }
 
 
-#: names that ``include`` may hold
-INCLUDES = tuple(QUANTITIES)
+# --- what is asked --------------------------------------------------------------------------------
+
+# in times of one spring, across, at one k
+_COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
+_BALL_ALONG = 5.0  # times both: a sum over springs
+_INTERVAL = frozenset(("k_range", "k_low", "k_high"))
+
+
+class Asked(NamedTuple):
+    """What is asked of cases: their kind, the quantities beside the default outputs, and deviations
+    for ``std``."""
+
+    kind: Kind = SPRING
+    interval: bool = False  # whether k is one
+    include: tuple[str, ...] = ()
+    std: Mapping[str, float] = {}
+
+    @classmethod
+    def of(cls, options: Any, inputs: Mapping[str, Any]) -> "Asked":
+        """What options ask of such inputs; InputError where the cases do not have it."""
+        kind, interval = options.kind, not _INTERVAL.isdisjoint(inputs)
+        if not options.include:
+            return cls(kind, interval)
+        include = tuple(name for name in QUANTITIES if name in options.include)  # once, in order
+        for word in (kind.names["direction"], *(["k_range"] if interval else [])):
+            for name in include:
+                if why := QUANTITIES[name].lacks.get(word):
+                    raise InputError("include", name, f"without {name} for {word}: {why}")
+        deviations = options.std
+        return cls(kind, interval, include, {} if deviations is None else deviations.by_field)
+
+    @property
+    def cost(self) -> float:
+        """Time of a case, in times of a plain answer."""
+        if not self.include and self.kind == SPRING and not self.interval:
+            return 1.0
+        cost = 1.0 + sum(QUANTITIES[name].cost for name in self.include)
+        words = (*self.kind.names.values(), *(["k_range"] if self.interval else []))
+        if {"ball", "along"} <= {*words}:
+            cost *= _BALL_ALONG
+        return cost * math.prod(_COSTS.get(word, 1.0) for word in words)
+
+
+def answer_case(
+    surrogate: Surrogate, inputs: Mapping[str, Any], asked: Asked
+) -> tuple[Outputs, int]:
+    """The answer to one case in plain numbers as JSON nests it, and the code of its source;
+    InputError where the case is not legal."""
+    if not (asked.include or asked.interval):
+        answer: Any = surrogate.evaluate(**inputs, **asked.kind.names)
+        code = answer.source_code
+        return {
+            "mu_macro": answer.mu_macro,
+            "mu_ratio": answer.mu_ratio,
+            "regime": REGIME_OF[code],
+            "error_bound": answer.error_bound,
+            "source": SOURCES[code],
+        }, code
+    outputs, codes = _answer(surrogate, inputs, asked)
+    code = int(codes)
+    outputs |= {"regime": REGIME_OF[code], "source": SOURCES[code]}
+    return nested(
+        {path: x if isinstance(x, str) else float(x) for path, x in outputs.items()}
+    ), code
+
+
+def answer_columns(
+    surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked
+) -> tuple[Outputs, Codes]:
+    """The outputs of many cases by path, and their source codes: NaN and -1 for a case that is not
+    legal.  Regime and source are codes, too."""
+    with np.errstate(all="ignore"):
+        outputs, codes = _answer(surrogate, columns, asked)
+    legal = codes >= 0
+    for path, column in outputs.items():
+        if path not in ("regime", "source"):
+            outputs[path] = np.where(legal, column, np.nan)
+    return outputs, codes
+
+
+def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> tuple[Outputs, Any]:
+    kind, include = asked.kind, asked.include
+    slopes = any(QUANTITIES[name].slopes for name in include)
+    answer: Any = surrogate.evaluate(**columns, **kind.names, gradient=slopes, groups=bool(include))
+    codes = answer.source_code
+    outputs = {
+        "mu_macro": answer.mu_macro,
+        "mu_ratio": answer.mu_ratio,
+        "regime": codes,
+        "error_bound": answer.error_bound,
+        "source": codes,
+    }
+    if asked.interval:
+        outputs |= {"mu_macro_low": answer.mu_macro_low, "mu_macro_high": answer.mu_macro_high}
+    if include:
+        if asked.interval or "f" in columns:
+            columns = Cases.of(by_name(None, columns, kind), kind).columns
+        known = Answered(surrogate, kind, columns, answer, asked.std)
+        for name in include:
+            outputs |= QUANTITIES[name].compute(known)
+    return outputs, codes
+
+
+def nested(outputs: Outputs) -> dict[str, Any]:
+    """Outputs by path as JSON has them: ``power.saved`` becomes ``power: {saved: ...}``."""
+    tree: dict[str, Any] = {}
+    for path, value in outputs.items():
+        name, _, member = path.partition(".")
+        if member:
+            tree.setdefault(name, {})[member] = value
+        else:
+            tree[name] = value
+    return tree
+
+
+def names_of(path: str, codes: Codes) -> list[str | None]:
+    """The names of regimes or sources by source code; None for -1."""
+    names = np.array((*(REGIME_OF if path == "regime" else SOURCES), None))
+    return list(names[codes].tolist())
+
+
+def listed(outputs: Outputs) -> dict[str, list[Any]]:
+    """Outputs of many cases as JSON lists them; NaN is written as null."""
+    return {
+        path: names_of(path, x) if path in ("regime", "source") else x.tolist()
+        for path, x in outputs.items()
+    }

@@ -4,7 +4,9 @@ service is ready."""
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
 
 from mumacro import Surrogate, TableError
 
@@ -118,3 +120,12 @@ class Tables:
                 tightest_available=tightest,
             )
         return min(fit, key=lambda table: (table.stamp[0], -table.surrogate.tolerance))
+
+
+async def _tables(request: Request) -> Tables:
+    tables: Tables = request.app.state.tables
+    return tables
+
+
+#: the tables of the application, for endpoints
+Loaded = Annotated[Tables, Depends(_tables)]

@@ -36,7 +36,7 @@ _FORM = (
     "an amplitude, a pair (amplitude, phase in degrees), or a list of triples (harmonic, "
     "amplitude, phase in degrees)"
 )
-_WHOLE = (
+WHOLE = (
     f"a whole number from 1 to {MOST_HARMONIC}: other ratios have no period 2 pi/omega; give the "
     "frequency of which all are multiples"
 )
@@ -292,11 +292,11 @@ def _terms(name: str, part: Any) -> Iterable[Term]:
         try:
             order = float(harmonic)
         except (TypeError, ValueError) as error:
-            raise InputError(f"{name}, harmonic", harmonic, _WHOLE) from error
+            raise InputError(f"{name}, harmonic", harmonic, WHOLE) from error
         if isinstance(harmonic, (str, bool)) or not (
             order.is_integer() and 1.0 <= order <= MOST_HARMONIC
         ):
-            raise InputError(f"{name}, harmonic", harmonic, _WHOLE)
+            raise InputError(f"{name}, harmonic", harmonic, WHOLE)
         degrees = real(f"{name}, phase", phase)
         with np.errstate(invalid="ignore"):
             angle = np.deg2rad(np.fmod(degrees, 360.0))

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from benchmarks.support.serving import CASE as SERVED
-from mumacro import Surrogate
+from mumacro import Surrogate, motion
 from tests.support.comparing import close
 
 CASE = {**SERVED, "omega": 2 * math.pi * 20e3}
@@ -76,6 +76,8 @@ def test_curl(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
     expected = surrogate.evaluate(**CASE).mu_macro
     assert number(r'^\{"mu_macro":([0-9.e-]+)', text.split("\n", 1)[1]) == expected
     assert number(r'"roots":\[\{"value":([0-9.e-]+)', text) == close(2.8656e-6, rel=1e-4)
+    ellipse = motion(**{name: CASE[name] for name in CASE if name != "y0"}, x=(1e-6, 90.0), y=2e-6)
+    assert number(r'"mu_macro":([0-9.e-]+),"mu_lateral"', text) == ellipse.mu_macro
     rows = [line for line in text.splitlines() if line.endswith(("_low", "corner"))]
     assert [float(row.split(",")[0]) for row in rows] == [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0]
 

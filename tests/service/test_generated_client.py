@@ -31,12 +31,12 @@ from mumacro_client.api.answers import (
     get_mu_macro, post_mu_macro, post_mu_macro_batch, post_solve_for
 )
 from mumacro_client.models import (
-    Case, CaseAnswer, CaseColumns, CaseRequest, CaseRequestIncludeType0Item, ColumnsAnswer,
+    Case, CaseAnswer, CaseColumns, CaseRequest, CaseRequestIncludeItem, ColumnsAnswer,
     Power, Problem, RowsAnswer, SolveForAnswer, SolveForRequest, SolveForRequestUnknown,
 )
 
 client = Client(base_url=sys.argv[1])
-power = CaseRequestIncludeType0Item.POWER
+power = CaseRequestIncludeItem.POWER
 one = post_mu_macro.sync(client=client, body=CaseRequest(
     mu0=0.3, fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01, include=[power]))
 assert isinstance(one, CaseAnswer) and isinstance(one.power, Power)

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.support.browser import RECORDED, START
 from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import contact_of
-from service.routes.page import ASSETS
+from service.routers.page import ASSETS
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow

@@ -53,8 +53,13 @@ RELATIONS = (
     r".* is (not computed|for one case)",
     r"must be >= 0 and below Fz",
     r"must be left out: (over an interval|unknown field)",
-    r"must be left out where k is the swept input",
-    r"must be given(:| \[)",
+    r"must be left out where",
+    r"must be given\b",
+    r"must be without \w+ for ",
+    r"must be without model",
+    r"must be one of mu_macro",
+    r"must be left out, because \w+ is the unknown",
+    r"must be finite and > 0, or rigid",  # a law that goes along k from 0
 )
 #: further ones of a path: what a geometry needs depends on its name; random points hold no
 #: information
@@ -62,6 +67,7 @@ OF_PATH = {
     "/v1/stiffness": (
         r"must be finite in at least one of the two bodies",
         r"must be >= \S+, the width of the contact",
+        r"must be finite and > 0, from ",
     ),
     "/v1/fit": (
         r"must be left out: it is among the unknowns",

@@ -28,7 +28,7 @@ BAD_ROWS = [
     ({"speed": 1}, "speed", "unknown"),
     ({"v0": True}, "v0", "must be a number"),
     ({"include": []}, "include", "unknown"),
-    ({"k": ...}, "k", "is required: the tangential stiffness"),
+    ({"k": ...}, "k", "rigid"),
 ]
 
 
@@ -195,6 +195,27 @@ def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client: Any, case
     assert [row["error"] for row in rows] == ["case: has 7 cells where the head has 6"] * 2
     good = read("csv", posted(client, "csv", "\ufeff" + as_csv([case])))
     assert good[0]["mu_macro"] == one(client, case)["mu_macro"]
+
+
+def test_a_wrong_line_of_csv_keeps_its_place_beside_blank_lines(client: Any, case: Case) -> None:
+    head, good = as_csv([case]).splitlines()
+    text = "\r\n".join([head, good, "", "1,2", good, "", "", "3", good])
+    rows = read("csv", posted(client, "csv", text))
+    assert [row["error"] and row["error"][:16] for row in rows] == [
+        None,
+        "case: has 2 cell",
+        None,
+        "case: has 1 cell",
+        None,
+    ]
+    # a wrong byte in a wrong line is a fault of the body, and nothing is printed
+    assert posted(client, "csv", text.encode() + b"\xb1").status_code == 400
+
+
+def test_a_number_of_csv_beyond_double_range_is_no_rigid_contact(client: Any, case: Case) -> None:
+    rows = [{**case, "k": k} for k in ("1e999", "inf", "rigid", 1e6)]
+    found = read("csv", posted(client, "csv", as_csv(rows)))
+    assert [row["error"] and row["error"][:2] for row in found] == ["k:", "k:", None, None]
 
 
 def test_arrow_keeps_order_over_batches_and_names_its_table(

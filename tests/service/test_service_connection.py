@@ -74,6 +74,16 @@ def test_a_connection_is_kept_over_errors_and_ends_when_asked(raw: Any) -> None:
     assert to_end(raw) == b""
 
 
+def test_a_head_is_complete_when_its_client_has_it(raw: Any) -> None:
+    for _ in range(20):
+        raw.sendall(b"HEAD /v1/table.nc HTTP/1.1\r\nHost: x\r\n\r\n")
+        response = http.client.HTTPResponse(raw, method="HEAD")
+        response.begin()
+        assert int(response.headers["content-length"]) > 0
+        raw.sendall(GET)
+        assert answer(raw)[0] == 200
+
+
 def test_a_second_request_before_the_answer_is_dropped_and_the_connection_closes(raw: Any) -> None:
     raw.sendall(posted(SINGLE, b"{}") + GET * 5000)
     received = to_end(raw)
@@ -180,6 +190,20 @@ def test_a_client_that_leaves_within_a_body_frees_its_place(strict: Any) -> None
     deadline = time.monotonic() + PATIENCE_S
     while strict.ask("POST", BATCH, columns(20_000))[0] != 200:
         assert time.monotonic() < deadline
+
+
+def test_a_client_that_leaves_its_stream_is_no_fault_of_the_service(strict: Any) -> None:
+    before = len(strict.lines)
+    with connect(strict) as raw:
+        raw.sendall(head(BATCH, None, NDJSON) + chunk(LINE))
+        while b"mu_macro" not in raw.recv(65536):
+            pass
+    until = time.monotonic() + PATIENCE_S
+    while not (left := [line for line in strict.lines[before:] if '"status":499' in line]):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    assert len(left) == 1
+    assert not [line for line in strict.lines[before:] if "Traceback" in line]
 
 
 def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(strict: Any) -> None:

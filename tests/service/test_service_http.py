@@ -7,8 +7,11 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from fastapi import APIRouter, Depends, Request
 
 from mumacro.inputs.fields import FIELDS, SI
+from service.models.options import CaseRequest
+from service.reading import DirectRoute
 from tests.support.cases import Case
 from tests.support.places import ROOT
 
@@ -23,7 +26,15 @@ FILES = {
 }
 PATHS = {
     **dict.fromkeys(
-        ("/v1/mu-macro/batch", "/v1/solve-for", "/v1/law", "/v1/stiffness", "/v1/fit"), "POST"
+        (
+            "/v1/mu-macro/batch",
+            "/v1/solve-for",
+            "/v1/law",
+            "/v1/motion",
+            "/v1/stiffness",
+            "/v1/fit",
+        ),
+        "POST",
     ),
     **dict.fromkeys(
         (
@@ -97,9 +108,7 @@ def test_an_unexpected_error_is_logged_and_not_shown(
         (RuntimeError, 500, "unexpected", None),
         (MemoryError, 503, "out-of-memory", "1"),
     ):
-        monkeypatch.setattr(
-            "mumacro.Surrogate.evaluate_case", Mock(side_effect=error("secret detail"))
-        )
+        monkeypatch.setattr("mumacro.Surrogate.evaluate", Mock(side_effect=error("secret detail")))
         for response in (
             client.post("/v1/mu-macro", json=case),
             client.get("/v1/mu-macro", params=case),
@@ -158,6 +167,23 @@ def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed: Any, pro
             problem(response, 401)
             assert "s3cret" not in response.text
             assert response.headers["www-authenticate"] == "Bearer"
+
+
+def test_a_route_that_nobody_thought_of_needs_the_key(started: Any) -> None:
+    client = started(api_key=KEY["X-API-Key"])
+    client.app.add_api_route("/new", lambda: "open")
+    with client:
+        assert client.get("/new").status_code == 401
+        assert client.get("/new", headers=KEY).json() == "open"
+
+
+def test_a_direct_route_refuses_a_dependency_that_it_would_not_solve() -> None:
+    router = APIRouter(route_class=DirectRoute)
+
+    async def answer(request: Request, case: CaseRequest) -> None: ...
+
+    with pytest.raises(TypeError, match="does not solve"):
+        router.post("/x", dependencies=[Depends(lambda: None)])(answer)
 
 
 @pytest.mark.parametrize("headers", [KEY, {"Authorization": "bearer s3cret-key"}])
@@ -259,7 +285,8 @@ def test_the_page_loads_nothing_from_elsewhere(client: Any) -> None:
     for path in ("/", "/docs"):
         page = client.get(path)
         assert page.headers["content-type"].startswith("text/html")
-        assert not re.search(r"<script(?![^>]*src=)|<style|style=|\son\w+=|https?:|//", page.text)
+        loaded = re.sub(r'<a [^>]*href="https://[^"]*"', "", page.text)  # a link loads nothing
+        assert not re.search(r"<script(?![^>]*src=)|<style|style=|\son\w+=|https?:|//", loaded)
     for path, media_type in FILES.items():
         assert path[1:] in page.text or "swagger" not in path
         asset = client.get(path)

@@ -13,6 +13,8 @@ import mumacro
 from benchmarks.support.serving import CASE
 from mumacro import Surrogate
 from mumacro.contacts.geometries import contact_of
+from service.quantities import QUANTITIES
+from service.routers.questions import unit_at
 from tests.support.cases import Case
 from tests.support.comparing import close
 
@@ -178,6 +180,16 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
     assert response.text.count("\r\n") == 34
     head = client.head("/v1/law.csv", params=LAW)
     assert (head.status_code, head.content) == (200, b"")
+
+
+def test_every_quantity_has_its_unit_in_the_description(client: Any) -> None:
+    for direction, amplitude in (("across", "y0"), ("normal", "Fz_amplitude")):
+        names = [name for name, one in QUANTITIES.items() if direction not in one.lacks]
+        given = {**LAW, "y0": ..., amplitude: 1e-6, "direction": direction, "std": {"mu0": 0.01}}
+        law = answered(client, "law", given, include=names)
+        for name in names:
+            for part in law[name] if isinstance(law[name], dict) else [""]:
+                assert unit_at(f"{name}.{part}" if part else name)
 
 
 STEEL = {"E": 210e9, "nu": 0.3, "Fz": 10.0}

@@ -36,251 +36,191 @@ ASKED = {
     "table": {},
     "table.nc": {},
 }
-#: request, what is changed (...: left out), where the fault is (# in the body, ? in the query), and
-#: words of its reason
+#: request, what is changed (...: left out), and where the fault is (# in the body, ? in the query)
 REFUSED = [
     # names
-    ("POST mu-macro", {"k": ...}, "#/k", "rigid"),
-    ("GET mu-macro", {"k": ...}, "?k", "rigid"),
-    *(
-        (f"POST {path}", {"k": None}, "#/k", "is missing; write rigid or a number")
-        for path in ("mu-macro", "law")
-    ),
-    ("POST solve-for", {"k": None}, "#/k", "is missing; write rigid or a number"),
-    ("POST fit", {"k": None, "unknowns": ["mu0"]}, "#/k", "is missing; write rigid or a number"),
-    ("POST mu-macro", {"v0": ...}, "#/v0", "is required"),
-    ("POST mu-macro", {"omega": ...}, "#/omega", "is required: omega [rad/s], or f [Hz]"),
-    ("POST mu-macro", {"f": 1.0}, "#/f", "exactly one of omega"),
-    (
-        "POST mu-macro",
-        {"f/~z": 1},
-        "#/f~1~0z",
-        "mu0, Fz, k, y0, omega, f, v0, Fz_amplitude, k_range, k_low, k_high",
-    ),
-    ("POST mu-macro", {"\ud800": 1}, "#/?", "unknown"),
-    ("POST mu-macro?v0=1", {}, "?v0", "belongs in the body"),
-    *(
-        ("GET mu-macro", {name: 1}, f"?{name}", f"mean {meant}?")
-        for name, meant in (("fz", "Fz"), ("K", "k"), ("stiffness", "k"), ("frequency", "f"))
-    ),
-    ("GET mu-macro?v0=1", {}, "?v0", "is given more than once"),
-    ("GET mu-macro.txt", {"value": "power"}, "?value", "is not in the answer"),
-    ("GET table", {"id": "../x"}, "?id", "unknown"),
-    ("GET table?tolerance=1", {"tolerance": 1}, "?tolerance", "is given more than once"),
-    ("GET table.nc", {"tolerance": "x"}, "?tolerance", "must be a number"),
+    ("POST mu-macro", {"k": ...}, "#/k"),
+    ("GET mu-macro", {"k": ...}, "?k"),
+    *((f"POST {path}", {"k": None}, "#/k") for path in ("mu-macro", "law", "solve-for")),
+    ("POST fit", {"k": None, "unknowns": ["mu0"]}, "#/k"),
+    ("POST mu-macro", {"v0": ...}, "#/v0"),
+    ("POST mu-macro", {"omega": ...}, "#/omega"),
+    ("POST mu-macro", {"f": 1.0}, "#/omega"),
+    ("POST mu-macro", {"f/~z": 1}, "#/f~1~0z"),
+    ("POST mu-macro", {"\ud800": 1}, "#"),
+    ("POST mu-macro?v0=1", {}, "?v0"),
+    *(("GET mu-macro", {name: 1}, f"?{name}") for name in ("fz", "K", "stiffness", "frequency")),
+    ("GET mu-macro?v0=1", {}, "?v0"),
+    ("GET mu-macro.txt", {"value": "power"}, "?value"),
+    ("GET table", {"id": "../x"}, "?id"),
+    ("GET table?tolerance=1", {"tolerance": 1}, "?tolerance"),
+    ("GET table.nc", {"tolerance": "x"}, "?tolerance"),
     # numbers
     *(
-        ("POST mu-macro", {name: value}, f"#/{name}", "must be a number")
+        ("POST mu-macro", {name: value}, f"#/{name}")
         for name in ("mu0", "k", "v0", "tolerance")
         for value in ("0.3", True, [0.3], {"value": 0.3}, "")
     ),
     *(
-        ("GET mu-macro", {"k": text}, "?k", "must be a number")
-        for text in ("abc", "", " ", "1_000", "0x10", "１", "1e", "1,5", "--1", "1 2", "null")
+        ("GET mu-macro", {"k": text}, "?k")
+        for text in ("abc", "", " ", "1_000", "0x10", "１", "1e", "1,5", "--1", "1 2", "null", "0")
     ),
     *(
-        (f"POST {path}", {name: zero}, f"#/{name}", "finite and > 0")
+        (f"POST {path}", {name: zero}, f"#/{name}")
         for path in ("mu-macro", "mu-macro/batch")
         for name in ("mu0", "Fz", "k", "tolerance")
         for zero in (0, -0.0)
     ),
     *(
-        ("GET mu-macro", {name: text}, f"?{name}", words)
-        for name, text, words in (
-            ("k", "0", "finite and > 0"),
-            ("k", "", "rigid"),
-            ("v0", "0,01", "0.01"),
-            ("y0", "2um", "give metres, 2e-06"),
-            ("v0", "5 mm/s", "give metres per second, 0.005"),
-        )
-    ),
-    *(
-        (
-            f"POST {path}",
-            {"tolerance": 1e-30},
-            "#/tolerance",
-            "must be >= 1e-12: no loaded table is tighter",
-        )
+        (f"POST {path}", {"tolerance": 1e-30}, "#/tolerance")
         for path in ("mu-macro", "mu-macro/batch", "law", "solve-for", "fit")
     ),
     *(
-        (f"GET {path}", {"tolerance": 1e-30}, "?tolerance", "no loaded table is tighter")
+        (f"GET {path}", {"tolerance": 1e-30}, "?tolerance")
         for path in ("mu-macro", "law.csv", "table", "table.nc")
     ),
-    ("POST mu-macro/batch?tolerance=1e-30", {}, "?tolerance", "no loaded table is tighter"),
+    ("POST mu-macro/batch?tolerance=1e-30", {}, "?tolerance"),
     # include and std
+    *(("POST mu-macro", {"include": [name]}, "#/include/0") for name in ("curvature", "Groups", 1)),
+    *(("POST mu-macro", {"include": value}, "#/include") for value in ("groups", 3, {"groups": 1})),
+    *(("GET mu-macro", {"include": name}, "?include") for name in ("curvature", "")),
+    *((f"POST {path}", {"include": ["std"]}, "#/std") for path in ("mu-macro", "mu-macro/batch")),
     *(
-        ("POST mu-macro", {"include": [name]}, "#/include/0", "groups, limits")
-        for name in ("curvature", "Groups", 1)
-    ),
-    *(
-        ("POST mu-macro", {"include": value}, "#/include", "a list of names")
-        for value in ("groups", 3, {"groups": 1})
-    ),
-    *(
-        ("GET mu-macro", {"include": name}, "?include", "groups, limits")
-        for name in ("curvature", "")
-    ),
-    *(
-        (f"POST {path}", {"include": ["std"]}, "#/std", "given if")
+        (f"POST {path}", {"include": ["groups"], "std": {}}, "#/std")
         for path in ("mu-macro", "mu-macro/batch")
     ),
     *(
-        (f"POST {path}", {"include": ["groups"], "std": {}}, "#/std", "no effect")
-        for path in ("mu-macro", "mu-macro/batch")
+        ("POST mu-macro", {"include": ["std"], "std": {name: value}}, f"#/std/{name}")
+        for name, value in (("mu0", -1), ("mu0", "0.1"), ("speed", 1))
     ),
-    *(
-        ("POST mu-macro", {"include": ["std"], "std": {name: value}}, f"#/std/{name}", words)
-        for name, value, words in (
-            ("mu0", -1, "finite and >= 0"),
-            ("mu0", "0.1", "number"),
-            ("speed", 1, "unknown"),
-        )
-    ),
-    ("POST mu-macro", {"include": ["std"], "std": [1, 2]}, "#/std", "an object of numbers"),
-    (
-        "POST mu-macro",
-        {"include": ["std"], "std": {"omega": 1.0, "f": 1.0}},
-        "#/std/f",
-        "not of both",
-    ),
-    ("GET mu-macro", {"include": "std"}, "?std_mu0", "given if"),
-    ("GET mu-macro", {"std_v0": 1}, "?std_mu0", "no effect"),
-    ("GET mu-macro", {"include": "std", "std_v0": -1}, "?std_v0", "finite and >= 0"),
-    ("GET mu-macro", {"include": "std", "std_omega": 1.0, "std_f": 1.0}, "?std_f", "not of both"),
-    ("POST mu-macro/batch?include=std", {}, "?std_mu0", "given if"),
+    ("POST mu-macro", {"include": ["std"], "std": [1, 2]}, "#/std"),
+    ("POST mu-macro", {"include": ["std"], "std": {"omega": 1.0, "f": 1.0}}, "#/std/f"),
+    ("GET mu-macro", {"include": "std"}, "?std_mu0"),
+    ("GET mu-macro", {"std_v0": 1}, "?std_mu0"),
+    ("GET mu-macro", {"include": "std", "std_v0": -1}, "?std_v0"),
+    ("GET mu-macro", {"include": "std", "std_omega": 1.0, "std_f": 1.0}, "?std_f"),
+    ("POST mu-macro/batch?include=std", {}, "?std_mu0"),
     # contact, direction, interval
     *(
-        ("POST mu-macro", changed, f"#/{place}", words)
-        for changed, place, words in (
-            ({"contact": "cone"}, "contact", "spring, ball"),
-            ({"direction": "up"}, "direction", "across, along, normal"),
-            ({"contact": "ball", "direction": "normal"}, "direction", "contact radius"),
-            ({"direction": "normal"}, "y0", "Fz_amplitude"),
-            ({"Fz_amplitude": 1.0}, "Fz_amplitude", "amplitude is y0"),
-            ({**NORMAL, "Fz_amplitude": 10.0}, "Fz_amplitude", "lifts off"),
-            ({"k_range": [1e6, 2e6]}, "k", "interval"),
-            ({**RANGE, "k_low": 1e6}, "k_low", "beside k_range"),
-            ({"k": ..., "k_low": 1e6}, "k_high", "required"),
-            ({**RANGE, "k_range": [2e6, 1e6]}, "k_range", "low <= high"),
-            ({**RANGE, "k_range": [1e6]}, "k_range", "two stiffnesses"),
-            ({**RANGE, "k_range": [1e6, "rigid"]}, "k_high", "number"),
-            ({**NORMAL, "include": ["power"]}, "include", "load"),
-            ({"direction": "along", "include": ["settling"]}, "include", "across"),
-            ({**RANGE, "include": ["std"], "std": {"v0": 1e-3}}, "include", "one k"),
-            ({**NORMAL, "include": ["std"], "std": {"y0": 1e-6}}, "std", "y0"),
+        ("POST mu-macro", changed, f"#/{place}")
+        for changed, place in (
+            ({"contact": "cone"}, "contact"),
+            ({"direction": "up"}, "direction"),
+            ({"contact": "ball", "direction": "normal"}, "direction"),
+            ({"direction": "normal"}, "y0"),
+            ({"Fz_amplitude": 1.0}, "Fz_amplitude"),
+            ({**NORMAL, "Fz_amplitude": 10.0}, "Fz_amplitude"),
+            ({"k_range": [1e6, 2e6]}, "k"),
+            ({**RANGE, "k_low": 1e6}, "k_low"),
+            ({"k": ..., "k_low": 1e6}, "k_high"),
+            ({**RANGE, "k_range": [2e6, 1e6]}, "k_range"),
+            ({**RANGE, "k_range": [1e6]}, "k_range"),
+            ({**RANGE, "k_range": [1e6, "rigid"]}, "k_range/1"),
+            ({**NORMAL, "include": ["power"]}, "include"),
+            ({"direction": "along", "include": ["settling"]}, "include"),
+            ({**RANGE, "include": ["std"], "std": {"v0": 1e-3}}, "include"),
+            ({**NORMAL, "include": ["std"], "std": {"y0": 1e-6}}, "std"),
         )
     ),
     # columns
     *(
-        ("POST mu-macro/batch", changed, f"#/{place}", words)
-        for changed, place, words in (
-            ({"v0": [1, 2, 3], "y0": [1e-6, 2e-6]}, "v0", "one length; given y0: 2, v0: 3"),
-            ({"y0": [1e-6]}, "v0", "one length"),
-            ({"y0": []}, "v0", "one length"),
-            ({"Fz": ...}, "Fz", "is required"),
-            ({"k": None}, "k", "is missing; write rigid or a number"),
-            ({"speed": [1]}, "speed", "unknown"),
-            ({"y0": {}}, "y0", "must be a number"),
-            ({"include": ["model"]}, "include", "one case"),
+        ("POST mu-macro/batch", changed, f"#/{place}")
+        for changed, place in (
+            ({"v0": [1, 2, 3], "y0": [1e-6, 2e-6]}, "v0"),
+            ({"y0": [1e-6]}, "v0"),
+            ({"y0": []}, "v0"),
+            ({"Fz": ...}, "Fz"),
+            ({"k": None}, "k"),
+            ({"speed": [1]}, "speed"),
+            ({"y0": {}}, "y0"),
+            ({"include": ["model"]}, "include"),
         )
     ),
-    ("POST mu-macro/batch?nonsense=1", {}, "?nonsense", "is no option"),
-    ("POST mu-macro/batch?mu0=1", {}, "?mu0", "inputs belong in the body"),
-    (
-        "POST mu-macro/batch?include=limits",
-        {"include": ["groups"]},
-        "#/include",
-        "in the query and in the body",
-    ),
+    ("POST mu-macro/batch?nonsense=1", {}, "?nonsense"),
+    ("POST mu-macro/batch?mu0=1", {}, "?mu0"),
+    ("POST mu-macro/batch?include=limits", {"include": ["groups"]}, "#/include"),
     # law
     *(
-        (request, {name: value}, place + name, words)
+        (request, {name: value}, place + name)
         for request, place in (("POST law", "#/"), ("GET law.csv", "?"))
-        for name, value, words in (
-            ("along", "x", "one of mu0"),
-            ("start", 0.0, "> 0 on a logarithmic"),
-            ("stop", 0.0, "finite and > 0"),
-            ("stop", 1e-5, "> start"),
-            ("points", 1, "from 2 to 10001"),
-            ("points", 10_002, "from 2 to 10001"),
-            ("scale", "cubic", "log or linear"),
-            ("v0", 0.01, "must be left out"),
-            ("mu0", -1.0, "finite and > 0"),
-            ("extra", 1.0, "unknown"),
+        for name, value in (
+            ("along", "x"),
+            ("start", 0.0),
+            ("stop", 0.0),
+            ("stop", 1e-5),
+            ("points", 1),
+            ("points", 10_002),
+            ("scale", "cubic"),
+            ("v0", 0.01),
+            ("mu0", -1.0),
+            ("extra", 1.0),
         )
     ),
+    *(("POST law", {"points": value}, "#/points") for value in (5.5, True, "5", 1e30)),
+    *(("POST law", {"include": [name]}, "#/include/0") for name in ("curvature", "approximations")),
     *(
-        ("POST law", {"points": value}, "#/points", "a whole number")
-        for value in (5.5, True, "5", 1e30)
+        ("GET law.csv", {"include": names}, "?include")
+        for names in ("curvature", "power,approximations")
     ),
-    ("POST law", {"include": ["curvature"]}, "#/include/0", "settling"),
-    ("POST law", {"include": ["approximations"]}, "#/include", "mumacro law --approximations"),
-    ("GET law.csv", {"include": "curvature"}, "?include", "settling"),
-    ("GET law.csv", {"include": "power,approximations"}, "?include", "--approximations"),
-    ("GET law.csv?mu0=0.4", {}, "?mu0", "is given more than once"),
-    ("GET law.csv", {"omega": ...}, "?omega", "is required"),
+    *((f"{call}", {"include": ["model"]}, "#/include") for call in ("POST law", "POST solve-for")),
+    ("GET law.csv?mu0=0.4", {}, "?mu0"),
+    ("GET law.csv", {"omega": ...}, "?omega"),
     *(
-        ("GET law.csv", {"Fz": text}, "?Fz", "")
+        ("GET law.csv", {"Fz": text}, "?Fz")
         for text in ("", "ten", "nan", "inf", "1e999", "0x10", "1_000")
     ),
-    ("POST law?mu0=1", {}, "?mu0", "belongs in the body"),
+    ("POST law?mu0=1", {}, "?mu0"),
     # solve-for
     *(
-        ("POST solve-for", {name: value}, f"#/{name}", words)
-        for name, value, words in (
-            ("unknown", "w0", "one of mu0"),
-            ("unknown", None, "one of mu0"),
-            ("y0", 1e-6, "must be left out"),
-            ("mu0", ..., "is required"),
-            ("target", [], "a list of 1 to 10000"),
-            ("target", [0.1] * 10_001, "10000"),
-            ("Fz", 0, "finite and > 0"),
-            ("Fz", "10", "must be a number"),
-            ("range", [1], "two numbers"),
-            ("range", [2, 1], "ascending"),
-            ("extra", 1, "unknown"),
-            ("omega", -1, "finite and >= 0"),
+        ("POST solve-for", {name: value}, f"#/{name}")
+        for name, value in (
+            ("unknown", "w0"),
+            ("unknown", None),
+            ("y0", 1e-6),
+            ("mu0", ...),
+            ("target", []),
+            ("target", [0.1] * 10_001),
+            ("Fz", 0),
+            ("Fz", "10"),
+            ("range", [1]),
+            ("range", [2, 1]),
+            ("extra", 1),
+            ("omega", -1),
         )
     ),
-    ("POST solve-for", {"target": -0.1}, "#/target/0", "finite and >= 0"),
-    *(
-        ("POST solve-for", {"target": [0.1, value]}, "#/target/1", "must be a number")
-        for value in ("0.1", True)
-    ),
-    ("POST solve-for", {"range": [0, -1]}, "#/range/1", "finite and >= 0"),
+    ("POST solve-for", {"target": -0.1}, "#/target/0"),
+    *(("POST solve-for", {"target": [0.1, value]}, "#/target/1") for value in ("0.1", True)),
+    ("POST solve-for", {"range": [0, -1]}, "#/range/1"),
     # stiffness and fit
     *(
-        ("POST stiffness", {name: value}, f"#/{name}", words)
-        for name, value, words in (
-            ("radius", -1.0, "> 0"),
-            ("nu", 0.7, ""),
-            ("E", "210GPa", ""),
-            ("a", 1, ""),
-            ("Fz", None, ""),
-            ("geometry", "cone", "ball"),
-            ("geometry", 3, "one of"),
+        ("POST stiffness", {name: value}, f"#/{name}")
+        for name, value in (
+            ("radius", -1.0),
+            ("nu", 0.7),
+            ("E", "210GPa"),
+            ("a", 1),
+            ("Fz", None),
+            ("geometry", "cone"),
+            ("geometry", 3),
         )
     ),
     *(
-        ("POST fit", {name: value}, f"#/{place}", words)
-        for name, value, place, words in (
-            ("mu_macro", [0.2], "data", ""),
-            ("y0", "2um", "y0", "number"),
-            ("include", ["power"], "include", "unknown"),
-            ("v0", [0.1, 0.2, None], "v0/2", "number"),
-            ("contact", "cone", "contact", "spring, ball"),
-            ("mu0", 0.3, "mu0", "among the unknowns"),
-            ("v0", [0.1] * 1001, "v0", "up to 1000 points, this has 1001"),
+        ("POST fit", {name: value}, f"#/{place}")
+        for name, value, place in (
+            ("mu_macro", [0.2], "data"),
+            ("y0", "2um", "y0"),
+            ("include", ["power"], "include"),
+            ("v0", [0.1, 0.2, None], "v0/2"),
+            ("contact", "cone", "contact"),
+            ("mu0", 0.3, "mu0"),
+            ("v0", [0.1] * 1001, "v0"),
         )
     ),
 ]
 
 
-@pytest.mark.parametrize(("request_line", "changed", "place", "words"), REFUSED)
-def test_a_bad_field_is_refused_by_its_place(
-    client: Any, problem: Any, request_line: Any, changed: Any, place: Any, words: Any
-) -> None:
+def faults_of(client: Any, problem: Any, request_line: str, changed: Any) -> dict[str, Any]:
+    """The faults of a refused request, by their places."""
     method, _, path = request_line.partition(" ")
     path, _, query = path.partition("?")
     given = {name: value for name, value in {**ASKED[path], **changed}.items() if value is not ...}
@@ -288,16 +228,52 @@ def test_a_bad_field_is_refused_by_its_place(
         ("", f"{urlencode(given)}&{query}") if method == "GET" else (json.dumps(given), query)
     )
     document = problem(client.request(method, f"/v1/{path}?{query}", content=body), 422)
-    faults = {
-        fault.get("pointer", f"?{fault.get('parameter')}"): fault for fault in document["errors"]
-    }
-    assert place in faults, document
-    assert words in f"{faults[place]['reason']}; {faults[place].get('bound')}"
     first = document["errors"][0]
     assert document["detail"].startswith(f"{first['field']}")
     assert document["n_errors"] == len(document["errors"])
-    if "tighter" in words:
-        assert document["tightest_available"] == 1e-12
+    loose = ("tolerance" in changed and changed["tolerance"] == 1e-30) or "=1e-30" in request_line
+    assert ("tightest_available" in document) == loose
+    return {
+        fault.get("pointer", f"?{fault.get('parameter')}"): fault for fault in document["errors"]
+    }
+
+
+@pytest.mark.parametrize(("request_line", "changed", "place"), REFUSED)
+def test_a_bad_field_is_refused_by_its_place(
+    client: Any, problem: Any, request_line: Any, changed: Any, place: Any
+) -> None:
+    faults = faults_of(client, problem, request_line, changed)
+    assert place in faults, faults
+    name = place.lstrip("#/?").split("/")[-1]
+    if name.isalpha():
+        assert faults[place]["field"] == name
+    assert faults[place]["reason"]
+
+
+#: what helps: the request, what is changed, the parameter, and the remedy that its reason names
+HINTS = [
+    *(
+        ("GET mu-macro", {name: 1}, f"?{name}", f"mean {meant}?")
+        for name, meant in (("fz", "Fz"), ("K", "k"), ("stiffness", "k"), ("frequency", "f"))
+    ),
+    ("POST mu-macro", {"k": ...}, "#/k", "rigid"),
+    ("GET mu-macro", {"k": ""}, "?k", "rigid"),
+    ("POST mu-macro", {"omega": ..., "v0": -1}, "#/omega", "f [Hz]"),
+    ("GET mu-macro", {"v0": "0,01"}, "?v0", "0.01"),
+    ("GET mu-macro", {"y0": "2um"}, "?y0", "give metres, 2e-06"),
+    ("GET mu-macro", {"v0": "5 mm/s"}, "?v0", "give metres per second, 0.005"),
+    ("POST mu-macro", {"v0": "0.01"}, "#/v0", "leave out the quotes"),
+    ("POST mu-macro", {**NORMAL, "Fz_amplitude": 10.0}, "#/Fz_amplitude", "lifts off"),
+    ("POST mu-macro", {"contact": "cone"}, "#/contact", "spring, ball"),
+    ("POST mu-macro", {"include": ["curvature"]}, "#/include/0", "groups, limits"),
+]
+
+
+@pytest.mark.parametrize(("request_line", "changed", "place", "remedy"), HINTS)
+def test_a_reason_names_the_remedy(
+    client: Any, problem: Any, request_line: Any, changed: Any, place: Any, remedy: Any
+) -> None:
+    assert remedy in faults_of(client, problem, request_line, changed)[place]["reason"]
 
 
 BEYOND = {
@@ -364,12 +340,13 @@ def test_all_faults_are_reported_at_once_and_their_list_is_bounded(
         "y0",
     ]
     both = {**CASE, "f": 1.0, "include": ["std"], "std": {"omega": 1.0, "f": 1.0}}
-    assert len(problem(client.post(SINGLE, json=both), 422)["errors"]) == 2
+    assert len(problem(client.post(SINGLE, json=both), 422)["errors"]) == 1  # relations: the first
     document = problem(
         client.post(SINGLE, json={f"x{i}": "y" * 100 if i == 0 else i for i in range(4000)}), 422
     )
     assert (len(document["errors"]), document["n_errors"]) == (100, 4006)
-    assert len(document["errors"][0]["value"]) == 80
+    (long,) = (fault["value"] for fault in document["errors"] if fault["field"] == "x0")
+    assert len(long) == 80
     problem(client.get(SINGLE + "?" + "&".join(f"a{i}=1" for i in range(200))), 422)
 
 
@@ -438,7 +415,7 @@ def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_na
         ("csv", "speed", "speed: unknown"),
         ("csv", "k [N/s]", "unit that k cannot have; known are N/m"),
         ("csv", "mu0,mu0", "mu0: is given more than once"),
-        ("csv", "mu0,Fz,k,y0,omega,f,v0", "f: omega is given, too: give exactly one of omega"),
+        ("csv", "mu0,Fz,k,y0,omega,f,v0", "omega: "),
     ],
 )
 def test_columns_that_do_not_fit_are_refused(
@@ -514,7 +491,7 @@ def test_a_body_that_is_no_plain_arrow_stream_or_no_csv_is_malformed(
         packed = stream_of(as_table([CASE] * 10_000), compression=codec)
         assert "compressed" in problem(posted(client, "arrow", packed), 400)["detail"]
     text = as_csv([CASE])
-    for csv in (text.encode("utf-16"), text + '"', text + "1" * 70_000):
+    for csv in (text.encode("utf-16"), text + '"', "mu0" * 30_000 + "\n1\n"):
         problem(posted(client, "csv", csv), 400)
 
 
@@ -575,3 +552,21 @@ def test_values_are_counted_before_they_are_made(few: Any, problem: Any) -> None
         problem(few.post(BATCH, content=body), 413)
     members = ",".join(f'"a{i}":1' for i in range(200))
     assert "more members" in problem(few.post(BATCH, content=f"{{{members}}}"), 422)["detail"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "bound"),
+    [
+        ("/v1/law", {"start": 1e-4, "stop": 1.0, "points": 1}, ">= 2"),
+        (
+            "/v1/stiffness",
+            {"geometry": "ball", "radius": 5e-3, "Fz": 1.0, "E": 2e11, "nu": -1},
+            "> -1",
+        ),
+    ],
+)
+def test_a_number_below_its_bound_is_refused_with_this_bound(
+    client: Any, path: str, body: Any, bound: str
+) -> None:
+    (fault,) = client.post(path, json=body).json()["errors"]
+    assert fault["reason"].endswith(bound)

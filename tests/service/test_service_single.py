@@ -79,6 +79,10 @@ def test_a_query_may_have_other_words(
     assert "1" in k or ask(client, {**case, "k": k}, include=["groups", "limits"]) == expected
 
 
+def test_a_query_that_says_nothing_stands_beside_a_body(client: Any, case: Case) -> None:
+    assert client.post(f"{PATH}?&&&", json=case).json() == ask(client, case)
+
+
 def test_a_frequency_and_its_deviation_are_given_in_either_unit(client: Any, case: Case) -> None:
     by_omega = ask(client, case, include=["std"], std={"omega": 2e3 * math.pi})
     named = {**case, "f": case["omega"] / (2 * math.pi)}

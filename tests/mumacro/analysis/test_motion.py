@@ -45,9 +45,9 @@ def test_one_harmonic_is_the_tables_within_both_bounds(
 def test_power_stick_slip_and_decay_are_those_of_the_table(
     surrogate: Surrogate, contact: str, direction: str
 ) -> None:
-    kind = {"contact": contact, "direction": direction}
+    kind: Any = {"contact": contact, "direction": direction}
     for v0, size in ((0.02, 2e-6), (0.1, 6e-6), (2.0, 3e-6)):
-        part = {"y" if direction == "across" else "x": size}
+        part: Any = {"y" if direction == "across" else "x": size}
         found = motion(**{**SCENE, "v0": v0}, **part, contact=contact)
         answer = surrogate.evaluate(**{**SCENE, "v0": v0}, y0=size, groups=True, **kind)
         groups = answer.v_tilde, answer.y_tilde

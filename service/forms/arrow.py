@@ -2,7 +2,7 @@
 
 import io
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from struct import error, unpack_from
 from typing import Any
 
@@ -11,38 +11,40 @@ import pyarrow as pa
 
 from mumacro.inputs.fields import RIGID
 
-from ..answers import Part
-from ..case import Columns, columns_of, too_large
-from ..options import kind_in
-from ..problems import Kind, RequestError
-from . import Batch, Form, check_names, text_form
-from .json import dump
+from ..batch import Batch, Body, Form, text_form, too_large
+from ..models.inputs import INPUTS
+from ..models.options import BatchOptions
+from ..problems import FieldFault, Kind, RequestError, refuse
+from ..quantities import REGIME_OF, SOURCES
+from ..reading import dump
 
 _SLICE = 32768  # cases of a record batch of the answer
+_NAMES = {"regime": REGIME_OF, "source": SOURCES}
 
 
-def _read(
-    text: bytearray, max_batch: int, query: Mapping[str, Any]
-) -> tuple[Columns, dict[str, Any]]:
-    kind = kind_in(query)
+def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
     try:
         buffer = pa.py_buffer(text)
         with pa.ipc.open_stream(buffer) as reader:
-            wrong = {
-                field.name: f"must be a column of numbers, not of {str(field.type)[:80]}"
-                for field in reader.schema
-                if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type))
-            }
-            check_names(reader.schema.names, kind, wrong)
+            faults = [
+                FieldFault.of(
+                    column.name, f"must be a column of numbers, not of {str(column.type)[:80]}"
+                )
+                for column in reader.schema
+                if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type))
+                and column.name in INPUTS
+            ]
+            if faults := [*faults, *twice(reader.schema.names)]:
+                refuse(faults)
             for message in pa.ipc.MessageReader.open_stream(buffer):
                 if message.type == "record batch" and _is_compressed(message.metadata):
-                    told = "the body is a compressed Arrow stream: send it uncompressed"
-                    raise RequestError(Kind.MALFORMED_BODY, told)
+                    detail = "the body is a compressed Arrow stream: send it uncompressed"
+                    raise RequestError(Kind.MALFORMED_BODY, detail)
             table = reader.read_all()
         table.validate()
         if table.num_rows > max_batch:
             raise too_large(max_batch)
-        found = {name: _column(table[name], name) for name in table.column_names}
+        return Body({name: _column(table[name], name) for name in table.column_names})
     except (pa.ArrowException, OSError, ValueError) as fault:
         if isinstance(fault, MemoryError):
             raise
@@ -50,11 +52,21 @@ def _read(
         raise RequestError(
             Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}"
         ) from None
-    return columns_of(found, max_batch, kind=kind), {}
+
+
+def twice(names: list[str]) -> list[FieldFault]:
+    """The faults of columns that a table has more than once."""
+    return [
+        FieldFault.of(name, "is given more than once")
+        for name in dict.fromkeys(names)
+        if names.count(name) > 1
+    ]
 
 
 def _column(column: Any, name: str) -> Any:
     """A column as float64; as a list where it has nulls, with the word rigid for an infinite k."""
+    if name not in INPUTS:  # which the model refuses by its name
+        return []
     column = column.cast(pa.float64(), safe=False)
     if column.null_count:
         return [
@@ -87,33 +99,38 @@ def _is_compressed(metadata: Any) -> bool:
         return True
 
 
+def tables_of(batch: Batch, step: int) -> Iterator[Any]:
+    """The answers as record batches, with the reasons in the last column."""
+    for outputs, codes, reasons in batch.slices(step):
+        arrays = {path: _array(path, column, codes) for path, column in outputs.items()}
+        yield pa.record_batch({**arrays, "error": pa.array(reasons, pa.string())})
+
+
+def _array(path: str, column: Any, codes: Any) -> Any:
+    """A column.  Regime and source are dictionaries: one byte per case."""
+    if path not in _NAMES:
+        return pa.array(column, mask=np.isnan(column))
+    names = list(dict.fromkeys(_NAMES[path]))
+    places = np.array([names.index(name) for name in _NAMES[path]], np.int8)[codes]
+    return pa.DictionaryArray.from_arrays(pa.array(places, mask=codes < 0), names)
+
+
 def _write(batch: Batch) -> Iterator[bytes]:
-    sink, signature = io.BytesIO(), batch.table.signature
-    writer: Any = None
-    for found, source, faults in batch.slices(_SLICE):
-        arrays = {part.path: _array(part, found[part.path], source) for part in batch.wanted.parts}
-        made = pa.record_batch({**arrays, "error": pa.array(faults, pa.string())})
+    sink, writer = io.BytesIO(), None
+    label = {
+        name: value if isinstance(value, str) else dump(value)
+        for name, value in batch.table.signature.items()
+    }
+    for made in tables_of(batch, _SLICE):
         if writer is None:
-            label = {
-                name: value if isinstance(value, str) else dump(value)
-                for name, value in signature.items()
-            }
             writer = pa.ipc.new_stream(sink, made.schema.with_metadata(label))
         writer.write_batch(made)
         yield sink.getvalue()
         sink.seek(0)
         sink.truncate()
-    writer.close()
+    if writer is not None:
+        writer.close()
     yield sink.getvalue()
-
-
-def _array(part: Part, column: Any, source: Any) -> Any:
-    """A column.  Regime and source are dictionaries: one byte per case."""
-    if not part.names:
-        return pa.array(column, mask=np.isnan(column))
-    names = list(dict.fromkeys(part.names))
-    codes = np.array([names.index(name) for name in part.names], np.int8)[column]
-    return pa.DictionaryArray.from_arrays(pa.array(codes, mask=source < 0), names)
 
 
 FORM = Form(

@@ -7,34 +7,28 @@ for a stream at its first complete line.  Computing and reading happen in thread
 """
 
 import asyncio
-from collections.abc import Iterator, Mapping
-from importlib.util import find_spec
-from typing import Any
+from collections.abc import Iterator
+from typing import Annotated, Any
 
-from starlette.requests import ClientDisconnect, Request
-from starlette.responses import Response
+from fastapi import Query, Request, Response
+from starlette.requests import ClientDisconnect
 from starlette.types import Receive, Scope, Send
 
 from mumacro.errors import MumacroError
 
-from ..answers import answer_case
-from ..case import Columns
-from ..limits import AT_ONCE, SMALL_BODY, form_of, read_body, within
-from ..options import Options, options_of
+from ..batch import Batch, Body, Form, both
+from ..forms import ALL, FORMS
+from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body, within
+from ..models.options import BatchOptions, CaseRequest
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
-from ..wire import Batch, Form, csv, json
-from ..wire.json import decode, dump
-from . import Asking, Endpoint, given_in_query
+from ..quantities import Asked, answer_case
+from ..reading import DirectRoute, decode, dump, of_members, validated
+from . import POSTED, router_of
 
+router = router_of("answers", DirectRoute)
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
-_FORMS = [*json.FORMS, csv.FORM]
-if find_spec("pyarrow"):
-    from ..wire import arrow
-
-    _FORMS.append(arrow.FORM)
-FORMS = {name: form for form in _FORMS for name in (form.media_type, *form.aliases)}
 
 
 class _Answer(Response):
@@ -42,25 +36,19 @@ class _Answer(Response):
 
     background = None
 
-    def __init__(self, request: Request) -> None:
-        self._request, self._app, self._work = request, request.app, request.app.work
-        self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
-        self._limit, self._most = self._app.settings.max_body_bytes, self._app.settings.max_batch
+    def __init__(self, request: Request, options: BatchOptions) -> None:
+        self._scope, self._state, self._options = request.scope, request.app.state, options
+        self._given: dict[bytes, bytes] = dict(request.scope["headers"])
+        self._work: Work = self._state.work
+        settings = self._state.settings
+        self._limit, self._most = settings.max_body_bytes, settings.max_batch
         self._placed = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, and give the slot back if one was taken."""
         del scope
         try:
-            async with within(self._app.settings.time_limit_s):
-                self._query = given_in_query(self._request)
-                _, rest, faults = options_of(Options, self._query, parameter=True)
-                told = "is no option; inputs belong in the body"
-                if faults := [
-                    *faults,
-                    *(FieldFault((name,), told, parameter=True) for name in rest),
-                ]:
-                    refuse(faults)
+            async with within(self._state.settings.time_limit_s):
                 form = form_of(self._given, FORMS)
                 await (self._stream if form.streams else self._whole)(form, receive, send)
         finally:
@@ -80,25 +68,9 @@ class _Answer(Response):
         self._place()
         return await asyncio.wrap_future(self._work.batches.threads.submit(work))
 
-    def _batch(self, columns: Columns, given: Mapping[str, Any]) -> Batch:
-        """The batch with the options of query and body together."""
-        options, _, faults = options_of(Options, self._both(given))
-        if options is None:
-            refuse(faults)
-        wanted = options.wanted(columns.asked)
-        table = self._app.tables.pick(options.tolerance, "tolerance" in self._query)
-        return Batch(table, columns, wanted, count=self._app.metrics.cases)
-
-    def _both(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """What the query and the body give, each name once."""
-        if twice := [name for name in given if name in self._query]:
-            refuse(
-                [
-                    FieldFault.of(name, "is given in the query and in the body", given[name])
-                    for name in twice
-                ]
-            )
-        return {**given, **self._query}
+    def _batch(self, body: Body) -> Batch:
+        state = self._state
+        return Batch.of(body, self._options, state.tables, self._most, count=state.metrics.cases)
 
     # --- bodies that are read whole ---------------------------------------------------------------
 
@@ -109,10 +81,11 @@ class _Answer(Response):
         # Reading costs by the byte, computing by the case: a small body can request much
         # computation.
         cost = len(text) / _BYTES_PER_UNIT
-        columns, given = await self._run(lambda: form.read(text, self._most, self._query), cost)
+        batch = await self._run(
+            lambda: self._batch(form.read(text, self._most, self._options)), cost
+        )
         text = bytearray()  # freed, unless the columns are views of it
-        batch = self._batch(columns, given)
-        cost += columns.size * batch.wanted.cost
+        cost += batch.cost
         pieces = _gathered(form.write(batch))
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [
@@ -144,7 +117,7 @@ class _Answer(Response):
             text = await self._work.client(
                 read_body(self._given, receive, self._limit, self._place)
             )
-        self._app.tables.pick(self._query.get("tolerance"), parameter=True)
+        self._state.tables.pick(self._options.tolerance, parameter=True)
         head = [(b"content-type", form.media_type.encode()), (b"x-accel-buffering", b"no")]
         await send({"type": "http.response.start", "status": 200, "headers": head})
         number = 0
@@ -187,26 +160,39 @@ class _Answer(Response):
         """Answer one line: one case, or a block of columns or a list of rows as a batch of its
         own."""
         try:
-            columns, given = (
-                form.read(bytearray(line), self._most, self._query) if b"[" in line else (None, {})
-            )
-            if columns is not None and columns.listed:
-                yield from form.write(self._batch(columns, given))
+            body = None
+            if b"[" in line:
+                body = form.read(bytearray(line), self._most, self._options)
+            if body is not None and _listed(body):
+                yield from form.write(self._batch(body))
             else:
-                yield self._case(decode(line))
+                yield self._case(line)
         except MumacroError as error:
-            scope = {**self._request.scope, "path": f"{self._request.scope['path']}#line={number}"}
+            scope = {**self._scope, "path": f"{self._scope['path']}#line={number}"}
             yield dump(document_of(error, scope))
         yield b"\n"
 
-    def _case(self, given: Any) -> bytes:
-        """The answer to one case of a stream, where a null is a gap."""
-        if not isinstance(given, dict):
-            refuse([FieldFault((), "must be an object or a list of rows", given)])
-        table, _, case, wanted = Asking.made(self._app.tables, Options, self._both(given))
-        values, source = answer_case(table.surrogate, case, wanted)
-        self._app.metrics.case(table, source)
+    def _case(self, line: bytes) -> bytes:
+        """The answer to one case of a stream."""
+        if self._options.model_fields_set:
+            members = decode(line)
+            if not isinstance(members, dict):
+                refuse([FieldFault((), "must be an object or a list of rows", members)])
+            case = of_members(CaseRequest, both(members, self._options))
+        else:
+            case = validated(CaseRequest, line)
+        table, inputs = self._state.tables.pick(case.tolerance), case.inputs
+        values, source = answer_case(table.surrogate, inputs, Asked.of(case, inputs))
+        self._state.metrics.case(table, source)
         return dump({**values, **table.signature})
+
+
+def _listed(body: Body) -> bool:
+    """Whether a line holds many cases."""
+    lists = (name for name, value in body.members.items() if not isinstance(value, (float, int)))
+    named = {*lists} - {"include", "k_range", "contact", "direction", "std", "k"}
+    k = body.members.get("k")
+    return body.rows or bool(named) or not (k is None or isinstance(k, (float, int, str)))
 
 
 async def _next_line(receive: Receive, text: bytearray) -> bool:
@@ -234,29 +220,27 @@ def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
         yield bytes(gathered)
 
 
-async def post_mu_macro_batch(request: Request) -> Response:
+_BODIES = {form.media_type: form.body for form in ALL}
+_ANSWERS: Any = {
+    "description": "The answers, in the form of the request",
+    "content": {form.media_type: form.answer for form in ALL},
+}
+
+
+@router.post(
+    "/mu-macro/batch",
+    response_class=Response,
+    openapi_extra={"requestBody": {"required": True, "content": _BODIES}},
+    responses={200: _ANSWERS, **POSTED},
+    summary="Macroscopic friction of many cases",
+)
+async def post_mu_macro_batch(
+    request: Request, options: Annotated[BatchOptions, Query()]
+) -> Response:
     """Answer in the form of the request, order kept.  A bad case has the result null and an entry
     in ``errors``.
 
     A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of
     rows, or one case.
     """
-    return _Answer(request)
-
-
-_BODIES, _ANSWERS = (
-    {form.media_type: getattr(form, part) for form in _FORMS} for part in ("body", "answer")
-)
-ENDPOINTS = [
-    Endpoint(
-        "/v1/mu-macro/batch",
-        "POST",
-        post_mu_macro_batch,
-        "Macroscopic friction of many cases",
-        Options,
-        request={"required": True, "content": _BODIES},
-        content={
-            200: {"description": "The answers, in the form of the request", "content": _ANSWERS}
-        },
-    )
-]
+    return _Answer(request, options)

@@ -1,0 +1,122 @@
+"""Counters of requests and cases: those of prometheus_client; several workers share them through
+its multiprocess mode, in a private folder that is made at the start."""
+
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
+from typing import Any
+
+import numpy as np
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    disable_created_metrics,
+    generate_latest,
+)
+from prometheus_client.multiprocess import MultiProcessCollector
+
+from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
+
+from .tables import LoadedTable, Tables
+
+_SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
+_METHODS = frozenset({"GET", "HEAD", "POST"})
+_BUCKETS_S = (
+    1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0,
+)  # fmt: skip
+
+
+@contextmanager
+def shared_counters() -> Iterator[None]:
+    """A private folder for the counters of all workers, in memory if possible; it is empty, and
+    removed at the end.
+
+    Without a writable folder every worker reports its own counters.
+    """
+    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108  (a folder of its own is made there)
+    with ExitStack() as stack:
+        with suppress(OSError):
+            made = tempfile.TemporaryDirectory(
+                prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True
+            )
+            os.environ[_SHARED] = stack.enter_context(made)
+        yield
+
+
+class Metrics:
+    """Counters of requests and cases."""
+
+    def __init__(self, paths: Iterable[str]) -> None:
+        disable_created_metrics()  # type: ignore[no-untyped-call]
+        self._paths = frozenset(paths)
+        self.registry = own = CollectorRegistry()
+        requests = Counter(
+            "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own
+        )
+        told = "From the head of a request to the end of its answer"
+        seconds = Histogram(
+            "mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own
+        )
+        cases = Counter(
+            "mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own
+        )
+        bad = Counter(
+            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own
+        )
+        labels = ["id", "tolerance"]
+        self._info = Gauge(
+            "mumacro_table_info",
+            "Loaded tables",
+            labels,
+            registry=own,
+            multiprocess_mode="mostrecent",
+        )
+        # a look-up of labels takes longer than counting
+        self._of_request = cache(
+            lambda *labels: (requests.labels(*labels).inc, seconds.labels(labels[0]).observe)
+        )
+        self._of_source = cache(
+            lambda table, code: (
+                bad.labels(table)
+                if code < 0
+                else cases.labels(table, SOURCES[code], REGIMES[REGIME_OF_SOURCE[code]])
+            )
+        )
+
+    def start(self, tables: Tables) -> None:
+        """Name the loaded tables."""
+        for table in tables.loaded:
+            self._info.labels(table.id, format(table.surrogate.tolerance, "g")).set(1)
+            self._of_source(table.id, -1)
+
+    def request(self, path: str, method: str, status: int, seconds: float) -> None:
+        """Count one request."""
+        path, method = (
+            path if path in self._paths else "other",
+            method if method in _METHODS else "other",
+        )
+        count, observe = self._of_request(path, method, status)
+        count()
+        observe(seconds)
+
+    def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
+        """Count answered cases of one source code; -1 are bad ones."""
+        self._of_source(table.id, source).inc(number)
+
+    def cases(self, table: LoadedTable, source: Any) -> None:
+        """Count the cases of a batch by their source codes, bad ones among them."""
+        for code, number in enumerate(np.bincount(source + 1).tolist()):
+            if number:
+                self.case(table, code - 1, number)
+
+    def text(self) -> bytes:
+        """The exposition format of Prometheus; with several workers, the sum over all."""
+        registry = self.registry
+        if _SHARED in os.environ:
+            registry = CollectorRegistry()
+            MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
+        return generate_latest(registry)

@@ -1,0 +1,447 @@
+"""What is answered.  ``N`` is one number, or a list of them: an answer in columns has the same
+members.
+
+A member whose value can be missing is null there; what ``include`` did not ask for is left out.
+"""
+
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
+
+from pydantic import BaseModel, Field
+
+from mumacro.inputs.kind import ContactName, DirectionName
+
+from .inputs import Name
+
+N = TypeVar("N")
+R = TypeVar("R")
+S = TypeVar("S")
+Regime = Literal["continuous", "stick_slip", "static", "partial_slip", "reverse_slip"]
+Number: TypeAlias = float | None
+Numbers: TypeAlias = list[float | None]
+
+
+def quantity(text: str, unit: str, default: Any = ...) -> Any:
+    """A member with its meaning and unit."""
+    return Field(default, description=f"{text} [{unit}]", json_schema_extra={"unit": unit})
+
+
+class Part(BaseModel, Generic[N]):
+    """A part of an answer."""
+
+    @classmethod
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
+        """The name in the description: that of the class, with Columns for lists."""
+        return f"{cls.__name__}Columns" if params[0] == Numbers else cls.__name__
+
+
+class Groups(Part[N]):
+    """Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double
+    range)."""
+
+    v_tilde: N = quantity("v0/(l0 omega)", "-")
+    y_tilde: N = quantity("y0/l0; for direction normal Fz_amplitude/Fz", "-")
+    l0: N = quantity("Length scale mu0 Fz/k; 0 for rigid contact", "m")
+
+
+class Limits(Part[N]):
+    """Marks on the friction law of this case; null: beyond double range."""
+
+    mu_static: N = quantity(
+        "Static limit, v0 -> 0, eq. (38): mu0 sqrt(1 - y~^2), or 0 for y~ >= 1", "-"
+    )
+    v0_crit: N = quantity("Velocity at the border of continuous sliding", "m/s")
+    mu_crit: N = quantity("mu_macro at that border", "-")
+
+
+class Gradient(Part[N]):
+    """d mu_macro / d input; null: not finite, or no such input (k of rigid contact)."""
+
+    mu0: N = quantity("d mu_macro / d mu0", "-")
+    Fz: N = quantity("d mu_macro / d Fz", "1/N")
+    k: N = quantity("d mu_macro / d k", "m/N")
+    y0: N | None = quantity("d mu_macro / d y0", "1/m", None)
+    Fz_amplitude: N | None = quantity("d mu_macro / d Fz_amplitude", "1/N", None)
+    omega: N = quantity("d mu_macro / d omega", "s/rad")
+    v0: N = quantity("d mu_macro / d v0", "s/m")
+
+
+class GradientBound(Gradient[N], Generic[N]):
+    """Bounds of the absolute errors of the gradient; null: not known."""
+
+
+class StdShare(Part[N]):
+    """Share of each input in the variance, 0 to 1."""
+
+    mu0: N = quantity("Share of mu0", "-")
+    Fz: N = quantity("Share of Fz", "-")
+    k: N = quantity("Share of k", "-")
+    y0: N | None = quantity("Share of y0", "-", None)
+    Fz_amplitude: N | None = quantity("Share of Fz_amplitude", "-", None)
+    omega: N = quantity("Share of omega", "-")
+    v0: N = quantity("Share of v0", "-")
+
+
+class Power(Part[N]):
+    """Mean powers; null: not finite in double precision."""
+
+    oscillation: N = quantity(
+        "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; null: rigid", "W"
+    )
+    saved: N = quantity("Power that the drive saves: (mu0 - mu_macro) Fz v0", "W")
+
+
+class PowerBound(Part[N]):
+    """Bounds of the absolute errors of the powers; null also: not known."""
+
+    oscillation: N = quantity("Bound of the absolute error of oscillation", "W")
+    saved: N = quantity("Bound of the absolute error of saved", "W")
+
+
+class Settling(Part[N]):
+    """Until a disturbed contact is within 1 % of its steady cycle; null: infinite, it never
+    slips."""
+
+    periods: N = quantity(
+        "For a small disturbance: ln(100)/slip_path; in stick-slip at most as many", "-"
+    )
+    periods_any: N = quantity("For a disturbance of any size: twice as many", "-")
+    time: N = quantity("periods as a time; also without oscillation", "s")
+    slip_path: N = quantity("Path of the foot in a period over l0; null also: rigid contact", "-")
+
+
+class SettlingBound(Part[N]):
+    """Bound of the absolute error of periods; null also: not known."""
+
+    periods: N = quantity("Bound of the absolute error of periods", "-")
+
+
+class Included(Part[N]):
+    """What ``include`` asks for."""
+
+    groups: Groups[N] | None = None
+    limits: Limits[N] | None = None
+    gradient: Gradient[N] | None = None
+    gradient_bound: GradientBound[N] | None = None
+    std: N | None = quantity(
+        "Standard deviation of mu_macro to first order, from the gradient", "-", None
+    )
+    std_bound: N | None = quantity(
+        "The part of std that comes from the gradient's bound", "-", None
+    )
+    std_share: StdShare[N] | None = None
+    stick_fraction: N | None = quantity(
+        "Share of the period during which the contact sticks", "-", None
+    )
+    stick_fraction_bound: N | None = quantity(
+        "Bound of its absolute error, larger at the border; null: not known", "-", None
+    )
+    power: Power[N] | None = None
+    power_bound: PowerBound[N] | None = None
+    settling: Settling[N] | None = None
+    settling_bound: SettlingBound[N] | None = None
+
+
+class OneOrMany(Included[N], Generic[N, R, S]):
+    """The default answer and what ``include`` adds."""
+
+    mu_macro: N = quantity("Macroscopic coefficient of friction", "-")
+    mu_ratio: N = quantity("mu_macro/mu0, from 0 to 1", "-")
+    regime: R = Field(description="How the contact moves")
+    error_bound: N = quantity("Bound of the absolute error of mu_macro", "-")
+    source: S = Field(
+        description="Block of the table, or closed-form tail, that the value came from"
+    )
+    mu_macro_low: N | None = quantity("Smallest mu_macro over the interval of k", "-", None)
+    mu_macro_high: N | None = quantity("Largest mu_macro over the interval of k", "-", None)
+
+
+class TableLabel(BaseModel):
+    """The table that an answer came from."""
+
+    id: str = Field(description="Name of the table")
+    tolerance: float = Field(description="The error of mu_macro/mu0 [-] that it was built to")
+
+
+class Answered(BaseModel):
+    """The members of every answer."""
+
+    table: TableLabel
+    api_version: str
+
+
+class ModelRow(BaseModel):
+    """One thing that the model leaves out, see docs/validity.md."""
+
+    row: str = Field(description="Its name")
+    text: str = Field(description="What it does here")
+    effect: float | None = Field(description="Relative change of mu_macro; null: not known")
+
+
+class Result(OneOrMany[Number, Regime, str]):
+    """Answer to one case."""
+
+
+class Columns(OneOrMany[Numbers, list[Regime | None], list[str | None]]):
+    """Answers in columns, order kept."""
+
+
+class CaseAnswer(Result, Answered):
+    """Answer to one case."""
+
+    mu_macro: float = quantity("Macroscopic coefficient of friction", "-")
+    mu_ratio: float = quantity("mu_macro/mu0, from 0 to 1", "-")
+    model: list[ModelRow] | None = Field(
+        None, description="Only if requested: what the model leaves out here"
+    )
+    digits: int | None = Field(None, description="With model: digits of mu_macro that k supports")
+
+
+# --- batches --------------------------------------------------------------------------------------
+
+
+class BatchFault(BaseModel):
+    """Why one case of a batch has no result."""
+
+    index: int = Field(description="Position in the batch, from 0")
+    field: str | None = Field(description="The bad field; null when the case as a whole is bad")
+    reason: str
+
+
+class BatchAnswered(Answered):
+    """What is said of a batch as a whole."""
+
+    errors: list[BatchFault] = Field(
+        description="One entry per bad case, in order; the first 1000 of them"
+    )
+    n_errors: int = Field(description="Number of bad cases, listed or not")
+
+
+class ColumnsAnswer(Columns, BatchAnswered):
+    """Answer to a batch in columns, order kept; null: a bad case."""
+
+
+class RowsAnswer(BatchAnswered):
+    """Answer to a batch in rows, order kept; null where a case is bad."""
+
+    results: list[Result | None]
+
+
+# --- questions ------------------------------------------------------------------------------------
+
+_MODEL = "Along Fz, or solved for it: what is said of k"
+
+
+class BorderMark(BaseModel):
+    """Where continuous sliding begins or ends."""
+
+    value: float = Field(description="The swept input [SI]")
+    mu_macro: float = Field(description="[-]")
+
+
+class LawAnswer(Columns, Answered):
+    """A friction law in columns."""
+
+    along: Name
+    unit: str
+    values: list[float] = Field(description="The swept input [SI]")
+    mu_static: list[float] = quantity("Static limit (v0 -> 0) of each case", "-")
+    k: list[float] | None = quantity(
+        "Stiffness at each value, where it grows along Fz", "N/m", None
+    )
+    model: list[ModelRow] | None = Field(None, description=_MODEL)
+    border: list[BorderMark] = Field(description="Up to two points inside the range")
+
+
+class Root(Included[Number]):
+    """One value of the unknown, and the answer there."""
+
+    value: float = Field(description="The unknown [SI]")
+    low: float = Field(description="From low ...")
+    high: float = Field(
+        description="... to high, mu_macro is the target within the table's error bound"
+    )
+    mu_macro: float = quantity("Value of the table there", "-")
+    regime: Regime
+
+
+class TargetAnswer(BaseModel):
+    """All values that give one target."""
+
+    target: float
+    roots: list[Root] = Field(
+        description="Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)"
+    )
+    reason: str | None = Field(None, description="Why there is no root")
+
+
+class Reachable(BaseModel):
+    """Range of mu_macro for all values of the unknown in its range."""
+
+    min: float
+    max: float
+    min_included: bool = Field(description="false: approached, never reached")
+    max_included: bool
+
+
+class Solved(BaseModel):
+    """The roots of every target, what was searched, and what is reachable there."""
+
+    results: list[TargetAnswer] = Field(description="One per target, in order")
+    range: list[float | None] = Field(description="The searched range [SI]; null: without limit")
+    reachable: Reachable
+
+
+class SolveForEnd(Solved):
+    """The same for one end of an interval of k."""
+
+    k: float = Field(description="[N/m]")
+
+
+class SolveForAnswer(Solved, Answered):
+    """Answer to the inverse problem."""
+
+    unknown: Name
+    unit: str
+    quantity: Literal["mu_macro", "mu_ratio"]
+    ends: list[SolveForEnd] | None = Field(
+        None, description="Only with an interval of k: for both ends; the rest is for the middle"
+    )
+    model: list[ModelRow] | None = Field(None, description=_MODEL)
+
+
+class StiffnessAnswer(BaseModel):
+    """What a contact of two bodies is; ``k`` and ``contact`` are those of a case."""
+
+    geometry: str
+    k: float = Field(description="Tangential stiffness while everything sticks [N/m]")
+    k_normal: float = Field(description="Normal stiffness [N/m]")
+    half_width: float = Field(
+        description="Radius of a circular contact, half width of a line contact [m]"
+    )
+    pressure: float = Field(
+        description="Largest pressure [Pa]: Hertz's, or the mean one under a flat punch"
+    )
+    contact: ContactName
+    warnings: list[str] = Field(description="Where the theory behind k is off")
+    api_version: str
+
+
+# --- fit ------------------------------------------------------------------------------------------
+
+_Stiffness = float | Literal["rigid"] | None
+
+
+class FittedValues(BaseModel):
+    """k [N/m], or rigid, and mu0 [-], those that were unknown."""
+
+    k: _Stiffness = None
+    mu0: float | None = None
+
+
+class Solution(FittedValues):
+    """One minimum that the points allow."""
+
+    chi2: float
+
+
+class Interval(BaseModel):
+    """What the points say of each unknown; those that were not unknown are left out."""
+
+    k: list[_Stiffness] | None = None
+    mu0: list[float | None] | None = None
+
+
+class FittedCurve(BaseModel):
+    """The fitted law over v0, with its 95 % band."""
+
+    v0: list[float] = Field(description="[m/s]")
+    mu_macro: list[float]
+    low: list[float | None]
+    high: list[float | None]
+
+
+class FitAnswer(Answered):
+    """What measured points say about a contact."""
+
+    values: FittedValues
+    std: FittedValues = Field(
+        description="Standard deviations; null: the points do not determine it, see warnings"
+    )
+    covariance: list[list[float | None]] = Field(
+        description="In the order of values; null: not determined"
+    )
+    interval: Interval = Field(
+        description="95 % intervals [low, high]; k may be rigid, null: without bound"
+    )
+    residuals: list[float] = Field(description="Measured minus fitted mu_macro, of each point [-]")
+    chi2: float
+    reduced_chi2: float | None = Field(description="null: no point more than unknowns")
+    solutions: list[Solution] = Field(description="All minima within 95 %, best first")
+    warnings: list[str] = Field(description="What the points do not determine")
+    contact: ContactName
+    direction: DirectionName
+    curve: FittedCurve | None = Field(
+        description="null where other inputs than v0 vary, or v0 is 0 everywhere"
+    )
+
+
+# --- tables, health, problems ---------------------------------------------------------------------
+
+
+class TableAnswer(Answered):
+    """Properties of a table."""
+
+    id: str
+    tolerance: float
+    checksum: str = Field(description="SHA-256 of the table's content")
+    file: str
+    size_bytes: int
+    max_abs_error: float | None = Field(
+        description="Largest verified absolute error of mu_macro/mu0 [-]"
+    )
+    max_rel_error: float | None = Field(
+        description="Largest verified relative error of mu_macro [-]"
+    )
+    error_distribution: dict[str, dict[str, float]] = Field(
+        description="By quantity: the error that a share of the verified points does not exceed; "
+        "bound over error"
+    )
+    attributes: dict[str, Any] = Field(description="Root attributes of the file")
+    blocks: list[dict[str, Any]]
+    loaded: list[TableLabel] = Field(description="All loaded tables, tightest first")
+    service_version: str
+
+
+class Health(BaseModel):
+    """Answer of a health endpoint."""
+
+    status: Literal["alive", "ready"]
+    tables: list[TableLabel] | None = None
+    api_version: str
+    service_version: str
+
+
+class FieldProblem(BaseModel):
+    """One bad field."""
+
+    pointer: str | None = Field(None, description="JSON pointer into the body")
+    parameter: str | None = Field(None, description="Query parameter")
+    field: str
+    value: Any = Field(
+        None, description="As given; a number that JSON cannot hold is a text, such as NaN"
+    )
+    reason: str
+    bound: str | None = None
+
+
+class Problem(BaseModel):
+    """Problem details, RFC 9457."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    instance: str
+    request_id: str | None = None
+    errors: list[FieldProblem] | None = None
+    n_errors: int | None = None

@@ -1,0 +1,259 @@
+"""The inputs of one case, and of many in columns: meaning, unit, bound and example of each.
+
+Bounds of one input are checked here; relations between inputs (omega or f, k or an interval of it,
+the amplitude of the direction) are the library's, which refuses them when it is asked.
+"""
+
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationInfo,
+    WithJsonSchema,
+    WrapValidator,
+)
+from pydantic_core import PydanticCustomError
+
+from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, is_rigid, refusal
+from mumacro.inputs.k_range import BOUND
+from mumacro.inputs.units import number_hint
+from mumacro.kernel.arrays import Array
+
+#: what a case may hold, in the order in which it is described
+INPUTS = (
+    "mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude", "k_low", "k_high", "k_range",
+)  # fmt: skip
+#: the first case of the documentation: mu_macro = 0.2405
+EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+MAX_REASONS = 1000  # bad cases of a batch that are listed
+
+Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
+OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, {"const": "rigid", "type": "string"}]
+
+
+def rigid_or(value: Any, number: Callable[[Any], float]) -> float:
+    """Infinity for the word rigid; any other value must be a number."""
+    return math.inf if isinstance(value, str) and is_rigid(value) else number(value)
+
+
+Stiffness = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
+
+
+def optional(description: str, **more: Any) -> Any:
+    """A member that may be left out.  Null says the same, which the description leaves out: a query
+    has none."""
+    return Field(None, description=description, json_schema_extra=_without_null, **more)
+
+
+def either(description: str, **more: Any) -> Any:
+    """A member that another one may stand for; null is refused."""
+    return Field(None, description=description, **more)
+
+
+def _without_null(schema: dict[str, Any]) -> None:
+    kinds = [kind for kind in schema.pop("anyOf", [schema]) if kind != {"type": "null"}]
+    schema |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+
+
+class Strict(BaseModel):
+    """A model with its own members only, each of its own type."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+_K = (
+    'Tangential stiffness of the contact [N/m], or "rigid"; it must be given, here or as an '
+    "interval"
+)
+_Y0 = (
+    "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding "
+    "direction; required, unless the direction is normal"
+)
+_AMPLITUDE = "Amplitude of the normal force [N], below Fz: for direction normal in place of y0"
+Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+
+
+class OneCase(Strict):
+    """The inputs of one case; omega or f, and k or an interval of it: exactly one of each."""
+
+    mu0: Positive = Field(
+        description="Coulomb friction coefficient of the contact [-]", examples=[0.3]
+    )
+    Fz: Positive = Field(description="Normal force [N]", examples=[10.0])
+    k: Stiffness = either(_K, examples=[1e6])
+    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
+    omega: NotNegative | None = optional(
+        "Angular frequency of the oscillation [rad/s]; omega or f is required"
+    )
+    f: Hertz | None = optional(
+        "Frequency of the oscillation [Hz], in place of omega", examples=[20e3]
+    )
+    v0: NotNegative = Field(description="Sliding velocity [m/s]", examples=[0.01])
+    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
+    k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
+    k_high: Positive | None = optional("Highest stiffness [N/m], with k_low")
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Those that are given, by name; a rigid contact is infinite."""
+        values = self.__dict__
+        return {name: values[name] for name in INPUTS if values.get(name) is not None}
+
+
+class Case(OneCase):
+    """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
+
+    k_range: Pair | None = optional(f"In place of k: {BOUND}")
+
+
+class OtherInputs(Strict):
+    """The inputs of a question about one of them, which is left out or null."""
+
+    mu0: Positive | None = optional(
+        "Coulomb friction coefficient of the contact [-]", examples=[0.3]
+    )
+    Fz: Positive | None = optional("Normal force [N]", examples=[10.0])
+    k: Stiffness | None = optional(_K, examples=[1e6])
+    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
+    omega: NotNegative | None = optional(
+        "Angular frequency of the oscillation [rad/s]; omega or f is required"
+    )
+    f: Hertz | None = optional(
+        "Frequency of the oscillation [Hz], in place of omega", examples=[20e3]
+    )
+    v0: NotNegative | None = optional("Sliding velocity [m/s]")
+    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
+    k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
+    k_high: Positive | None = optional("Highest stiffness [N/m], with k_low")
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Those that are given, by name; a rigid contact is infinite, and a null in k stays."""
+        values = self.__dict__
+        found = {name: values[name] for name in INPUTS if values.get(name) is not None}
+        if values["k"] is None and "k" in self.model_fields_set:
+            found["k"] = None
+        return found
+
+
+# --- columns --------------------------------------------------------------------------------------
+
+
+class Column(NamedTuple):
+    """One input of many cases: NaN where there is no number, and why, by the index of the case."""
+
+    values: Array
+    reasons: Mapping[int, str]
+
+
+_LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in BOUNDS}
+_MOST = dict.fromkeys(_LEAST, sys.float_info.max) | {"f": MOST_HZ}
+_NUMBERS = frozenset((float, int))
+
+
+def number(name: str, value: object) -> tuple[float, str | None]:
+    """The value of an input and None, or NaN and the reason why it is none."""
+    if type(value) in _NUMBERS:
+        try:
+            real = float(value)  # type: ignore[arg-type]
+        except OverflowError:
+            real = math.inf
+        return (real, None) if _LEAST[name] <= real <= _MOST[name] else (
+            math.nan, refusal(name, real)
+        )  # fmt: skip
+    if name == "k" and isinstance(value, str) and is_rigid(value):
+        return math.inf, None
+    if value is None and name != "k":
+        return math.nan, "is required"
+    return math.nan, number_hint(name, value)
+
+
+def column(name: str, values: Sequence[Any]) -> Column:
+    """A list as a column.  A number beyond double range is never a rigid contact."""
+    if _NUMBERS.issuperset(map(type, values)):
+        try:
+            array = np.array(values, np.float64)
+        except OverflowError:
+            array = np.array([math.inf])
+        if np.isfinite(array).all():
+            return Column(array, {})
+    array, reasons = np.empty(len(values)), dict[int, str]()
+    for i, value in enumerate(values):
+        array[i], reason = number(name, value)
+        if reason is not None and len(reasons) < MAX_REASONS:
+            reasons[i] = reason
+    return Column(array, reasons)
+
+
+def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
+    """A number for all cases, or a list or an array with one for each."""
+    name = info.field_name or ""
+    if isinstance(value, Column):
+        return value
+    if isinstance(value, list):
+        return column(name, value)
+    if isinstance(value, np.ndarray):  # of a form in which infinity is a rigid contact
+        return Column(value, {})
+    if value is None and name != "k":
+        return None
+    real, reason = number(name, value)
+    if reason is not None:
+        raise PydanticCustomError("input", "{reason}", {"reason": reason})
+    return real
+
+
+def _or_listed(*one: dict[str, Any]) -> WithJsonSchema:
+    several = {"type": "array", "items": {"anyOf": [*one, {"type": "null"}]}}
+    return WithJsonSchema({"anyOf": [*one, several]})
+
+
+_CELLS = PlainValidator(_of_cases)
+PositiveColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "exclusiveMinimum": 0})]
+NotNegativeColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "minimum": 0})]
+HertzColumn = Annotated[
+    Any, _CELLS, _or_listed({"type": "number", "minimum": 0, "maximum": MOST_HZ})
+]
+StiffnessColumn = Annotated[Any, _CELLS, _or_listed(*OR_RIGID)]
+
+
+class InputColumns(Strict):
+    """Cases in columns: lists of one length, and a plain number holds for every case.
+
+    An entry that is no legal number spoils its own case only.
+    """
+
+    mu0: PositiveColumn = Field(description="Coulomb friction coefficient of the contact [-]")
+    Fz: PositiveColumn = Field(description="Normal force [N]")
+    k: StiffnessColumn = Field(
+        None, description='Tangential stiffness [N/m], or "rigid"; or k_low and k_high'
+    )
+    y0: NotNegativeColumn = Field(
+        None, description="Amplitude of the oscillation [m], half of peak to peak"
+    )
+    omega: NotNegativeColumn = Field(None, description="Angular frequency [rad/s]; or f")
+    f: HertzColumn = Field(None, description="Frequency [Hz], in place of omega")
+    v0: NotNegativeColumn = Field(description="Sliding velocity [m/s]")
+    Fz_amplitude: NotNegativeColumn = Field(
+        None, description="Amplitude of the normal force [N], for direction normal in place of y0"
+    )
+    k_low: PositiveColumn = Field(None, description="Lowest stiffness [N/m], with k_high")
+    k_high: PositiveColumn = Field(None, description="Highest stiffness [N/m], with k_low")
+    k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """What is given, by name."""
+        values = self.__dict__
+        return {name: values[name] for name in INPUTS if values[name] is not None}

@@ -1,0 +1,169 @@
+"""Any periodic motion: what is asked, and its steady cycle."""
+
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    WithJsonSchema,
+    WrapValidator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from mumacro.analysis.motion import MOST_HARMONIC, TOLERANCES, WHOLE
+from mumacro.errors import InputError
+from mumacro.inputs.kind import ContactName
+
+from .answers import Number, Numbers, quantity
+from .inputs import EXAMPLE, Hertz, NotNegative, Positive, Stiffness, Strict, optional
+
+MAX_TERMS = 10  # of one part of the motion
+# of a ball, whose hundreds of springs each follow every turn of the motion
+MOST_OF_A_BALL, LEAST_OF_A_BALL = 20, 1e-7
+
+
+def _whole(number: Any) -> Any:
+    if type(number) in (int, float) and 1 <= number <= MOST_HARMONIC and number == int(number):
+        return int(number)
+    raise PydanticCustomError("input", "{reason}", {"reason": f"must be {WHOLE}"})
+
+
+_Harmonic = Annotated[
+    int,
+    BeforeValidator(_whole),
+    WithJsonSchema({"type": "integer", "minimum": 1, "maximum": MOST_HARMONIC}),
+]
+_POSITIVE = WithJsonSchema({"type": "number", "exclusiveMinimum": 0})  # the library has the reason
+_Degrees = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Harmonic(Strict):
+    """amplitude sin(harmonic omega t + phase)."""
+
+    harmonic: _Harmonic = Field(1, description="Times the frequency")
+    amplitude: NotNegative = Field(description="Half of peak to peak [m]; of normal [N]")
+    phase: _Degrees = Field(0.0, description="[degrees]")
+
+
+_Pair = Annotated[tuple[NotNegative, _Degrees], Field(strict=False)]
+_Listed = Annotated[list[Harmonic], Field(max_length=MAX_TERMS)]
+_STRICT = ConfigDict(strict=True)
+_AMPLITUDE: Any = TypeAdapter(NotNegative, config=_STRICT)
+_PAIR: Any = TypeAdapter(_Pair, config=_STRICT)
+_LISTED: Any = TypeAdapter(_Listed)
+
+
+def _of_its_form(value: Any, _: Any) -> Any:
+    """The oscillation as the library takes it; a union would report the faults of every form."""
+    if not isinstance(value, list):
+        return _AMPLITUDE.validate_python(value)
+    if value and not isinstance(value[0], dict):
+        return _PAIR.validate_python(value)
+    return [(one.harmonic, one.amplitude, one.phase) for one in _LISTED.validate_python(value)]
+
+
+_Oscillation = Annotated[NotNegative | _Pair | _Listed, WrapValidator(_of_its_form)]
+_FORMS = (
+    "an amplitude, half of peak to peak; an amplitude and a phase in degrees; or a list of "
+    f"harmonics, at most {MAX_TERMS}. Left out: none"
+)
+
+
+class MotionRequest(Strict):
+    """A contact that is dragged along x and shaken in x, y and normally, all with one period."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    **{name: x for name, x in EXAMPLE.items() if name != "y0"},
+                    "x": [1e-6, 90.0],
+                    "y": 2e-6,
+                }
+            ]
+        }
+    )
+
+    mu0: Positive = Field(description="Coulomb friction coefficient of the contact [-]")
+    Fz: Positive = Field(description="Mean normal force [N]")
+    k: Annotated[Stiffness, _POSITIVE] = Field(
+        description="Tangential stiffness of the contact [N/m]; a rigid contact is the limit of a "
+        "large one"
+    )
+    omega: Annotated[NotNegative, _POSITIVE] | None = optional(
+        "Angular frequency of the period [rad/s]; omega or f is required"
+    )
+    f: Annotated[Hertz, _POSITIVE] | None = optional(
+        "Frequency of the period [Hz], in place of omega"
+    )
+    v0: NotNegative = Field(description="Speed of the drag along x [m/s]")
+    x: _Oscillation | None = optional(f"Oscillation along the drag [m]: {_FORMS}")
+    y: _Oscillation | None = optional(f"Oscillation across it [m]: {_FORMS}")
+    normal: _Oscillation | None = optional(
+        f"Oscillation of the normal force [N], not of a ball: {_FORMS}"
+    )
+    contact: ContactName = Field(
+        "spring",
+        description="One spring, or a ball on a flat (Hertz) under a constant normal force, with "
+        f"harmonics up to {MOST_OF_A_BALL} and a tolerance from {LEAST_OF_A_BALL:g}",
+    )
+    tolerance: Annotated[float, Field(ge=TOLERANCES[0], le=TOLERANCES[1])] = Field(
+        1e-6, description="Of the mean force over mu0 Fz"
+    )
+    cycle: bool = Field(False, description="Whether the answer has one period of the forces")
+
+    @model_validator(mode="after")
+    def _within_the_time(self) -> Self:
+        if self.contact == "ball":
+            if self.tolerance < LEAST_OF_A_BALL:
+                raise InputError(
+                    "tolerance", self.tolerance, f">= {LEAST_OF_A_BALL:g} for a ball over HTTP"
+                )
+            for name in ("x", "y"):
+                part = getattr(self, name)
+                if isinstance(part, list) and any(n > MOST_OF_A_BALL for n, *_ in part):
+                    bound = f"of harmonics up to {MOST_OF_A_BALL} for a ball over HTTP"
+                    raise InputError(name, None, bound)
+        return self
+
+    @property
+    def case(self) -> dict[str, Any]:
+        """The arguments of ``mumacro.motion`` that are given."""
+        values = self.__dict__
+        return {name: x for name, x in values.items() if name != "cycle" and x is not None}
+
+
+class CycleColumns(BaseModel):
+    """One steady period at equal times, both ends included."""
+
+    t: list[float] = quantity("Time", "s")
+    x: list[float] = quantity("Way of the upper point along, that of the drag included", "m")
+    y: list[float] = quantity("Way of the upper point across", "m")
+    Fx: Numbers = quantity("Force on it along", "N")
+    Fy: Numbers = quantity("Force on it across", "N")
+    Fz: list[float] = quantity("Normal force", "N")
+
+
+class MotionAnswer(BaseModel):
+    """The steady cycle of a motion; it is computed, no table is read.
+
+    A mean force may be negative.
+    """
+
+    mu_macro: float = quantity("Mean force along the drag over the mean normal force", "-")
+    mu_lateral: float = quantity("Mean force along y over the mean normal force", "-")
+    stick_fraction: float = quantity("Share of the period during which the contact sticks", "-")
+    slip_path: Number = quantity("Path of the foot in a period", "m")
+    power: Number = quantity("Mean power of the shaker in x and y", "W")
+    power_drive: Number = quantity("Mean power of the drive, mu_macro Fz v0", "W")
+    error_estimate: float = quantity("Estimated error of mu_macro and mu_lateral, no bound", "-")
+    periods: Number = quantity(
+        "Until a small disturbance has fallen to 1 %; null: infinite, nothing slips", "-"
+    )
+    contact: ContactName
+    cycle: CycleColumns | None = Field(None, description="Only if requested")
+    api_version: str

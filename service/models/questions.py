@@ -1,0 +1,265 @@
+"""The bodies and queries of the questions: friction law, inverse problem, stiffness, fit."""
+
+import math
+import sys
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    WrapValidator,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from mumacro.contacts.geometries import GEOMETRIES
+from mumacro.errors import InputError
+from mumacro.inputs.fields import STIFFNESS, is_rigid
+from mumacro.inputs.k_range import BOUND
+from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.units import number_hint
+
+from .inputs import (
+    EXAMPLE,
+    OR_RIGID,
+    Name,
+    NotNegative,
+    OtherInputs,
+    Pair,
+    Positive,
+    Strict,
+    optional,
+    rigid_or,
+)
+from .options import Choice, Options, QueryOptions, QueryStiffness, with_interval
+
+MAX_VALUES = 10_001  # of a law
+MAX_TARGETS = 10_000
+MAX_POINTS = 1000  # of a fit, which scipy answers within seconds
+
+# JSON has one kind of number: 55.0 is an integer there, and in a JSON Schema
+_Whole = Annotated[
+    int,
+    Field(ge=2, le=MAX_VALUES),
+    BeforeValidator(lambda n: int(n) if isinstance(n, float) and n.is_integer() else n),
+]
+_Exponent = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+_EXPONENT = (
+    "For Fz only: k grows as Fz to this power, and Fz of the case is the load at which k holds; "
+    "left out: 1/3 for a ball with Fz, else k is constant"
+)
+
+
+class Sweep(Strict):
+    """The values of a law."""
+
+    along: Name = Field("v0", description="The swept input, which is left out of the case")
+    start: NotNegative = Field(
+        description="First value [SI]; > 0 on a logarithmic scale", examples=[1e-4]
+    )
+    stop: Positive = Field(description="Last value [SI], > start", examples=[10.0])
+    points: _Whole = Field(201, description="Number of values")
+    scale: Literal["log", "linear"] = Field("log", description="Spacing of the values")
+    stiffness_exponent: _Exponent | None = optional(_EXPONENT)
+
+
+_five = {name: value for name, value in EXAMPLE.items() if name != "v0"}
+_without_y0 = {name: value for name, value in EXAMPLE.items() if name != "y0"}
+
+
+class LawRequest(Options, Sweep, OtherInputs):
+    """mu_macro over a range of one input."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{**_five, "start": 1e-4, "stop": 10.0, "points": 5}]}
+    )
+
+    k_range: Pair | None = optional(f"In place of k: {BOUND}")
+
+
+class LawQuery(QueryOptions, Sweep, OtherInputs):
+    """mu_macro over a range of one input."""
+
+    k: QueryStiffness | None = optional(
+        'Tangential stiffness of the contact [N/m], "rigid", or low..high; required, '
+        "unless it is swept",
+        examples=[1e6],
+    )
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Those that are given, by name; two ends are an interval of k."""
+        return with_interval(super().inputs)
+
+
+class SolveForRequest(Options, OtherInputs):
+    """Which value of one input gives a wanted mu_macro."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{**_without_y0, "unknown": "y0", "target": 0.15}]}
+    )
+
+    k_range: Pair | None = optional(f"In place of k: {BOUND}")
+    unknown: Name = Field(description="The input to solve for, which is left out of the case")
+    target: Annotated[
+        list[NotNegative],
+        Field(min_length=1, max_length=MAX_TARGETS),
+        BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
+        WithJsonSchema(
+            {
+                "anyOf": [
+                    {"type": "number", "minimum": 0},
+                    {
+                        "type": "array",
+                        "items": {"type": "number", "minimum": 0},
+                        "minItems": 1,
+                        "maxItems": MAX_TARGETS,
+                    },
+                ]
+            }
+        ),
+    ] = Field(description=f"Wanted value [-]: one, or a list of up to {MAX_TARGETS}")
+    quantity: Literal["mu_macro", "mu_ratio"] = Field(
+        "mu_macro",
+        description="What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)",
+    )
+    range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = optional(
+        "Where to search [SI], ascending; left out: wherever it changes mu_macro"
+    )
+    stiffness_exponent: _Exponent | None = optional(_EXPONENT)
+
+
+# --- stiffness ------------------------------------------------------------------------------------
+
+_Modulus = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
+_Poisson = Annotated[float, Field(gt=-1, le=0.5, allow_inf_nan=False)]
+_GEOMETRIES = "; ".join(f"{name}: {one.meaning}" for name, one in GEOMETRIES.items())
+
+
+class StiffnessRequest(Strict):
+    """Two bodies in contact, in SI units."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3}]
+        }
+    )
+
+    geometry: Literal["ball", "flat", "cylinder"] = Field(description=_GEOMETRIES)
+    radius: Positive | None = optional("Radius of the ball, pin or cylinder [m]")
+    length: Positive | None = optional("Length of the cylinder [m]; of: cylinder")
+    Fz: Positive | None = optional("Normal force [N]")
+    oscillation: Literal["across", "along"] | None = optional(
+        "To the axis of the cylinder; of: cylinder"
+    )
+    E: _Modulus = Field(description='Young\'s modulus of the first body [Pa], or "rigid"')
+    nu: _Poisson = Field(description="Poisson's ratio of the first body [-]")
+    E2: _Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
+    nu2: _Poisson | None = optional("Of the second body [-]")
+
+
+# --- fit ------------------------------------------------------------------------------------------
+
+
+def _of_points(value: Any, info: ValidationInfo) -> Any:
+    """A number, or an array of numbers, as an array; the word rigid in k is infinite."""
+    name = info.field_name or ""
+    if name == "k" and isinstance(value, str) and is_rigid(value):
+        return math.inf
+    entries = value if isinstance(value, list) else [value]
+    if len(entries) > MAX_POINTS:
+        reason = f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them"
+        raise PydanticCustomError("input", "{reason}", {"reason": reason})
+    for i, entry in enumerate(entries):
+        if type(entry) not in (int, float) or not abs(entry) <= sys.float_info.max:
+            real = type(entry) in (int, float)
+            reason = "must be finite" if real else number_hint(name, entry)
+            fault = PydanticCustomError("input", "{reason}", {"reason": reason})
+            place = (i,) if isinstance(value, list) else ()
+            raise ValidationError.from_exception_data(
+                name, [InitErrorDetails(type=fault, loc=place, input=entry)]
+            )
+    return np.array(value, np.float64)
+
+
+_LISTED = {
+    "type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": MAX_POINTS,
+}  # fmt: skip
+
+
+_POINTS = PlainValidator(_of_points)
+PositivePoints = Annotated[
+    Any,
+    _POINTS,
+    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, _LISTED]}),
+]
+NotNegativePoints = Annotated[
+    Any, _POINTS, WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, _LISTED]})
+]
+StiffnessPoints = Annotated[Any, _POINTS, WithJsonSchema({"anyOf": [*OR_RIGID, _LISTED]})]
+MeasuredPoints = Annotated[Any, _POINTS, WithJsonSchema(_LISTED)]
+
+
+class FitRequest(Choice):
+    """Measured points as columns: lists of one length; a plain number holds for every point."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "v0": [0.001, 0.003, 0.01, 0.03, 0.1, 0.3],
+                    "mu_macro": [0.226, 0.23, 0.24, 0.26, 0.273, 0.282],
+                    "Fz": 10.0,
+                    "y0": 2e-6,
+                    "f": 20e3,
+                }
+            ]
+        }
+    )
+
+    unknowns: Annotated[list[Literal["k", "mu0"]], Field(min_length=1, max_length=2)] = Field(
+        ["k", "mu0"], description="What is fitted"
+    )
+    v0: PositivePoints = Field(description="Sliding velocity of each point [m/s]")
+    mu_macro: MeasuredPoints = Field(description="Measured mu_macro of each point [-]")
+    std: PositivePoints | None = optional("Standard deviation of mu_macro [-]")
+    mu0: PositivePoints | None = optional("Friction coefficient, unless it is fitted [-]")
+    Fz: PositivePoints | None = optional("Normal force [N]")
+    k: StiffnessPoints | None = optional(
+        'Tangential stiffness, unless it is fitted [N/m], or "rigid"'
+    )
+    y0: NotNegativePoints | None = optional(
+        "Amplitude of the oscillation [m], half of peak to peak"
+    )
+    omega: NotNegativePoints | None = optional("Angular frequency [rad/s]; or f")
+    f: NotNegativePoints | None = optional("Frequency [Hz], in place of omega")
+    Fz_amplitude: NotNegativePoints | None = optional(
+        "Amplitude of the normal force [N], for direction normal in place of y0"
+    )
+
+    @model_validator(mode="after")
+    def _what_is_left_out(self) -> Self:
+        for name in self.unknowns:
+            if getattr(self, name) is not None:
+                raise InputError(name, None, "left out: it is among the unknowns")
+        other = "y0" if self.kind.normal else AMPLITUDE
+        if getattr(self, other) is not None:
+            raise InputError(other, None, f"left out for direction {self.direction}")
+        return self
+
+    @property
+    def points(self) -> dict[str, Any]:
+        """The columns that are given, by name; a null in k stays, unless k is fitted."""
+        found = {name: value for name in _COLUMNS if (value := getattr(self, name)) is not None}
+        if "k" in self.model_fields_set and self.k is None and "k" not in self.unknowns:
+            raise InputError("k", None, STIFFNESS)
+        return found
+
+
+_COLUMNS = ("v0", "mu_macro", "std", "mu0", "Fz", "k", "y0", "omega", "f", "Fz_amplitude")

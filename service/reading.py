@@ -1,0 +1,251 @@
+"""How a request becomes the model that its endpoint declares.
+
+FastAPI reads body and query from a request; :class:`StrictRequest` is one of our own, as FastAPI's
+chapter on custom requests has it.  A member or a parameter that is given twice is refused, numbers
+of a query are read as people type them, and limits hold.  :class:`DirectRoute` reads one model and
+solves nothing else: FastAPI's own reading of a case takes longer than its answer
+(docs/decisions.md).
+"""
+
+import json
+import string
+from collections.abc import Callable, Coroutine, Mapping
+from typing import Any
+from urllib.parse import parse_qsl
+
+import orjson
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from pydantic import ValidationError
+from starlette.datastructures import ImmutableMultiDict
+
+from .limits import SMALL_BODY, form_of, read_body
+from .problems import FieldFault, Kind, RequestError, invalid, refuse
+
+Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+JSON = "application/json"
+# of a query that needs no decoding
+_PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
+_LISTS = frozenset(("include",))
+
+
+# --- JSON -----------------------------------------------------------------------------------------
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    members = dict(pairs)
+    if len(members) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = [name for name in members if names.count(name) > 1]
+        refuse([FieldFault.of(name, "is given more than once") for name in twice])
+    return members
+
+
+# Numbers are read by functions of Python, so that other threads run meanwhile; int refuses 4300
+# digits.
+_DECODER = json.JSONDecoder(
+    object_pairs_hook=_unique,
+    parse_int=lambda digits: int(digits) if len(digits) < 4300 else float(digits),
+    parse_float=lambda digits: float(digits),
+)
+
+
+def decode(text: bytes | bytearray, large: bool = False) -> Any:
+    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later."""
+    if not text:
+        raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
+    try:
+        quick = None if large else orjson.loads(text)
+        # One colon for each member: none is named twice, and none stands in an object within.
+        if type(quick) is dict and text.count(b":") == len(quick):
+            return quick
+    except ValueError:
+        pass  # _DECODER gives the reason
+    try:
+        return _DECODER.decode(text.decode())
+    except RecursionError:
+        raise RequestError(Kind.MALFORMED_BODY, "the body is nested too deeply") from None
+    except ValueError as error:
+        raise RequestError(Kind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
+
+
+def dump(values: Any) -> bytes:
+    """Write JSON; numbers that are not finite become null."""
+    return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+class Json(Response):
+    """An answer as JSON; Starlette's own looks for what the headers may lack, which takes as long
+    as a case."""
+
+    def __init__(self, content: Any, headers: Mapping[str, str] | None = None) -> None:
+        self.status_code, self.body, self.background = 200, dump(content), None
+        self.raw_headers = [
+            (b"content-length", b"%d" % len(self.body)),
+            (b"content-type", b"application/json"),
+            *((name.lower().encode(), value.encode()) for name, value in (headers or {}).items()),
+        ]
+
+
+# --- requests -------------------------------------------------------------------------------------
+
+
+async def small_body(request: Request) -> bytes:
+    """The bytes of a small JSON body, beside which there is no query."""
+    headers = dict(request.scope["headers"])
+    if headers.get(b"content-type") != b"application/json" or b"content-encoding" in headers:
+        form_of(headers, {JSON: JSON})
+    limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
+    body = bytes(await read_body(headers, request.receive, limit))
+    if pairs := _pairs(request.scope["query_string"]):
+        refuse(
+            [
+                FieldFault((name,), "belongs in the body", value, parameter=True)
+                for name, value in pairs[:100]
+            ]
+        )
+    return body
+
+
+def members_of(query: bytes) -> dict[str, Any]:
+    """The parameters of a query as a body has them: numbers as numbers, and both ends of
+    ``k=low..high``."""
+    members: dict[str, Any] = {}
+    twice: dict[str, None] = {}
+    for name, value in _pairs(query):
+        if name in _LISTS:
+            members.setdefault(name, []).extend(part.strip() for part in value.split(","))
+        elif name in members:
+            twice[name] = None
+        elif name == "k" and ".." in value:
+            members[name] = tuple(_number(end) for end in value.split(".."))
+        else:
+            members[name] = _number(value)
+    if twice:
+        refuse([FieldFault((name,), "is given more than once", parameter=True) for name in twice])
+    return members
+
+
+class StrictRequest(Request):
+    """A request whose body and query say nothing twice."""
+
+    _json: Any
+    _body: bytes
+
+    async def read(self) -> None:
+        """Read all that the endpoint may need, so that FastAPI finds it."""
+        if self.method == "POST":
+            self._body = await small_body(self)
+            self._json = decode(self._body)
+            if not isinstance(self._json, dict):
+                refuse([FieldFault((), "must be a JSON object", self._json)])
+        else:
+            # FastAPI takes lists apart again
+            pairs = [
+                (name, one)
+                for name, value in members_of(self.scope["query_string"]).items()
+                for one in (value if name in _LISTS else [value])
+            ]
+            self._query_params: Any = ImmutableMultiDict(pairs)
+
+
+def _pairs(query: bytes) -> list[tuple[str, str]]:
+    """Names and values of a query."""
+    text = query.decode("latin-1")
+    # what urllib would take longer to find
+    if not query.translate(None, _PLAIN) and query.count(b"&") < 100:
+        pairs = (pair.partition("=") for pair in text.split("&") if pair)
+        return [(name, value) for name, _, value in pairs]
+    try:
+        return parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)
+    except (ValueError, UnicodeDecodeError) as error:
+        raise RequestError(Kind.MALFORMED_BODY, f"the query cannot be read: {error}") from None
+
+
+def _number(text: str) -> Any:
+    """A number where the text is one, else the text; an unescaped "+" of a query arrives as a
+    space."""
+    if text.strip("0123456789.eE+- ") == "":
+        try:
+            number = float(text.replace("e ", "e+").replace("E ", "E+"))
+        except ValueError:
+            return text
+        return int(number) if text.isdigit() and len(text) < 16 else number
+    return text
+
+
+# --- routes ---------------------------------------------------------------------------------------
+
+
+class StrictRoute(APIRoute):
+    """FastAPI's own handling of a :class:`StrictRequest`."""
+
+    def get_route_handler(self) -> Handler:
+        """FastAPI's handler, with the request read before."""
+        answer = super().get_route_handler()
+
+        async def read_and_answer(request: Request) -> Response:
+            strict = StrictRequest(request.scope, request.receive)
+            await strict.read()
+            return await answer(strict)
+
+        return read_and_answer
+
+
+class DirectRoute(APIRoute):
+    """A route for ``async def answer(request, model)``: the model is read straight from the bytes
+    of the body, or from the query.
+
+    Nothing else is solved: such an endpoint declares no dependency.
+    """
+
+    def get_route_handler(self) -> Handler:
+        """Take the place of FastAPI's handler."""
+        in_body = bool(self.dependant.body_params)
+        declared = (self.dependant.body_params or self.dependant.query_params)[0]
+        model: Any = declared.field_info.annotation
+        answer: Any = self.endpoint
+
+        async def of_body(request: Request) -> Response:
+            case = validated(model, await small_body(request))
+            response: Response = await answer(request, case)
+            return response
+
+        async def of_query(request: Request) -> Response:
+            members = members_of(request.scope["query_string"])
+            try:
+                case = model.model_validate(members)
+            except ValidationError as error:
+                raise invalid(error, model, members, parameter=True) from None
+            response: Response = await answer(request, case)
+            return response
+
+        if self.dependant.dependencies:
+            raise TypeError(f"{self.path} has a dependency, which a DirectRoute does not solve")
+        return of_body if in_body else of_query
+
+
+def of_members(model: Any, members: Mapping[str, Any]) -> Any:
+    """The model of these members."""
+    try:
+        return model.model_validate(members)
+    except ValidationError as error:
+        raise invalid(error, model, members) from None
+
+
+def validated(model: Any, text: bytes) -> Any:
+    """The model that a JSON text holds."""
+    try:
+        found = model.model_validate_json(text)
+    except ValidationError as error:
+        # Python's reader has the reasons for what is no JSON, and for a member given twice
+        members = decode(text)
+        if not isinstance(members, dict):
+            refuse([FieldFault((), "must be a JSON object", members)])
+        if error.errors()[0]["type"] != "json_invalid":
+            raise invalid(error, model, members) from None
+        return of_members(model, members)  # such as half of a surrogate pair
+    # one colon for each member: none is named twice, and there is no object within
+    if text.count(b":") != len(found.model_fields_set):
+        decode(text)
+    return found

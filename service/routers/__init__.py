@@ -1,0 +1,90 @@
+"""The endpoints, one router for each topic."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse
+from starlette.types import Message, Receive, Scope, Send
+
+from ..problems import Kind
+
+
+def router_of(tag: str, route_class: type[APIRoute], prefix: str = "/v1") -> APIRouter:
+    """A router whose operations have the names of their functions."""
+    return APIRouter(
+        prefix=prefix,
+        tags=[tag],
+        route_class=route_class,
+        generate_unique_id_function=lambda route: route.name,
+        strict_content_type=False,
+    )
+
+
+_PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+_ID = {
+    "X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}
+}
+_RETRY = {
+    "Retry-After": {
+        "description": "Seconds after which to send the request again",
+        "schema": {"type": "integer"},
+    }
+}
+
+
+def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The descriptions of problems with these statuses, for ``responses``."""
+    return {
+        status: {
+            "description": "; ".join(kind.title for kind in Kind if kind.status == status),
+            "content": _PROBLEM,
+            "headers": _ID | (_RETRY if status == 503 else {}),
+        }
+        for status in statuses
+    }
+
+
+#: of every question in the query, and in the body
+ASKED = problems(400, 401, 422, 503)
+POSTED = problems(400, 401, 408, 413, 415, 422, 503)
+
+
+class _File(FileResponse):
+    """A file, or a part of it; a range outside the file is answered with problem details."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        size = self.headers["content-length"]
+
+        async def send_checked(message: Message) -> None:
+            if message.get("status") == 416:
+                raise HTTPException(
+                    416, f"the file has {size} bytes", {"Content-Range": f"bytes */{size}"}
+                )
+            if message.get("status") == 400:
+                raise HTTPException(400, "Range must be such as bytes=0-99, first <= last")
+            await send(message)
+
+        await super().__call__(scope, receive, send_checked)
+
+
+def file_answer(
+    request: Request, path: Path, headers: Mapping[str, str], **options: Any
+) -> Response:
+    """A file, the part of it that Range requests, or 304 if the client has it already; OSError if
+    it is gone.
+
+    The ETag is that of the headers, or is made from the size and the modification time.
+    """
+    answer = _File(path, headers=headers, stat_result=path.stat(), **options)
+    etag = answer.headers["etag"]
+    offered = [
+        part.strip().removeprefix("W/")
+        for part in request.headers.get("if-none-match", "").split(",")
+    ]
+    if etag in offered or "*" in offered:
+        return Response(status_code=304, headers={**headers, "ETag": etag})
+    return answer

@@ -1,0 +1,85 @@
+"""One case: ``GET`` and ``POST /v1/mu-macro``, and ``GET /v1/mu-macro.txt`` for spreadsheets."""
+
+from typing import Annotated, Any
+
+from fastapi import Query, Request, Response
+from starlette.responses import PlainTextResponse
+
+from mumacro.analysis.validity import digits, k_effect, model_rows
+from mumacro.errors import InputError
+
+from ..models.answers import CaseAnswer
+from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
+from ..quantities import Asked, answer_case
+from ..reading import DirectRoute, Json, dump
+from . import ASKED, POSTED, router_of
+
+router = router_of("answers", DirectRoute)
+_LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
+_CACHED: Any = {
+    "model": CaseAnswer,
+    "headers": {
+        "Cache-Control": {
+            "description": "How long, and by whom, it may be cached",
+            "schema": {"type": "string"},
+        }
+    },
+}
+
+
+async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str, Any]:
+    """The answer to a case."""
+    state, inputs = request.app.state, case.inputs
+    table, asked = state.tables.pick(case.tolerance), Asked.of(case, inputs)
+    surrogate, told = table.surrogate, MODEL in (case.include or ())
+
+    def work() -> tuple[dict[str, Any], int]:
+        values, source = answer_case(surrogate, inputs, asked)
+        if told:  # rows of docs/validity.md, and the digits that k supports
+            words = asked.kind.names
+            values["model"] = model_rows(surrogate, inputs, **words)
+            values["digits"] = digits(k_effect(surrogate, inputs, **words))
+        return values, source
+
+    large = told or asked.cost > _LARGE
+    values, source = await state.work.question(work) if large else work()
+    state.metrics.case(table, source)
+    return {**values, **table.signature}
+
+
+@router.get(
+    "/mu-macro", responses={200: _CACHED, **ASKED}, summary="Macroscopic friction of one case"
+)
+async def get_mu_macro(request: Request, case: Annotated[CaseQuery, Query()]) -> Response:
+    """Answer one case given as a query.  The answer can be cached."""
+    answer = await _answered(request, case)
+    return Json(answer, headers=request.app.state.settings.cache_fields)
+
+
+@router.post(
+    "/mu-macro",
+    responses={200: {"model": CaseAnswer}, **POSTED},
+    summary="Macroscopic friction of one case, as JSON",
+)
+async def post_mu_macro(request: Request, case: CaseRequest) -> Response:
+    """Answer one case given as a JSON object; ``include`` adds quantities to the default answer."""
+    return Json(await _answered(request, case))
+
+
+@router.get(
+    "/mu-macro.txt",
+    response_class=PlainTextResponse,
+    responses={200: {"headers": _CACHED["headers"]}, **ASKED},
+    summary="One value of one case, for spreadsheets (WEBSERVICE)",
+)
+async def get_mu_macro_text(request: Request, case: Annotated[TextQuery, Query()]) -> Response:
+    """Answer one case with one value as text: ``mu_macro``, or the one that ``value`` names."""
+    answer: Any = await _answered(request, case)
+    value = answer
+    for step in case.value.split("."):
+        value = value.get(step) if isinstance(value, dict) else None
+    if value is None or isinstance(value, dict):
+        raise InputError("value", case.value, f"one of {', '.join(answer)}; more with include")
+    text = value.encode() if isinstance(value, str) else dump(value)
+    headers = request.app.state.settings.cache_fields
+    return Response(text, media_type="text/plain; charset=utf-8", headers=headers)

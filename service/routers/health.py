@@ -1,0 +1,60 @@
+"""The state of the service: ``/livez`` (the process answers), ``/readyz`` and ``/healthz`` (answers
+are correct), ``/metrics``."""
+
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from .. import API_VERSION, __version__
+from ..limits import Working
+from ..models.answers import Health
+from ..reading import Json
+from ..tables import Loaded
+from . import problems, router_of
+
+router = router_of("health", APIRoute, prefix="")
+_NO_STORE = {"Cache-Control": "no-store"}
+_VERSIONS = {"api_version": API_VERSION, "service_version": __version__}
+_READY: dict[int | str, Any] = {200: {"model": Health}, **problems(503)}
+
+
+@router.get("/livez", responses={200: {"model": Health}}, summary="The process is alive")
+async def livez() -> Response:
+    """Report that the process answers, also without a table: a restart would not repair a table."""
+    return Json({"status": "alive", **_VERSIONS}, headers=_NO_STORE)
+
+
+@router.get("/readyz", responses=_READY, summary="The service is ready")
+async def readyz(tables: Loaded) -> Response:
+    """Check that every table is loaded, has the right checksum, gives its known answer and has an
+    unchanged file."""
+    tables.check()
+    labels = [table.label for table in tables.loaded]
+    return Json({"status": "ready", "tables": labels, **_VERSIONS}, headers=_NO_STORE)
+
+
+@router.get("/healthz", responses=_READY, summary="As /readyz")
+async def healthz(tables: Loaded) -> Response:
+    """Answer as /readyz."""
+    return await readyz(tables)
+
+
+_COUNTERS: dict[int | str, Any] = {
+    200: {
+        "description": "Requests by route, method and status, their duration, cases by table, "
+        "source and regime",
+        "content": {"text/plain": {"schema": {"type": "string"}}},
+    },
+    **problems(401, 503),
+}
+
+
+@router.get(
+    "/metrics", response_class=Response, responses=_COUNTERS, summary="Counters for Prometheus"
+)
+async def get_metrics(request: Request, work: Working) -> Response:
+    """Return the counters of all worker processes, in the text form of Prometheus."""
+    text = await work.question(request.app.state.metrics.text)
+    return Response(text, headers={**_NO_STORE, "Content-Type": CONTENT_TYPE_LATEST})

@@ -1,0 +1,45 @@
+"""Any periodic motion: ``POST /v1/motion``.  It reads no table."""
+
+from dataclasses import fields
+from typing import Any
+
+from fastapi import Response
+
+import mumacro
+from mumacro.errors import InputError
+
+from .. import API_VERSION
+from ..limits import Working
+from ..models.motion import MotionAnswer, MotionRequest
+from ..problems import FieldFault, reason_of, refuse
+from ..reading import Json, StrictRoute
+from . import POSTED, router_of
+
+router = router_of("answers", StrictRoute)
+_NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnswer.model_fields]
+
+
+@router.post(
+    "/motion",
+    responses={200: {"model": MotionAnswer}, **POSTED},
+    summary="The mean friction of any periodic motion",
+)
+async def post_motion(scene: MotionRequest, work: Working) -> Response:
+    """Compute the steady cycle of a contact that is shaken obliquely, in an ellipse, with harmonics
+    or with an oscillating load."""
+    return await work.question(lambda: Json(_answered(scene)))
+
+
+def _answered(scene: MotionRequest) -> dict[str, Any]:
+    try:
+        found = mumacro.motion(**scene.case, threads=1)
+    except InputError as error:
+        if error.field in MotionRequest.model_fields:
+            raise
+        # of a group of inputs, such as the speed: none of them is bad by itself
+        refuse([FieldFault((), f"{error.field} {reason_of(error)}", error.value)])
+    answer = {name: getattr(found, name) for name in _NUMBERS} | {"contact": scene.contact}
+    if scene.cycle:
+        columns = found.cycle()._asdict()
+        answer["cycle"] = {name: column.tolist() for name, column in columns.items()}
+    return {**answer, "api_version": API_VERSION}

@@ -1,0 +1,83 @@
+"""``/``: the page, a map of all cases with the user's point on it, and the friction law; ``/docs``:
+the description.
+
+What is served from files holds no number of a table and loads nothing from elsewhere.
+"""
+
+from pathlib import Path
+
+from fastapi import APIRouter, HTTPException, Request, Response
+
+from mumacro.inputs.kind import SPRING, kind_of
+
+from .. import __version__
+from ..limits import Working
+from ..page_data import POLICY, map_of, names
+from ..reading import Json
+from ..tables import Loaded
+from . import file_answer
+
+STATIC = Path(__file__).resolve().parent.parent / "static"
+_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+_FRESH = {"Cache-Control": "no-cache"}
+# what is vendored changes with its version only
+_KEPT = {"Cache-Control": "public, max-age=86400"}
+# Inline styles are allowed at /docs: the interface sets some on its elements.
+_DOCS_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
+    "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+router = APIRouter(include_in_schema=False)
+
+
+def _page(request: Request, path: Path, policy: str) -> Response:
+    headers = {"Content-Security-Policy": policy, "Referrer-Policy": "no-referrer", **_FRESH}
+    return file_answer(request, path, headers, media_type=_TYPES[path.suffix])
+
+
+@router.get("/")
+async def page(request: Request) -> Response:
+    """The page."""
+    return _page(request, STATIC / "page" / "index.html", POLICY)
+
+
+@router.get("/docs")
+async def docs(request: Request) -> Response:
+    """The description."""
+    return _page(request, STATIC / "swagger-ui" / "index.html", _DOCS_POLICY)
+
+
+@router.get("/static/page/names.json")
+async def get_names(request: Request) -> Response:
+    """The library's inputs, units and bounds, and the geometries of a contact."""
+    return Json(names(guide=request.app.state.settings.guide is not None), headers=_FRESH)
+
+
+@router.get("/static/page/map.json")
+async def get_map(request: Request, tables: Loaded, work: Working) -> Response:
+    """The data of the map of a contact and a direction, see ``page_data.map_of``."""
+    surrogate = tables.pick().surrogate
+    asked = [request.query_params.get(name, word) for name, word in SPRING.names.items()]
+    kind = kind_of(*asked)
+    etag = f'"{surrogate.checksum[:32]}-{__version__}-{"-".join(asked)}"'
+    headers = {"ETag": etag, **_FRESH}
+    if etag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return await work.question(lambda: Json(map_of(surrogate, **kind.names), headers=headers))
+
+
+# .js, .css
+ASSETS, _VENDORED = ([*(STATIC / folder).glob("*.*s")] for folder in ("page", "swagger-ui"))
+_FILES = {f"/static/{path.relative_to(STATIC).as_posix()}": path for path in (*ASSETS, *_VENDORED)}
+#: what needs no API key: the same for everyone, and without a number of a table
+OPEN = ("/", "/docs", "/static/page/names.json", *_FILES)
+
+
+@router.get("/static/{folder}/{name}")
+async def get_asset(request: Request, folder: str, name: str) -> Response:
+    """A script or a style sheet."""
+    path = _FILES.get(f"/static/{folder}/{name}")
+    if path is None:
+        raise HTTPException(404)
+    headers = _KEPT if name.startswith("swagger-ui") else _FRESH
+    return file_answer(request, path, headers, media_type=_TYPES[path.suffix])

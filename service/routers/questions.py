@@ -1,0 +1,260 @@
+"""Questions about a range of one input: its friction law, ``/v1/law`` and ``/v1/law.csv``, and
+``/v1/solve-for``."""
+
+import csv
+import io
+import itertools
+from functools import cache
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import Query, Response
+
+import mumacro
+from mumacro.analysis.law import Law
+from mumacro.analysis.load import Stiffening
+from mumacro.analysis.solve_for import Solution
+from mumacro.analysis.validity import load_rows
+from mumacro.errors import InputError
+from mumacro.inputs.fields import field_of, unit_of
+from mumacro.kernel.arrays import Array
+
+from ..limits import Working
+from ..models import answers
+from ..models.answers import LawAnswer, SolveForAnswer
+from ..models.options import MODEL
+from ..models.questions import LawQuery, LawRequest, SolveForRequest
+from ..quantities import Asked, answer_columns, listed, nested
+from ..reading import Json, StrictRoute
+from ..tables import Loaded, LoadedTable, Tables
+from . import ASKED, POSTED, router_of
+
+router = router_of("answers", StrictRoute)
+
+
+# --- friction law ---------------------------------------------------------------------------------
+
+
+def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
+    """The library's law and all columns beside the swept input."""
+    case, (along, per) = question.inputs, field_of(question.along)
+    asked = _asked(question, case)
+    law = mumacro.law(
+        table.surrogate,
+        along,
+        start=question.start * per,
+        stop=question.stop * per,
+        points=question.points,
+        scale=question.scale,
+        stiffness_exponent=question.stiffness_exponent,
+        **asked.kind.names,
+        **case,
+    )
+    inputs = _at(case, along, law.values, law.stiffening)
+    outputs, _ = answer_columns(table.surrogate, inputs, asked)
+    columns = listed(outputs) | {"mu_static": law.mu_static.tolist()}
+    if law.stiffening is not None:
+        columns["k"] = law.inputs["k"].tolist()
+    return law, columns
+
+
+def _asked(question: Any, case: dict[str, Any]) -> Asked:
+    if MODEL in (question.include or ()):
+        raise InputError("include", MODEL, f"without {MODEL}, which is for one case: /v1/mu-macro")
+    return Asked.of(question, case)
+
+
+def _at(
+    case: dict[str, Any], unknown: str, values: Array, stiffening: Stiffening | None
+) -> dict[str, Any]:
+    """The inputs of the cases at values of one of them."""
+    inputs = {name: value for name, value in case.items() if value is not None}
+    inputs[unknown] = values
+    if stiffening is not None:
+        inputs |= stiffening.scaled(case, values)
+    return inputs
+
+
+def _said(
+    question: Any, unknown: str, case: dict[str, Any], stiffening: Stiffening | None
+) -> dict[str, Any]:
+    """What is said of the model, if anything."""
+    rows = load_rows(unknown, case, question.contact, stiffening)
+    return {MODEL: rows} if rows else {}
+
+
+@router.post(
+    "/law",
+    responses={200: {"model": LawAnswer}, **POSTED},
+    summary="mu_macro over a range of one input",
+)
+async def post_law(question: LawRequest, tables: Loaded, work: Working) -> Response:
+    """Return the law in columns, with its static limit and its border."""
+
+    def answer() -> Response:
+        table = tables.pick(question.tolerance)
+        law, columns = _law(question, table)
+        along, per = question.along, field_of(question.along)[1]
+        swept = {"along": along, "unit": unit_of(along), "values": law.values / per}
+        border = [{"value": mark.value / per, "mu_macro": mark.mu_macro} for mark in law.border]
+        said = _said(question, along, question.inputs, law.stiffening)
+        return Json({**swept, **nested(columns), "border": border, **said, **table.signature})
+
+    return await work.question(answer)
+
+
+_CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
+
+
+@router.get(
+    "/law.csv",
+    response_class=Response,
+    responses={200: _CSV, **ASKED},
+    summary="mu_macro over a range of one input, as a table",
+)
+async def get_law_csv(
+    question: Annotated[LawQuery, Query()], tables: Loaded, work: Working
+) -> Response:
+    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their
+    units."""
+
+    def answer() -> Response:
+        law, columns = _law(question, tables.pick(question.tolerance))
+        along, per = question.along, field_of(question.along)[1]
+        heads = {f"{along} [{unit_of(along)}]": (law.values / per).tolist()}
+        for path in sorted(columns, key=lambda path: path in _TEXTS):  # texts last
+            shown = ["" if value != value else value for value in columns[path]]
+            heads[path if path in _TEXTS else f"{path} [{unit_at(path)}]"] = shown
+        text = io.StringIO()
+        writer = csv.writer(text)
+        writer.writerow(heads)
+        writer.writerows(zip(*heads.values(), strict=True))
+        headers = {
+            "Content-Disposition": f'attachment; filename="friction-law-{along}.csv"',
+            "Cache-Control": "no-cache",
+        }
+        kind = "text/csv; charset=utf-8; header=present"
+        return Response(text.getvalue(), media_type=kind, headers=headers)
+
+    return await work.question(answer)
+
+
+_TEXTS = ("regime", "source")
+
+
+@cache
+def unit_at(path: str) -> str:
+    """The unit of a column of a law, as the model of the answer has it."""
+    name, _, member = path.partition(".")
+    model: Any = LawAnswer
+    if member:
+        model = getattr(answers, "".join(word.capitalize() for word in name.split("_")))
+    extra: Any = model.model_fields[member or name].json_schema_extra
+    return str(extra["unit"])
+
+
+# --- inverse --------------------------------------------------------------------------------------
+
+_NO_LIMIT = 1e300
+
+
+@router.post(
+    "/solve-for",
+    responses={200: {"model": SolveForAnswer}, **POSTED},
+    summary="The value of one input that gives a wanted mu_macro",
+)
+async def post_solve_for(question: SolveForRequest, tables: Loaded, work: Working) -> Response:
+    """Return every root of every target.  A target out of reach has none; ``reachable`` is the
+    range of mu_macro."""
+    return await work.question(lambda: Json(_solved(question, tables)))
+
+
+def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
+    table, case = tables.pick(question.tolerance), question.inputs
+    asked = _asked(question, case)
+    name, per = field_of(question.unknown)
+    unit = 1.0
+    if question.quantity == "mu_ratio":
+        if question.unknown == "mu0" or question.mu0 is None:
+            bound = "mu_macro where mu0 is the unknown or is left out"
+            raise InputError("quantity", question.quantity, bound)
+        unit = question.mu0
+    within = None if question.range is None else (question.range[0] * per, question.range[1] * per)
+    solution = mumacro.solve_for(
+        table.surrogate,
+        name,
+        [x * unit for x in question.target],
+        within=within,
+        stiffness_exponent=question.stiffness_exponent,
+        **asked.kind.names,
+        **case,
+    )
+    included = _included(table, case, asked, name, solution)
+    answer: dict[str, Any] = {"unknown": question.unknown, "unit": unit_of(question.unknown)}
+    answer["quantity"] = question.quantity
+    answer |= _results(question, solution, included, unit, per)
+    if solution.ends:
+        ks = case.get("k_range") or (case["k_low"], case["k_high"])
+        answer["ends"] = [
+            {"k": k, **_results(question, end, None, unit, per)}
+            for k, end in zip(ks, solution.ends, strict=True)
+        ]
+    answer |= _said(question, name, case, solution.stiffening)
+    return {**answer, **table.signature}
+
+
+def _results(
+    question: SolveForRequest,
+    solution: Solution,
+    included: list[dict[str, Any]] | None,
+    unit: float,
+    per: float,
+) -> dict[str, Any]:
+    """The roots of every target, what was searched, and what is reachable there."""
+    reach, more = solution.reach, itertools.repeat({}) if included is None else iter(included)
+    results: list[dict[str, Any]] = []
+    for target, roots in zip(question.target, solution.roots, strict=True):
+        in_unit = [
+            root._replace(value=root.value / per, low=root.low / per, high=root.high / per)
+            for root in roots
+        ]
+        results.append(
+            {"target": target, "roots": [{**root._asdict(), **next(more)} for root in in_unit]}
+        )
+        if not roots:
+            results[-1]["reason"] = _reason(question, target, solution, unit)
+    reachable = {
+        "min": reach.mu_min / unit,
+        "max": reach.mu_max / unit,
+        "min_included": reach.min_included,
+        "max_included": reach.max_included,
+    }
+    searched = [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per]
+    return {"results": results, "range": searched, "reachable": reachable}
+
+
+def _included(
+    table: LoadedTable, case: dict[str, Any], asked: Asked, unknown: str, solution: Solution
+) -> list[dict[str, Any]]:
+    """The included quantities of every root, in order."""
+    values = np.array([root.value for roots in solution.roots for root in roots])
+    if not asked.include or not values.size:
+        return [{}] * values.size
+    inputs = _at(case, unknown, values, solution.stiffening)
+    outputs, _ = answer_columns(table.surrogate, inputs, asked)
+    default = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+    more = {path: x.tolist() for path, x in outputs.items() if path not in default}
+    rows = zip(*more.values(), strict=True)
+    return [nested(dict(zip(more, row, strict=True))) for row in rows]
+
+
+def _reason(question: SolveForRequest, target: float, solution: Solution, unit: float) -> str:
+    reach = solution.reach
+    low, high = reach.mu_min / unit, reach.mu_max / unit
+    if solution.constant:
+        return (
+            f"{question.unknown} has no influence here: {question.quantity} is {low!r} for every "
+            "value in the range"
+        )
+    left, right = "[" if reach.min_included else "(", "]" if reach.max_included else ")"
+    return f"{target!r} is not in the reachable range {left}{low!r}, {high!r}{right}"

@@ -1,0 +1,75 @@
+"""The table itself: ``/v1/table`` (metadata) and ``/v1/table.nc`` (the file)."""
+
+from typing import Annotated, Any
+
+from fastapi import Query, Request, Response
+from pydantic import Field
+
+from mumacro.errors import TableError
+
+from .. import __version__
+from ..models.answers import TableAnswer
+from ..models.inputs import Positive, Strict
+from ..reading import Json, StrictRoute
+from ..tables import Loaded
+from . import ASKED, file_answer, problems, router_of
+
+router = router_of("table", StrictRoute)
+
+
+class TableQuery(Strict):
+    """Choice of a table; the tightest by default."""
+
+    tolerance: Positive | None = Field(None, description="Error of mu_macro/mu0 [-]")
+
+
+Chosen = Annotated[TableQuery, Query()]
+
+
+@router.get(
+    "/table", responses={200: {"model": TableAnswer}, **ASKED}, summary="Properties of a table"
+)
+async def get_table(chosen: Chosen, tables: Loaded) -> Response:
+    """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
+    table = tables.pick(chosen.tolerance)
+    surrogate = table.surrogate
+    answer = {
+        name: getattr(surrogate, name)
+        for name in TableAnswer.model_fields
+        if hasattr(surrogate, name)
+    }
+    answer |= {
+        "file": surrogate.path.name,
+        "size_bytes": table.stamp[0],
+        "service_version": __version__,
+    }
+    loaded = [other.label for other in tables.loaded]
+    return Json({**answer, "loaded": loaded, **table.signature})
+
+
+_FILE: Any = {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}}
+_PARTS: dict[int | str, Any] = {
+    200: {"description": "The file", "content": _FILE},
+    206: {"description": "The part of it that Range requests", "content": _FILE},
+}
+
+
+@router.get(
+    "/table.nc",
+    response_class=Response,
+    responses={**_PARTS, **ASKED, **problems(416)},
+    summary="The table as a netCDF-4 file",
+)
+async def get_table_file(request: Request, chosen: Chosen, tables: Loaded) -> Response:
+    """Stream the file from disk; ranges are supported.  It is the file that the answers come
+    from."""
+    table = tables.pick(chosen.tolerance)
+    table.check()  # a file that was replaced after loading holds another table with the same name
+    path = table.surrogate.path
+    headers = {"ETag": f'"{table.surrogate.checksum}"', "Cache-Control": "no-cache"}
+    try:
+        return file_answer(
+            request, path, headers, media_type="application/x-netcdf", filename=path.name
+        )
+    except OSError as error:
+        raise TableError(path, "the file is gone") from error

@@ -1,0 +1,92 @@
+"""API keys, and what the head of a request may say: two middlewares in front of every path."""
+
+import secrets
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from .problems import Kind, RequestError, path_in
+
+#: as OpenAPI names the two ways to send a key
+SCHEMES = {
+    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
+    "bearer": {"type": "http", "scheme": "bearer"},
+}
+HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
+NOSNIFF = (b"x-content-type-options", b"nosniff")
+_ONCE = (
+    b"host",
+    b"x-api-key",
+    b"authorization",
+    b"content-type",
+    b"content-encoding",
+    b"transfer-encoding",
+    b"x-request-id",
+)
+
+
+class Keys:
+    """Every path needs a key but those that are named, and what is below ``/guide/``.
+
+    A dependency of each router would leave open whatever somebody forgets to give it.
+    """
+
+    def __init__(self, app: ASGIApp, keys: Mapping[str, str], open_paths: Iterable[str]) -> None:
+        self._app, self._keys, self._open = app, keys, frozenset(open_paths)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request pass with a known key; the name of the key's holder goes into the log."""
+        if scope["type"] == "http":
+            path = path_in(scope)
+            if path not in self._open and not path.startswith("/guide/"):
+                scope["key_holder"] = self._holder(dict(scope["headers"]))
+        await self._app(scope, receive, send)
+
+    def _holder(self, headers: Mapping[bytes, bytes]) -> str:
+        offered = headers.get(b"x-api-key")
+        if offered is None:
+            scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
+            offered = credentials.strip() if scheme.lower() == b"bearer" else b""
+        # compares all keys: the time does not depend on the key sent
+        names = [
+            name
+            for key, name in self._keys.items()
+            if secrets.compare_digest(offered, key.encode("ascii"))
+        ]
+        if not names:
+            detail = "send the API key as X-API-Key or as Authorization: Bearer"
+            headers_back = {"WWW-Authenticate": "Bearer"}
+            raise RequestError(Kind.UNAUTHORIZED, detail, headers=headers_back)
+        return names[0]
+
+
+class Heads:
+    """Refuses a head that says two things, or asks for another protocol, as which its body would be
+    read."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request pass whose head is clear."""
+        if scope["type"] == "http":
+            _check(scope, dict(scope["headers"]))
+        await self._app(scope, receive, send)
+
+
+def _check(scope: Scope, headers: Mapping[bytes, Any]) -> None:
+    version = scope["http_version"]
+    if version not in ("1.0", "1.1") or (version == "1.1" and b"host" not in headers):
+        raise RequestError(Kind.MALFORMED_HTTP, "a request is of HTTP/1.1 and has one Host")
+    if headers.get(b"transfer-encoding", b"chunked").lower().strip(b" \t,") != b"chunked":
+        raise RequestError(Kind.MALFORMED_HTTP, "the only transfer coding is chunked")
+    if len(headers) != len(scope["headers"]):
+        names = [name for name, _ in scope["headers"]]
+        for name in _ONCE:
+            if names.count(name) > 1:
+                detail = f"the header {name.decode()} is given more than once"
+                raise RequestError(Kind.MALFORMED_HTTP, detail)
+    if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
+        detail = "this service does not upgrade connections: send no Upgrade"
+        raise RequestError(Kind.MALFORMED_HTTP, detail)
