@@ -13,7 +13,7 @@
 MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s)) : 1.0; }
 
 /* v~ from which all springs slide: the slowest for its amplitude is the middle one, or the one of the steepest ray. */
-static double mu_ball_border(const mumacro_data *data, double y) {
+MU_INLINE double mu_ball_border(const mumacro_data *data, double y) {
     if (!(y > MU_MIDDLE * MU_STEEPEST_Y)) return y >= 0.0 ? MU_STEEPEST * y : NAN;
     return MU_MIDDLE * mu_border_at(data, y / MU_MIDDLE);
 }

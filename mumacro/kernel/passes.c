@@ -70,8 +70,8 @@ MU_INLINE int mu_pass_places(const mumacro_data *data, int contact, int n, mu_ch
             contact == MU_BALL ? mu_place_ball(steepest, v, y, crit, ln_y) : mu_place_common(v, y, crit, ln_y);
         memcpy(&known, c->block + i, sizeof known);
         block = mu_select_whole(MU_WHERE(known == 0), found.block, known);
-        left |= MU_WHERE(block == mu_all_whole(contact == MU_BALL ? MU_B_CORNER : MU_CORNER)) |
-                MU_WHERE(block == mu_all_whole(contact == MU_BALL ? MU_B_FAST : MU_FAST)) |
+        left |= MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_CORNER : (int)MU_CORNER)) |
+                MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_FAST : (int)MU_FAST)) |
                 MU_WHERE(block == mu_all_whole(MU_OTHER));
         mu_store(c->a + i, found.a);
         mu_store(c->b + i, found.b);
@@ -232,7 +232,7 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, c
         bound[i] = fabs(c->factor[i]) * error[0] + error[1];
     }
     for (int i = 0; source && i < n; ++i)
-        source[i] = (int8_t)(contact != MU_BALL ? c->block[i] : c->block[i] < MU_B_RING ? MU_BALL_SLIDES : MU_BALL_PARTLY);
+        source[i] = (int8_t)(contact != MU_BALL ? c->block[i] : (int64_t)(c->block[i] < MU_B_RING ? MU_BALL_SLIDES : MU_BALL_PARTLY));
     for (int i = 0; left && i < n; ++i) {
         if (mu_is_left(c->block[i])) {
             const mu_answer found = mu_answer_left(data, contact, MU_MU_RATIO, c, i, v[i], y[i]);
@@ -288,13 +288,13 @@ static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
     return mu;
 }
 
-/* Slopes at a point of the chunk; slope: of mu_pass_slopes, which counts for mu~ only. */
+/* Slopes at a point of the chunk; slope: of mu_pass_slopes for mu~, NULL for other quantities. */
 MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quantity, const mu_chunk *c,
                                  const mu_slope *slope, int i, double v, double y) {
     const int charted = contact == MU_BALL ? c->block[i] >= MU_B_LOW && c->block[i] < MU_B_END : c->block[i] < MU_CHARTS;
     if (charted && mu_form_in((int)c->block[i], quantity).factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
-        if (quantity == MU_MU_RATIO && !mu_is_corner(at.block)) {
+        if (slope != NULL && !mu_is_corner(at.block)) {
             const mu_spot spot = {c->cell[i], c->u[i], c->w[i]};
             return mu_slopes_in_block(data, quantity, &at, spot, slope[i], c->base[i], c->factor[i]);
         }
@@ -310,14 +310,16 @@ MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int q
         const int few = mu_few(n - i);
         mu_chunk c;
         mu_slope slope[MU_CHUNK];
+        const mu_slope *known = NULL;
         mu_pass_borders(data, contact, few, v + i, y + i, &c);
         mu_pass_places(data, contact, few, &c);
         if (quantity == MU_MU_RATIO) {
             mu_pass_cells(data, few, &c);
             mu_pass_slopes(data, few, &c, slope);
+            known = slope;
         }
         for (int j = 0; j < few; ++j) {
-            const mu_slopes found = mu_slopes_of(data, contact, quantity, &c, slope, j, v[i + j], y[i + j]);
+            const mu_slopes found = mu_slopes_of(data, contact, quantity, &c, known, j, v[i + j], y[i + j]);
             out[MU_SLOPE_VALUE * stride + i + j] = found.value;
             out[MU_SLOPE_V * stride + i + j] = found.along_v;
             out[MU_SLOPE_Y * stride + i + j] = found.along_y;
