@@ -101,8 +101,8 @@ def in_words(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> 
     >>> in_words({"mu0": 0.3, "Fz": 10.0, "k": 1e6}, {"contact": "ball", "direction": "along"})
     '$\\\\mu_0$ = 0.3, $F_z$ = 10 N, $k$ = 1 N/µm; ball, along'
     """
-    told = ", ".join(_quantity(name, value) for name, value in case.items())
-    return "; ".join(part for part in (told, ", ".join((kind or {}).values())) if part)
+    inputs = ", ".join(_quantity(name, value) for name, value in case.items())
+    return "; ".join(part for part in (inputs, ", ".join((kind or {}).values())) if part)
 
 
 def _quantity(name: str, value: Any) -> str:
@@ -374,7 +374,15 @@ def _plane(axes: Any, v_crit: Any, y: Any, normal: bool = False) -> None:
 
 
 def plot_cycle(
-    t: Array, x: Array, y: Array, Fx: Array, Fy: Array, Fz: Array, mu0: float, axes: Any = None
+    t: Array,
+    x: Array,
+    y: Array,
+    Fx: Array,
+    Fy: Array,
+    Fz: Array,
+    mu0: float,
+    title: str,
+    axes: Any = None,
 ) -> Any:
     """Forces of one period over time, with the limit mu0 Fz, and the path of the upper point with
     the force's direction at 16 moments; all (n,), in SI.  ``axes`` are two, or new ones."""
@@ -389,7 +397,7 @@ def plot_cycle(
     mean = float(np.sum((Fx[1:] + Fx[:-1]) * np.diff(share)) / 2.0)
     forces.axhline(mean, lw=0.8, color=BLUE, ls="--", label="mean of $F_x$")
     forces.set(xlabel="share of the period [-]", ylabel="force [N]")
-    _finish(forces, "")
+    _finish(forces, title)
     micro = 1e6
     path.plot(micro * x, micro * y, color=INK, label="upper point")
     path.plot(micro * x[0], micro * y[0], "o", color=BLUE, label="start of the period")

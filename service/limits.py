@@ -34,19 +34,19 @@ _NICENESS = 5  # that is added to the threads of batches, so that short requests
 _OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
 
 
-def form_of(headers: Mapping[bytes, bytes], known: Mapping[str, T]) -> T:
-    """What is known by the media type of a body; without a Content-Type it is the first."""
-    given = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(known))
-    media, _, parameters = given.partition(";")
-    found = known.get(media.strip())
-    if found is None or (parameters and _OTHER_CHARSET.search(parameters)):
-        offer = ", ".join(known)
-        told = f"send {offer}, not {given[:80]}"
-        raise RequestError(Kind.UNSUPPORTED_BODY, told, headers={"Accept-Post": offer})
+def form_of(headers: Mapping[bytes, bytes], forms: Mapping[str, T]) -> T:
+    """Of ``forms`` by media type the one of a body; without a Content-Type the first."""
+    media_type = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(forms))
+    media, _, parameters = media_type.partition(";")
+    form = forms.get(media.strip())
+    if form is None or (parameters and _OTHER_CHARSET.search(parameters)):
+        offer = ", ".join(forms)
+        detail = f"send {offer}, not {media_type[:80]}"
+        raise RequestError(Kind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": offer})
     if headers.get(b"content-encoding", b"identity").lower() != b"identity":
-        told = "send the body without Content-Encoding"
-        raise RequestError(Kind.UNSUPPORTED_BODY, told, headers={"Accept-Encoding": "identity"})
-    return found
+        detail = "send the body without Content-Encoding"
+        raise RequestError(Kind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"})
+    return form
 
 
 async def read_body(
@@ -61,12 +61,14 @@ async def read_body(
     body, more = bytearray(), True
     while True:
         if size > limit:
-            told = (
+            remedy = (
                 "send many cases to /v1/mu-macro/batch, more as NDJSON without a "
                 "Content-Length, reading while you send"
             )
             raise RequestError(
-                Kind.BODY_TOO_LARGE, f"a body may have up to {limit} bytes: {told}", max_bytes=limit
+                Kind.BODY_TOO_LARGE,
+                f"a body may have up to {limit} bytes: {remedy}",
+                max_bytes=limit,
             )
         if size > SMALL_BODY:
             large()

@@ -57,9 +57,9 @@ class Metrics:
         requests = Counter(
             "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own
         )
-        told = "From the head of a request to the end of its answer"
+        meaning = "From the head of a request to the end of its answer"
         seconds = Histogram(
-            "mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own
+            "mumacro_request_duration_seconds", meaning, ["route"], buckets=_BUCKETS_S, registry=own
         )
         cases = Counter(
             "mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own

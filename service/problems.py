@@ -198,8 +198,8 @@ def invalid(
     """The error that reports what a model refuses in the members of a body or query."""
     faults = faults_of(error.errors(include_url=False), names_of(model), parameter)
     if "mu0" in model.model_fields and model.model_fields["mu0"].is_required():
-        known = {fault.path for fault in faults}
-        faults += [fault for fault in _absent_in(members) if fault.path not in known]
+        paths = {fault.path for fault in faults}
+        faults += [fault for fault in _absent_in(members) if fault.path not in paths]
     return refused(faults)
 
 
@@ -319,42 +319,40 @@ def meaning(error: Exception, scope: Scope) -> RequestError:
     """What an exception means for its request; nothing of an unknown one is told."""
     for kind, means in _MEANINGS.items():
         if isinstance(error, kind):
-            known: RequestError = means(error, scope)
-            return known
+            request_error: RequestError = means(error, scope)
+            return request_error
     detail = "The request could not be answered; the log has the reason under its request id."
     return RequestError(Kind.UNEXPECTED, detail)
 
 
-def document_of(error: Exception, scope: Scope) -> dict[str, Any]:
-    """The problem document of an exception."""
-    found = meaning(error, scope)
-    slug = found.kind.name.lower().replace("_", "-")
-    body: dict[str, Any] = {"type": f"urn:problem-type:mumacro:{slug}", "title": found.kind.title}
-    body |= {"status": found.kind.status, "detail": found.detail, "instance": scope["path"]}
+def document_of(error: RequestError, scope: Scope) -> dict[str, Any]:
+    """The problem document of an error."""
+    slug = error.kind.name.lower().replace("_", "-")
+    body: dict[str, Any] = {"type": f"urn:problem-type:mumacro:{slug}", "title": error.kind.title}
+    body |= {"status": error.kind.status, "detail": error.detail, "instance": scope["path"]}
     if "request_id" in scope:
         body["request_id"] = scope["request_id"]
-    if found.faults:
+    if error.faults:
         query = scope["method"] in ("GET", "HEAD")
-        body["errors"] = [fault.as_json(query) for fault in found.faults[:MAX_FIELD_FAULTS]]
-        body["n_errors"] = len(found.faults)
-    return body | found.members
+        body["errors"] = [fault.as_json(query) for fault in error.faults[:MAX_FIELD_FAULTS]]
+        body["n_errors"] = len(error.faults)
+    return body | error.members
 
 
-def problem_of(error: Exception, scope: Scope) -> Response:
-    """The response to an exception."""
-    found = meaning(error, scope)
-    headers = {"Cache-Control": "no-store", **found.kind.headers, **found.headers}
-    content = orjson.dumps(document_of(found, scope))
+def problem_of(error: RequestError, scope: Scope) -> Response:
+    """The response to an error."""
+    headers = {"Cache-Control": "no-store", **error.kind.headers, **error.headers}
+    content = orjson.dumps(document_of(error, scope))
     return Response(
-        content, found.kind.status, headers=headers, media_type="application/problem+json"
+        content, error.kind.status, headers=headers, media_type="application/problem+json"
     )
 
 
 async def handle(request: Request, error: Exception) -> Response:
     """FastAPI's handler of all of them."""
-    found = meaning(error, request.scope)
-    await drained(found, request)
-    return problem_of(found, request.scope)
+    request_error = meaning(error, request.scope)
+    await drained(request_error, request)
+    return problem_of(request_error, request.scope)
 
 
 #: exception -> its handler: the one table of the application

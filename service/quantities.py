@@ -195,13 +195,13 @@ _DERIVED = "how a disturbance decays is derived for across only"
 @quantity(cost=5, along=_DERIVED, normal=_DERIVED)
 def settling(cases: Answered) -> Outputs:
     """Periods until a disturbed contact is within 1 % of its steady cycle."""
-    found = decay(cases.surrogate, **cases.columns, **cases.words)
+    settled = decay(cases.surrogate, **cases.columns, **cases.words)
     return {
-        "settling.periods": found.periods,
-        "settling.periods_any": found.periods_any,
-        "settling.time": found.time,
-        "settling.slip_path": found.slip_path,
-        "settling_bound.periods": found.error_bound,
+        "settling.periods": settled.periods,
+        "settling.periods_any": settled.periods_any,
+        "settling.time": settled.time,
+        "settling.slip_path": settled.slip_path,
+        "settling_bound.periods": settled.error_bound,
     }
 
 
@@ -302,9 +302,9 @@ def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> t
     if include:
         if asked.interval or "f" in columns:
             columns = Cases.of(by_name(None, columns, kind), kind).columns
-        known = Answered(surrogate, kind, columns, answer, asked.std)
+        answered = Answered(surrogate, kind, columns, answer, asked.std)
         for name in include:
-            outputs |= QUANTITIES[name].compute(known)
+            outputs |= QUANTITIES[name].compute(answered)
     return outputs, codes
 
 

@@ -236,7 +236,7 @@ def of_members(model: Any, members: Mapping[str, Any]) -> Any:
 def validated(model: Any, text: bytes) -> Any:
     """The model that a JSON text holds."""
     try:
-        found = model.model_validate_json(text)
+        instance = model.model_validate_json(text)
     except ValidationError as error:
         # Python's reader has the reasons for what is no JSON, and for a member given twice
         members = decode(text)
@@ -246,6 +246,6 @@ def validated(model: Any, text: bytes) -> Any:
             raise invalid(error, model, members) from None
         return of_members(model, members)  # such as half of a surrogate pair
     # one colon for each member: none is named twice, and there is no object within
-    if text.count(b":") != len(found.model_fields_set):
+    if text.count(b":") != len(instance.model_fields_set):
         decode(text)
-    return found
+    return instance

@@ -117,10 +117,10 @@ class Settings(BaseSettings):
 
     def keys(self) -> dict[str, str]:
         """API key -> name of its holder, which logs show; empty where no key is needed."""
-        found = {key.get_secret_value(): name for name, key in self.api_keys.items()}
+        holders = {key.get_secret_value(): name for name, key in self.api_keys.items()}
         if self.api_key is not None:
-            found.setdefault(self.api_key.get_secret_value(), "default")
-        return found
+            holders.setdefault(self.api_key.get_secret_value(), "default")
+        return holders
 
     @cached_property
     def cache_fields(self) -> dict[str, str]:
@@ -144,15 +144,15 @@ def load_settings(**chosen: Any) -> Settings:
         for problem in error.errors(include_url=False):
             name = str(problem["loc"][0]).lower()
             bound = Settings.model_fields[name].description
-            given = "(hidden)" if name in ("api_key", "api_keys") else repr(problem["input"])[:200]
-            lines.setdefault(name, f"{PREFIX}{name.upper()} must be {bound}, got {given}")
+            value = "(hidden)" if name in ("api_key", "api_keys") else repr(problem["input"])[:200]
+            lines.setdefault(name, f"{PREFIX}{name.upper()} must be {bound}, got {value}")
         raise SettingsError("; ".join(lines.values())) from None
 
 
 def unknown_variables() -> list[str]:
     """Variables that begin with MUMACRO_ and are not settings: mostly spelling mistakes, so the log
     warns of them."""
-    known = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
+    names = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
     return sorted(
-        name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known
+        name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in names
     )

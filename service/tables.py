@@ -24,12 +24,12 @@ def _files(paths: Sequence[Path]) -> list[Path]:
     """
     files: list[Path] = []
     for path in paths:
-        found = [path] if path.is_file() else sorted(path.glob("[!.]*.nc"))
-        if not found:
+        tables = [path] if path.is_file() else sorted(path.glob("[!.]*.nc"))
+        if not tables:
             raise TableError(
                 path, "the directory holds no *.nc file" if path.is_dir() else "missing"
             )
-        files += found
+        files += tables
     return files
 
 

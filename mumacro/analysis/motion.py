@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from mumacro import plotting
 from mumacro.errors import InputError
-from mumacro.inputs.cases import real
-from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS, is_rigid
+from mumacro.inputs.cases import columns_of, real
+from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
@@ -153,8 +153,10 @@ class Motion:
     def plot(self, axes: Any = None, *, index: int | None = None) -> Any:
         """Forces over a period and the path of the upper point, see
         ``mumacro.plotting.plot_cycle``; needs matplotlib."""
-        mu0 = float(self.scenes.columns["mu0"][self._place(index)])
-        return plotting.plot_cycle(*self.cycle(index), mu0, axes)
+        i = self._place(index)
+        case = {name: float(column[i]) for name, column in self.scenes.columns.items()}
+        title = plotting.in_words(case, {"contact": self.scenes.contact})
+        return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, axes)
 
     def _place(self, index: int | None) -> int:
         n = np.size(self.mu_macro)
@@ -248,13 +250,8 @@ def motion(
         raise InputError("tolerance", tolerance, f"from {least:g} to {most:g}")
     if (omega is None) == (f is None):
         raise InputError("omega", omega, "given [rad/s], or f [Hz], exactly one of them")
-    columns = {
-        "mu0": real("mu0", mu0),
-        "Fz": real("Fz", Fz),
-        "k": np.asarray(math.inf) if isinstance(k, str) and is_rigid(k) else real("k", k),
-        "omega": real("omega", omega) if f is None else RAD_PER_CYCLE * real("f", f),
-        "v0": real("v0", v0),
-    }
+    inputs = {"mu0": mu0, "Fz": Fz, "k": k, "y0": 0.0, "omega": omega, "f": f, "v0": v0}
+    columns = {name: np.asarray(x) for name, x in columns_of(inputs).items() if name != "y0"}
     numbers = [number for part in terms for term in part for number in term[1:]]
     try:
         shape = common_shape([*columns.values(), *numbers])

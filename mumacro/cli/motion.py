@@ -47,10 +47,10 @@ def read_terms(name: str, text: str) -> list[tuple[float, float, float]]:
     """
     terms = []
     for part in text.split(","):
-        found = _TERM.fullmatch(part.strip())
-        if found is None:
+        term = _TERM.fullmatch(part.strip())
+        if term is None:
             raise ValueError(f"{name}={text}: write amplitude@phase, or harmonic:amplitude@phase")
-        harmonic, amplitude, phase = found.groups()
+        harmonic, amplitude, phase = term.groups()
         try:
             order = 1.0 if harmonic is None else float(harmonic)
         except ValueError:
@@ -89,7 +89,7 @@ def run(words: Sequence[str]) -> str:
         raise UsageError("y0 is an option here: --y for across, --x for along the drag")
     texts = [(name, text) for name in PARTS if (text := getattr(chosen, name)) is not None]
     parts = common.read_values(texts, read_terms)
-    found = steady_cycle(
+    motion = steady_cycle(
         **case,
         **dict(zip((name for name, _ in texts), parts, strict=True)),
         contact=chosen.contact,
@@ -97,24 +97,24 @@ def run(words: Sequence[str]) -> str:
     )
     names = [*(name for name, _, _ in _ROWS), "error_estimate"]
     if chosen.json:
-        lines = as_json({name: getattr(found, name) for name in names})
+        lines = as_json({name: getattr(motion, name) for name in names})
     else:
         form = f"#.{chosen.digits or 6}g"
         rows = [
-            (name, f"{getattr(found, name):{form}}", f"[{unit}]", text)
+            (name, f"{getattr(motion, name):{form}}", f"[{unit}]", text)
             for name, unit, text in _ROWS
         ]
-        lines = f"{in_columns(rows)}\nnumerical error of both about {found.error_estimate:.1e}"
+        lines = f"{in_columns(rows)}\nnumerical error of both about {motion.error_estimate:.1e}"
     if chosen.out is None:
         return lines
-    _write(chosen.out, found)
+    _write(chosen.out, motion)
     return lines if chosen.json else f"{lines}\nwritten: {chosen.out}"
 
 
-def _write(path: Path, found: Motion) -> None:
+def _write(path: Path, motion: Motion) -> None:
     if path.suffix != ".csv":
-        plotting.save(path, found.plot, panels=2)
+        plotting.save(path, motion.plot, panels=2)
         return
-    cycle: Cycle = found.cycle()
+    cycle: Cycle = motion.cycle()
     columns = {f"{name} [{_SI[name]}]": column for name, column in cycle._asdict().items()}
-    common.write_result(path, columns, found.plot)
+    common.write_result(path, columns, motion.plot)

@@ -360,8 +360,8 @@ class Kernel:
     ) -> None:
         """Move contacts (n,) by (dx, dy), while their limits go from ``before`` to ``after``:
         ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
-        given = map(_numbers, (before, after, k, dx, dy, forces, sums))
-        self._found.element_steps(before.size, forces.shape[1], *given)
+        arrays = map(_numbers, (before, after, k, dx, dy, forces, sums))
+        self._found.element_steps(before.size, forces.shape[1], *arrays)
 
     def motions(
         self,

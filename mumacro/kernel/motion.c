@@ -620,7 +620,7 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
     return r;
 }
 
-static mu_steady mu_cycle_of(const mu_march *march, double distance) {
+static mu_steady mu_steady_of(const mu_march *march, double distance) {
     mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
@@ -647,7 +647,7 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
         distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_length(r.step[0], r.step[1]));
         if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
         distance = mu_min(distance, 2.0 * limit);
-        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed) return mu_cycle_of(&march, distance);
+        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed) return mu_steady_of(&march, distance);
         ahead = base.step[0] * r.moved[0] + base.step[1] * r.moved[1];
         behind = base.step[0] * base.moved[0] + base.step[1] * base.moved[1];
         if (ahead < 0.0 && r.size > 0.5 * base.size && share > 1e-3) {
@@ -689,7 +689,7 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
         rate = mu_max(size[0] / size[1], size[1] / size[2]);
         distance = march.mean[MU_MEAN_PATH] < 1e-13 ? 0.0 : period > 2 && rate < 1.0 ? mu_min(2.0 * size[0] / (1.0 - rate), 2.0) : 2.0;
         if (march.failed) distance = 2.0;
-        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) return mu_cycle_of(&march, distance);
+        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) return mu_steady_of(&march, distance);
         f[0] = march.f[0];
         f[1] = march.f[1];
     }
@@ -762,7 +762,7 @@ typedef struct {
 
 /* How rough two functions are at the points of the rule: the size of their four highest coefficients by polynomials that
  * are orthogonal there.  They stay large at kinks, wherever these lie between the points. */
-static double mu_roughness(const double values[15][2], double *start, double *end) {
+static double mu_roughness(double values[15][2], double *start, double *end) {
     double x[15], weight[15], last[15] = {0.0}, p[15], size = 0.0, square = 0.0;
     double at_end = 0.7071067811865476, before = 0.0, sign = 1.0;
     for (int i = 0; i < 15; ++i) {

@@ -33,14 +33,14 @@ def _cost(kind: tuple[int, int]) -> int:
 def processors() -> int:
     """How many processors this process may use; the limit of a container counts, if the system
     gives it."""
-    found = (
+    count = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
     with suppress(OSError, ValueError):
         with open("/sys/fs/cgroup/cpu.max", encoding="ascii") as limit:
             quota, period = limit.read().split()
-        found = min(found, max(1, -(-int(quota) // int(period))))
-    return found
+        count = min(count, max(1, -(-int(quota) // int(period))))
+    return count
 
 
 def default_threads() -> int:

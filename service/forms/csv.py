@@ -31,8 +31,8 @@ _DIGITS = b"0123456789.eE+-"
 
 def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
     start = len(_MARK) if text.startswith(_MARK) else 0
-    found = _HEAD.match(text, start)
-    head, start = (b"", start) if found is None else (found[1], found.end())
+    first_line = _HEAD.match(text, start)
+    head, start = (b"", start) if first_line is None else (first_line[1], first_line.end())
     if len(head) > _LONGEST_HEAD:
         detail = f"the first line of the body has more than {_LONGEST_HEAD} bytes"
         raise RequestError(Kind.MALFORMED_BODY, detail)
@@ -115,8 +115,8 @@ def _head(cells: list[str]) -> dict[str, Scale]:
         units = UNITS_OF.get(LIKE.get(name, name), {})
         scale = Scale() if unit is None or not units else scale_of(name, unit)
         if scale is None:
-            known = ", ".join(units)[:300]
-            reason = f"has a unit that {name} cannot have; known are {known}"
+            symbols = ", ".join(units)[:300]
+            reason = f"has a unit that {name} cannot have; known are {symbols}"
             faults.append(FieldFault.of(name, reason))
         names.append(name)
         scales[name] = scale or Scale()

@@ -75,6 +75,12 @@ _K = (
     'Tangential stiffness of the contact [N/m], or "rigid"; it must be given, here or as an '
     "interval"
 )
+_MU0 = "Coulomb friction coefficient of the contact [-]"
+_FZ = "Normal force [N]"
+_OMEGA = "Angular frequency of the oscillation [rad/s]; omega or f is required"
+_F = "Frequency of the oscillation [Hz], in place of omega"
+_V0 = "Sliding velocity [m/s]"
+_LOW, _HIGH = "Lowest stiffness [N/m], with k_high", "Highest stiffness [N/m], with k_low"
 _Y0 = (
     "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding "
     "direction; required, unless the direction is normal"
@@ -86,22 +92,16 @@ Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 class OneCase(Strict):
     """The inputs of one case; omega or f, and k or an interval of it: exactly one of each."""
 
-    mu0: Positive = Field(
-        description="Coulomb friction coefficient of the contact [-]", examples=[0.3]
-    )
-    Fz: Positive = Field(description="Normal force [N]", examples=[10.0])
+    mu0: Positive = Field(description=_MU0, examples=[0.3])
+    Fz: Positive = Field(description=_FZ, examples=[10.0])
     k: Stiffness = either(_K, examples=[1e6])
     y0: NotNegative | None = optional(_Y0, examples=[2e-6])
-    omega: NotNegative | None = optional(
-        "Angular frequency of the oscillation [rad/s]; omega or f is required"
-    )
-    f: Hertz | None = optional(
-        "Frequency of the oscillation [Hz], in place of omega", examples=[20e3]
-    )
-    v0: NotNegative = Field(description="Sliding velocity [m/s]", examples=[0.01])
+    omega: NotNegative | None = optional(_OMEGA)
+    f: Hertz | None = optional(_F, examples=[20e3])
+    v0: NotNegative = Field(description=_V0, examples=[0.01])
     Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
-    k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
-    k_high: Positive | None = optional("Highest stiffness [N/m], with k_low")
+    k_low: Positive | None = optional(_LOW)
+    k_high: Positive | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -121,31 +121,25 @@ class Case(OneCase):
 class OtherInputs(Strict):
     """The inputs of a question about one of them, which is left out or null."""
 
-    mu0: Positive | None = optional(
-        "Coulomb friction coefficient of the contact [-]", examples=[0.3]
-    )
-    Fz: Positive | None = optional("Normal force [N]", examples=[10.0])
+    mu0: Positive | None = optional(_MU0, examples=[0.3])
+    Fz: Positive | None = optional(_FZ, examples=[10.0])
     k: Stiffness | None = optional(_K, examples=[1e6])
     y0: NotNegative | None = optional(_Y0, examples=[2e-6])
-    omega: NotNegative | None = optional(
-        "Angular frequency of the oscillation [rad/s]; omega or f is required"
-    )
-    f: Hertz | None = optional(
-        "Frequency of the oscillation [Hz], in place of omega", examples=[20e3]
-    )
-    v0: NotNegative | None = optional("Sliding velocity [m/s]")
+    omega: NotNegative | None = optional(_OMEGA)
+    f: Hertz | None = optional(_F, examples=[20e3])
+    v0: NotNegative | None = optional(_V0)
     Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
-    k_low: Positive | None = optional("Lowest stiffness [N/m], with k_high")
-    k_high: Positive | None = optional("Highest stiffness [N/m], with k_low")
+    k_low: Positive | None = optional(_LOW)
+    k_high: Positive | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite, and a null in k stays."""
         values = self.__dict__
-        found = {name: values[name] for name in INPUTS if values.get(name) is not None}
+        inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
         if values["k"] is None and "k" in self.model_fields_set:
-            found["k"] = None
-        return found
+            inputs["k"] = None
+        return inputs
 
 
 # --- columns --------------------------------------------------------------------------------------
@@ -234,8 +228,8 @@ class InputColumns(Strict):
     An entry that is no legal number spoils its own case only.
     """
 
-    mu0: PositiveColumn = Field(description="Coulomb friction coefficient of the contact [-]")
-    Fz: PositiveColumn = Field(description="Normal force [N]")
+    mu0: PositiveColumn = Field(description=_MU0)
+    Fz: PositiveColumn = Field(description=_FZ)
     k: StiffnessColumn = Field(
         None, description='Tangential stiffness [N/m], or "rigid"; or k_low and k_high'
     )
@@ -244,12 +238,12 @@ class InputColumns(Strict):
     )
     omega: NotNegativeColumn = Field(None, description="Angular frequency [rad/s]; or f")
     f: HertzColumn = Field(None, description="Frequency [Hz], in place of omega")
-    v0: NotNegativeColumn = Field(description="Sliding velocity [m/s]")
+    v0: NotNegativeColumn = Field(description=_V0)
     Fz_amplitude: NotNegativeColumn = Field(
         None, description="Amplitude of the normal force [N], for direction normal in place of y0"
     )
-    k_low: PositiveColumn = Field(None, description="Lowest stiffness [N/m], with k_high")
-    k_high: PositiveColumn = Field(None, description="Highest stiffness [N/m], with k_low")
+    k_low: PositiveColumn = Field(None, description=_LOW)
+    k_high: PositiveColumn = Field(None, description=_HIGH)
     k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")
 
     @property

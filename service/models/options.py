@@ -145,10 +145,10 @@ class Deviations(Strict):
         names = self.model_fields_set & _DEVIATIONS
         if not names:
             return None
-        found = {name.removeprefix("std_"): getattr(self, name) for name in names}
-        if found.get("omega") and found.get("f"):
-            raise InputError("std_f", found["f"], "left out beside std_omega: not of both")
-        return InputStd(**found)
+        deviations = {name.removeprefix("std_"): getattr(self, name) for name in names}
+        if deviations.get("omega") and deviations.get("f"):
+            raise InputError("std_f", deviations["f"], "left out beside std_omega: not of both")
+        return InputStd(**deviations)
 
 
 _DEVIATIONS = frozenset(Deviations.model_fields)

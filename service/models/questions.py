@@ -256,10 +256,10 @@ class FitRequest(Choice):
     @property
     def points(self) -> dict[str, Any]:
         """The columns that are given, by name; a null in k stays, unless k is fitted."""
-        found = {name: value for name in _COLUMNS if (value := getattr(self, name)) is not None}
+        columns = {name: value for name in _COLUMNS if (value := getattr(self, name)) is not None}
         if "k" in self.model_fields_set and self.k is None and "k" not in self.unknowns:
             raise InputError("k", None, STIFFNESS)
-        return found
+        return columns
 
 
 _COLUMNS = ("v0", "mu_macro", "std", "mu0", "Fz", "k", "y0", "omega", "f", "Fz_amplitude")

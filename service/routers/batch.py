@@ -20,7 +20,7 @@ from ..batch import Batch, Body, Form, both
 from ..forms import ALL, FORMS
 from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body, within
 from ..models.options import BatchOptions, CaseRequest
-from ..problems import FieldFault, Kind, RequestError, document_of, refuse
+from ..problems import FieldFault, Kind, RequestError, document_of, meaning, refuse
 from ..quantities import Asked, answer_case
 from ..reading import DirectRoute, decode, dump, of_members, validated
 from . import POSTED, router_of
@@ -169,7 +169,7 @@ class _Answer(Response):
                 yield self._case(line)
         except MumacroError as error:
             scope = {**self._scope, "path": f"{self._scope['path']}#line={number}"}
-            yield dump(document_of(error, scope))
+            yield dump(document_of(meaning(error, scope), scope))
         yield b"\n"
 
     def _case(self, line: bytes) -> bytes:

@@ -31,17 +31,17 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     """The answer to a case."""
     state, inputs = request.app.state, case.inputs
     table, asked = state.tables.pick(case.tolerance), Asked.of(case, inputs)
-    surrogate, told = table.surrogate, MODEL in (case.include or ())
+    surrogate, with_model = table.surrogate, MODEL in (case.include or ())
 
     def work() -> tuple[dict[str, Any], int]:
         values, source = answer_case(surrogate, inputs, asked)
-        if told:  # rows of docs/validity.md, and the digits that k supports
+        if with_model:  # rows of docs/validity.md, and the digits that k supports
             words = asked.kind.names
             values["model"] = model_rows(surrogate, inputs, **words)
             values["digits"] = digits(k_effect(surrogate, inputs, **words))
         return values, source
 
-    large = told or asked.cost > _LARGE
+    large = with_model or asked.cost > _LARGE
     values, source = await state.work.question(work) if large else work()
     state.metrics.case(table, source)
     return {**values, **table.signature}

@@ -39,8 +39,8 @@ _MEASURED = ("mu_macro", STD)
 async def post_stiffness(contact: StiffnessRequest) -> Response:
     """Return k, and the contact to ask for with it; the arguments of a geometry in SI."""
     arguments = contact.model_dump(exclude_none=True, exclude={"geometry"})
-    found = asdict(contact_of(contact.geometry, **arguments))
-    return Json({"geometry": contact.geometry, **found, "api_version": API_VERSION})
+    answer = asdict(contact_of(contact.geometry, **arguments))
+    return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 
 
 @router.post(
@@ -63,9 +63,9 @@ def _fitted(table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]
             fit = mumacro.fit(columns, measured.unknowns, surrogate=table.surrogate, **words)
     except ModuleNotFoundError as error:
         raise RequestError(Kind.NOT_INSTALLED, missing("fit", error)) from None
-    found = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
+    members = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
     return {
-        **found,
+        **members,
         "values": _in_words(fit.values),
         "interval": {
             name: [_in_words({name: end})[name] for end in ends]

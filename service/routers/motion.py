@@ -32,14 +32,14 @@ async def post_motion(scene: MotionRequest, work: Working) -> Response:
 
 def _answered(scene: MotionRequest) -> dict[str, Any]:
     try:
-        found = mumacro.motion(**scene.case, threads=1)
+        motion = mumacro.motion(**scene.case, threads=1)
     except InputError as error:
         if error.field in MotionRequest.model_fields:
             raise
         # of a group of inputs, such as the speed: none of them is bad by itself
         refuse([FieldFault((), f"{error.field} {reason_of(error)}", error.value)])
-    answer = {name: getattr(found, name) for name in _NUMBERS} | {"contact": scene.contact}
+    answer = {name: getattr(motion, name) for name in _NUMBERS} | {"contact": scene.contact}
     if scene.cycle:
-        columns = found.cycle()._asdict()
+        columns = motion.cycle()._asdict()
         answer["cycle"] = {name: column.tolist() for name, column in columns.items()}
     return {**answer, "api_version": API_VERSION}

@@ -75,10 +75,10 @@ def _at(
     return inputs
 
 
-def _said(
+def _remarks_on(
     question: Any, unknown: str, case: dict[str, Any], stiffening: Stiffening | None
 ) -> dict[str, Any]:
-    """What is said of the model, if anything."""
+    """Remarks on the model, if there are any."""
     rows = load_rows(unknown, case, question.contact, stiffening)
     return {MODEL: rows} if rows else {}
 
@@ -97,8 +97,8 @@ async def post_law(question: LawRequest, tables: Loaded, work: Working) -> Respo
         along, per = question.along, field_of(question.along)[1]
         swept = {"along": along, "unit": unit_of(along), "values": law.values / per}
         border = [{"value": mark.value / per, "mu_macro": mark.mu_macro} for mark in law.border]
-        said = _said(question, along, question.inputs, law.stiffening)
-        return Json({**swept, **nested(columns), "border": border, **said, **table.signature})
+        remarks = _remarks_on(question, along, question.inputs, law.stiffening)
+        return Json({**swept, **nested(columns), "border": border, **remarks, **table.signature})
 
     return await work.question(answer)
 
@@ -199,7 +199,7 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
             {"k": k, **_results(question, end, None, unit, per)}
             for k, end in zip(ks, solution.ends, strict=True)
         ]
-    answer |= _said(question, name, case, solution.stiffening)
+    answer |= _remarks_on(question, name, case, solution.stiffening)
     return {**answer, **table.signature}
 
 

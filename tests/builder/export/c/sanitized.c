@@ -14,7 +14,7 @@ extern const mumacro_export mumacro_table;
 static const double nasty[] = {
     -1.0, -0.0, 0.0, 5e-324, 1e-310, 1e-160, 1.0, 1e160, 1.7976931348623157e308, HUGE_VAL, -HUGE_VAL, NAN,
 };
-enum { NASTY = sizeof nasty / sizeof *nasty, LONGEST = 1000, FEW = 16 }; /* a ball costs as much as 100 springs */
+enum { NASTY = sizeof nasty / sizeof *nasty, LONGEST = 1000, FEW = 16, MOTIONS = 400 }; /* a ball costs as much as 100 springs */
 
 static uint64_t state = 88172645463325252u;
 
@@ -83,28 +83,59 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
 /* n cases through every function of cases; where column i is single, all have its first number. */
 static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, double *const *columns,
                       int single) {
+    static const int ends[3] = {MU_ROW_V_TILDE, MU_ROW_GRADIENT, MU_ROWS};
     const size_t size = (size_t)n;
-    double *rows[3] = {numbers(3 * size), numbers(5 * size), numbers(17 * size)}, *high = numbers(size);
+    double *rows[3], *high = numbers(size), *extremes = numbers(MU_EXTREME_ROWS * size);
     int8_t *source = (int8_t *)malloc(size);
-    int64_t strides[6];
-    for (int i = 0; i < 6; ++i) strides[i] = i == single ? 0 : 1;
-    kernel->cases(data, 0, 0, n, (const double *const *)columns, strides, 3, rows[0], n, source);
-    kernel->cases(data, 0, 0, n, (const double *const *)columns, strides, 5, rows[1], n, source);
-    kernel->cases(data, 0, 0, n, (const double *const *)columns, strides, 17, rows[2], n, source);
+    mumacro_columns in;
+    memset(&in, 0, sizeof in);
+    for (int i = 0; i < 6; ++i) {
+        if (i == single) in.constant[i] = columns[i][0];
+        else in.array[i] = columns[i];
+    }
+    for (int i = 0; i < 3; ++i) {
+        rows[i] = numbers((size_t)ends[i] * size);
+        kernel->cases(data, 0, 0, n, &in, ends[i], rows[i], n, source);
+    }
     for (int kind = 1; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
-        kernel->cases(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW,
-                         (const double *const *)columns, strides, 17, rows[2], n, source);
-    for (int64_t i = 0; i < n; ++i) high[i] = columns[2][i * strides[2]] * scaled(-0.1, drawn() < 0.5 ? 4.0 : 600.0);
+        kernel->cases(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW, &in, MU_ROWS, rows[2], n,
+                      source);
+    for (int64_t i = 0; i < n; ++i)
+        high[i] = columns[2][single == 2 ? 0 : i] * scaled(-0.1, drawn() < 0.5 ? 4.0 : 600.0);
     for (int kind = 0; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
         kernel->intervals(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, kind ? n < 2 ? n : 2 : n < FEW ? n : FEW,
-                          (const double *const *)columns, strides, high, rows[0], n);
+                          &in, high, extremes, n);
     for (int64_t i = 0; i < n; ++i) {
-        double x[6], *found = numbers(i % 2 ? 19 : 7);
-        for (int j = 0; j < 6; ++j) x[j] = columns[j][i * strides[j]];
-        kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2 ? 19 : 7, found);
-        free(found);
+        double x[6];
+        mumacro_case *answer = (mumacro_case *)malloc(sizeof *answer);
+        if (answer == NULL) exit(2);
+        for (int j = 0; j < 6; ++j) x[j] = columns[j][j == single ? 0 : i];
+        kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2, answer);
+        free(answer);
     }
-    free(rows[0]), free(rows[1]), free(rows[2]), free(high), free(source);
+    free(rows[0]), free(rows[1]), free(rows[2]), free(high), free(extremes), free(source);
+}
+
+/* A motion of a few harmonics, in room for few steps or for many; every eighth is that of a ball. */
+static void ask_motions(const mumacro_kernel *kernel, int turn) {
+    const int ball = turn % 8 == 1;
+    const int32_t counts[3] = {(int32_t)(drawn() * 3.0), (int32_t)(drawn() * 3.0), ball ? 0 : (int32_t)(drawn() * 2.0)};
+    const int terms = counts[0] + counts[1] + counts[2], n = 1 + (int)(drawn() * 50.0);
+    const int64_t room = (int64_t)1 << (3 + (int)(drawn() * 14.0));
+    const double tolerance = scaled(ball ? -5.0 : -8.0, -2.0);
+    double *orders = numbers((size_t)terms + 1), *one = numbers(1 + 2 * (size_t)terms);
+    double *work = numbers(2 * (size_t)room), *out = numbers(7), *forces = numbers(2 * (size_t)n + 2);
+    double *shares = numbers(2), *weights = numbers(2);
+    one[0] = drawn() < 0.1 ? 0.0 : scaled(-6.0, 2.0);
+    for (int i = 0; i < terms; ++i) {
+        orders[i] = 1 + (int)(drawn() * 4.0);
+        one[1 + 2 * i] = i < counts[0] + counts[1] ? scaled(-6.0, ball ? 1.0 : 3.0) : 0.9 * drawn();
+        one[2 + 2 * i] = 7.0 * drawn();
+    }
+    shares[0] = weights[0] = 0.5, shares[1] = weights[1] = 1.0;
+    kernel->motions(ball, 1, counts, orders, one, tolerance, room, work, out);
+    kernel->motion_cycle(counts, orders, one, 2, shares, weights, tolerance, room, work, n, forces);
+    free(orders), free(one), free(work), free(out), free(forces), free(shares), free(weights);
 }
 
 /* Steps of n contacts of a few springs, whose forces are what x holds. */
@@ -260,6 +291,7 @@ int main(int count, char **words) {
         combinations += LONGEST;
     }
     for (long i = 0; i < tables; ++i) ask_nonsense(kernel);
+    for (int i = 0; i < MOTIONS; ++i) ask_motions(kernel, i);
     printf("random %ld nasty %ld tables %ld lanes %d\n", asked, combinations, tables, MU_LANES);
     return 0;
 }
