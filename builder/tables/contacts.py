@@ -18,6 +18,7 @@ from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import MIDDLE, Chart
 from mumacro.table.blocks import Block, BorderPiece, Table
+from mumacro.table.polynomials import Border
 
 from ..solver.ball import Ball, Springs, points_for
 from ..solver.sweep import Sweep
@@ -41,17 +42,24 @@ class Solve(Protocol):
         ...
 
 
+Noise = Callable[[str, Array, Array, dict[str, Array], Sliding], Array]
+
+
 class Contact(NamedTuple):
     """One contact; ``noise`` as :func:`.quantities.solver_noise`."""
 
     kind: Kind
     charts: Sequence[Chart]
     solve: Solve
-    noise: Callable[[str, Array, Array, dict[str, Array], Sliding], Array]
+    noise: Noise
+    #: the part of it that bounds allow for beside the errors that a table states
+    allowed: Noise
     #: quantities whose slopes a table gives
     sloped: tuple[str, ...]
     #: times those of the charts: v~ and y~ of the contact as a whole
     scale: float
+    #: v~crit of one spring with far more digits than a table's, where the errors of that count
+    border: Border | None
 
     def blocks(self, table: Table) -> list[Block]:
         """Its blocks in a table."""
@@ -105,7 +113,9 @@ def spring(sweep: Sweep) -> Contact:
     ) -> dict[str, Array]:
         return sweep.solve("continuous" if continuous else "full", v, y, eta)
 
-    return Contact(SPRING, atlas.CHARTS, solve, solver_noise, atlas.QUANTITY_NAMES, 1.0)
+    return Contact(
+        SPRING, atlas.CHARTS, solve, solver_noise, solver_noise, atlas.QUANTITY_NAMES, 1.0, None
+    )
 
 
 def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> Contact:
@@ -118,7 +128,16 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> Contact
         del continuous  # no block of a ball reaches over the border
         return integral.solve(v, y, eta)
 
-    return Contact(BALL, atlas.BALL_CHARTS, solve, _ball_noise, ("mu_ratio",), MIDDLE)
+    return Contact(
+        BALL,
+        atlas.BALL_CHARTS,
+        solve,
+        _ball_noise,
+        _no_noise,
+        ("mu_ratio",),
+        MIDDLE,
+        springs.fine.border,
+    )
 
 
 def _ball_noise(name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding) -> Array:
@@ -128,6 +147,12 @@ def _ball_noise(name: str, v: Array, y: Array, solved: dict[str, Array], sliding
         return BALL_NOISE * np.minimum(1.0, 4.0 * value)
     # next to the border a spring's own stick fraction has half of its digits
     return 8.0 * BALL_NOISE * value if name == "power" else np.full(value.shape, 25.0 * BALL_NOISE)
+
+
+def _no_noise(name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding) -> Array:
+    """A quadrature's own error is a part of the errors that a table of a ball states."""
+    del y, solved, sliding, name
+    return np.zeros_like(v)
 
 
 def fine_springs(pieces: list[BorderPiece], blocks: list[Block]) -> Springs:

@@ -21,7 +21,15 @@ from mumacro.inputs.kind import BALL
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import CONTINUOUS, QUANTITIES, STEEPEST, STEEPEST_Y, Axis, Chart
+from mumacro.table.atlas import (
+    CONTINUOUS,
+    QUANTITIES,
+    QUANTITY_NAMES,
+    STEEPEST,
+    STEEPEST_Y,
+    Axis,
+    Chart,
+)
 from mumacro.table.blocks import Block
 from mumacro.table.polynomials import (
     WIDTH,
@@ -35,6 +43,7 @@ from mumacro.table.polynomials import (
 from ..solver.sweep import Sweep
 from .blocks import solve_nodes
 from .contacts import Contact
+from .quantities import SOLVED
 
 
 class BlockErrors(NamedTuple):
@@ -138,8 +147,56 @@ def block_errors(surrogate: Surrogate, of: Contact, n: int, seed: int) -> list[B
             surrogate, stating, of, index, np.random.default_rng([seed, index]), n
         )
         _, _, *exact = solve_nodes(of, index, finer((block.a.size, block.b.size)), surrogate.border)
-        found.append(BlockErrors(*errors, cell_errors(of, index, block, *exact)))
+        cells = cell_errors(of, index, block, *exact)
+        chart = of.charts[index]
+        if of.border is not None and chart.b.name in _FROM_BORDER and chart.a.name != "inverse_y":
+            for name, rows in cells.items():
+                bends = _bends(surrogate, of, of.border, index, name)
+                rows[:, 1] += bends.max(axis=(1, 3)).ravel()
+        found.append(BlockErrors(*errors, cells))
     return found
+
+
+#: coordinates that are a function of v~/v~crit
+_FROM_BORDER = ("ln_rho", "s", "s_root")
+BESIDE = 24  # steps of the border between two points of a cell
+
+
+def _bends(surrogate: Surrogate, of: Contact, true: Border, index: int, name: str) -> Array:
+    """What a slope along a is off by, over its share, because the table's border is not the true
+    one, (cells a, POINTS, cells b, POINTS).
+
+    That border is in the coordinate along b and has cells and pieces of its own: what a block
+    tabulates bends where they meet, between the nodes of the block and those of the finer
+    interpolant.  A slope at a fixed v~ is then off by the error of the border's slope times the
+    slope along ln v~.
+    """
+    chart, block = of.charts[index], of.blocks(surrogate.table)[index]
+    a, b = (_Along(axis, n, 2) for axis, n in zip((chart.a, chart.b), block.cells, strict=True))
+    steps = a.x[:, :1] + np.linspace(0.0, 1.0, BESIDE * (POINTS - 1) + 1) * a.wide[:, None]
+    at = np.clip(chart.a.to_file(steps.ravel()), chart.a.low, chart.a.high)
+    y = np.maximum(chart.a.amplitude(at), 1e-60)
+    off = np.log(surrogate.border(y) / true(y)).reshape(steps.shape)
+    step = a.wide / (BESIDE * (POINTS - 1))
+    slope = np.abs(np.diff(off, axis=1)) / np.where(step > 0.0, step, np.inf)[:, None]
+    ends = np.searchsorted(np.linspace(-1.0, 1.0, steps.shape[1] - 1), _AT)
+    low, high = (np.clip(ends + side * BESIDE, 0, slope.shape[1]) for side in (-1, 1))
+    around = np.stack([slope[:, i:j].max(axis=1) for i, j in zip(low, high, strict=True)], axis=1)
+    file_a, file_b = (
+        np.clip(axis.to_file(x.x.ravel()), axis.low, axis.high)
+        for axis, x in ((chart.a, a), (chart.b, b))
+    )
+    v, y, eta = chart.point(file_a[:, None], file_b[None, :], surrogate.border)
+    v, y, eta = (x.ravel() for x in np.broadcast_arrays(v, y, eta))
+    code, lively = QUANTITY_NAMES.index(name), v > 0.0
+    along, scale = np.zeros(v.size), np.ones(v.size)
+    along[lively] = of.slopes(surrogate, name, v[lively], y[lively])[1]
+    scale[lively] = kernels[-1].forms(
+        code, index, v[lively], y[lively], eta[lively], of.kind.contact
+    )[1]
+    moved = np.abs(np.divide(along, scale, out=np.zeros(v.size), where=scale != 0.0))
+    wide = (*a.x.shape, *b.x.shape)
+    return np.asarray(moved.reshape(wide) * (around / a.shares)[:, :, None, None])
 
 
 def _value_errors(
@@ -163,11 +220,14 @@ def _value_errors(
     errors = {}
     for name in of.blocks(surrogate.table)[index].nodes:
         value, *_ = of.quantity(surrogate, name, v, y)
+        truth, complement = solved[name], SOLVED[name].complement
+        if of.kind == BALL and complement:  # next to 1 it has the digits
+            truth = np.where(truth > 0.5, 1.0 - solved[complement], truth)
         scale, beside, rounding = (of.quantity(table, name, v, y)[1] for table in stating)
         # what the bound allows anyway: half of rounding, and what the border's error does, of which
         # it states twice
-        noise = of.noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
-        errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
+        noise = of.allowed(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
+        errors[name] = float((np.maximum(np.abs(value - truth) - noise, 0.0) / scale).max())
     return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
 
 
@@ -227,17 +287,17 @@ class _Along:
 
 
 def _difference(
-    chart: Chart, block: Block, values: Array, exact: Array, noise: Array
+    chart: Chart, block: Block, values: Array, exact: Array
 ) -> tuple[Array, _Along, _Along]:
-    """Cells through node ``values`` minus the interpolant through ``exact``, (cells a, POINTS,
-    cells b, POINTS)."""
+    """Cells through node ``values`` minus the interpolant with coefficients ``exact``, (cells a,
+    POINTS, cells b, POINTS)."""
     a, b = (
         _Along(axis, n, m)
         for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
     )
     own = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
     found = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
-    return found - (a.follow @ _without_noise(exact, noise) @ b.follow.T).reshape(found.shape), a, b
+    return found - (a.follow @ exact @ b.follow.T).reshape(found.shape), a, b
 
 
 #: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to
@@ -288,21 +348,33 @@ def cell_errors(
     ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`;
     ``noise`` their rounding.
     """
-    chart, found = of.charts[index], {}
-    for quantity in QUANTITIES:
-        if quantity.name in block.nodes and quantity.name in of.sloped:
-            name = quantity.name
-            off, a, b = _difference(chart, block, block.nodes[name], exact[name], noise[name])
-            along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)
-            along_b = np.einsum("jrq,ipjq->ipjr", b.to_derivative, off)
-            if quantity.smooth_at_border and chart.regime != CONTINUOUS and chart.b.knotted:
-                _without_edge(along_b, b, chart.b, block.cells[1])
-            if chart.a.name == "ray_root":
-                _without_edge(along_a.transpose(2, 3, 0, 1), a, chart.a, block.cells[0])
-            along_a /= a.shares[:, :, None, None]
-            along_b /= b.shares
-            largest = np.stack(
-                [np.abs(x).max(axis=(1, 3)) for x in (off, along_a, along_b)], axis=-1
-            )
-            found[quantity.name] = largest.reshape(-1, 3)
+    found: dict[str, Array] = {}
+    for name in QUANTITY_NAMES:
+        if name in block.nodes and name in of.sloped:
+            for coefficients in _truths(of, exact[name], noise[name]):
+                largest = _largest(of, index, block, name, coefficients)
+                found[name] = np.maximum(found.get(name, 0.0), largest)
     return found
+
+
+def _truths(of: Contact, exact: Array, noise: Array) -> list[Array]:
+    """Chebyshev coefficients of the model: without what may be rounding; of a ball also all of
+    them, since its quadrature's error is no rounding of the nodes."""
+    clean = _without_noise(exact, noise)
+    return [clean, chebyshev_coefficients(exact)] if of.kind == BALL else [clean]
+
+
+def _largest(of: Contact, index: int, block: Block, name: str, exact: Array) -> Array:
+    """A quantity's largest errors over every cell, (cells, 3)."""
+    chart, quantity = of.charts[index], QUANTITIES[QUANTITY_NAMES.index(name)]
+    off, a, b = _difference(chart, block, block.nodes[name], exact)
+    along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)
+    along_b = np.einsum("jrq,ipjq->ipjr", b.to_derivative, off)
+    if quantity.smooth_at_border and chart.regime != CONTINUOUS and chart.b.knotted:
+        _without_edge(along_b, b, chart.b, block.cells[1])
+    if chart.a.name == "ray_root":
+        _without_edge(along_a.transpose(2, 3, 0, 1), a, chart.a, block.cells[0])
+    along_a /= a.shares[:, :, None, None]
+    along_b /= b.shares
+    largest = np.stack([np.abs(x).max(axis=(1, 3)) for x in (off, along_a, along_b)], axis=-1)
+    return largest.reshape(-1, 3)

@@ -165,6 +165,33 @@ def test_no_slope_is_beyond_its_bound(of: Contact, corner: str) -> None:
         assert np.ptp(along, axis=0).max() <= 1e-4
 
 
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-10])
+def test_power_at_large_speeds_is_known_in_closed_form(tolerance: float) -> None:
+    """A quadrature's own error is within the bounds: powers here differ by 1e-13 of their value."""
+    v, y = (
+        np.array([3.97134e4, 6.36416e4, 6.06508e4, 1e5]),
+        np.array([2.9556e5, 7.8218e5, 6.7737e5, 3e5]),
+    )
+    power, bound, _ = opened(tolerance).quantity("power", v, y, contact="ball")
+    m = -((y / v) ** 2)
+    first = 2.0 / math.pi * v * (ellipe(m) - ellipk(m))
+    # the second term is that of one spring at v~ of the middle, times the mean of s^2
+    spring, _, _ = opened(1e-12).quantity("power", v, y)
+    exact = first + (spring - first) * MIDDLE**2 * 24.0 / 35.0
+    assert np.all(np.abs(power - exact) <= bound + 2e-14 * exact)
+    assert np.all(bound <= 1e-11 * exact)
+
+
+def test_a_slope_where_the_border_has_a_knot_is_within_its_bound(of: Contact) -> None:
+    """The border's pieces meet at y~ = 1.5, within a block of the ball."""
+    table = opened(COARSE)
+    y = 1.5 + np.linspace(-0.05, 0.01, 121)
+    v, y = of.as_asked(np.full(y.size, 0.1742), y)
+    truth, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
+    rows = of.slopes(table, "mu_ratio", v, y)
+    assert np.all(np.abs(rows[1:3] - truth) <= rows[3:5] + noise)
+
+
 def test_seams_are_invisible() -> None:
     table = opened(COARSE)
     assert seam_jumps(table, 500, kind=BALL) <= 20.0 * table.tolerance

@@ -66,7 +66,8 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, NULL);
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, source);
         kernel->values(data, 0, 0, quantity, n, v, y, again, bound, NULL);
-        kernel->slopes(data, quantity, n, v, y, rows, n);
+        for (int contact = 0; contact < MU_CONTACTS; ++contact)
+            kernel->slopes(data, contact, quantity, n, v, y, rows, n);
         for (int64_t i = 0; i < n; ++i)
             if (source[i] < -1 || source[i] >= MU_SOURCES) wrong("a source that there is not");
     }
