@@ -180,7 +180,8 @@ class Ball:
         # beyond the corner xi grows by ten from piece to piece
         rising = (y / (1.0 + np.minimum(beyond * 100.0**i, 0.5)) for i in range(5))
         steps = (inner, y / (1.0 - width), y, y / (1.0 + width), *rising, last)
-        edges = np.minimum.accumulate([np.ones(v.shape), *steps])
+        # those beyond the border's last crossing may be on this side of it, next to the ridge
+        edges = -np.sort(-np.minimum([np.ones(v.shape), *steps], 1.0), axis=0)
         decades = [edges[0]]
         for above, below in itertools.pairwise(edges):
             parts = math.ceil(float(np.log(above / below).max()) / LONGEST)
