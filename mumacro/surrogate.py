@@ -425,9 +425,12 @@ class Surrogate:
         (0.012142, True, 5)
         """
         data, kind = self._with(name), kind_of(contact, direction)
-        if kind == SPRING and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
+        if not kind.direction and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
+            code = _CODES[name]
+            if kind.contact:
+                data = self._data_of(kind, code)
             try:
-                scalar = _SCALAR_KERNEL.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+                scalar = _SCALAR_KERNEL.value(data, code, v_tilde, y_tilde, kind.contact)  # type: ignore[arg-type]
                 if scalar[2] >= 0:
                     return scalar
             except OverflowError:  # a whole number beyond double range
@@ -687,24 +690,25 @@ class Surrogate:
             cases is None
             and k_range is k_low is k_high is Fz_amplitude is ABSENT
             and (f is ABSENT or omega is ABSENT)
-            and contact == "spring"
+            and (contact == "spring" or (contact == "ball" and self.table.ball))
             and direction == "across"
             and illegal in ILLEGAL
             and not unknown
         ):
-            # One spring across in plain numbers and arrays takes this short way, which saves most
-            # of the time of a call.  Illegal inputs go the long way, which has the messages.
+            # Contacts across in plain numbers and arrays take this short way, which saves most of
+            # the time of a call.  Illegal inputs go the long way, which has the messages.
+            short = SPRING if contact == "spring" else BALL
             types = {*map(type, (mu0, Fz, k, y0, omega if f is ABSENT else f, v0))}
             if types <= NUMBERS:
                 with suppress(OverflowError):  # a whole number beyond double range
                     angular = omega if f is ABSENT else RAD_PER_CYCLE * float(f)
-                    answer = self._scalar_answer((mu0, Fz, k, y0, angular, v0), gradient)
+                    answer = self._scalar_answer((mu0, Fz, k, y0, angular, v0), gradient, short)
                     if answer.source_code >= 0:
                         return answer
             elif types <= NUMBERS_AND_ARRAYS:
                 columns = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "v0": v0}
                 columns |= {"omega": omega} if f is ABSENT else {"f": f}
-                return self.answer(Cases.of(columns, SPRING, illegal == "raise"), gradient, groups)
+                return self.answer(Cases.of(columns, short, illegal == "raise"), gradient, groups)
         kind = kind_of(contact, direction)
         if illegal not in ILLEGAL:
             raise InputError("illegal", illegal, '"nan" or "raise"')
@@ -742,8 +746,8 @@ class Surrogate:
     def answer(self, cases: Cases, gradient: bool = False, groups: bool = False) -> Answer[Any]:
         """:meth:`evaluate` of cases in their one form."""
         kind, columns, shape = cases.kind, cases.columns, cases.shape or (1,)
-        if not cases.shape and kind == SPRING and cases.ends is None:
-            return self._scalar_answer([*columns.values()], gradient)
+        if not cases.shape and not kind.direction and cases.ends is None:
+            return self._scalar_answer([*columns.values()], gradient, kind)
         groups = groups or gradient or not cases.shape
         detail: Detail = "gradient" if gradient else "groups" if groups else "values"
         six, n, data = [*columns.values()], math.prod(shape), self._data_of(kind)
@@ -776,14 +780,21 @@ class Surrogate:
             answer.gradient_bound = dict(zip(kind.fields, rows.gradient_bound, strict=True))
         return answer if cases.shape else single(answer)
 
-    def _scalar_answer(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
-        """The answer to one case of one spring across; NaN where it is illegal."""
-        row = _SCALAR_KERNEL.one(self._pointer, six, gradient)
+    def _scalar_answer(
+        self, six: Sequence[Any], gradient: bool, kind: Kind = SPRING
+    ) -> Answer[float]:
+        """The answer to one case across; NaN where it is illegal."""
+        certain, border, pointer = self._certain, self.v_tilde_crit, self._pointer
+        if kind.contact:
+            certain = functools.partial(self._certain, kind=kind)
+            border = functools.partial(self.v_tilde_crit, **kind.names)
+            pointer = self._data_of(kind).pointer
+        row = _SCALAR_KERNEL.one(pointer, six, gradient, kind.contact)
         groups = (row.v_tilde, row.y_tilde, row.length_scale)
         answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
-            row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, self._certain
+            row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, certain
         )
-        answer._border = self.v_tilde_crit
+        answer._border = border
         if gradient:
             answer.gradient = dict(zip(FIELDS, row.gradient, strict=True))
             answer.gradient_bound = dict(zip(FIELDS, row.gradient_bound, strict=True))

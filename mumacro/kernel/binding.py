@@ -268,10 +268,13 @@ class Kernel:
         arrays = _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
         self._values(data.pointer, *kind, quantity, v.size, *arrays)
 
-    def value(self, data: Data, quantity: int, v: float, y: float) -> tuple[float, float, int]:
+    def value(
+        self, data: Data, quantity: int, v: float, y: float, contact: int = 0
+    ) -> tuple[float, float, int]:
         """A quantity at one point in plain numbers, its bound and the source."""
         point, code = _new(_POINT, (v, y)), _new(_CODE)
-        self._values(data.pointer, 0, 0, quantity, 1, point, point + 1, point + 2, point + 3, code)
+        at = point, point + 1, point + 2, point + 3
+        self._values(data.pointer, contact, 0, quantity, 1, *at, code)
         return point[2], point[3], code[0]
 
     def slopes(
@@ -324,11 +327,11 @@ class Kernel:
         six, _kept = _columns_of(columns)
         self._found.intervals(data.pointer, *kind, n, six, _numbers(high), *_out(rows, start))
 
-    def one(self, pointer: Any, six: Sequence[float], with_gradient: bool) -> Any:
+    def one(self, pointer: Any, six: Sequence[float], with_gradient: bool, contact: int = 0) -> Any:
         """One case in plain numbers: a ``mumacro_case``, its gradient only where asked for."""
         # named: a call with *six takes longer
         answer, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six
-        self._one(pointer, mu0, Fz, k, y0, omega, v0, with_gradient, answer)
+        self._one(pointer, contact, mu0, Fz, k, y0, omega, v0, with_gradient, answer)
         return answer
 
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:

@@ -279,14 +279,16 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
     }
 }
 
-static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
-                   int with_gradient, mumacro_case *out) {
+static void mu_one(const mumacro_data *data, int contact, double mu0, double Fz, double k, double y0, double omega,
+                   double v0, int with_gradient, mumacro_case *out) {
     double in[6][MU_CHUNK], rows[MU_ROWS];
     const double six[6] = {mu0, Fz, k, y0, omega, v0};
     int8_t source;
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
-    mu_chunk_of_cases(data, MU_SPRING, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
+    if (contact == MU_BALL)
+        mu_chunk_of_cases(data, MU_BALL, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
+    else mu_chunk_of_cases(data, MU_SPRING, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
     out->mu_macro = rows[MU_ROW_MU_MACRO];
     out->mu_ratio = rows[MU_ROW_MU_RATIO];
     out->error_bound = rows[MU_ROW_ERROR_BOUND];

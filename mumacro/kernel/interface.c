@@ -95,7 +95,7 @@ MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y
 
 MUMACRO_API double mumacro_mu_macro(double mu0, double Fz, double k, double y0, double omega, double v0) {
     mumacro_case answer;
-    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, 0, &answer);
+    mu_one(MU_TABLE, MU_SPRING, mu0, Fz, k, y0, omega, v0, 0, &answer);
     return answer.mu_macro;
 }
 

@@ -41,9 +41,9 @@ typedef struct {
     /* cases whose k, the third column, reaches to high: mumacro_extreme_row, stride apart */
     void (*intervals)(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *columns,
                       const double *high, double *out, int64_t stride);
-    /* of a spring, across, alone, in a fraction of the time: mu~; and one case, its gradient only where asked for */
+    /* across, alone, in a fraction of the time: mu~ of a spring; and one case, its gradient only where asked for */
     double (*ratio)(const mumacro_data *data, double v, double y);
-    void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
+    void (*one)(const mumacro_data *data, int contact, double mu0, double Fz, double k, double y0, double omega, double v0,
                 int with_gradient, mumacro_case *out);
     /* v~crit(y~) of a contact and direction: 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *y, double *crit);

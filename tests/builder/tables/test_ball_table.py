@@ -92,6 +92,17 @@ def test_at_rest_it_is_the_closed_form_and_slides_like_a_rigid_contact(springs: 
     np.testing.assert_allclose(fast, closed_forms.outer(0.7), rtol=0.0, atol=3e-12)
 
 
+def test_next_to_the_ridge_the_last_crossing_is_an_edge(springs: Springs) -> None:
+    """A ray leaves stick-slip below y~ = 1.5 there; a quadrature that runs across errs by 5e-12."""
+    y = 0.9508120035041991
+    v = 0.3178542013643792 * np.exp(np.linspace(-2e-3, 2e-3, 41))
+    few, many = (Ball(springs, n).solve(v, np.full(v.size, y)) for n in (73, 146))
+    assert np.abs(few["mu_ratio"] - many["mu_ratio"]).max() <= BALL_NOISE
+    edges = Ball(springs)._edges(v, np.full(v.size, y))
+    for at in Ball(springs).crossings(v / y):
+        assert np.abs(edges * (at / y)[:, None] - 1.0).min(axis=1).max() <= 1e-12
+
+
 # --- charts ---------------------------------------------------------------------------------------
 
 
@@ -222,6 +233,39 @@ def test_an_error_of_a_block_is_found(of: Contact) -> None:
     v, y = of.as_asked(v, y)
     value, bound, _ = of.quantity(wrong, "mu_ratio", v, y)
     assert np.any(np.abs(value - of.solve(v, y)["mu_ratio"]) > bound)
+
+
+# --- plain numbers --------------------------------------------------------------------------------
+
+
+def test_plain_numbers_answer_as_arrays_do() -> None:
+    table = opened(COARSE)
+    v, y = wide(40, 6)
+    v[:3], y[:4] = (0.0, 0.0, 0.2), (0.0, 0.5, 0.0, 1.5)
+    for name in QUANTITY_NAMES:
+        rows = table.quantity(name, v, y, contact="ball")
+        for i in range(v.size):
+            one = table.quantity(name, float(v[i]), float(y[i]), contact="ball")
+            assert one == tuple(row[i] for row in rows), (name, i)
+    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5, "contact": "ball"}
+    v0, y0 = 0.3 * v, 3e-6 * y
+    many = table.evaluate(**case, v0=v0, y0=y0, gradient=True)
+    for i in range(v.size):
+        alone = table.evaluate(**case, v0=float(v0[i]), y0=float(y0[i]), gradient=True)
+        assert (alone.mu_macro, alone.error_bound) == (many.mu_macro[i], many.error_bound[i])
+        assert (alone.source_code, alone.regime) == (many.source_code[i], many.regime[i])
+        assert alone.gradient == {name: x[i] for name, x in many.gradient.items()}
+        assert alone.regime_certain == many.regime_certain[i]
+        assert alone._border(2.0) == table.v_tilde_crit(2.0, contact="ball")
+
+
+@pytest.mark.parametrize(("name", "value"), [("mu0", -0.3), ("v0", math.nan), ("k", 0.0)])
+def test_an_illegal_plain_number_is_refused(name: str, value: float) -> None:
+    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5, "y0": 2e-6, "v0": 0.01}
+    with pytest.raises(InputError, match=name):
+        opened(COARSE).evaluate(**{**case, name: value}, contact="ball")
+    with pytest.raises(InputError, match="v_tilde"):
+        opened(COARSE).quantity("mu_ratio", -1.0, 0.5, contact="ball")
 
 
 # --- a table without a ball -----------------------------------------------------------------------
