@@ -25,6 +25,29 @@ SCALARS = {
     "evaluate, k from 1e-300 to 1e300": "s.evaluate(**soft, k_range=(1e-300, 1e300))",
     "the same, a ball": "s.evaluate(**soft, k_range=(1e-300, 1e300), contact='ball')",
 }
+EVALUATE = "s.evaluate(**case)"
+WITH_F = {name: x for name, x in CASE.items() if name != "omega"} | {"f": 20e3}
+SPEEDS = np.linspace(0.001, 0.1, 100)
+AMPLITUDES = np.linspace(1e-6, 4e-6, 100)
+
+
+def _all(case: dict[str, float], n: int) -> dict[str, object]:
+    return {**{name: np.full(n, x) for name, x in case.items()}, "v0": SPEEDS[:n]}
+
+
+#: by name: the call, and its inputs
+SMALL: dict[str, tuple[str, dict[str, object]]] = {
+    "`mu_ratio(v, y)`": ("s.mu_ratio(0.1, 0.5)", {}),
+    "`evaluate` of floats": (EVALUATE, CASE),
+    "of numpy's float64": (EVALUATE, {name: np.float64(x) for name, x in CASE.items()}),
+    "of numpy's float32": (EVALUATE, {name: np.float32(x) for name, x in CASE.items()}),
+    "of an array of one, `v0`": (EVALUATE, {**CASE, "v0": SPEEDS[:1]}),
+    "of six arrays of one": (EVALUATE, _all(CASE, 1)),
+    "the same, `f` for `omega`": (EVALUATE, _all(WITH_F, 1)),
+    "of arrays of 100, `v0` and `y0`": (EVALUATE, {**CASE, "v0": SPEEDS, "y0": AMPLITUDES}),
+    "of six arrays of 100": (EVALUATE, _all(CASE, 100)),
+    "the same, `f` for `omega`, of 100": (EVALUATE, _all(WITH_F, 100)),
+}
 ARRAYS = {
     "scipy.special.ellipk(m), for comparison": "ellipk(m)",
     "mu_ratio(v, y)": "s.mu_ratio(v, y)",
@@ -89,6 +112,25 @@ def calls(points: int, quick: bool) -> str:
     return "\n\n".join([said, *tables, processes(quick)])
 
 
+def small(points: int, quick: bool) -> str:  # noqa: ARG001
+    """Small calls beside scipy's elliptic integral of one number, in turn with it; the least of
+    many."""
+    s = mumacro.open(1e-10, threads=1)
+    statements = {"`scipy.special.ellipk(0.5)`": ("ellipk(0.5)", {}), **SMALL}
+    timers = {
+        name: timeit.Timer(call, globals={"s": s, "ellipk": ellipk, "case": case})
+        for name, (call, case) in statements.items()
+    }
+    number = 100
+    least = dict.fromkeys(timers, float("inf"))
+    for _ in range(5 if quick else 400):
+        for name, timer in timers.items():
+            least[name] = min(least[name], timer.timeit(number) / number)
+    reference = next(iter(least.values()))
+    rows = [[name, quantity(1e6 * t), f"{t / reference:.1f}"] for name, t in least.items()]
+    return markdown(["one call", "[us]", "times ellipk"], rows)
+
+
 #: places that cost more than most: v~, y~
 FAR = {
     "y~ = 1e3, v~ = 0.1": (0.1, 1e3),
@@ -120,4 +162,6 @@ def far_end(points: int, quick: bool) -> str:  # noqa: ARG001
 
 
 if __name__ == "__main__":
-    main(__doc__, {"calls": calls, "far_end": far_end}, points=1_000_000, quick=False)
+    main(
+        __doc__, {"calls": calls, "small": small, "far_end": far_end}, points=1_000_000, quick=False
+    )

@@ -46,8 +46,9 @@ def main(
     """The command line of a script: run its sections, print them, and with ``--write`` store them.
 
     A section returns Markdown; it receives the ``options``, each with its default, as keywords.  A
-    line about the machine is added.  ``--write`` stores it as build/results/SCRIPT-SECTION.md, and
-    between its markers where a document of :data:`PAGES` has them.
+    line about the machine is added; the exit code is 1 where one says FAILED.  ``--write`` stores
+    it as build/results/SCRIPT-SECTION.md, and between its markers where a document of :data:`PAGES`
+    has them.
     """
     parser = argparse.ArgumentParser(
         description=text, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -63,7 +64,7 @@ def main(
             parser.add_argument(
                 f"--{name}", type=type(default), default=default, help=f"default: {default}"
             )
-    given = parser.parse_args()
+    given, failed = parser.parse_args(), False
     if given.write and (getattr(given, "quick", False) or getattr(given, "share", 1.0) < 1.0):
         parser.error("--write stores full runs only")
     for name, section in sections.items():
@@ -73,8 +74,11 @@ def main(
             found = section(**{option: getattr(given, option) for option in options})
             found += f"\n\nTook {(perf_counter() - started) / 60.0:.1f} min. {machine()}"
             print(f"## {name}\n\n{found}\n", flush=True)
+            failed |= "FAILED" in found
             if given.write:
                 write(Path(sys.argv[0]).stem, name, found)
+    if failed:
+        raise SystemExit(1)
 
 
 def write(script: str, section: str, text: str) -> None:

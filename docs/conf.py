@@ -26,7 +26,7 @@ html_copy_source = False
 html_show_copyright = False
 html_math_renderer = "mathml"  # docs/_ext/mathml.py
 html_static_path = ["_static"]
-html_css_files = ["mathml.css"]
+html_css_files = ["mathml.css", "site.css"]
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "interface", "mathml"]
 exclude_patterns = ["_ext", "_static"]

@@ -58,6 +58,7 @@ def main() -> None:
             server.wait(30)
     print(json.dumps(answer, indent=2))
     print(f"Answer:   mu_macro = {answer['mu_macro']:.12g} [-]")
+    print("Next:     python3 dev.py serve, then open http://127.0.0.1:8000")
 
 
 if __name__ == "__main__":

@@ -210,8 +210,8 @@ def on_any_processor(table: Surrogate, share: float) -> Count:
     for n, _, cases in pieces(N // 5, share):
         found = []
         for kernel in (kernels[-1], kernels[0]):
-            answers = CaseRows.empty(n)
-            kernel.cases(table._data, n, list(cases.values()), answers)
+            answers = CaseRows.empty((n,))
+            kernel.cases(table._data, list(cases.values()), answers, slice(0, n))
             found.append(answers)
         here, there = found
         change = np.abs(here.mu_macro - there.mu_macro)

@@ -72,6 +72,24 @@ def idle_streams(server: Server, share: float) -> None:
     held(server, share, head("/v1/mu-macro/batch", None, "application/x-ndjson"), law)
 
 
+def motions(server: Server, share: float) -> None:
+    """Many motions of a ball with high harmonics; a law is answered beside them."""
+    terms = [
+        {"harmonic": n, "amplitude": 3e-7 * (n % 5 + 1), "phase": 70 * n} for n in range(11, 21)
+    ]
+    rig = {name: value for name, value in CASE.items() if name != "y0"}
+    ball = {**rig, "contact": "ball", "tolerance": 1e-4, "x": terms, "y": terms}
+    law = {name: value for name, value in CASE.items() if name != "v0"} | {"start": 1e-4, "stop": 1}
+    number = max(6, round(30 * share))
+    with ThreadPoolExecutor(number) as pool:
+        answers = [
+            pool.submit(server.ask, "POST", "/v1/motion", json.dumps(ball)) for _ in range(number)
+        ]
+        statuses = [server.ask("POST", "/v1/law", json.dumps(law))[0] for _ in range(20)]
+    assert statuses == [200] * 20, statuses
+    assert {answer.result()[0] for answer in answers} == {200, 503}
+
+
 def descriptions(server: Server, share: float) -> None:
     number = max(4, round(8 * share))
     with ThreadPoolExecutor(number) as pool:
@@ -125,6 +143,7 @@ ATTACKS: dict[str, Attack] = {
     "Columns of words and of nulls, which Python reads one by one": strange_words,
     "Streams without a line; the question of a person is answered beside them": idle_streams,
     "Many at once ask for /openapi.json for the first time": descriptions,
+    "Motions of a ball with high harmonics; a law is answered beside them": motions,
 }
 
 

@@ -20,7 +20,10 @@ class InputError(MumacroError, ValueError):
         self.bound = bound  #: what the value must satisfy, e.g. ``"finite and > 0"``
         self.index = index  #: position in the flattened, broadcast input; None for a scalar call
         where = "" if index is None else f" at index {index}"
-        super().__init__(f"{field}{where} must be {bound}, got {_shown(value)}")
+        value_shown = (
+            "" if value is None and bound.startswith("given") else f", got {_shown(value)}"
+        )
+        super().__init__(f"{field}{where} must be {bound}{value_shown}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Rebuild from the parts: an error that a worker process raises must reach the calling

@@ -8,6 +8,7 @@ MOVED = {
     "mumacro.element": "mumacro.Element(mu0, Fz, k)",
     "mumacro.fields": "mumacro.inputs.fields",
     "mumacro.interop": "mumacro.frames",
+    "mumacro.analysis.load": "mumacro.analysis.stiffening",
     "mumacro.jax": "evaluate(gradient=True) inside jax.custom_vjp, as docs/how-to/embed.md shows",
     "mumacro.torch": "evaluate(gradient=True) inside torch.autograd.Function, as "
     "docs/how-to/embed.md shows",

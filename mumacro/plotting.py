@@ -54,7 +54,7 @@ _MARKS = "osD^vPX"  # of groups of cases: they differ without colour, too
 _MOST_LABELS = 8  # of curves in a legend
 _SIDE = 0.05  # of the map, where no label stands
 #: places where the map names the regime, in shares of its width and height
-AREAS = ((0.14, 0.9), (0.8, 0.12))
+AREAS = ((0.14, 0.735), (0.8, 0.12))
 
 
 class Curve(NamedTuple):
@@ -86,7 +86,7 @@ def save(path: str | Path, draw: Callable[[Any], Any], panels: int = 1) -> None:
     where the name does not end in one of ``ENDINGS``."""
     path = Path(path)
     if path.suffix not in ENDINGS:
-        endings = f"a name that ends in {', '.join(ENDINGS)}, or for the command in .csv"
+        endings = f"one that ends in {', '.join(ENDINGS)}, or for the command in .csv"
         raise InputError("file name", str(path), endings)
     figure = _loaded("figure").Figure(
         figsize=(7.0 if panels == 1 else 5.0 * panels, 4.8), layout="constrained"

@@ -686,6 +686,7 @@ class Surrogate:
         >>> a.mu_macro_low < a.mu_macro < a.mu_macro_high
         True
         """
+        inputs: dict[str, Any] = {}
         if (
             cases is None
             and k_range is k_low is k_high is Fz_amplitude is ABSENT
@@ -698,7 +699,8 @@ class Surrogate:
             # Contacts across in plain numbers and arrays take this short way, which saves most of
             # the time of a call.  Illegal inputs go the long way, which has the messages.
             short = SPRING if contact == "spring" else BALL
-            types = {*map(type, (mu0, Fz, k, y0, omega if f is ABSENT else f, v0))}
+            rate, rate_name = (omega, "omega") if f is ABSENT else (f, "f")
+            types = {*map(type, (mu0, Fz, k, y0, rate, v0))}
             if types <= NUMBERS:
                 with suppress(OverflowError):  # a whole number beyond double range
                     angular = omega if f is ABSENT else RAD_PER_CYCLE * float(f)
@@ -706,41 +708,42 @@ class Surrogate:
                     if answer.source_code >= 0:
                         return answer
             elif types <= NUMBERS_AND_ARRAYS:
-                columns = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "v0": v0}
-                columns |= {"omega": omega} if f is ABSENT else {"f": f}
-                return self.answer(Cases.of(columns, short, illegal == "raise"), gradient, groups)
+                inputs = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, rate_name: rate, "v0": v0}
         kind = kind_of(contact, direction)
         if illegal not in ILLEGAL:
             raise InputError("illegal", illegal, '"nan" or "raise"')
         if unknown:
             name = min(unknown)
             raise InputError(name, unknown[name], f"one of {', '.join(kind.fields)} or f")
-        keywords = {
-            "mu0": mu0,
-            "Fz": Fz,
-            "k": k,
-            "k_range": k_range,
-            "k_low": k_low,
-            "k_high": k_high,
-            "y0": y0,
-            "Fz_amplitude": Fz_amplitude,
-            "omega": omega,
-            "f": f,
-            "v0": v0,
-        }
-        inputs = by_name(cases, {name: x for name, x in keywords.items() if x is not ABSENT}, kind)
-        if has_labels(cases, inputs):
-            options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
-            return evaluate_labelled(
-                self.evaluate,
-                self.on_one_thread().evaluate,
-                functools.partial(self._certain, kind=kind),
-                cases,
-                inputs,
-                kind,
-                "k_low" in inputs,
-                options,
+        if not inputs:
+            keywords = {
+                "mu0": mu0,
+                "Fz": Fz,
+                "k": k,
+                "k_range": k_range,
+                "k_low": k_low,
+                "k_high": k_high,
+                "y0": y0,
+                "Fz_amplitude": Fz_amplitude,
+                "omega": omega,
+                "f": f,
+                "v0": v0,
+            }
+            inputs = by_name(
+                cases, {name: x for name, x in keywords.items() if x is not ABSENT}, kind
             )
+            if has_labels(cases, inputs):
+                options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
+                return evaluate_labelled(
+                    self.evaluate,
+                    self.on_one_thread().evaluate,
+                    functools.partial(self._certain, kind=kind),
+                    cases,
+                    inputs,
+                    kind,
+                    "k_low" in inputs,
+                    options,
+                )
         return self.answer(Cases.of(inputs, kind, illegal == "raise"), gradient, groups)
 
     def answer(self, cases: Cases, gradient: bool = False, groups: bool = False) -> Answer[Any]:
@@ -750,8 +753,8 @@ class Surrogate:
             return self._scalar_answer([*columns.values()], gradient, kind)
         groups = groups or gradient or not cases.shape
         detail: Detail = "gradient" if gradient else "groups" if groups else "values"
-        six, n, data = [*columns.values()], math.prod(shape), self._data_of(kind)
-        rows = shared_out.cases(data, six, n, self._thread_limit, detail, kind).reshaped(shape)
+        six, data = [*columns.values()], self._data_of(kind)
+        rows = shared_out.cases(data, six, shape, self._thread_limit, detail, kind)
         answer: Answer[Any]
         if cases.ends is not None:
             low, high = cases.ends

@@ -28,8 +28,9 @@ try:
     from .settings import PREFIX, Settings, SettingsError, load_settings
 except ModuleNotFoundError as error:
     # Without mumacro.errors.missing: perhaps no package is installed here.
+    command = "python -m service" if __name__ == "__main__" else "mumacro serve"
     raise SystemExit(
-        f"python -m service: {error.name} is not installed: pip install 'mumacro[service]' "
+        f"{command}: {error.name} is not installed: pip install 'mumacro[service]' "
         "(in a checkout: pip install -e '.[service]')"
     ) from None
 

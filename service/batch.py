@@ -1,8 +1,8 @@
 """Many cases at once: one model of columns for every form of a body, answered slice by slice.
 
-A form decodes a body to numbers, lists and arrays by name (``forms/``); :class:`CaseColumns` checks
-them; :class:`Batch` evaluates slices, so that memory stays small and other threads run between
-them; the form writes the slices.  A bad case spoils only itself.
+A form (``batch_forms/``) decodes a body to numbers, lists and arrays by name; :class:`CaseColumns`
+checks them; :class:`Batch` evaluates slices, so that memory stays small and other threads run
+between them; the form writes the slices.  A bad case spoils only itself.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,10 +16,10 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
 from mumacro.kernel.arrays import Codes
 
+from .included import Outputs, Plan, answer_columns
 from .models.inputs import MAX_REASONS, Column
 from .models.options import MODEL, BatchOptions, CaseColumns
 from .problems import FieldFault, Kind, RequestError, reason_of, refuse
-from .quantities import Asked, Outputs, answer_columns
 from .reading import of_members
 from .tables import LoadedTable, Tables
 
@@ -61,7 +61,7 @@ class Batch:
     taken."""
 
     table: LoadedTable
-    asked: Asked
+    plan: Plan
     columns: dict[str, Any]  # numbers, and arrays (size,)
     size: int
     reasons: dict[int, Reason]
@@ -83,35 +83,35 @@ class Batch:
         }
         if any(length > max_batch for length in lengths.values()):
             raise too_large(max_batch)
-        asked_of = of_members(CaseColumns, both(body.members, options))
-        if MODEL in (asked_of.include or ()):
+        model = of_members(CaseColumns, both(body.members, options))
+        if MODEL in (model.include or ()):
             raise InputError("include", MODEL, f"without {MODEL}, which is for one case")
-        given, reasons = asked_of.columns, dict(body.reasons)
+        columns, reasons = model.columns, dict(body.reasons)
         # the first bad input of a case, in the order of the inputs, is told
-        for name, column in given.items():
+        for name, column in columns.items():
             if isinstance(column, Column):
-                given[name] = column.values
+                columns[name] = column.values
                 for i, reason in column.reasons.items():
                     reasons.setdefault(i, (name, reason))
-        lengths = {name: len(x) for name, x in given.items() if isinstance(x, np.ndarray)}
+        lengths = {name: len(x) for name, x in columns.items() if isinstance(x, np.ndarray)}
         size = next(iter(lengths.values()), 1)
         if wrong := [name for name, length in lengths.items() if length != size]:
             shown = ", ".join(f"{name}: {length}" for name, length in lengths.items())
             reason = f"lists must have one length; given {shown}"
             refuse([FieldFault.of(name, reason) for name in wrong])
         if not lengths:
-            given["v0"] = np.array([given["v0"]])
-        asked = Asked.of(asked_of, given)
+            columns["v0"] = np.array([columns["v0"]])
+        plan = Plan.of(model, columns)
         # relations between inputs are the same for all cases: an empty part shows whether they hold
-        Cases.of(by_name(None, _part(given, 0, 0), asked.kind), asked.kind)
+        Cases.of(by_name(None, _part(columns, 0, 0), plan.kind), plan.kind)
         in_query = options.tolerance is not None
-        table = tables.pick(asked_of.tolerance, True if in_query else None)
-        return cls(table, asked, given, size, reasons, bool(lengths), body.rows, **more)
+        table = tables.pick(model.tolerance, True if in_query else None)
+        return cls(table, plan, columns, size, reasons, bool(lengths), body.rows, **more)
 
     @property
     def cost(self) -> float:
         """Time of all cases, in times of a plain one."""
-        return self.size * self.asked.cost
+        return self.size * self.plan.cost
 
     def slices(self, step: int) -> Iterator[tuple[Outputs, Codes, list[str | None]]]:
         """Outputs by path, source codes and reasons of ``step`` cases after another.
@@ -121,7 +121,7 @@ class Batch:
         for start in range(0, max(self.size, 1), step):
             stop = min(start + step, self.size)
             part = _part(self.columns, start, stop)
-            outputs, codes = answer_columns(self.table.surrogate, part, self.asked)
+            outputs, codes = answer_columns(self.table.surrogate, part, self.plan)
             self.count(self.table, codes)
             yield outputs, codes, self._reasons(part, codes, start)
 
@@ -130,7 +130,7 @@ class Batch:
         bad = np.flatnonzero(codes < 0).tolist()
         if not bad:
             return texts
-        cases = Cases.of(by_name(None, part, self.asked.kind), self.asked.kind)
+        cases = Cases.of(by_name(None, part, self.plan.kind), self.plan.kind)
         for index in bad:
             self.n_errors += 1
             texts[index] = "bad case"

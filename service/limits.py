@@ -2,7 +2,7 @@
 
 A request that may take longer than one case needs a slot and runs in a thread.  Batches and streams
 share the slots of ``MUMACRO_MAX_BATCHES``; the questions of a person (law, solve-for, the page)
-have slots and threads of their own.
+have slots and threads of their own, and so have questions that may take longer than a person waits.
 """
 
 import asyncio
@@ -30,7 +30,11 @@ SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
 # largest cost without a thread, in times of a plain case: under half a millisecond
 AT_ONCE = 4000.0
 QUESTIONS = 8  # questions that are answered at the same time
-_NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
+LONG_QUESTIONS = 4  # of those that take longer, such as the motion of a ball: up to seconds each
+#: largest cost of a question that is not long: about 50 ms
+LONG = 100.0 * AT_ONCE
+# that is added to the threads of batches and long questions: short requests are answered first
+_NICENESS = 5
 _OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
 
 
@@ -111,19 +115,21 @@ class Work:
         self.settings = settings
         self.batches = Slots(settings.max_batches, "batches", _NICENESS)
         self.questions = Slots(QUESTIONS, "questions")
+        self.long_questions = Slots(LONG_QUESTIONS, "long questions", _NICENESS)
 
     def close(self) -> None:
         """Let no thread keep the process alive."""
-        for slots in (self.batches, self.questions):
+        for slots in (self.batches, self.questions, self.long_questions):
             slots.threads.shutdown(wait=False, cancel_futures=True)
 
-    async def question(self, work: Callable[[], T]) -> T:
-        """Do the work of a question in a thread; its slot is held until it is done, even without a
-        client."""
-        self.questions.take()
+    async def question(self, work: Callable[[], T], cost: float = 0.0) -> T:
+        """Do the work of a question, of this cost in times of a plain case, in a thread; its slot
+        is held until it is done, even without a client."""
+        slots = self.long_questions if cost > LONG else self.questions
+        slots.take()
         loop = asyncio.get_running_loop()
-        task = self.questions.threads.submit(work)
-        task.add_done_callback(lambda _: loop.call_soon_threadsafe(self.questions.give_back))
+        task = slots.threads.submit(work)
+        task.add_done_callback(lambda _: loop.call_soon_threadsafe(slots.give_back))
         async with within(self.settings.time_limit_s):
             return await asyncio.wrap_future(task)
 

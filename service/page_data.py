@@ -14,7 +14,7 @@ from mumacro import plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.fields import BOUNDS, LIKE, POSITIVE, RAD_PER_CYCLE, unit_of
-from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, kind_of
+from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRINGS_OF, kind_of
 from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.surrogate import Surrogate
 
@@ -40,10 +40,7 @@ _INPUTS = {
 }
 # what may be chosen, with its part of the model line; the first is the usual one
 _CHOICES = {
-    "contact": {
-        "spring": "one spring of stiffness k",
-        "ball": "a ball (Hertz) with the initial stiffness k",
-    },
+    "contact": {name: springs.meaning for name, springs in SPRINGS_OF.items()},
     "direction": {
         "across": "oscillation across the sliding direction",
         "along": "oscillation along the sliding direction",

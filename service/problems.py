@@ -116,9 +116,9 @@ def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
 
 
 def faults_of(
-    errors: Iterable[Any], known: Iterable[str], parameter: bool | None = None
+    errors: Iterable[Any], allowed: Iterable[str], parameter: bool | None = None
 ) -> list[FieldFault]:
-    """Pydantic's errors as faults, one per place; ``known`` are the names that may be given."""
+    """Pydantic's errors as faults, one per place; ``allowed`` are the names that may be given."""
     faults: dict[tuple[str | int, ...], FieldFault] = {}
     for error in errors:
         path, value = error["loc"], error["input"]
@@ -129,8 +129,8 @@ def faults_of(
             value = _NO_VALUE
         names = [str(step) for step in path if isinstance(step, str)]
         name = names[-1] if names else "body"
-        allowed = _WITHIN.get(names[0], INPUTS) if len(names) > 1 else known
-        reason = _reason(error, name, allowed)
+        own = _WITHIN.get(names[0], INPUTS) if len(names) > 1 else allowed
+        reason = _reason(error, name, own)
         faults.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(faults.values())
 
@@ -143,7 +143,7 @@ def reason_of(error: InputError) -> str:
     return f"must be {error.bound}".replace(" or math.inf", "")
 
 
-def _reason(error: Any, name: str, known: Iterable[str]) -> str:
+def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
     """What is wrong with a value, in the words of the library where it has some."""
     kind, value = error["type"], error["input"]
     cause = error.get("ctx", {}).get("error")
@@ -152,7 +152,7 @@ def _reason(error: Any, name: str, known: Iterable[str]) -> str:
     if kind == "missing":
         return "is required"
     if kind == "extra_forbidden":
-        return unknown_name(name, known)
+        return unknown_name(name, allowed)
     if kind == "float_type" and type(value) is int and name in BOUNDS:  # beyond double range
         return refusal(name, math.inf)
     if kind == "float_type":
@@ -173,6 +173,8 @@ def _reason(error: Any, name: str, known: Iterable[str]) -> str:
         return f"must have at least {least} entries" if most is None else (
             f"may have up to {most} entries"
         )  # fmt: skip
+    if kind == "list_type":
+        return "must be a list"
     message: str = error["msg"]
     return message.replace("Input should be", "must be").replace("Input should", "must")
 

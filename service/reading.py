@@ -97,7 +97,8 @@ async def small_body(request: Request) -> bytes:
         form_of(headers, {JSON: JSON})
     limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
     body = bytes(await read_body(headers, request.receive, limit))
-    if pairs := _pairs(request.scope["query_string"]):
+    query = request.scope["query_string"]
+    if query and (pairs := _pairs(query)):
         refuse(
             [
                 FieldFault((name,), "belongs in the body", value, parameter=True)

@@ -1,6 +1,6 @@
 """Settings of the service: ``MUMACRO_*`` environment variables, checked before anything starts.
 
-Each setting has a heading of the same name in docs/operations.md.  A bad one is reported in one
+Each setting has a row in the table of docs/operations.md.  A bad one is reported in one
 line that names the variable, the value and what it must be; the value of the API key is never
 shown.
 """

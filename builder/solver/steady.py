@@ -317,10 +317,10 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     check_range(v, y, eta)
     w, out, orbit, res = workspace()
     status = int(solve_raw(v, y, eta, w, out, orbit, res))
-    found = dict(zip(RESULTS, res.tolist(), strict=True))
-    found["regime"] = REGIMES[int(res[REGIME])] if status == OK else "unknown"
-    found["error_estimate"] = error_estimate(res[MU_RATIO], res[DEFICIT])
-    return Steady(**found, status=status, advice=ADVICE[status])
+    results = dict(zip(RESULTS, res.tolist(), strict=True))
+    results["regime"] = REGIMES[int(res[REGIME])] if status == OK else "unknown"
+    results["error_estimate"] = error_estimate(res[MU_RATIO], res[DEFICIT])
+    return Steady(**results, status=status, advice=ADVICE[status])
 
 
 def border(y: float) -> tuple[float, float]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
-from mumacro.analysis.load import Stiffening
 from mumacro.analysis.rootfinding import TINY, last_double
+from mumacro.analysis.stiffening import Stiffening
 from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.analysis.load import Stiffening
+from mumacro.analysis.stiffening import Stiffening
 from mumacro.answer import Answer
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from mumacro import plotting
 from mumacro.analysis.borders import Crossing, border_crossings
 from mumacro.analysis.input_curve import InputCurve
-from mumacro.analysis.load import Stiffening, stiffening_of
+from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval

@@ -143,9 +143,9 @@ class Measured:
         if settings < len(self.unknowns):
             raise InputError(
                 "data",
-                f"{self.n} points with {settings} different inputs",
-                f"points with at least {len(self.unknowns)} different inputs, one for each unknown "
-                f"({', '.join(self.unknowns)}); measure more, or fix one of the two",
+                f"{settings}",
+                f"points at {len(self.unknowns)} different inputs or more, one for each unknown "
+                f"({', '.join(self.unknowns)}): measure more, or fit k alone with mu0 known",
             )
         if self.mu.max() < _LEAST:
             bound = f"> 0 in at least one point, >= {_LEAST:g}: friction of zero tells nothing"

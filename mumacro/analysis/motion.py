@@ -205,10 +205,10 @@ def motion(
     omega or f : array_like
         Angular frequency [rad/s] or frequency [Hz], > 0, of the period.
     x, y, normal : array_like, tuple or list
-        Oscillations along [m], across [m] and of the normal force [N].  Each is an amplitude, a
-        pair (amplitude, phase in degrees), or a list of triples (harmonic, amplitude, phase), that
-        is amplitude sin(harmonic omega t + phase).  Harmonics are whole numbers from 1 to 1000.
-        Phases beyond 360 count as what is left of them.
+        Oscillations along [m], across [m] and of the normal force [N].  Each is an amplitude (half
+        of peak to peak), a pair (amplitude, phase in degrees), or a list of triples (harmonic,
+        amplitude, phase), that is amplitude sin(harmonic omega t + phase).  Harmonics are whole
+        numbers from 1 to 1000.  Phases beyond 360 count as what is left of them.
     contact : str
         "spring", or "ball" under a constant normal force.
     tolerance : float

@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike
 
 from mumacro.errors import InputError
 from mumacro.inputs.fields import RAD_PER_CYCLE
-from mumacro.inputs.kind import kind_of
+from mumacro.inputs.kind import CONTACTS, SPRINGS_OF, kind_of
 from mumacro.surrogate import Surrogate
 
 
@@ -117,7 +117,7 @@ def settling(
         if f is None
         else RAD_PER_CYCLE * np.asarray(f, dtype=np.float64)
     )
-    load_ratio = 1.5 if kind.contact else 1.0  # load of the middle spring of a ball over the mean
+    load_ratio = SPRINGS_OF[CONTACTS[kind.contact]].middle_load
     v, y, l0 = (
         answer.v_tilde / load_ratio,
         answer.y_tilde / load_ratio,

@@ -38,8 +38,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
-from mumacro.analysis.load import Stiffening, stiffening_of
 from mumacro.analysis.rootfinding import TINY, Branch, branches_between, last_double, samples
+from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval

@@ -12,13 +12,13 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from mumacro.analysis.load import EXPONENTS, ROUGH, Stiffening
 from mumacro.analysis.measured_points import HARDLY
 from mumacro.analysis.settling import settling
+from mumacro.analysis.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name, without_interval
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
-from mumacro.inputs.kind import Kind, kind_of
+from mumacro.inputs.kind import SPRINGS_OF, Kind, kind_of
 from mumacro.surrogate import Surrogate
 
 #: names of the rows, as in the table of docs/validity.md
@@ -68,7 +68,7 @@ def model_rows(
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
     >>> [k_row] = [row for row in model_rows(Surrogate.open(), case) if row["row"] == "k is known"]
     >>> k_row["text"]
-    'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
+    '10 % more or less of k changes mu_macro by 6 %: give k_range, or fit k'
     """
     case, ends = without_interval(case)
     kind = kind_of(contact, direction)
@@ -116,7 +116,7 @@ def load_rows(
             f"k grows as Fz^{stiffening.exponent:.3g} from its value at Fz = {stiffening.load:g} N"
         )
     else:
-        advice = "" if EXPONENTS[contact] else ", and a stiffness exponent"
+        advice = "" if SPRINGS_OF[contact].exponent else ", and a stiffness exponent"
         text = (
             "constant over Fz here; with the load k grows, as Fz^(1/3) for a ball, as "
             f"Fz^{ROUGH[0]:g} to Fz^{ROUGH[1]:g} for rough surfaces: give Fz at which k "
@@ -130,16 +130,16 @@ def k_effect(
     case: Mapping[str, Any],
     contact: str = "spring",
     direction: str = "across",
-    known: float = K_UNCERTAINTY,
+    uncertainty: float = K_UNCERTAINTY,
 ) -> float:
-    """By how much, relatively, mu_macro may differ [-] where k may by the factor 1 + ``known`` up
-    or down; 0 if rigid.
+    """By how much, relatively, mu_macro may differ [-] where k may by the factor 1 +
+    ``uncertainty`` up or down; 0 if rigid.
 
     The largest of seven values of k, since mu_macro is no straight line in k.  Over an interval of
     k half the width.
     """
-    if not 0.0 < known < math.inf:
-        raise InputError("known", known, "finite and > 0")
+    if not 0.0 < uncertainty < math.inf:
+        raise InputError("uncertainty", uncertainty, "finite and > 0")
     words = kind_of(contact, direction).names
     middle_case, ends = without_interval(case)
     k = _six_inputs(middle_case, kind_of(contact, direction))["k"]
@@ -149,7 +149,9 @@ def k_effect(
         band = surrogate.evaluate(**case, **words)
         middle_mu, half_width = band.mu_macro, 0.5 * (band.mu_macro_high - band.mu_macro_low)
     else:
-        stiffnesses = k * np.geomspace(1.0 / (1.0 + known), 1.0 + known, 7)  # the middle one is k
+        stiffnesses = k * np.geomspace(
+            1.0 / (1.0 + uncertainty), 1.0 + uncertainty, 7
+        )  # the middle one is k
         samples = surrogate.evaluate(**{**case, "k": stiffnesses}, **words).mu_macro
         middle_mu, half_width = float(samples[3]), float(np.abs(samples - samples[3]).max())
     return 0.0 if half_width == 0.0 else half_width / middle_mu if middle_mu > 0.0 else math.inf
@@ -211,7 +213,7 @@ def _stiffness(
     effect = k_effect(surrogate, case, contact, direction)
     margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{100.0 * effect:.2g} %"
     if effect >= 1e-3:
-        text = f"k known to {margin} leaves mu_macro uncertain by {change}: give k_range, or fit k"
+        text = f"{margin} more or less of k changes mu_macro by {change}: give k_range, or fit k"
     elif y > HARDLY:
         text = (
             f"y~ = {y:.3g}, above {HARDLY:g}: k off by {margin} moves mu_macro by {change}; "

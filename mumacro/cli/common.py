@@ -32,9 +32,8 @@ inputs, each as name=value, in SI units or with a unit as in y0=2um:
   mu0    Coulomb friction coefficient [-], > 0
   Fz     normal force [N], > 0
   k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
-  y0     amplitude of the oscillation [m], half of peak to peak, >= 0; with --direction normal
-         that of the force, Fz_amplitude [N], < Fz
-  omega  its angular frequency [rad/s], or f, its frequency [Hz], >= 0
+  y0     amplitude [m], half of peak to peak; with --direction normal Fz_amplitude [N], below Fz
+  omega  angular frequency [rad/s], or f, frequency [Hz], >= 0
   v0     sliding speed [m/s], >= 0
 """
 
@@ -66,15 +65,15 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault, with the choice that may have been meant."""
         if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
-            known = [word.strip(" '") for word in wrong[3].split(",")]
-            near = difflib.get_close_matches(wrong[2].lower(), known, n=1)
+            choices = [word.strip(" '") for word in wrong[3].split(",")]
+            near = difflib.get_close_matches(wrong[2].lower(), choices, n=1)
             message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
 
 
 def question(
     name: str,
-    told: str,
+    description: str,
     epilog: str,
     words: str,
     least: str = "+",
@@ -82,7 +81,7 @@ def question(
 ) -> OneLineParser:
     """The parser of a command that is given a case and has ``-o``; ``first`` is an argument that
     stands before it."""
-    parser = OneLineParser(prog=f"mumacro {name}", description=told, epilog=epilog)
+    parser = OneLineParser(prog=f"mumacro {name}", description=description, epilog=epilog)
     if first:
         parser.add_argument(first[0], **first[1])
     add_case(parser, words, least)
@@ -107,10 +106,7 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
     """The options for the contact and the direction of its oscillation; :func:`kind_in` reads
     them."""
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
-    text = (
-        "of the oscillation to the sliding direction; normal: the normal force oscillates; "
-        "default: across"
-    )
+    text = "of the oscillation; normal: of the normal force; default: across"
     parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
 
 
@@ -122,10 +118,7 @@ def kind_in(chosen: argparse.Namespace) -> Kind:
 
 def add_table(parser: OneLineParser) -> None:
     """The options of all commands that read a table and answer."""
-    text = (
-        "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: "
-        "the tightest one"
-    )
+    text = "a file, or the largest error; default: the tightest bundled one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
 
@@ -143,8 +136,8 @@ def add_format(parser: OneLineParser) -> None:
 def add_exponent(parser: OneLineParser) -> None:
     """The option for a stiffness that grows with the load."""
     text = (
-        "where Fz is swept or the unknown: k grows as Fz^M, 0 to 1, and Fz= in the case is the "
-        "load at which k holds; default with Fz=: 1/3 for a ball"
+        "with Fz as the input: k grows as Fz^M, M from 0 to 1, from its value at the Fz= of the "
+        "case; default for a ball: 1/3"
     )
     parser.add_argument("--stiffness-exponent", type=float, metavar="M", help=text)
 
@@ -156,16 +149,16 @@ def add_form(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--digits", type=int, choices=range(1, 18), metavar="N", help=text)
 
 
-def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
+def run(title: str, command: Callable[[Any], int | str], arguments: Any) -> int:
     """Run a command, print the text that it returns, and return the exit code; an error is one line
     on stderr."""
     try:
-        found = command(given)
-        if isinstance(found, str):
-            print(found, flush=True)
+        output = command(arguments)
+        if isinstance(output, str):
+            print(output, flush=True)
             return 0
         sys.stdout.flush()
-        return found
+        return output
     except BrokenPipeError:  # the reader, such as head, has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -206,10 +199,11 @@ def read_case(
     1000000.0
     """
     case: dict[str, Any] = {}
-    faults = []
+    faults: list[str] = []
+    strange: list[str] = []
     for name, text in _pairs(words):
         if text is None:
-            faults.append(f"{name!r} is no name=value such as Fz=10")
+            strange.append(repr(name))
             continue
         if name not in kind.columns:
             meant = suggestion(name)
@@ -223,6 +217,9 @@ def read_case(
             case[name] = _read(name, text, one_k)
         except ValueError as error:
             faults.append(str(error))
+    if strange:
+        verb = "is" if len(strange) == 1 else "are"
+        faults.insert(0, f"{', '.join(strange)} {verb} no name=value such as Fz=10")
     absent = {*optional} - case.keys()
     faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
@@ -257,17 +254,17 @@ def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
 
 def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
     """Name and value of each ``name=value``; a unit may stand apart; other words have no value."""
-    found: list[tuple[str, str | None]] = []
+    pairs: list[tuple[str, str | None]] = []
     for word in re.sub(r"\s*=\s*", "=", " ".join(words)).split():
         name, equals, text = word.strip(",;").partition("=")
-        last, value = found[-1] if found else ("", None)
+        last, value = pairs[-1] if pairs else ("", None)
         if equals:
-            found.append((name, text))
+            pairs.append((name, text))
         elif value is not None and last in (*NAMES, *LIKE) and scale_of(last, name):
-            found[-1] = last, f"{value} {name}"
+            pairs[-1] = last, f"{value} {name}"
         else:
-            found.append((name, None))
-    return found
+            pairs.append((name, None))
+    return pairs
 
 
 def _faults_of_names(
@@ -275,15 +272,15 @@ def _faults_of_names(
 ) -> list[str]:
     frequencies = {"f", "omega"}
     left_out = {*without} | (frequencies if frequencies & {*without} else set())
-    names = " and ".join(without)
-    told = f"{names} {'is' if len(without) == 1 else 'are'} the unknown or the swept input"
-    faults = [f"leave {name} out: {told}" for name in case if name in left_out]
+    faults = [
+        f"leave {name} out: it varies here or is computed" for name in case if name in left_out
+    ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
-    given = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
+    complete = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
     hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
     absent = [
-        hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in given
+        hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in complete
     ]
     return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
 
@@ -296,8 +293,8 @@ def without_or_load(unknown: str) -> dict[str, Any]:
 
 def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
     """A case with the geometric middle in place of an interval of k."""
-    found, _ = without_interval(case)
-    return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in found.items()}
+    one_k, _ = without_interval(case)
+    return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
 
 
 def in_words(text: str, case: Mapping[str, Any]) -> str:
@@ -319,12 +316,12 @@ def format_for(
 
 
 def read_values(
-    given: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
+    pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
 ) -> list[Any]:
     """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
     are none."""
     values, faults = [], []
-    for name, text in given:
+    for name, text in pairs:
         try:
             values.append(read(name, text))
         except ValueError as error:
@@ -366,7 +363,7 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
 
 def model_lines(rows: Sequence[Row]) -> list[str]:
     """What is said about the model, below a result."""
-    return [in_columns([("model", f"{row['row']}: {row['text']}")]) for row in rows]
+    return [in_columns([("assumes", f"{row['row']}: {row['text']}")]) for row in rows]
 
 
 def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:

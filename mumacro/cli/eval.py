@@ -18,10 +18,10 @@ _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
-  for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N]
+  for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N];
+  amplitudes are half of peak to peak
   other columns are copied; those of CSV and NDJSON stay text
-added: mu_macro, mu_ratio, regime, error_bound, source; for k_low and k_high also mu_macro_low and
-  mu_macro_high
+added: mu_macro, mu_ratio, regime, error_bound, source; with k_low, k_high mu_macro_low and _high
 rejected rows are in OUT.rejects.csv only: row (from 1), field, value, reason
 
 examples:

@@ -38,9 +38,8 @@ _TASKS = {
     "mumacro serve": "page and REST service",
 }
 OVERVIEW = (
-    "Friction of a contact that is shaken across or along its sliding direction, or by its normal\n"
-    "force.  Each command has its own help: mumacro eval --help.\n\n"
-    + "".join(f"  {words:68}  {told}\n" for words, told in _TASKS.items())
+    "Friction of a shaken contact.  Each command has its own help: mumacro eval --help.\n\n"
+    + "".join(f"  {words:68}  {description}\n" for words, description in _TASKS.items())
     + "\n"
 )
 

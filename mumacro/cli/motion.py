@@ -69,12 +69,16 @@ def run(words: Sequence[str]) -> str:
     """``mumacro motion``."""
     parser = OneLineParser(
         prog="mumacro motion",
-        description="The mean friction of a contact that is dragged along x and shaken in any "
-        "periodic way, and its steady cycle.",
-        epilog=f"{_INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} --normal 3N@45deg -o cycle.png",
+        description="Mean friction and steady cycle of a contact that is dragged along x and "
+        "shaken in any periodic way.",
+        epilog=f"{_INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} -o cycle.png",
     )
     parser.add_argument("words", nargs="+", metavar="name=value", help="a case without y0")
-    helps = ("oscillation along the drag [m]", "across it [m]", "of the normal force [N]")
+    helps = (
+        "amplitude along the drag [m], half of peak to peak",
+        "across it [m], likewise",
+        "of the normal force [N], likewise",
+    )
     for name, text in zip(PARTS, helps, strict=True):
         parser.add_argument(f"--{name}", metavar="AMPLITUDE[@PHASE]", help=text)
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")

@@ -49,7 +49,7 @@ def run(words: Sequence[str], description: str) -> str:
         result |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**result, "table": common.about(surrogate)})
     lines = [
-        ("model", f"{row['row']}: {common.in_words(row['text'], middle)}")
+        ("assumes", f"{row['row']}: {common.in_words(row['text'], middle)}")
         for row in rows
         if (row["row"], "k_range" in case) != ROW_OF_K
     ]

@@ -155,12 +155,12 @@ class Element:
 
     @state.setter
     def state(self, forces: ArrayLike) -> None:
-        given, shape = real("state", forces), (*self.shape, self.springs, 2)
-        if given.shape != shape:
-            raise InputError("state", given.shape, f"of the shape {shape}")
-        if not np.isfinite(given).all():
+        array, shape = real("state", forces), (*self.shape, self.springs, 2)
+        if array.shape != shape:
+            raise InputError("state", array.shape, f"of the shape {shape}")
+        if not np.isfinite(array).all():
             raise InputError("state", forces, "finite")
-        self._forces = given.reshape(self._forces.shape).copy()
+        self._forces = array.reshape(self._forces.shape).copy()
 
     def reset(self) -> None:
         """Relax all springs: no force."""
@@ -190,12 +190,12 @@ class Element:
         """``value`` for every contact, (n,) and contiguous; finite."""
         if type(value) is float and math.isfinite(value):
             return np.full(self._k.size, value)
-        given = real(name, value)
+        numbers = real(name, value)
         try:
-            array = np.broadcast_to(given, self.shape).ravel()
+            array = np.broadcast_to(numbers, self.shape).ravel()
         except ValueError as error:
             raise InputError(
-                name, given.shape, f"of a shape that broadcasts to the contacts' {self.shape}"
+                name, numbers.shape, f"of a shape that broadcasts to the contacts' {self.shape}"
             ) from error
         if not np.isfinite(array).all():
             raise InputError(name, value, "finite")

@@ -179,12 +179,13 @@ def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
         )
         return {name: cases[name] for name in names if name in present}
     except (AttributeError, TypeError, KeyError) as error:
-        type_name = f"{type(cases).__module__}.{type(cases).__qualname__}"
+        type_name = f"{type(cases).__module__}.{type(cases).__qualname__}".removeprefix("builtins.")
         raise InputError(
             argument,
             type_name,
             "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
-            "give anything else as {name: array}, what is lazy after its collect() or read_all()",
+            "give anything else as {name: array}, a file as pandas.read_csv reads it, "
+            "what is lazy after its collect() or read_all()",
         ) from error
 
 
@@ -313,24 +314,50 @@ def columns_of(inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     """
     columns: dict[str, float | Array] = {}
     for name in kind.fields:
-        source = _frequency_in(inputs) if name == "omega" else name
+        source = _frequency_in(inputs, kind) if name == "omega" else name
         value = inputs.get(source, ABSENT)
         if type(value) is not float:
+            if value is ABSENT:
+                raise _missing(inputs, kind)
             value = _column(source, value)
-        if source == "f":
-            with np.errstate(over="ignore"):  # an infinite omega, refused as a value of f
-                value = value * RAD_PER_CYCLE
-        columns[name] = value
+        columns[name] = _angular(value) if source == "f" else value
     return columns
 
 
-def _frequency_in(inputs: Mapping[str, Any]) -> str:
+def _missing(inputs: Mapping[str, Any], kind: Kind) -> InputError:
+    """What to give, where ``inputs`` lack one or more of the six."""
+    frequency = {name for name in ("omega", "f") if inputs.get(name) is not None}
+    present = {*inputs} - {"omega"} | ({"omega"} if frequency else set())
+    absent = [name for name in kind.fields if name not in present]
+    in_words = {name: f"{name} [{UNITS.get(name, 'N')}]" for name in absent}
+    in_words["omega"] = "omega [rad/s] or f [Hz]"
+    bounds = {name: f"given [{UNITS.get(name, 'N')}]" for name in absent} | {
+        "k": f"given: {STIFFNESS}",
+        "omega": "given, or f [Hz] in its place",
+        AMPLITUDE: "given [N] for direction normal",
+    }
+    others = ", ".join(in_words[name] for name in absent[1:])
+    return InputError(absent[0], None, bounds[absent[0]] + (others and f"; so must {others}"))
+
+
+def _angular(frequency: float | Array) -> float | Array:
+    """omega [rad/s] of f [Hz]; beyond double range infinite, which is refused as a value of f."""
+    if isinstance(frequency, float):
+        return frequency * RAD_PER_CYCLE
+    with np.errstate(over="ignore"):
+        return frequency * RAD_PER_CYCLE
+
+
+def _frequency_in(inputs: Mapping[str, Any], kind: Kind) -> str:
     """Which of omega and f the inputs have."""
-    has_omega = inputs.get("omega") is not None
-    if has_omega == (inputs.get("f") is not None):
-        choice = "not both" if has_omega else "one of them"
-        raise InputError("omega", inputs.get("omega"), f"given or f [Hz] in its place, {choice}")
-    return "omega" if has_omega else "f"
+    if inputs.get("f") is None:
+        if inputs.get("omega") is None:
+            raise _missing(inputs, kind)
+        return "omega"
+    if inputs.get("omega") is None:
+        return "f"
+    bound = "left out beside f [Hz], which stands in its place: give one, not both"
+    raise InputError("omega", inputs["omega"], bound)
 
 
 def _column(name: str, value: Any) -> float | Array:
@@ -338,14 +365,8 @@ def _column(name: str, value: Any) -> float | Array:
     remedy where it has no real numbers."""
     if type(value) is np.ndarray and value.dtype == _FLOAT:
         return value if value.ndim else float(value)
-    if value is ABSENT or (name == AMPLITUDE and value is None):
-        hint = f" [{UNITS.get(name, 'N')}]"
-        hint = (
-            f": {STIFFNESS}"
-            if name == "k"
-            else hint + " for direction normal" * (name == AMPLITUDE)
-        )
-        raise InputError(name, None, f"given{hint}")
+    if name == AMPLITUDE and value is None:
+        raise InputError(name, None, "given [N] for direction normal")
     if type(value) in NUMBERS:
         with suppress(OverflowError):  # a whole number beyond double range is refused below
             return float(value)

@@ -18,9 +18,28 @@ DirectionName = Literal["across", "along", "normal"]
 #: in the order of the kernel's codes
 CONTACTS: tuple[ContactName, ...] = ("spring", "ball")
 DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
+
+
+class Springs(NamedTuple):
+    """What is known of a contact's springs without an evaluation."""
+
+    meaning: str
+    exponent: float  #: k grows with this power of the load
+    middle_load: float  #: load of the middle spring over the mean
+
+
+#: by contact
+SPRINGS_OF: dict[str, Springs] = {
+    "spring": Springs("one spring of stiffness k", 0.0, 1.0),
+    "ball": Springs("a ball (Hertz) with the initial stiffness k", 1.0 / 3.0, 1.5),
+}
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
-# the fields of direction normal
-_FORCED = tuple(AMPLITUDE if name == "y0" else name for name in FIELDS)
+# by code of the direction
+_FIELDS = (
+    FIELDS,
+    FIELDS,
+    tuple(AMPLITUDE if name == "y0" else name for name in FIELDS),
+)
 LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of that amplitude
 
 
@@ -39,7 +58,7 @@ class Kind(NamedTuple):
     def fields(self) -> tuple[str, ...]:
         """The six inputs by name, :data:`mumacro.inputs.fields.FIELDS` with Fz_amplitude in place
         of y0 for normal."""
-        return _FORCED if self.normal else FIELDS
+        return _FIELDS[self.direction]
 
     @property
     def names(self) -> dict[str, Any]:

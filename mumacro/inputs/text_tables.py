@@ -162,7 +162,8 @@ def absent(name: str, heads: Sequence[str]) -> str:
             return f"there is no column {name}; {head!r} is similar: {remedy}"
     unit = f"{name} [{unit_of(name) if name in (*UNITS_OF, *LIKE) else '-'}]"
     heading = f"{unit} or f [Hz]" if name == "omega" else unit
-    return f"there is no column {heading}; there are {', '.join(map(repr, heads))}"
+    meaning = ": the mean friction force over Fz" if name == "mu_macro" else ""
+    return f"there is no column {heading}{meaning}; there are {', '.join(map(repr, heads))}"
 
 
 def read_cell(name: str, cell: str, decimal: str = ".") -> float:

@@ -236,8 +236,7 @@ def read_number(name: str, text: str) -> float:
     >>> read_number("y0", "2 N")
     Traceback (most recent call last):
     ...
-    ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um,
-    ...
+    ValueError: y0=2 N: give metres as a plain number, or with a unit: m, cm, mm, um, ...
     """
     like = LIKE.get(name, name)
     return read_quantity(name, text, SI[like][1], UNITS_OF[like], rigid=name == "k")
@@ -264,8 +263,7 @@ def read_quantity(
     examples = ", ".join([unit for unit in units if unit][:4])
     or_rigid = ", or rigid" if rigid else ""
     raise ValueError(
-        f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {examples}, "
-        f"...{or_rigid}"
+        f"{name}={text}: give {words} as a plain number, or with a unit: {examples}, ...{or_rigid}"
     )
 
 

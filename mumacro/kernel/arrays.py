@@ -13,14 +13,17 @@ Places = NDArray[np.intp]
 
 def common_shape(arrays: Iterable[Array]) -> tuple[int, ...]:
     """The shape to which arrays broadcast; ValueError where they do not."""
-    shapes = {array.shape for array in arrays} - {()}
-    return np.broadcast_shapes(*shapes) if len(shapes) > 1 else shapes.pop() if shapes else ()
+    shapes = {array.shape for array in arrays}
+    shapes.discard(())
+    if len(shapes) > 1:
+        return np.broadcast_shapes(*shapes)
+    return shapes.pop() if shapes else ()
 
 
 def flat(array: Array, shape: tuple[int, ...]) -> Array:
-    """``array`` broadcast to ``shape``, as flat, contiguous and aligned float64."""
+    """``array`` broadcast to ``shape``, as flat, contiguous and aligned."""
     if array.shape != shape:
         array = np.broadcast_to(array, shape)
-    if not (array.flags.carray and array.dtype == np.float64):
-        array = np.require(array, np.float64, ["C", "A"])
-    return array if array.ndim == 1 else array.reshape(-1)
+    if not array.flags.carray:
+        array = np.require(array, requirements=["C", "A"])
+    return array if len(shape) == 1 else array.reshape(-1)

@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
+import _cffi_backend  # type: ignore[import-untyped]
 import numpy as np
 from cffi import FFI
 
 from mumacro.kernel.arrays import Array, Codes
-
-#: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
-BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 
 MOST_STEPS = 200_000  # of a period of a motion
 
@@ -32,37 +30,59 @@ _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "mumacro_cas
 _POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
 _COLUMNS = _FFI.typeof("mumacro_columns *")
 _NOTHING: Any = _FFI.NULL
-_new = _FFI.new
+# of types that are resolved already, in half the time of the methods of FFI
+_resolved = _cffi_backend.FFI()
+_new, _from_buffer = _resolved.new, _resolved.from_buffer
 
 
 def _numbers(array: Array | None) -> Any:
-    return _NOTHING if array is None else _FFI.from_buffer(_NUMBERS, array)
+    return _NOTHING if array is None else _from_buffer(_NUMBERS, array)
 
 
 def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
     """How many harmonics x, y and the normal force have, and all of them."""
     joined = [float(order) for part in orders for order in part]
-    return _new("int32_t[3]", [len(part) for part in orders]), _new("double[]", joined or [0.0])
+    return _FFI.new("int32_t[3]", [len(part) for part in orders]), _FFI.new(
+        "double[]", joined or [0.0]
+    )
 
 
 def _out(rows: Sequence[Array], start: int) -> tuple[Any, int]:
     """Where the kernel writes rows of one array from column ``start`` on, and their stride."""
     whole = np.asarray(rows[0].base)
-    return _numbers(whole.reshape(-1)[start:]), whole.shape[1]
+    return _numbers(whole) + start, whole.shape[1]
 
 
-def _columns_of(columns: Sequence[Array | float]) -> tuple[Any, list[Any]]:
-    """Six columns, (n,) or one number, as a ``mumacro_columns``, and what it points to."""
-    of_kernel, kept = _new(_COLUMNS), []
+def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
+    """Six columns, (n,) or one number, from ``start`` on as a ``mumacro_columns``, which is valid
+    as long as they are."""
+    of_kernel = _new(_COLUMNS)
     arrays, constants = of_kernel.array, of_kernel.constant
     for i, column in enumerate(columns):
         if isinstance(column, float):
             constants[i] = column
         else:
-            arrays[i] = pointer = _numbers(column)
-            kept.append(pointer)
-    return of_kernel, kept
+            arrays[i] = _from_buffer(_NUMBERS, column) + start
+    return of_kernel
 
+
+def _record(enum: str, prefix: str, end: str) -> np.dtype[np.void]:
+    """A row of doubles with the names of an enum, in which ``end`` counts all columns."""
+    places = dict(_FFI.typeof(f"enum {enum}").relements)
+    columns = places.pop(end)
+    return np.dtype(
+        {
+            "names": [name.removeprefix(prefix).lower() for name in places],
+            "formats": [np.float64] * len(places),
+            "offsets": [8 * place for place in places.values()],
+            "itemsize": 8 * columns,
+        }
+    )
+
+
+#: rows of :class:`Data`'s blocks and pieces of the border, see ``kernel/data.h``
+BLOCK_ROW = _record("mumacro_block_column", "MU_", "MU_BLOCK_COLUMNS")
+PIECE_ROW = _record("mumacro_piece_column", "MU_PIECE_", "MU_PIECE_COLUMNS")
 
 _ROW = _FFI.typeof("enum mumacro_row").relements
 _SLOPE_ROWS = _FFI.typeof("enum mumacro_slope_row").relements["MU_SLOPE_ROWS"]
@@ -76,8 +96,19 @@ _END: dict[Detail, int] = {
 }
 
 
+class _Rows:
+    """A row of :class:`CaseRows` by its name in ``mumacro_row``, or all rows up to another."""
+
+    def __init__(self, name: str, end: str = "") -> None:
+        self._place = slice(_ROW[name], _ROW[end]) if end else _ROW[name]
+
+    def __get__(self, answers: "CaseRows", _owner: type) -> Array:
+        rows: Array = answers.numbers[self._place]
+        return rows
+
+
 class CaseRows:
-    """Answers to n cases, which :meth:`Kernel.cases` fills in, by the names of ``mumacro_row``.
+    """Answers to cases of one shape, which :meth:`Kernel.cases` fills in.
 
     ``v_tilde``, ``y_tilde`` and ``length_scale`` are there from the detail "groups" on,
     ``gradient`` and ``gradient_bound``, six rows each, for "gradient".  ``source`` holds codes, -1
@@ -86,64 +117,30 @@ class CaseRows:
 
     __slots__ = ("numbers", "source")
 
+    #: friction coefficient [-]
+    mu_macro = _Rows("MU_ROW_MU_MACRO")
+    #: mu_macro / mu0 [-]
+    mu_ratio = _Rows("MU_ROW_MU_RATIO")
+    #: bound of the absolute error of mu_macro [-]
+    error_bound = _Rows("MU_ROW_ERROR_BOUND")
+    #: dimensionless speed [-]
+    v_tilde = _Rows("MU_ROW_V_TILDE")
+    #: dimensionless amplitude [-]
+    y_tilde = _Rows("MU_ROW_Y_TILDE")
+    #: l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact
+    length_scale = _Rows("MU_ROW_LENGTH_SCALE")
+    #: d mu_macro / d input
+    gradient = _Rows("MU_ROW_GRADIENT", "MU_ROW_GRADIENT_BOUND")
+    #: bounds of the absolute errors of the gradient
+    gradient_bound = _Rows("MU_ROW_GRADIENT_BOUND", "MU_ROWS")
+
     def __init__(self, numbers: Array, source: Codes) -> None:
         self.numbers, self.source = numbers, source
 
     @classmethod
-    def empty(cls, n: int, detail: Detail = "values") -> Self:
-        """Room for n answers, (n,) each."""
-        return cls(np.empty((_END[detail], n)), np.empty(n, np.int8))
-
-    def reshaped(self, shape: tuple[int, ...]) -> Self:
-        """The same answers, in another shape."""
-        if shape == self.source.shape:
-            return self
-        rows = self.numbers.reshape(len(self.numbers), *shape)
-        return type(self)(rows, self.source.reshape(shape))
-
-    @property
-    def mu_macro(self) -> Array:
-        """Friction coefficient [-]."""
-        return self._row("MU_ROW_MU_MACRO")
-
-    @property
-    def mu_ratio(self) -> Array:
-        """mu_macro / mu0 [-]."""
-        return self._row("MU_ROW_MU_RATIO")
-
-    @property
-    def error_bound(self) -> Array:
-        """Bound of the absolute error of mu_macro [-]."""
-        return self._row("MU_ROW_ERROR_BOUND")
-
-    @property
-    def v_tilde(self) -> Array:
-        """Dimensionless speed [-]."""
-        return self._row("MU_ROW_V_TILDE")
-
-    @property
-    def y_tilde(self) -> Array:
-        """Dimensionless amplitude [-]."""
-        return self._row("MU_ROW_Y_TILDE")
-
-    @property
-    def length_scale(self) -> Array:
-        """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact."""
-        return self._row("MU_ROW_LENGTH_SCALE")
-
-    @property
-    def gradient(self) -> Array:
-        """d mu_macro / d input, (6, n)."""
-        return self.numbers[_ROW["MU_ROW_GRADIENT"] : _ROW["MU_ROW_GRADIENT_BOUND"]]
-
-    @property
-    def gradient_bound(self) -> Array:
-        """Bounds of the absolute errors of :attr:`gradient`, (6, n)."""
-        return self.numbers[_ROW["MU_ROW_GRADIENT_BOUND"] : _ROW["MU_ROWS"]]
-
-    def _row(self, name: str) -> Array:
-        row: Array = self.numbers[_ROW[name]]
-        return row
+    def empty(cls, shape: tuple[int, ...], detail: Detail = "values") -> Self:
+        """Room for the answers to cases of a shape."""
+        return cls(np.empty((_END[detail], *shape)), np.empty(shape, np.int8))
 
 
 class SlopeRows(NamedTuple):
@@ -180,13 +177,12 @@ class Data:
     """A table as the kernel reads it.
 
     ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3,
-    PIECE_COLUMNS): first cell, offset, step, relative error.  ``blocks`` (sources + 1,
-    BLOCK_COLUMNS): first cell, cells along b, offset and step along a, along b; zero where no
-    cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
+    columns): rows of ``PIECE_ROW``.  ``blocks`` (sources + 1, columns): rows of ``BLOCK_ROW``,
+    zero where no cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
     """
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
-        self.pointer = _new("mumacro_data *")
+        self.pointer = _FFI.new("mumacro_data *")
         self._kept: list[Any] = []
         #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by
         #: code of the quantity
@@ -264,7 +260,7 @@ class Kernel:
 
         Of another ``kind``, see :meth:`cases`, all three are.
         """
-        codes = _NOTHING if source is None else _FFI.from_buffer(_CODES, source)
+        codes = _NOTHING if source is None else _from_buffer(_CODES, source)
         arrays = _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
         self._values(data.pointer, *kind, quantity, v.size, *arrays)
 
@@ -294,38 +290,35 @@ class Kernel:
     def cases(
         self,
         data: Data,
-        n: int,
         columns: Sequence[Array | float],
         answers: CaseRows,
-        start: int = 0,
+        part: slice,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """n cases: fill ``answers`` from ``start`` on.
+        """A part of n cases: fill ``answers`` there.
 
         ``columns`` are the six inputs, (n,) or one number.  ``kind``: another contact and
         direction, see :class:`mumacro.inputs.kind.Kind`.
         """
-        six, _kept = _columns_of(columns)
-        rows, stride = answers.numbers.shape
+        start, n = part.start, part.stop - part.start
         numbers, codes = answers.numbers, answers.source
-        if start:
-            numbers, codes = numbers.reshape(-1)[start:], codes[start:]
-        out, sources = _numbers(numbers), _FFI.from_buffer(_CODES, codes)
+        out, sources = _numbers(numbers) + start, _from_buffer(_CODES, codes) + start
+        six, rows, stride = _columns_of(columns, start), len(numbers), codes.size
         self._cases(data.pointer, *kind, n, six, rows, out, stride, sources)
 
     def intervals(
         self,
         data: Data,
-        n: int,
         columns: Sequence[Array | float],
         high: Array,
         rows: ExtremeRows,
-        start: int = 0,
+        part: slice,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
         """As :meth:`cases`, with k from its column to ``high`` (n,)."""
-        six, _kept = _columns_of(columns)
-        self._found.intervals(data.pointer, *kind, n, six, _numbers(high), *_out(rows, start))
+        start, n = part.start, part.stop - part.start
+        six, ends = _columns_of(columns, start), _numbers(high) + start
+        self._found.intervals(data.pointer, *kind, n, six, ends, *_out(rows, start))
 
     def one(self, pointer: Any, six: Sequence[float], with_gradient: bool, contact: int = 0) -> Any:
         """One case in plain numbers: a ``mumacro_case``, its gradient only where asked for."""
@@ -346,7 +339,7 @@ class Kernel:
         """Blocks of points (n,) with 0 < v~, y~ < infinity, of a ball those of its middle spring,
         and their coordinates as evaluation counts them."""
         block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
-        codes = _FFI.from_buffer(_CODES, block)
+        codes = _from_buffer(_CODES, block)
         arrays = _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
         self._found.places(data.pointer, contact, v.size, *arrays)
         return block, a, b

@@ -4,8 +4,6 @@
  * mid   1.5 < y~ <= 2^17     coordinate ln y~, nodes hold v~crit / sqrt(y~), cells v~crit itself
  * high  y~ > 2^17            coordinate 1/y~, nodes hold v~crit / sqrt(y~) */
 
-enum { MU_PIECE_FIRST, MU_PIECE_OFFSET, MU_PIECE_STEP, MU_PIECE_ERROR, MU_PIECE_COLUMNS };
-
 /* How far v~crit may be off, relative, with the last digits of v~ and y~. */
 MU_INLINE double mu_border_error(const mumacro_data *data) { return data->pieces[MU_PIECE_ERROR] + MU_ROUNDING; }
 

@@ -1,7 +1,5 @@
 /* The charts: which block a point belongs to, and its coordinates there. */
 
-enum { MU_FIRST, MU_CELLS_B, MU_OFFSET_A, MU_STEP_A, MU_OFFSET_B, MU_STEP_B, MU_BLOCK_COLUMNS = 8 };
-
 /* A point in its block: coordinates (a, b), v~crit and d ln v~crit / d ln y~; phi in the corner only. */
 typedef struct {
     int block;

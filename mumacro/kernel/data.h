@@ -20,12 +20,26 @@ typedef struct {
     const double *points;
 } mumacro_driven_rule;
 
-/* border (border_cells, 8): polynomials of v~crit, highest power first; pieces (3, 4): first cell, offset, step,
- * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused; step
- * times coordinate plus offset counts cells.  Rows of sources without cells are zero.  outer (outer_cells, 2, 8): the
- * two terms of large speed, in cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of
- * them is read.  A ball that is shaken across has blocks and quantities of its own, with the same border; driven is for
- * one that is shaken along, without nodes where that is not wanted. */
+/* Columns of a block's row: its first cell, cells along b, and how they are counted along a and along b: step times
+ * coordinate plus offset.  The columns up to the eighth are unused. */
+enum mumacro_block_column {
+    MU_FIRST,
+    MU_CELLS_B,
+    MU_OFFSET_A,
+    MU_STEP_A,
+    MU_OFFSET_B,
+    MU_STEP_B,
+    MU_BLOCK_COLUMNS = 8
+};
+
+/* Columns of a row of a piece of the border: likewise, and the relative error of v~crit. */
+enum mumacro_piece_column { MU_PIECE_FIRST, MU_PIECE_OFFSET, MU_PIECE_STEP, MU_PIECE_ERROR, MU_PIECE_COLUMNS };
+
+/* border (border_cells, 8): polynomials of v~crit, highest power first; pieces (3, MU_PIECE_COLUMNS); blocks (sources +
+ * 1, MU_BLOCK_COLUMNS), zero for sources without cells.  outer (outer_cells, 2, 8): the two terms of large speed, in
+ * cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of them is read.  A ball that is
+ * shaken across has blocks and quantities of its own, with the same border; driven is for one that is shaken along,
+ * without nodes where that is not wanted. */
 typedef struct {
     int64_t border_cells;
     const double *border, *pieces, *blocks, *outer;

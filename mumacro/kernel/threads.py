@@ -77,10 +77,6 @@ def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: 
             pass
 
 
-def _slice(columns: Sequence[Array | float], part: slice) -> list[Array | float]:
-    return [column if isinstance(column, float) else column[part] for column in columns]
-
-
 def values(
     quantity: int,
     data: Data,
@@ -128,23 +124,19 @@ def slopes(
 def cases(
     data: Data,
     columns: Sequence[Array | float],
-    n: int,
+    shape: tuple[int, ...],
     threads: int | None,
     detail: Detail,
     kind: tuple[int, int] = (0, 0),
 ) -> CaseRows:
-    """Answers to n cases, see :meth:`mumacro.kernel.binding.Kernel.cases`."""
-    answers = CaseRows.empty(n, detail)
-    cost = _cost(kind)
-    if n <= SLICE // cost:  # most calls; the shorter way
-        _KERNEL.cases(data, n, columns, answers, 0, kind)
-        return answers
-
-    def work(part: slice) -> None:
-        six = _slice(columns, part)
-        _KERNEL.cases(data, part.stop - part.start, six, answers, part.start, kind)
-
-    share_out(n, threads, work, cost)
+    """Answers to cases of a shape, see :meth:`mumacro.kernel.binding.Kernel.cases`."""
+    answers = CaseRows.empty(shape, detail)
+    share_out(
+        answers.source.size,
+        threads,
+        lambda part: _KERNEL.cases(data, columns, answers, part, kind),
+        _cost(kind),
+    )
     return answers
 
 
@@ -159,9 +151,10 @@ def intervals(
     :meth:`mumacro.kernel.binding.Kernel.intervals`."""
     rows = ExtremeRows.empty(high.size)
 
-    def work(part: slice) -> None:
-        six = _slice(columns, part)
-        _KERNEL.intervals(data, part.stop - part.start, six, high[part], rows, part.start, kind)
-
-    share_out(high.size, threads, work, INTERVAL * _cost(kind))
+    share_out(
+        high.size,
+        threads,
+        lambda part: _KERNEL.intervals(data, columns, high, rows, part, kind),
+        INTERVAL * _cost(kind),
+    )
     return rows

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 
 from mumacro.kernel.arrays import Array
-from mumacro.kernel.binding import BLOCK_COLUMNS, PIECE_COLUMNS, Data, kernels
+from mumacro.kernel.binding import BLOCK_ROW, PIECE_ROW, Data, kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import Axis, Chart
 from mumacro.table.blocks import Block, BorderPiece
@@ -147,25 +148,32 @@ def _join_patches(patches: Sequence[Array]) -> Array:
 
 
 def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
-    """The stored border for evaluation: coefficients (cells, WIDTH) and pieces (3,
-    PIECE_COLUMNS)."""
-    coefficients, rows, first = [], np.zeros((len(pieces), PIECE_COLUMNS)), 0
-    worst = max(piece.max_rel_error for piece in pieces)
-    for index, piece in enumerate(pieces):
+    """The stored border for evaluation: coefficients (cells, WIDTH), and a row for each piece."""
+    coefficients, rows, first = [], np.zeros(len(pieces), PIECE_ROW), 0
+    rows["error"] = max(piece.max_rel_error for piece in pieces)
+    for index, (row, piece) in enumerate(zip(rows, pieces, strict=True)):
         coefficients.append(cells_1d(index, piece.values, piece.cells))
-        rows[index] = first, *_count(atlas.BORDER_PIECES[index][1], piece.cells), worst
+        row["first"] = first
+        row["offset"], row["step"] = _count(atlas.BORDER_PIECES[index][1], piece.cells)
         first += piece.cells
-    return np.concatenate(coefficients), rows
+    return np.concatenate(coefficients), _as_numbers(rows)
 
 
 def block_rows(blocks: Sequence[Block], charts: Sequence[Chart] = atlas.CHARTS) -> Array:
-    """The geometry of the blocks for evaluation, (sources + 1, BLOCK_COLUMNS)."""
-    rows, first = np.zeros((len(atlas.SOURCES) + 1, BLOCK_COLUMNS)), 0
+    """The geometry of the blocks for evaluation: a row for each source, and one for none."""
+    rows, first = np.zeros(len(atlas.SOURCES) + 1, BLOCK_ROW), 0
     for row, chart, block in zip(rows, charts, blocks, strict=False):
         na, nb = block.cells
-        row[:6] = first, nb, *_count(chart.a, na), *_count(chart.b, nb)
+        row["first"], row["cells_b"] = first, nb
+        row["offset_a"], row["step_a"] = _count(chart.a, na)
+        row["offset_b"], row["step_b"] = _count(chart.b, nb)
         first += na * nb
-    return rows
+    return _as_numbers(rows)
+
+
+def _as_numbers(rows: NDArray[np.void]) -> Array:
+    """Rows with names as rows of doubles, for the kernel."""
+    return rows.view(np.float64).reshape(len(rows), -1)
 
 
 def quantity_cells(
@@ -213,9 +221,7 @@ class Border:
     def __init__(self, pieces: Sequence[BorderPiece]) -> None:
         self.arrays: tuple[Array, Array] = border_cells(pieces)
         self.max_rel_error = max(piece.max_rel_error for piece in pieces)
-        self._data = Data(
-            *self.arrays, np.zeros((len(atlas.SOURCES) + 1, BLOCK_COLUMNS)), outer_cells()
-        )
+        self._data = Data(*self.arrays, block_rows(()), outer_cells())
 
     def __call__(self, y: Array) -> Array:
         """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN below 0 and for

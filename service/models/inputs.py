@@ -57,10 +57,11 @@ def optional(description: str, **more: Any) -> Any:
 
 def either(description: str, **more: Any) -> Any:
     """A member that another one may stand for; null is refused."""
-    return Field(None, description=description, **more)
+    return Field(None, description=description, json_schema_extra=_without_null, **more)
 
 
 def _without_null(schema: dict[str, Any]) -> None:
+    schema.pop("default", None)
     kinds = [kind for kind in schema.pop("anyOf", [schema]) if kind != {"type": "null"}]
     schema |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
 
@@ -85,7 +86,37 @@ _Y0 = (
     "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding "
     "direction; required, unless the direction is normal"
 )
-_AMPLITUDE = "Amplitude of the normal force [N], below Fz: for direction normal in place of y0"
+_AMPLITUDE = (
+    "Amplitude of the normal force [N], half of peak to peak, below Fz: for direction normal in "
+    "place of y0"
+)
+
+
+def one_of(*names: str) -> dict[str, Any]:
+    """The schema of alternatives: exactly one of these members is given."""
+    return {"oneOf": [{"required": [name]} for name in names]}
+
+
+def not_both(one: str, other: str) -> dict[str, Any]:
+    """The schema of two members of which one at most is given."""
+    return {"not": {"required": [one, other]}}
+
+
+ONE_FREQUENCY = one_of("omega", "f")
+#: what is given of every case, beside what is always required
+ALTERNATIVES: Any = {
+    "allOf": [one_of("k", "k_range", "k_low"), one_of("y0", "Fz_amplitude"), ONE_FREQUENCY],
+    "dependentRequired": {"k_low": ["k_high"], "k_high": ["k_low"]},
+}
+#: the same of a case whose unknown or swept input is left out
+NOT_BOTH: Any = {
+    "allOf": [
+        not_both("k", "k_range"),
+        not_both("k", "k_low"),
+        not_both("y0", "Fz_amplitude"),
+        not_both("omega", "f"),
+    ]
+}
 Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 
 
@@ -113,7 +144,7 @@ class OneCase(Strict):
 class Case(OneCase):
     """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})
 
     k_range: Pair | None = optional(f"In place of k: {BOUND}")
 
@@ -230,20 +261,14 @@ class InputColumns(Strict):
 
     mu0: PositiveColumn = Field(description=_MU0)
     Fz: PositiveColumn = Field(description=_FZ)
-    k: StiffnessColumn = Field(
-        None, description='Tangential stiffness [N/m], or "rigid"; or k_low and k_high'
-    )
-    y0: NotNegativeColumn = Field(
-        None, description="Amplitude of the oscillation [m], half of peak to peak"
-    )
-    omega: NotNegativeColumn = Field(None, description="Angular frequency [rad/s]; or f")
-    f: HertzColumn = Field(None, description="Frequency [Hz], in place of omega")
+    k: StiffnessColumn = either('Tangential stiffness [N/m], or "rigid"; or k_low and k_high')
+    y0: NotNegativeColumn = either("Amplitude of the oscillation [m], half of peak to peak")
+    omega: NotNegativeColumn = either("Angular frequency [rad/s]; or f")
+    f: HertzColumn = either("Frequency [Hz], in place of omega")
     v0: NotNegativeColumn = Field(description=_V0)
-    Fz_amplitude: NotNegativeColumn = Field(
-        None, description="Amplitude of the normal force [N], for direction normal in place of y0"
-    )
-    k_low: PositiveColumn = Field(None, description=_LOW)
-    k_high: PositiveColumn = Field(None, description=_HIGH)
+    Fz_amplitude: NotNegativeColumn = either(_AMPLITUDE)
+    k_low: PositiveColumn = either(_LOW)
+    k_high: PositiveColumn = either(_HIGH)
     k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")
 
     @property

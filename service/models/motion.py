@@ -19,11 +19,22 @@ from mumacro.errors import InputError
 from mumacro.inputs.kind import ContactName
 
 from .answers import Number, Numbers, quantity
-from .inputs import EXAMPLE, Hertz, NotNegative, Positive, Stiffness, Strict, optional
+from .inputs import (
+    EXAMPLE,
+    ONE_FREQUENCY,
+    Hertz,
+    NotNegative,
+    Positive,
+    Stiffness,
+    Strict,
+    optional,
+)
 
 MAX_TERMS = 10  # of one part of the motion
 # of a ball, whose hundreds of springs each follow every turn of the motion
 MOST_OF_A_BALL, LEAST_OF_A_BALL = 20, 1e-7
+# in times of a plain case, from random motions; within a factor of 10
+_COST, _COST_OF_A_TERM, _SPRINGS_OF_A_BALL = 4000.0, 400.0, 250.0
 
 
 def _whole(number: Any) -> Any:
@@ -84,7 +95,8 @@ class MotionRequest(Strict):
                     "x": [1e-6, 90.0],
                     "y": 2e-6,
                 }
-            ]
+            ],
+            "allOf": [ONE_FREQUENCY],
         }
     )
 
@@ -129,6 +141,17 @@ class MotionRequest(Strict):
                     bound = f"of harmonics up to {MOST_OF_A_BALL} for a ball over HTTP"
                     raise InputError(name, None, bound)
         return self
+
+    @property
+    def cost(self) -> float:
+        """Time of the answer, in times of a plain case: each term is followed through every turn
+        of the highest harmonic."""
+        parts = (self.x, self.y, self.normal)
+        terms: list[Any] = [x for part in parts if isinstance(part, list) for x in part]
+        plain = sum(isinstance(part, (float, tuple)) for part in parts)
+        highest: int = max([1, *(harmonic for harmonic, *_ in terms)])
+        cost = _COST + _COST_OF_A_TERM * highest * (1 + plain + len(terms))
+        return cost * (_SPRINGS_OF_A_BALL if self.contact == "ball" else 1.0)
 
     @property
     def case(self) -> dict[str, Any]:

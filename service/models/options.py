@@ -9,6 +9,7 @@ from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import AMPLITUDE, ContactName, DirectionName, Kind, kind_of
 
 from .inputs import (
+    ALTERNATIVES,
     EXAMPLE,
     OR_RIGID,
     Case,
@@ -103,7 +104,7 @@ class Options(Choice):
     std: InputStd | None = optional("Standard deviations of the inputs, for include=std")
 
     @model_validator(mode="after")
-    def _std_where_asked(self) -> Self:
+    def _std_beside_include(self) -> Self:
         if self.include or self.std is not None:
             check_std(self.std, self.include, self.direction)
         return self
@@ -119,7 +120,8 @@ class CaseColumns(Options, InputColumns):
 
     model_config = ConfigDict(
         json_schema_extra={
-            "examples": [{**EXAMPLE, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}]
+            "examples": [{**EXAMPLE, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}],
+            **ALTERNATIVES,
         }
     )
 
@@ -162,7 +164,7 @@ class QueryOptions(Deviations, Choice):
     )
 
     @model_validator(mode="after")
-    def _std_where_asked(self) -> Self:
+    def _std_beside_include(self) -> Self:
         std = self.std
         if self.include or std is not None:
             check_std(std, self.include, self.direction)

@@ -2,7 +2,7 @@
 
 import math
 import sys
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -27,6 +27,7 @@ from mumacro.inputs.units import number_hint
 
 from .inputs import (
     EXAMPLE,
+    NOT_BOTH,
     OR_RIGID,
     Name,
     NotNegative,
@@ -77,7 +78,10 @@ class LawRequest(Options, Sweep, OtherInputs):
     """mu_macro over a range of one input."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{**_five, "start": 1e-4, "stop": 10.0, "points": 5}]}
+        json_schema_extra={
+            "examples": [{**_five, "start": 1e-4, "stop": 10.0, "points": 5}],
+            **NOT_BOTH,
+        }
     )
 
     k_range: Pair | None = optional(f"In place of k: {BOUND}")
@@ -102,7 +106,10 @@ class SolveForRequest(Options, OtherInputs):
     """Which value of one input gives a wanted mu_macro."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{**_without_y0, "unknown": "y0", "target": 0.15}]}
+        json_schema_extra={
+            "examples": [{**_without_y0, "unknown": "y0", "target": 0.15}],
+            **NOT_BOTH,
+        }
     )
 
     k_range: Pair | None = optional(f"In place of k: {BOUND}")
@@ -139,6 +146,10 @@ class SolveForRequest(Options, OtherInputs):
 
 _Modulus = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
 _Poisson = Annotated[float, Field(gt=-1, le=0.5, allow_inf_nan=False)]
+if TYPE_CHECKING:
+    _Geometry = str
+else:
+    _Geometry = Literal[tuple(GEOMETRIES)]
 _GEOMETRIES = "; ".join(f"{name}: {one.meaning}" for name, one in GEOMETRIES.items())
 
 
@@ -151,7 +162,7 @@ class StiffnessRequest(Strict):
         }
     )
 
-    geometry: Literal["ball", "flat", "cylinder"] = Field(description=_GEOMETRIES)
+    geometry: _Geometry = Field(description=_GEOMETRIES)
     radius: Positive | None = optional("Radius of the ball, pin or cylinder [m]")
     length: Positive | None = optional("Length of the cylinder [m]; of: cylinder")
     Fz: Positive | None = optional("Normal force [N]")

@@ -17,11 +17,11 @@ from starlette.types import Receive, Scope, Send
 from mumacro.errors import MumacroError
 
 from ..batch import Batch, Body, Form, both
-from ..forms import ALL, FORMS
+from ..batch_forms import ALL, FORMS
+from ..included import Plan, answer_case
 from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body, within
 from ..models.options import BatchOptions, CaseRequest
 from ..problems import FieldFault, Kind, RequestError, document_of, meaning, refuse
-from ..quantities import Asked, answer_case
 from ..reading import DirectRoute, decode, dump, of_members, validated
 from . import POSTED, router_of
 
@@ -38,7 +38,7 @@ class _Answer(Response):
 
     def __init__(self, request: Request, options: BatchOptions) -> None:
         self._scope, self._state, self._options = request.scope, request.app.state, options
-        self._given: dict[bytes, bytes] = dict(request.scope["headers"])
+        self._fields: dict[bytes, bytes] = dict(request.scope["headers"])
         self._work: Work = self._state.work
         settings = self._state.settings
         self._limit, self._most = settings.max_body_bytes, settings.max_batch
@@ -49,7 +49,7 @@ class _Answer(Response):
         del scope
         try:
             async with within(self._state.settings.time_limit_s):
-                form = form_of(self._given, FORMS)
+                form = form_of(self._fields, FORMS)
                 await (self._stream if form.streams else self._whole)(form, receive, send)
         finally:
             if self._placed:
@@ -75,7 +75,7 @@ class _Answer(Response):
     # --- bodies that are read whole ---------------------------------------------------------------
 
     async def _whole(self, form: Form, receive: Receive, send: Send) -> None:
-        text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
+        text = await self._work.client(read_body(self._fields, receive, self._limit, self._place))
         if not text:
             raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
         # Reading costs by the byte, computing by the case: a small body can request much
@@ -111,11 +111,11 @@ class _Answer(Response):
         # A client that gives a length may send all of the body before it reads: the answer then
         # comes after the body. A client that gives none may wait for the start of the answer before
         # it sends more.
-        more = b"content-length" not in self._given
+        more = b"content-length" not in self._fields
         text = bytearray()
         if not more:
             text = await self._work.client(
-                read_body(self._given, receive, self._limit, self._place)
+                read_body(self._fields, receive, self._limit, self._place)
             )
         self._state.tables.pick(self._options.tolerance, parameter=True)
         head = [(b"content-type", form.media_type.encode()), (b"x-accel-buffering", b"no")]
@@ -182,7 +182,7 @@ class _Answer(Response):
         else:
             case = validated(CaseRequest, line)
         table, inputs = self._state.tables.pick(case.tolerance), case.inputs
-        values, source = answer_case(table.surrogate, inputs, Asked.of(case, inputs))
+        values, source = answer_case(table.surrogate, inputs, Plan.of(case, inputs))
         self._state.metrics.case(table, source)
         return dump({**values, **table.signature})
 
@@ -210,14 +210,15 @@ async def _next_line(receive: Receive, text: bytearray) -> bool:
 
 def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
     """The same bytes in larger pieces."""
-    gathered = bytearray()
+    gathered, size = list[bytes](), 0
     for piece in pieces:
-        gathered += piece
-        if len(gathered) >= _PIECE:
-            yield bytes(gathered)
-            gathered.clear()
-    if gathered:
-        yield bytes(gathered)
+        gathered.append(piece)
+        size += len(piece)
+        if size >= _PIECE:
+            yield b"".join(gathered)
+            gathered, size = [], 0
+    if size:
+        yield b"".join(gathered)
 
 
 _BODIES = {form.media_type: form.body for form in ALL}

@@ -8,9 +8,9 @@ from starlette.responses import PlainTextResponse
 from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 
+from ..included import Plan, answer_case
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
-from ..quantities import Asked, answer_case
 from ..reading import DirectRoute, Json, dump
 from . import ASKED, POSTED, router_of
 
@@ -30,18 +30,18 @@ _CACHED: Any = {
 async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str, Any]:
     """The answer to a case."""
     state, inputs = request.app.state, case.inputs
-    table, asked = state.tables.pick(case.tolerance), Asked.of(case, inputs)
+    table, plan = state.tables.pick(case.tolerance), Plan.of(case, inputs)
     surrogate, with_model = table.surrogate, MODEL in (case.include or ())
 
     def work() -> tuple[dict[str, Any], int]:
-        values, source = answer_case(surrogate, inputs, asked)
+        values, source = answer_case(surrogate, inputs, plan)
         if with_model:  # rows of docs/validity.md, and the digits that k supports
-            words = asked.kind.names
+            words = plan.kind.names
             values["model"] = model_rows(surrogate, inputs, **words)
             values["digits"] = digits(k_effect(surrogate, inputs, **words))
         return values, source
 
-    large = with_model or asked.cost > _LARGE
+    large = with_model or plan.cost > _LARGE
     values, source = await state.work.question(work) if large else work()
     state.metrics.case(table, source)
     return {**values, **table.signature}

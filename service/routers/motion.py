@@ -27,7 +27,7 @@ _NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnsw
 async def post_motion(scene: MotionRequest, work: Working) -> Response:
     """Compute the steady cycle of a contact that is shaken obliquely, in an ellipse, with harmonics
     or with an oscillating load."""
-    return await work.question(lambda: Json(_answered(scene)))
+    return await work.question(lambda: Json(_answered(scene)), scene.cost)
 
 
 def _answered(scene: MotionRequest) -> dict[str, Any]:

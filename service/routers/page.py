@@ -57,9 +57,9 @@ async def get_names(request: Request) -> Response:
 async def get_map(request: Request, tables: Loaded, work: Working) -> Response:
     """The data of the map of a contact and a direction, see ``page_data.map_of``."""
     surrogate = tables.pick().surrogate
-    asked = [request.query_params.get(name, word) for name, word in SPRING.names.items()]
-    kind = kind_of(*asked)
-    etag = f'"{surrogate.checksum[:32]}-{__version__}-{"-".join(asked)}"'
+    words = [request.query_params.get(name, word) for name, word in SPRING.names.items()]
+    kind = kind_of(*words)
+    etag = f'"{surrogate.checksum[:32]}-{__version__}-{"-".join(words)}"'
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)

@@ -12,19 +12,19 @@ from fastapi import Query, Response
 
 import mumacro
 from mumacro.analysis.law import Law
-from mumacro.analysis.load import Stiffening
 from mumacro.analysis.solve_for import Solution
+from mumacro.analysis.stiffening import Stiffening
 from mumacro.analysis.validity import load_rows
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
 from mumacro.kernel.arrays import Array
 
+from ..included import Plan, answer_columns, listed, nested
 from ..limits import Working
 from ..models import answers
 from ..models.answers import LawAnswer, SolveForAnswer
 from ..models.options import MODEL
 from ..models.questions import LawQuery, LawRequest, SolveForRequest
-from ..quantities import Asked, answer_columns, listed, nested
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
 from . import ASKED, POSTED, router_of
@@ -38,7 +38,7 @@ router = router_of("answers", StrictRoute)
 def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
     """The library's law and all columns beside the swept input."""
     case, (along, per) = question.inputs, field_of(question.along)
-    asked = _asked(question, case)
+    plan = _plan(question, case)
     law = mumacro.law(
         table.surrogate,
         along,
@@ -47,21 +47,21 @@ def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict
         points=question.points,
         scale=question.scale,
         stiffness_exponent=question.stiffness_exponent,
-        **asked.kind.names,
+        **plan.kind.names,
         **case,
     )
     inputs = _at(case, along, law.values, law.stiffening)
-    outputs, _ = answer_columns(table.surrogate, inputs, asked)
+    outputs, _ = answer_columns(table.surrogate, inputs, plan)
     columns = listed(outputs) | {"mu_static": law.mu_static.tolist()}
     if law.stiffening is not None:
         columns["k"] = law.inputs["k"].tolist()
     return law, columns
 
 
-def _asked(question: Any, case: dict[str, Any]) -> Asked:
+def _plan(question: Any, case: dict[str, Any]) -> Plan:
     if MODEL in (question.include or ()):
         raise InputError("include", MODEL, f"without {MODEL}, which is for one case: /v1/mu-macro")
-    return Asked.of(question, case)
+    return Plan.of(question, case)
 
 
 def _at(
@@ -171,7 +171,7 @@ async def post_solve_for(question: SolveForRequest, tables: Loaded, work: Workin
 
 def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     table, case = tables.pick(question.tolerance), question.inputs
-    asked = _asked(question, case)
+    plan = _plan(question, case)
     name, per = field_of(question.unknown)
     unit = 1.0
     if question.quantity == "mu_ratio":
@@ -186,10 +186,10 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
         [x * unit for x in question.target],
         within=within,
         stiffness_exponent=question.stiffness_exponent,
-        **asked.kind.names,
+        **plan.kind.names,
         **case,
     )
-    included = _included(table, case, asked, name, solution)
+    included = _included(table, case, plan, name, solution)
     answer: dict[str, Any] = {"unknown": question.unknown, "unit": unit_of(question.unknown)}
     answer["quantity"] = question.quantity
     answer |= _results(question, solution, included, unit, per)
@@ -234,14 +234,14 @@ def _results(
 
 
 def _included(
-    table: LoadedTable, case: dict[str, Any], asked: Asked, unknown: str, solution: Solution
+    table: LoadedTable, case: dict[str, Any], plan: Plan, unknown: str, solution: Solution
 ) -> list[dict[str, Any]]:
     """The included quantities of every root, in order."""
     values = np.array([root.value for roots in solution.roots for root in roots])
-    if not asked.include or not values.size:
+    if not plan.include or not values.size:
         return [{}] * values.size
     inputs = _at(case, unknown, values, solution.stiffening)
-    outputs, _ = answer_columns(table.surrogate, inputs, asked)
+    outputs, _ = answer_columns(table.surrogate, inputs, plan)
     default = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
     more = {path: x.tolist() for path, x in outputs.items() if path not in default}
     rows = zip(*more.values(), strict=True)

@@ -35,8 +35,8 @@ def shown(surrogate: Surrogate) -> Shown:
 
 
 def labelled(panel: Panel, part: str) -> Curve:
-    (found,) = [curve for curve in panel.curves if part in curve.label]
-    return found
+    (result,) = [curve for curve in panel.curves if part in curve.label]
+    return result
 
 
 LENGTH, OMEGA = 1e-6, 2.0 * np.pi * 20e3
@@ -111,8 +111,8 @@ def test_lines_of_constant_amplitude_are_the_models(shown: Shown, name: str) -> 
     amplitudes, scale = AMPLITUDES[name]
     (panel,) = shown[name]
     for y, curve in zip(amplitudes, panel.curves, strict=False):
-        found = [solve(x * scale(y), y).mu_ratio if y else 1.0 for x in curve.x[[1, 200, 400]]]
-        assert curve.y[[1, 200, 400]] == close(found, abs=1e-11)
+        result = [solve(x * scale(y), y).mu_ratio if y else 1.0 for x in curve.x[[1, 200, 400]]]
+        assert curve.y[[1, 200, 400]] == close(result, abs=1e-11)
     top = labelled(panel, "border")
     at = [border(y) for y in amplitudes if y]
     for x, mu in zip(top.x, top.y, strict=True):
@@ -129,10 +129,10 @@ def test_the_master_curve_rises_from_zero_to_one_at_the_border(shown: Shown) -> 
     (panel,) = shown["fig09_master_curve"]
     for y, curve in zip(np.arange(1, 10) * 0.1, panel.curves, strict=False):
         (crit, top), low = border(y), np.sqrt(1.0 - y * y)
-        found = [
+        result = [
             (solve(x * crit, y).mu_ratio - low) / (top - low) for x in curve.x[[100, 300, 600]]
         ]
-        assert curve.y[[0, 100, 300, 600]] == close([0.0, *found], abs=1e-7)
+        assert curve.y[[0, 100, 300, 600]] == close([0.0, *result], abs=1e-7)
     limit, first = labelled(panel, "N_0"), panel.curves[0]
     assert limit.y[[0, -1]] == close([0.0, 1.0], abs=1e-12)
     assert np.abs(np.interp(limit.x, first.x, first.y) - limit.y).max() < 0.01

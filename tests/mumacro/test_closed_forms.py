@@ -72,11 +72,11 @@ def critical_of(y: float) -> float:
 def test_a_formula_of_the_border_keeps_its_digits_at_both_ends(name: str) -> None:
     formula = getattr(closed_forms, f"border_{name}")
     y = np.array([0.0, 1e-150, 1e-9, 1e-3, 1.0, 1e3, 1e160, 1e300])
-    found = formula(y)
-    assert found.shape == y.shape
-    assert found[0] == 0.0
-    assert np.all(np.diff(found[1:]) > 0.0)
-    assert np.all(np.isfinite(found))
+    result = formula(y)
+    assert result.shape == y.shape
+    assert result[0] == 0.0
+    assert np.all(np.diff(result[1:]) > 0.0)
+    assert np.all(np.isfinite(result))
     growth = 1e100 if name == "24" else 1e50  # the others grow like the square root
     assert float(formula(1e300)) == close(growth * float(formula(1e200)), rel=1e-14)
     # small y~: the formulas for large amplitudes grow like the square root here too, the others

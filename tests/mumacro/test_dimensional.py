@@ -220,10 +220,20 @@ def test_zero_is_legal_only_where_documented(table: Surrogate, field: str) -> No
 @pytest.mark.parametrize("field", FIELDS)
 def test_every_input_must_be_given(table: Surrogate, field: str) -> None:
     rest = without(CASE, field)
-    said = {"omega": r" or f \[Hz\]", "k": ': .*"rigid" or math.inf'}.get(field, "")
+    said = {"omega": r", or f \[Hz\]", "k": ': .*"rigid" or math.inf'}.get(field, "")
     for cases, keywords in (((), rest), ((rest,), {})):
         with pytest.raises(InputError, match=f"^{field} must be given{said}"):
             table.evaluate(*cases, **keywords)
+
+
+def test_all_that_is_missing_is_named_at_once(table: Surrogate) -> None:
+    with pytest.raises(InputError) as caught:
+        table.evaluate(mu0=0.3, v0=0.01)
+    assert str(caught.value) == (
+        "Fz must be given [N]; so must k [N/m], y0 [m], omega [rad/s] or f [Hz]"
+    )
+    with pytest.raises(InputError, match=r"^k must be given: .*; so must y0 \[m\]$"):
+        table.evaluate(mu0=0.3, Fz=10.0, f=2e4, v0=0.01)
 
 
 def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
@@ -235,7 +245,7 @@ def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
     assert whole.mu_macro[0] == expected.mu_macro
     with pytest.raises(InputError, match="not both"):
         table.evaluate(**CASE, f=frequency)
-    with pytest.raises(InputError, match=r"omega must be given or f \[Hz\]"):
+    with pytest.raises(InputError, match=r"omega must be given, or f \[Hz\]"):
         table.evaluate(**rest, f=None, omega=None)
     for bad, index in ((x, i) for x in (-2e4, math.nan, math.inf) for i in (None, 1)):
         with pytest.raises(InputError) as caught:

@@ -137,8 +137,8 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
 def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
     """A masked value is unknown: the value under the mask is not evaluated."""
     masked: Any = np.ma.masked_array([1, 2, 3], mask=[False, True, False], dtype=kind)
-    found = table.mu_ratio(masked, 0.5)
-    assert np.isnan(found).tolist() == [False, True, False]
+    ratio = table.mu_ratio(masked, 0.5)
+    assert np.isnan(ratio).tolist() == [False, True, False]
     assert table.evaluate({**CASE, "v0": masked}).source_code.tolist()[1] == -1
     assert masked.data.tolist() == [1, 2, 3]
     for v, y, field in ((np.ma.masked, 0.5, "v_tilde"), (1.0, math.inf, "y_tilde")):
@@ -179,9 +179,9 @@ def test_evaluate_refuses_a_value_that_is_not_a_number_by_name(
     table: Surrogate, field: str, bad: str
 ) -> None:
     case = {**without(CASE, "omega" if field == "f" else field), field: NO_NUMBERS[bad]}
-    for asked in ({}, {"gradient": True}, {"illegal": "raise"}):
+    for request in ({}, {"gradient": True}, {"illegal": "raise"}):
         with pytest.raises(InputError) as caught:
-            table.evaluate(**case, **asked)
+            table.evaluate(**case, **request)
         assert caught.value.field == field
     with pytest.raises(InputError):
         table.evaluate(case)
@@ -222,8 +222,8 @@ def test_any_bits_have_an_answer_if_they_are_legal_alone_as_in_an_array(
     rng, pairs = np.random.default_rng(0), np.array(list(itertools.product(EXTREMES, EXTREMES)))
     bits = rng.integers(0, 2**64, 200_000, dtype=np.uint64).view(np.float64).reshape(-1, 2)
     v, y = np.concatenate([pairs, bits]).T
-    found = parts(PLANE[method](table, v, y))
-    value = found[0]
+    result = parts(PLANE[method](table, v, y))
+    value = result[0]
     legal = (v >= 0.0) & (y >= 0.0)
     assert np.isnan(value[~legal]).all()
     assert not np.isnan(value[legal & np.isfinite(y)]).any()
@@ -233,7 +233,9 @@ def test_any_bits_have_an_answer_if_they_are_legal_alone_as_in_an_array(
         except InputError:
             assert math.isnan(value[i]), pair
         else:
-            np.testing.assert_array_equal(alone, [column[i] for column in found], err_msg=str(pair))
+            np.testing.assert_array_equal(
+                alone, [column[i] for column in result], err_msg=str(pair)
+            )
     np.testing.assert_array_equal(np.isnan(table.v_tilde_crit(y)), ~(y >= 0.0))
 
 
@@ -242,20 +244,20 @@ def test_six_inputs_of_any_bits_are_answered_alone_as_in_an_array(table: Surroga
     six = rng.integers(0, 2**64, (6, 2000), dtype=np.uint64).view(np.float64)
     six[:, :1000] = rng.choice(EXTREMES, (6, 1000))
     six[:, ::3] = np.abs(six[:, ::3])
-    found = table.evaluate(dict(zip(CASE, six, strict=True)), gradient=True)
-    legal = found.source_code >= 0
+    answer = table.evaluate(dict(zip(CASE, six, strict=True)), gradient=True)
+    legal = answer.source_code >= 0
     assert legal.any()
     assert not legal.all()
-    assert np.array_equal(np.isnan(found.mu_macro), ~legal)
-    assert np.all(found.error_bound[legal] >= 0.0)
+    assert np.array_equal(np.isnan(answer.mu_macro), ~legal)
+    assert np.all(answer.error_bound[legal] >= 0.0)
     for i, case in enumerate(six.T.tolist()):
-        assert table.evaluate_case(*case)[3] == found.source_code[i]
+        assert table.evaluate_case(*case)[3] == answer.source_code[i]
         try:
             one = table.evaluate(dict(zip(CASE, case, strict=True)), gradient=True)
         except InputError:
             assert not legal[i]
             continue
-        assert (one.mu_macro, one.error_bound) == (found.mu_macro[i], found.error_bound[i])
+        assert (one.mu_macro, one.error_bound) == (answer.mu_macro[i], answer.error_bound[i])
         np.testing.assert_array_equal(
-            [*one.gradient.values()], [column[i] for column in found.gradient.values()]
+            [*one.gradient.values()], [column[i] for column in answer.gradient.values()]
         )

@@ -32,14 +32,14 @@ table = tables(1e-7)
 def columns(n: int = N) -> Case:
     """Cases of every regime, including rigid and illegal ones."""
     rng = np.random.default_rng(5)
-    found = {name: np.full(n, value) for name, value in CASE.items()}
-    found["v0"] = 10.0 ** rng.uniform(-4.0, 0.0, n)
-    found["y0"] = 10.0 ** rng.uniform(-7.0, -5.0, n)
-    found["k"][::7] = math.inf
-    found["v0"][::11] = 0.0
-    found["mu0"][3] = -0.3
-    found["v0"][5] = math.nan
-    return found
+    result = {name: np.full(n, value) for name, value in CASE.items()}
+    result["v0"] = 10.0 ** rng.uniform(-4.0, 0.0, n)
+    result["y0"] = 10.0 ** rng.uniform(-7.0, -5.0, n)
+    result["k"][::7] = math.inf
+    result["v0"][::11] = 0.0
+    result["mu0"][3] = -0.3
+    result["v0"][5] = math.nan
+    return result
 
 
 def same(found: Any, expected: Any) -> None:
@@ -62,30 +62,30 @@ def test_series_give_series_with_their_index(table: Surrogate) -> None:
     index = pd.Index([f"case {i}" for i in range(N)], name="which")
     frame = pd.DataFrame(columns(), index=index)
     expected = table.evaluate(columns(), gradient=True)
-    found = table.evaluate(**{name: frame[name] for name in FIELDS}, gradient=True)
-    same(found, expected)
+    answer = table.evaluate(**{name: frame[name] for name in FIELDS}, gradient=True)
+    same(answer, expected)
     for name in ALL:
-        values = getattr(found, name)
+        values = getattr(answer, name)
         assert isinstance(values, pd.Series), name
         assert values.index.equals(index), name
-    assert found.gradient["v0"].index.equals(index)
-    assert found.source_code.dtype == found.regime_code.dtype == np.int8
-    assert found.regime_certain.dtype == bool
+    assert answer.gradient["v0"].index.equals(index)
+    assert answer.source_code.dtype == answer.regime_code.dtype == np.int8
+    assert answer.regime_certain.dtype == bool
 
 
 def test_regime_and_source_of_pandas_are_categories_without_one_for_illegal_cases(
     table: Surrogate,
 ) -> None:
-    found = table.evaluate(pd.DataFrame(columns()))
+    answer = table.evaluate(pd.DataFrame(columns()))
     expected = table.evaluate(columns())
-    assert list(found.columns) == ["mu_macro", "mu_ratio", "regime", "error_bound", "source"]
+    assert list(answer.columns) == ["mu_macro", "mu_ratio", "regime", "error_bound", "source"]
     for name, kinds in (("regime", REGIMES), ("source", SOURCES)):
-        assert isinstance(found[name].dtype, pd.CategoricalDtype)
-        assert list(found[name].cat.categories) == list(kinds)
-        assert found[name].astype(object).fillna("").tolist() == getattr(expected, name).tolist()
-        assert found[name].isna().tolist() == (expected.source_code == -1).tolist()
-    np.testing.assert_array_equal(found["mu_macro"], expected.mu_macro)
-    assert found.groupby("regime", observed=True)["mu_ratio"].count().sum() == N - 2
+        assert isinstance(answer[name].dtype, pd.CategoricalDtype)
+        assert list(answer[name].cat.categories) == list(kinds)
+        assert answer[name].astype(object).fillna("").tolist() == getattr(expected, name).tolist()
+        assert answer[name].isna().tolist() == (expected.source_code == -1).tolist()
+    np.testing.assert_array_equal(answer["mu_macro"], expected.mu_macro)
+    assert answer.groupby("regime", observed=True)["mu_ratio"].count().sum() == N - 2
 
 
 @pytest.mark.parametrize("index", ["dates", "two levels", "repeated", "empty"])
@@ -102,39 +102,39 @@ def test_a_frame_gives_a_frame_with_its_index(table: Surrogate, index: str) -> N
     frame = pd.DataFrame(
         {**{name: values[:n] for name, values in columns().items()}, "note": ["x"] * n}, index=at
     )
-    found = table.evaluate(frame)
-    assert found.index.equals(at)
-    np.testing.assert_array_equal(found["mu_ratio"], table.evaluate(columns()).mu_ratio[:n])
+    answer = table.evaluate(frame)
+    assert answer.index.equals(at)
+    np.testing.assert_array_equal(answer["mu_ratio"], table.evaluate(columns()).mu_ratio[:n])
     assert "note" in frame  # ignored
-    assert "note" not in found
+    assert "note" not in answer
 
 
 def test_numbers_and_arrays_go_beside_series(table: Surrogate) -> None:
     index = pd.Index(range(10, 10 + N))
-    given = columns()
-    v0 = pd.Series(given["v0"], index=index)
-    expected = table.evaluate({**CASE, "v0": given["v0"], "k": given["k"], "mu0": 0.3})
-    found = table.evaluate(**{**CASE, "v0": v0, "k": given["k"]})
-    np.testing.assert_array_equal(found.mu_macro.to_numpy(), expected.mu_macro)
-    assert found.mu_macro.index.equals(index)
+    inputs = columns()
+    v0 = pd.Series(inputs["v0"], index=index)
+    expected = table.evaluate({**CASE, "v0": inputs["v0"], "k": inputs["k"], "mu0": 0.3})
+    answer = table.evaluate(**{**CASE, "v0": v0, "k": inputs["k"]})
+    np.testing.assert_array_equal(answer.mu_macro.to_numpy(), expected.mu_macro)
+    assert answer.mu_macro.index.equals(index)
     rigid = table.evaluate(**{**CASE, "v0": v0, "k": "rigid"})
     np.testing.assert_array_equal(
-        rigid.mu_macro, table.evaluate({**CASE, "v0": given["v0"], "k": "rigid"}).mu_macro
+        rigid.mu_macro, table.evaluate({**CASE, "v0": inputs["v0"], "k": "rigid"}).mu_macro
     )
     frequency = table.evaluate(pd.DataFrame({"v0": v0, "f": 2e4}), mu0=0.3, Fz=10.0, k=1e6, y0=2e-6)
-    expected = table.evaluate(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=2e4, v0=given["v0"])
+    expected = table.evaluate(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=2e4, v0=inputs["v0"])
     np.testing.assert_array_equal(frequency["mu_macro"], expected.mu_macro)
 
 
 def test_integers_and_missing_values_of_pandas(table: Surrogate) -> None:
     for v0 in (pd.Series([1, None, 3], dtype="Int64"), pd.Series([1.0, None, 3.0])):
-        found = table.evaluate(**{**CASE, "v0": v0})
+        answer = table.evaluate(**{**CASE, "v0": v0})
         assert (
-            found.mu_macro.isna().tolist()
-            == (found.source_code == -1).tolist()
+            answer.mu_macro.isna().tolist()
+            == (answer.source_code == -1).tolist()
             == [False, True, False]
         )
-        assert found.mu_macro[0] == table.evaluate(**{**CASE, "v0": 1.0}).mu_macro
+        assert answer.mu_macro[0] == table.evaluate(**{**CASE, "v0": 1.0}).mu_macro
 
 
 def test_indexes_that_differ_are_refused(table: Surrogate) -> None:
@@ -166,9 +166,9 @@ def test_policies_hold_for_labels_too(table: Surrogate) -> None:
 
 
 def plane() -> dict[str, xr.DataArray]:
-    given = columns()
+    inputs = columns()
     v0 = xr.DataArray(
-        given["v0"],
+        inputs["v0"],
         dims="speed",
         coords={"speed": np.arange(N), "hour": ("speed", np.arange(N) / 4)},
     )
@@ -177,21 +177,22 @@ def plane() -> dict[str, xr.DataArray]:
 
 
 def test_data_arrays_broadcast_by_name_and_keep_their_coordinates(table: Surrogate) -> None:
-    given = plane()
-    found = table.evaluate(**{**CASE, **given}, gradient=True)
+    inputs = plane()
+    answer = table.evaluate(**{**CASE, **inputs}, gradient=True)
     expected = table.evaluate(
-        {**CASE, "v0": given["v0"].values[:, None], "k": given["k"].values[None, :]}, gradient=True
+        {**CASE, "v0": inputs["v0"].values[:, None], "k": inputs["k"].values[None, :]},
+        gradient=True,
     )
-    dims = found.mu_macro.dims
+    dims = answer.mu_macro.dims
     assert set(dims) == {"speed", "spring"}
 
     def turned(x: xr.DataArray) -> Any:
         return x.transpose("speed", "spring").values
 
-    np.testing.assert_array_equal(turned(found.gradient["v0"]), expected.gradient["v0"])
-    np.testing.assert_array_equal(turned(found.gradient_bound["k"]), expected.gradient_bound["k"])
+    np.testing.assert_array_equal(turned(answer.gradient["v0"]), expected.gradient["v0"])
+    np.testing.assert_array_equal(turned(answer.gradient_bound["k"]), expected.gradient_bound["k"])
     for name in ALL:
-        values = getattr(found, name)
+        values = getattr(answer, name)
         np.testing.assert_array_equal(turned(values), getattr(expected, name))
         assert values.dims == dims
         assert values.spring.values.tolist() == list("abcd")
@@ -202,11 +203,11 @@ def test_a_dataset_gives_a_dataset(table: Surrogate) -> None:
     data = xr.Dataset(
         {**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane(), "note": 1.0}
     )
-    found = table.evaluate(data)
-    assert isinstance(found, xr.Dataset)
-    assert set(found) == {"mu_macro", "mu_ratio", "regime", "error_bound", "source"}
-    assert dict(found.sizes) == {"speed": N, "spring": 4}
-    one = found.sel(speed=7, spring="b")
+    answer = table.evaluate(data)
+    assert isinstance(answer, xr.Dataset)
+    assert set(answer) == {"mu_macro", "mu_ratio", "regime", "error_bound", "source"}
+    assert dict(answer.sizes) == {"speed": N, "spring": 4}
+    one = answer.sel(speed=7, spring="b")
     expected = table.evaluate(**{**CASE, "v0": float(data.v0[7]), "k": 1e6})
     assert float(one.mu_macro) == expected.mu_macro
     assert str(one.source.values) == expected.source
@@ -232,24 +233,24 @@ def no_compute(*_: Any, **__: Any) -> Any:
 def test_dask_arrays_stay_lazy_and_keep_their_chunks(table: Surrogate) -> None:
     da = pytest.importorskip("dask.array")
     dask = pytest.importorskip("dask")
-    given = columns()
+    inputs = columns()
     chunks = (17, 20, 23)
-    lazy = {name: da.from_array(values, chunks=(chunks,)) for name, values in given.items()}
-    expected = table.evaluate(given, gradient=True)
+    lazy = {name: da.from_array(values, chunks=(chunks,)) for name, values in inputs.items()}
+    expected = table.evaluate(inputs, gradient=True)
     with dask.config.set(scheduler=no_compute):
-        found = table.evaluate(**lazy, gradient=True)
+        answer = table.evaluate(**lazy, gradient=True)
         for name in ALL:
-            assert isinstance(getattr(found, name), da.Array), name
-            assert getattr(found, name).chunks == (chunks,), name
-            assert getattr(found, name).shape == (N,)
+            assert isinstance(getattr(answer, name), da.Array), name
+            assert getattr(answer, name).chunks == (chunks,), name
+            assert getattr(answer, name).shape == (N,)
         with pytest.raises(AssertionError, match="computed before"):
-            found.mu_macro.compute()
+            answer.mu_macro.compute()
     with dask.config.set(scheduler="threads"):
-        same(found, expected)
-        assert found.mu_macro.dtype == np.float64
-        assert found.source_code.dtype == np.int8
-        assert found.source.compute().tolist() == expected.source.tolist()
-        assert found.regime.compute().tolist() == expected.regime.tolist()
+        same(answer, expected)
+        assert answer.mu_macro.dtype == np.float64
+        assert answer.source_code.dtype == np.int8
+        assert answer.source.compute().tolist() == expected.source.tolist()
+        assert answer.regime.compute().tolist() == expected.regime.tolist()
 
 
 def test_a_dask_dataset_stays_lazy(table: Surrogate) -> None:
@@ -258,20 +259,20 @@ def test_a_dask_dataset_stays_lazy(table: Surrogate) -> None:
         {**{name: CASE[name] for name in ("mu0", "Fz", "y0", "omega")}, **plane()}
     ).chunk(speed=13)
     with dask.config.set(scheduler=no_compute):
-        found = table.evaluate(data)
-        assert found.mu_macro.chunks is not None
-        assert found.source.chunks is not None
+        answer = table.evaluate(data)
+        assert answer.mu_macro.chunks is not None
+        assert answer.source.chunks is not None
     whole = table.evaluate(data.compute())
     with dask.config.set(scheduler="threads"):
-        xr.testing.assert_identical(found.compute(), whole)
+        xr.testing.assert_identical(answer.compute(), whole)
 
 
 def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surrogate) -> None:
     da = pytest.importorskip("dask.array")
     v0 = da.from_array(np.array([0.01, -1.0, 0.02]), chunks=2)
-    found = table.evaluate(**{**CASE, "v0": v0}, illegal="raise")
+    answer = table.evaluate(**{**CASE, "v0": v0}, illegal="raise")
     with pytest.raises(InputError, match="v0 at index 1"):
-        found.mu_macro.compute(scheduler="threads")
+        answer.mu_macro.compute(scheduler="threads")
     assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [
         False,
         True,
@@ -316,11 +317,11 @@ def test_results_of_xarray_have_names_and_units_of_their_own(table: Surrogate) -
     v0 = xr.DataArray(
         [0.01, 0.02], dims="t", name="v0", attrs={"units": "m/s", "long_name": "sliding speed"}
     )
-    found = table.evaluate(**{**CASE, "v0": v0}, gradient=True)
+    answer = table.evaluate(**{**CASE, "v0": v0}, gradient=True)
     names = ALL
-    arrays = {name: getattr(found, name) for name in names}
-    arrays |= {f"d_mu_macro_d_{name}": slope for name, slope in found.gradient.items()}
-    arrays |= {f"d_mu_macro_d_{name}_bound": bound for name, bound in found.gradient_bound.items()}
+    arrays = {name: getattr(answer, name) for name in names}
+    arrays |= {f"d_mu_macro_d_{name}": slope for name, slope in answer.gradient.items()}
+    arrays |= {f"d_mu_macro_d_{name}_bound": bound for name, bound in answer.gradient_bound.items()}
     for name, array in arrays.items():
         assert array.name == name
         assert set(array.attrs) == {"units", "long_name"}
@@ -334,7 +335,7 @@ def test_results_of_xarray_have_names_and_units_of_their_own(table: Surrogate) -
     }
     assert units == {**expected, "length_scale": "m"}
     data = table.evaluate(xr.Dataset({**CASE, "v0": v0}))
-    assert data.mu_macro.attrs == found.mu_macro.attrs
+    assert data.mu_macro.attrs == answer.mu_macro.attrs
     assert v0.attrs["units"] == "m/s"  # the input is as it was
 
 
@@ -342,11 +343,11 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
     frames = pytest.importorskip("dask.dataframe")
     frame = pd.DataFrame({**columns(), "note": "x"}).drop(columns="Fz")
     lazy = frames.from_pandas(frame, npartitions=3)
-    found = table.evaluate(lazy, Fz=10.0)
-    assert isinstance(found, frames.DataFrame)
-    assert found.npartitions == 3
+    answer = table.evaluate(lazy, Fz=10.0)
+    assert isinstance(answer, frames.DataFrame)
+    assert answer.npartitions == 3
     pd.testing.assert_frame_equal(
-        found.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0)
+        answer.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0)
     )
     with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(lazy, Fz=10.0, v0=0.01)
@@ -360,21 +361,21 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
 def test_columns_of_arrow_tables_give_arrays(table: Surrogate, kind: str) -> None:
     library, name = kind.split(".")
     make: Any = getattr(pytest.importorskip(library), name)
-    given = {name: values.tolist() for name, values in columns().items()}
-    given["v0"][7] = None
-    given["omega"] = [130_000] * N
+    inputs = {name: values.tolist() for name, values in columns().items()}
+    inputs["v0"][7] = None
+    inputs["omega"] = [130_000] * N
     expected = columns()
     expected["v0"][7] = math.nan
     want = table.evaluate(expected, gradient=True)
-    found = table.evaluate(make(given), gradient=True)
-    same(found, want)
-    same(table.evaluate(**{name: make(given)[name] for name in given}, gradient=True), want)
-    assert isinstance(found.mu_macro, np.ndarray)
-    words = make({**given, "k": ["rigid"] * N})
+    answer = table.evaluate(make(inputs), gradient=True)
+    same(answer, want)
+    same(table.evaluate(**{name: make(inputs)[name] for name in inputs}, gradient=True), want)
+    assert isinstance(answer.mu_macro, np.ndarray)
+    with_text = make({**inputs, "k": ["rigid"] * N})
     np.testing.assert_array_equal(
-        table.evaluate(words).mu_macro, table.evaluate({**expected, "k": math.inf}).mu_macro
+        table.evaluate(with_text).mu_macro, table.evaluate({**expected, "k": math.inf}).mu_macro
     )
-    rigid = table.evaluate(**{**given, "k": words["k"], "v0": 0.01}).mu_macro
+    rigid = table.evaluate(**{**inputs, "k": with_text["k"], "v0": 0.01}).mu_macro
     np.testing.assert_array_equal(
         rigid, table.evaluate({**expected, "k": math.inf, "v0": 0.01}).mu_macro
     )
@@ -387,7 +388,7 @@ def test_a_stream_of_arrow_is_read_once(table: Surrogate) -> None:
     rows = pa.table(
         {**{name: [value] * 3 for name, value in CASE.items()}, "v0": [0.01, 0.02, None]}
     )
-    found = table.evaluate(rows.to_reader(max_chunksize=2)).mu_macro
+    answer = table.evaluate(rows.to_reader(max_chunksize=2)).mu_macro
     np.testing.assert_array_equal(
-        found, table.evaluate({**CASE, "v0": np.array([0.01, 0.02, math.nan])}).mu_macro
+        answer, table.evaluate({**CASE, "v0": np.array([0.01, 0.02, math.nan])}).mu_macro
     )

@@ -129,8 +129,8 @@ def test_eight_threads_may_evaluate_at_once(table: Surrogate) -> None:
     expected = everything(table, 70_000)
     fresh = Surrogate.open(table.path, threads=2)  # power and stick fraction are not prepared yet
     with ThreadPoolExecutor(8) as pool:
-        for found in pool.map(lambda _: everything(fresh, 70_000), range(8)):
-            assert found == expected
+        for result in pool.map(lambda _: everything(fresh, 70_000), range(8)):
+            assert result == expected
 
 
 def test_tables_are_read_by_many_threads_at_once() -> None:
@@ -145,7 +145,7 @@ def test_tables_are_read_by_many_threads_at_once() -> None:
         }
 
     with ThreadPoolExecutor(8) as pool:
-        assert all(found == expected for found in pool.map(work, range(8)))
+        assert all(result == expected for result in pool.map(work, range(8)))
 
 
 def test_a_small_call_does_not_wait_for_a_large_one(table: Surrogate) -> None:

@@ -100,8 +100,8 @@ def test_speeds_whose_square_overflows_still_follow_the_elliptic_integral(table:
 def test_companions_at_the_ends(
     table: Surrogate, name: str, v: float, y: float, value: float, bound: float
 ) -> None:
-    found, off, _ = table.quantity(name, v, y)
-    assert found == value
+    result, off, _ = table.quantity(name, v, y)
+    assert result == value
     assert 0.0 < off < bound if bound else off == 0.0
 
 
@@ -201,7 +201,7 @@ def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(
         {**{name: shaped(x) for name, x in CASE.items()}, "v0": v0} for shaped in shapes
     ]
     expected, *others = (np.asarray(fine.evaluate(**case).mu_macro) for case in cases)
-    assert all(np.array_equal(found.ravel(), expected) for found in others)
+    assert all(np.array_equal(result.ravel(), expected) for result in others)
 
 
 @pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
@@ -210,8 +210,8 @@ def test_empty_arrays_give_empty_answers(
     fine: Surrogate, shape: tuple[int, ...], asked: Case
 ) -> None:
     for mu0 in (0.3, -0.3):
-        found = fine.evaluate(**{**CASE, "mu0": mu0, "v0": np.empty(shape)}, **asked)
-        assert found.mu_macro.shape == found.error_bound.shape == found.source.shape == shape
+        answer = fine.evaluate(**{**CASE, "mu0": mu0, "v0": np.empty(shape)}, **asked)
+        assert answer.mu_macro.shape == answer.error_bound.shape == answer.source.shape == shape
     with pytest.raises(InputError, match="mu0"):
         fine.evaluate(**{**CASE, "mu0": -0.3, "v0": np.empty(shape)}, illegal="raise", **asked)
 

@@ -30,14 +30,14 @@ def run(script: str, *arguments: str) -> list[list[Row]]:
 def tables(text: str) -> list[list[Row]]:
     """Every Markdown table in ``text``, rows as mappings from the header; unequal lengths are an
     error."""
-    found: list[list[Row]] = []
+    result: list[list[Row]] = []
     for block in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE):
         header, rule, *rows = (
             [cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines()
         )
         assert all(re.fullmatch(r"-+:?", cell) for cell in rule)
-        found.append([dict(zip(header, row, strict=True)) for row in rows])
-    return found
+        result.append([dict(zip(header, row, strict=True)) for row in rows])
+    return result
 
 
 def test_a_result_is_put_between_its_markers(

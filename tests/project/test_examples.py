@@ -49,9 +49,9 @@ def need(name: str | None, *modules: Any) -> None:
 
 
 def number(pattern: Any, text: str) -> Any:
-    found = re.search(pattern, text)
-    assert found, text
-    return float(found[1])
+    match = re.search(pattern, text)
+    assert match, text
+    return float(match[1])
 
 
 def test_every_example_is_listed_and_tested(repository: Path) -> None:

@@ -28,23 +28,23 @@ def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository: Path
         ("deploy/compose.yaml", r"image: mumacro:(\S+)"),
         ("deploy/kubernetes.yaml", r'(?:image: mumacro:|kubernetes\.io/version: ")([^"\s]+)'),
     ):
-        found = re.findall(pattern, (repository / name).read_text("utf-8"), re.MULTILINE)
-        assert set(found) == {mumacro.__version__}, name
+        matches = re.findall(pattern, (repository / name).read_text("utf-8"), re.MULTILINE)
+        assert set(matches) == {mumacro.__version__}, name
 
 
 def test_the_parts_of_the_manifest_belong_together(repository: Path) -> None:
     yaml = pytest.importorskip("yaml", reason="the PyPI package PyYAML is not installed")
     text = (repository / "deploy" / "kubernetes.yaml").read_text("utf-8")
-    found = {one["kind"]: one for one in yaml.safe_load_all(text)}
-    pod = found["Deployment"]["spec"]["template"]["spec"]
-    labels = found["Deployment"]["spec"]["template"]["metadata"]["labels"]
+    result = {one["kind"]: one for one in yaml.safe_load_all(text)}
+    pod = result["Deployment"]["spec"]["template"]["spec"]
+    labels = result["Deployment"]["spec"]["template"]["metadata"]["labels"]
     for kind in ("NetworkPolicy", "PodDisruptionBudget", "Service"):
-        spec = found[kind]["spec"]
+        spec = result[kind]["spec"]
         selector = spec.get("podSelector") or spec["selector"]
         assert selector.get("matchLabels", selector).items() <= labels.items(), kind
-    scaled = found["HorizontalPodAutoscaler"]["spec"]
-    assert scaled["scaleTargetRef"]["name"] == found["Deployment"]["metadata"]["name"]
-    assert scaled["minReplicas"] > found["PodDisruptionBudget"]["spec"]["minAvailable"]
+    scaled = result["HorizontalPodAutoscaler"]["spec"]
+    assert scaled["scaleTargetRef"]["name"] == result["Deployment"]["metadata"]["name"]
+    assert scaled["minReplicas"] > result["PodDisruptionBudget"]["spec"]["minAvailable"]
     assert pod["terminationGracePeriodSeconds"] > load_settings().shutdown_grace_s + 3.0  # preStop
 
 

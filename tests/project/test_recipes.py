@@ -48,19 +48,19 @@ def expected() -> Any:
 
 @pytest.mark.slow
 def test_designs_and_reductions() -> None:
-    found = run("Lazy designs, streaming reductions", "distributed")
-    mu = found["mu"].compute()
+    output = run("Lazy designs, streaming reductions", "distributed")
+    mu = output["mu"].compute()
     assert mu.size == 2**16
-    assert found["mean"] == close(float(np.mean(mu)), rel=1e-12)
-    assert found["spread"] == close(float(np.std(mu)), rel=1e-12)
-    assert found["least"] == float(np.min(mu))
-    assert found["on_two"] == found["mean"]
+    assert output["mean"] == close(float(np.mean(mu)), rel=1e-12)
+    assert output["spread"] == close(float(np.std(mu)), rel=1e-12)
+    assert output["least"] == float(np.min(mu))
+    assert output["on_two"] == output["mean"]
     exact = np.quantile(mu, [0.05, 0.5, 0.95], method="inverted_cdf")
-    assert np.all((found["below"] <= exact) & (exact <= found["above"]))
-    enough = found["enough"].compute()
+    assert np.all((output["below"] <= exact) & (exact <= output["above"]))
+    enough = output["enough"].compute()
     assert 0 < int(enough.sum()) < enough.size
-    assert float(found["found"].y0) == float(found["plane"].y0.where(enough.any("v")).min())
-    assert bool(enough.isel(found["place"]))
+    assert float(output["found"].y0) == float(output["plane"].y0.where(enough.any("v")).min())
+    assert bool(enough.isel(output["place"]))
 
 
 def test_files_over_a_cluster(

@@ -34,11 +34,11 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tables.Outcome
 def test_a_hostile_file_is_refused_before_memory_is_taken(
     opened: dict[str, tables.Outcome], name: str
 ) -> None:
-    found = opened[name]
-    assert found.what == (
+    result = opened[name]
+    assert result.what == (
         "differs" if name in ANOTHER else "same" if name in HARMLESS else "refused"
-    ), found
-    assert found.megabytes < 32.0
+    ), result
+    assert result.megabytes < 32.0
 
 
 @pytest.mark.parametrize("change", tables.CHANGES)
@@ -48,10 +48,10 @@ def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
     for start in range(0, size, 4096 if change == "cut" else 1201):
         images.update(tables.work(start, 1, change))
     assert len(images) > 30
-    found = [tables.outcome(image, Path(f"{start}.nc")) for start, image in images.items()]
-    assert {one.what for one in found} <= {tables.REFUSED, tables.SAME}, found
+    result = [tables.outcome(image, Path(f"{start}.nc")) for start, image in images.items()]
+    assert {one.what for one in result} <= {tables.REFUSED, tables.SAME}, result
     # the rest is in room that HDF5 leaves empty
-    assert sum(one.what == tables.REFUSED for one in found) > 0.6 * len(found)
+    assert sum(one.what == tables.REFUSED for one in result) > 0.6 * len(result)
 
 
 table = ordinary.tables(1e-4, 1e-12)
@@ -68,9 +68,9 @@ PROMISES = [
 def test_answers_have_their_properties_over_the_full_double_range(
     table: Surrogate, check: Any
 ) -> None:
-    found = check(table, 0.02)
-    assert found.tried >= 500
-    assert found.broken == 0
+    result = check(table, 0.02)
+    assert result.tried >= 500
+    assert result.broken == 0
 
 
 @pytest.mark.parametrize("x", [0.6, 1.18, 2.68, 30.0, 54.0, 55.0, 125.0, 250.0])
@@ -88,11 +88,11 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(
         return float(outer(y / v) + layer * (v / y))
 
     v = x * np.sqrt(y)
-    found, bound, _ = table.ratio_with_bound(v, y)
-    assert abs(found - expected(v, y)) <= bound + 1e-14 * found
+    result, bound, _ = table.ratio_with_bound(v, y)
+    assert abs(result - expected(v, y)) <= bound + 1e-14 * result
     along_v, along_y, error_v, error_y = table.slopes(v, y, bounds=True)[1:]
     near = {h: (expected(v * (1.0 + h), y), expected(v, y * (1.0 + h))) for h in (-1e-4, 1e-4)}
-    noise = 1e-7 * found  # error of the differences
+    noise = 1e-7 * result  # error of the differences
     assert abs(along_v - (near[1e-4][0] - near[-1e-4][0]) / 2e-4) <= error_v + noise
     assert abs(along_y - (near[1e-4][1] - near[-1e-4][1]) / 2e-4) <= error_y + noise
 
@@ -163,8 +163,8 @@ def test_numbers_in_text_have_the_bits_of_float_or_are_refused(
     lines = ["mu0,Fz,k,y0,omega,v0"] * (kind == "csv") + [line.format(text) for text in texts]
     source.write_text("\n".join(lines), "utf-8")
     evaluate_files([source], out, Surrogate.open(1e-4))
-    found = [json.loads(line)["mu_macro"] for line in out.read_text("utf-8").splitlines()]
-    assert found == [float(text) for text in texts if right]
+    result = [json.loads(line)["mu_macro"] for line in out.read_text("utf-8").splitlines()]
+    assert result == [float(text) for text in texts if right]
 
 
 @pytest.mark.slow
@@ -191,8 +191,8 @@ def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Pa
         ):
             sweep.solve("full", v[:20], y[:20])
             kept, many = faults.left(disk), np.geomspace(0.1, 10.0, 600)  # 29 kB of results
-            said = r"work\.checkpoint: finished work cannot be stored: No space left"
-            with pytest.raises(CheckpointError, match=said):
+            words = r"work\.checkpoint: finished work cannot be stored: No space left"
+            with pytest.raises(CheckpointError, match=words):
                 sweep.solve("full", many, many)
             assert faults.left(disk) == kept
     except faults.NotTriedError as error:

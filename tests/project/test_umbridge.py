@@ -46,8 +46,8 @@ def test_every_way_of_asking_has_the_shape_of_the_sizes(bridge: Any) -> None:
         status, answer = ask(bridge, way, name="mu_macro", input=POINT, config={}, **WAYS[way])
         assert status == 200
         assert list(answer) == ["output"]
-        found = answer["output"]
-        assert ([len(part) for part in found] if way == "Evaluate" else len(found)) == shape
+        result = answer["output"]
+        assert ([len(part) for part in result] if way == "Evaluate" else len(result)) == shape
 
 
 @pytest.mark.parametrize(
@@ -66,8 +66,8 @@ def test_every_way_of_asking_has_the_shape_of_the_sizes(bridge: Any) -> None:
 def test_a_refusal_is_400_with_its_type_and_a_message(
     bridge: Any, way: str, change: Any, kind: str
 ) -> None:
-    asked = {"name": "mu_macro", "input": POINT, "config": {}, **WAYS.get(way, {}), **change}
-    status, answer = ask(bridge, way, **asked)
+    request = {"name": "mu_macro", "input": POINT, "config": {}, **WAYS.get(way, {}), **change}
+    status, answer = ask(bridge, way, **request)
     assert (status, answer["error"]["type"]) == (400, kind)
     assert set(answer) == {"error"}
     assert set(answer["error"]) == {"type", "message"}

@@ -114,8 +114,8 @@ def build(folder: Path, platform: str | None = None) -> Path:
         command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
         subprocess.run(command, cwd=ROOT, env=env, check=True)
         made = [*folder.glob("*.whl")]
-    (found,) = made
-    return found
+    (result,) = made
+    return result
 
 
 @pytest.fixture(scope="module")
@@ -185,10 +185,10 @@ def test_a_linux_wheel_asks_for_no_newer_system_and_calls_no_mathematics(
     assert verdict["overall_tag"] == verdict["sym_tag"]
     elffile = importlib.import_module("elftools.elf.elffile")
     with zipfile.ZipFile(wheel) as archive:
-        found = elffile.ELFFile(io.BytesIO(archive.read("mumacro/_kernel.so"))).get_section_by_name(
-            ".dynsym"
-        )
-    symbols = [(symbol.name, symbol["st_shndx"]) for symbol in found.iter_symbols() if symbol.name]
+        result = elffile.ELFFile(
+            io.BytesIO(archive.read("mumacro/_kernel.so"))
+        ).get_section_by_name(".dynsym")
+    symbols = [(symbol.name, symbol["st_shndx"]) for symbol in result.iter_symbols() if symbol.name]
     harmless = {"memcmp", "memcpy", "memmove", "memset", "strlen"}
     assert {name for name, place in symbols if place == "SHN_UNDEF"} <= harmless
     assert {name for name, place in symbols if place != "SHN_UNDEF"} == {"mumacro_kernel_at"}
@@ -200,10 +200,10 @@ def _parts(tag: Any) -> Any:
 
 
 def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(installed: Any) -> None:
-    found = json.loads(installed.run("mumacro", "table", "--json"))
-    site = Path(found["path"]).parents[2]
+    output = json.loads(installed.run("mumacro", "table", "--json"))
+    site = Path(output["path"]).parents[2]
     assert site.name == "site-packages"
-    assert [Path(path).parent for path in found["bundled"]] == [site / "mumacro" / "data"] * 4
+    assert [Path(path).parent for path in output["bundled"]] == [site / "mumacro" / "data"] * 4
     for name in ("service", "builder", "friction", "tables", "tests"):
         assert not (site / name).exists()
     program = (

@@ -279,6 +279,19 @@ def test_the_description_is_accessible_and_leads_back(
     )
     page.wait_for("#swagger-ui", "Coulomb friction coefficient of the contact")
     assert inaccessible(page, repository) == {}
+    # the body of a batch stands above its options; "Try it out" answers as it opens
+    batch = "#operations-answers-post_mu_macro_batch"
+    page.find(f"{batch} .opblock-summary-control").click()
+    page.wait_for(batch, "Standard deviation")
+    top = "return document.querySelector(arguments[0]).getBoundingClientRect().top;"
+    body, options = (
+        page.browser.execute_script(top, f"{batch} {part}")
+        for part in (".opblock-section-request-body", ".parameters-container")
+    )
+    assert body < options
+    page.find(f"{batch} .try-out__btn").click()
+    page.find(f"{batch} .execute").click()
+    page.wait_for(f"{batch} .live-responses-table", '"mu_macro"')
     page.find("#back").click()
     page.settle()
     assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)

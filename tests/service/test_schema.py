@@ -73,7 +73,7 @@ OF_PATH = {
         r"must be left out: it is among the unknowns",
         r"must be one or both of",
         r"must be columns of one length",
-        r"must be given or f \[Hz\] in its place",
+        r"must be left out beside f \[Hz\]",
         r"must be points ",
         r"must be > 0 in at least one point",
         r"must be finite and (>|>=) 0$",  # an entry of a list

@@ -79,6 +79,67 @@ def test_a_gap_in_k_is_never_a_rigid_contact(client: Any, case: Case, gap: Any) 
     ]
 
 
+GOOD = '{"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}'
+
+
+@pytest.mark.parametrize("before", [0, 1, 9000])
+@pytest.mark.parametrize(
+    ("odd", "field"),
+    [
+        ('{"v0": 0.01, "f": 2e4, "y0": 2e-6, "k": 1e6, "Fz": 10, "mu0": 0.3}', ...),
+        (GOOD.replace("10", "10, "), 400),
+        (GOOD + "}", 400),
+        (GOOD.replace("{", "{{"), 400),
+        (GOOD.replace("1e6", "1e999"), "k"),
+        (GOOD.replace("1e6", "true"), "k"),
+        (GOOD.replace("0.01", "false"), "v0"),
+        (GOOD.replace("1e6", "NaN"), "k"),
+        (GOOD.replace("1e6", "null"), "k"),
+        (GOOD.replace("1e6", '"1e6"'), "k"),
+        (GOOD.replace("1e6", '"rigid:"'), "k"),
+        (GOOD.replace("1e6", '"Rigid"'), ...),
+        (GOOD.replace("1e6", "[]"), "k"),
+        (GOOD.replace("1e6", "{}"), "k"),
+        (GOOD.replace("v0", "v1"), "v1"),
+        (GOOD.replace("v0", "v\\u0030"), ...),
+        (GOOD.replace('"v0": 0.01', '"k": 2e6'), 422),
+        (GOOD.replace('"k": 1e6', '"k": 1e6, "k": 1e6'), 422),
+        (GOOD.replace("}", ', "k": null}'), 422),
+        ('["mu0", "Fz", "k", "y0", "f", "v0"]', None),
+        ('"mu0"', None),
+    ],
+)
+def test_an_odd_row_is_seen_in_every_place(client: Any, odd: str, field: Any, before: int) -> None:
+    """Many plain rows are read together: none of them may hide another one.  ``field`` is the one
+    at fault, the status of a refusal, or ``...`` where the row is right."""
+    body = "[" + ",".join([GOOD] * before + [odd, GOOD]) + "]"
+    response = client.post(BATCH, content=body)
+    if isinstance(field, int):
+        assert response.status_code == field
+        return
+    answer = response.json()
+    (expected,) = client.post(BATCH, content=f"[{GOOD}]").json()["results"]
+    assert answer["results"][before + 1] == expected
+    assert [row == expected for row in answer["results"][:before]] == [True] * before
+    faults = [(fault["index"], fault["field"]) for fault in answer["errors"]]
+    assert faults == ([] if field is ... else [(before, field)])
+    if field is ... and "igid" not in odd:
+        assert answer["results"][before] == expected
+
+
+@pytest.mark.parametrize("text", ["[", " [", "[\n", "[ ", "[,", "[{", "[[", "[]]", "[ ] ["])
+def test_half_a_list_is_no_json(client: Any, problem: Any, text: str) -> None:
+    assert problem(client.post(BATCH, content=text), 400)["type"].endswith("malformed-body")
+    half, good = read("ndjson", posted(client, "ndjson", text.strip() + "\n" + GOOD + "\n"))
+    assert (half["status"], good["source"]) == (400, "stick_slip_low")
+
+
+def test_rows_may_stand_far_apart(client: Any) -> None:
+    answer = client.post(BATCH, content=f"[{GOOD},{' ' * 2_000_000}{GOOD}]").json()
+    assert answer["n_errors"] == 0
+    assert answer["results"][0] == answer["results"][1]
+
+
 def test_explicit_nulls_are_read_like_absent_names(client: Any, case: Case) -> None:
     rows = [{**case, "f": None}, {**case, "k": "rigid"}, {**case, "omega": None, "f": 1e4}]
     answer = client.post(BATCH, json=rows).json()

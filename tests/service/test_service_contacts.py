@@ -9,6 +9,7 @@ import pytest
 from benchmarks.support.forms import BATCH, as_csv, asked, posted, read
 from mumacro import Surrogate
 from mumacro.analysis.validity import digits, k_effect, model_rows
+from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES
 from tests.support.cases import Case
 from tests.support.comparing import close
 
@@ -171,3 +172,10 @@ def test_a_law_has_a_band_and_an_inverse_its_contact(client: Any, surrogate: Sur
     }
     law = client.post("/v1/law", json={**normal, "points": 3}).json()
     assert (law["unit"], len(law["mu_macro"])) == ("N", 3)
+
+
+def test_the_service_takes_every_geometry_of_the_library(client: Any) -> None:
+    schemas = client.get("/openapi.json").json()["components"]["schemas"]
+    properties = schemas["StiffnessRequest"]["properties"]
+    assert properties["geometry"]["enum"] == [*GEOMETRIES]
+    assert {"geometry", *ARGUMENTS} == properties.keys()

@@ -1,6 +1,7 @@
 """Common to all requests: errors, request ids, keys, body limits, headers, files, the interface's
 description."""
 
+import itertools
 import json
 import re
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 from fastapi import APIRouter, Depends, Request
 
 from mumacro.inputs.fields import FIELDS, SI
+from service.models.inputs import EXAMPLE
 from service.models.options import CaseRequest
 from service.reading import DirectRoute
 from tests.support.cases import Case
@@ -245,6 +247,73 @@ def test_the_description_is_whole(client: Any) -> None:
     assert parameters.keys() == inputs | options
     required = {name for name, needed in parameters.items() if needed}
     assert required == set(schemas["Case"]["required"]) == {"mu0", "Fz", "v0"}
+
+
+def allows(schema: Any, members: set[str]) -> bool:
+    """Whether a schema allows an object of these members, as far as their names go."""
+    return (
+        members >= set(schema.get("required", ()))
+        and all(allows(part, members) for part in schema.get("allOf", ()))
+        and ("anyOf" not in schema or any(allows(part, members) for part in schema["anyOf"]))
+        and ("oneOf" not in schema or sum(allows(one, members) for one in schema["oneOf"]) == 1)
+        and all(
+            members >= set(others)
+            for name, others in schema.get("dependentRequired", {}).items()
+            if name in members
+        )
+        and not ("not" in schema and allows(schema["not"], members))
+    )
+
+
+_INTERVAL = {"k_range": [1e6, 2e6], "k_low": 1e6, "k_high": 2e6}
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "fixed", "varied", "exact"),
+    [
+        ("CaseRequest", "/v1/mu-macro", {}, ("k", *_INTERVAL, "y0", "omega", "f"), True),
+        ("CaseColumns", "/v1/mu-macro/batch", {}, ("k", *_INTERVAL, "y0", "omega", "f"), True),
+        ("MotionRequest", "/v1/motion", {"k": 1e6}, ("x", "omega", "f"), True),
+        (
+            "LawRequest",
+            "/v1/law",
+            {"start": 0.01, "stop": 1.0, "points": 2},
+            ("k", *_INTERVAL, "y0", "omega", "f", "v0"),
+            False,
+        ),
+        (
+            "SolveForRequest",
+            "/v1/solve-for",
+            {"unknown": "k", "target": 0.2},
+            ("k", "k_range", "y0", "omega", "f"),
+            False,
+        ),
+    ],
+)
+def test_the_description_has_the_alternatives(
+    client: Any, name: str, path: str, fixed: Any, varied: Any, exact: bool
+) -> None:
+    """A body is answered if, and where nothing is left out only if, its schema allows it."""
+    schema = client.get("/openapi.json").json()["components"]["schemas"][name]
+    values = {**EXAMPLE, **_INTERVAL, "omega": 1.3e5, "x": 1e-6, "y": 2e-6, "normal": 1.0}
+    required = {one: values[one] for one in ("mu0", "Fz", "v0") if one not in varied}
+    allowed = set()
+    for n in range(len(varied) + 1):
+        for names in itertools.combinations(varied, n):
+            body = required | fixed | {one: values[one] for one in names}
+            status = client.post(path, json=body).status_code
+            assert status in (200, 422)
+            allowed.add(allows(schema, set(body)))
+            if exact or status == 200:
+                assert allows(schema, set(body)) == (status == 200), names
+    assert allowed == {True, False}
+
+
+def test_no_default_of_the_description_is_refused(client: Any) -> None:
+    """A client that sends every default must be answered: null in k never is."""
+    schemas = client.get("/openapi.json").json()["components"]["schemas"]
+    for name in ("Case", "CaseRequest", "CaseColumns", "LawRequest", "MotionRequest"):
+        assert None not in [one.get("default", 0) for one in schemas[name]["properties"].values()]
 
 
 def examples_of(operation: Any, schemas: Any) -> Any:

@@ -19,10 +19,10 @@ def compiler(name: str) -> tuple[str, ...]:
         if importlib.util.find_spec("ziglang") is None:
             pytest.skip("zig is not installed (pip install ziglang)")
         return (sys.executable, "-m", "ziglang", name.removeprefix("zig "))
-    found = shutil.which(name)
-    if found is None:
+    result = shutil.which(name)
+    if result is None:
         pytest.skip(f"{name} is not installed")
-    return (found,)
+    return (result,)
 
 
 def run(*command: object, cwd: Path | None = None, given: str = "") -> str:

@@ -46,8 +46,8 @@ class Block:
     def entries(self) -> list[tuple[str, str]]:
         """Each command of a shell's block, with what the page shows below it."""
         if self.language == "console":
-            found = re.split(r"^\$ ", self.text, flags=re.MULTILINE)[1:]
-            return [(command, shown) for command, _, shown in (x.partition("\n") for x in found)]
+            result = re.split(r"^\$ ", self.text, flags=re.MULTILINE)[1:]
+            return [(command, shown) for command, _, shown in (x.partition("\n") for x in result)]
         return [(line, "") for line in self.text.splitlines() if line.strip()]
 
 
@@ -81,38 +81,38 @@ def parts(page: Path) -> Iterator[tuple[re.Match[str], int, bool]]:
     """Blocks and paragraphs of a page in their order, with their lines, and whether the paragraph
     above says that they are not run."""
     text, above = page.read_text("utf-8"), ""
-    for found in PART.finditer(text):
-        line = text.count("\n", 0, found.start()) + 1
-        yield found, line, above.rstrip().endswith(":") and says(above)
-        above = found["prose"] or ""
+    for result in PART.finditer(text):
+        line = text.count("\n", 0, result.start()) + 1
+        yield result, line, above.rstrip().endswith(":") and says(above)
+        above = result["prose"] or ""
 
 
 def blocks(page: Path, *languages: str) -> list[Block]:
     """The fenced blocks of a page, of these languages."""
-    found = [
+    result = [
         Block(page, line, part["language"], part["text"], marked)
         for part, line, marked in parts(page)
         if part["prose"] is None
     ]
-    return [block for block in found if block.language in languages or not languages]
+    return [block for block in result if block.language in languages or not languages]
 
 
 def mentions(page: Path) -> list[Mention]:
     """Commands in sentences, lists and tables of a page, and in its indented blocks."""
-    found = []
+    result = []
     for part, first, marked in parts(page):
         line = first
         for item in ITEM.split(part["prose"] or ""):
             for i, row in enumerate(item.splitlines()):
                 indented = row.startswith("    ")
                 commands = [row] if indented else SPAN.findall(row)
-                found += [
+                result += [
                     Mention(page, line + i, plain(command), marked or says(item), indented)
                     for command in commands
                     if is_command(command)
                 ]
             line += item.count("\n")
-    return found
+    return result
 
 
 def comments(manifest: Path) -> list[Mention]:

@@ -8,6 +8,8 @@ import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
 
 const STEPS = 1000; // of a slider, a decade
+/** What a field of materials can hold, while it is empty: a ball of steel. */
+const SUCH_AS = { radius: "such as 5 mm", length: "such as 10 mm", E: "steel: 210 GPa", nu: "steel: 0.3" };
 
 /** Shows a quantity in its field; what is typed and cannot be used stays, and is marked unless it is empty. */
 function fill(input, { text, fault, typed = text }) {
@@ -146,7 +148,7 @@ export function stiffness(use) {
   $("arguments").append(...shown.map(([name, { unit, meaning, choices }]) => {
     const given = { name, id: `argument-${name}`, "aria-describedby": `about-${name}`, class: "wide" };
     const input = choices.length ? make("select", given, choices.map((one) => new Option(one)))
-      : make("input", { spellcheck: "false", ...given });
+      : make("input", { spellcheck: "false", placeholder: SUCH_AS[name] ?? "", ...given });
     const label = make("label", { for: given.id }, /\w/.test(unit) ? `${name} [${unit}]` : name);
     const told = make("span", { id: `about-${name}`, class: "hint wide" }, meaning);
     return make("fieldset", { class: "field", name }, label, input, told);

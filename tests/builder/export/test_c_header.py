@@ -104,9 +104,9 @@ def build(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
 def flags(repository: Path) -> Any:
     """The options with which the library's kernels are compiled, by level."""
     module = runpy.run_path(str(repository / "hatch_build.py"))
-    found = module["levels"](module["own_platform"]())
+    levels = module["levels"](module["own_platform"]())
     return {
-        level: ["-O2", "-std=c99", "-ffp-contract=off", *words] for level, words in found.items()
+        level: ["-O2", "-std=c99", "-ffp-contract=off", *words] for level, words in levels.items()
     }
 
 
@@ -120,8 +120,8 @@ def ask(function: Any, n: int, columns: Any, *arrays: Any) -> Any:
     """``function`` of the driver over contiguous arrays."""
     out = np.empty((n, columns) if columns > 1 else n)
     pointer = ctypes.POINTER(ctypes.c_double)
-    given = [a.ctypes.data_as(pointer) if isinstance(a, np.ndarray) else a for a in arrays]
-    function(*given, n, out.ctypes.data_as(pointer))
+    inputs = [a.ctypes.data_as(pointer) if isinstance(a, np.ndarray) else a for a in arrays]
+    function(*inputs, n, out.ctypes.data_as(pointer))
     return out
 
 
@@ -225,11 +225,11 @@ def test_names_of_the_declarations_are_the_kernels() -> None:
     expected = ", ".join(f"MUMACRO_{name.upper()}" for name in atlas.QUANTITY_NAMES)
     assert f"enum {{ {expected}, MUMACRO_QUANTITIES }};" in text
     code = (KERNEL / "interface.c").read_text("ascii")
-    said = [
+    words = [
         f"{name} must be {BOUNDS[name]}" + (", or infinite" if name == "k" else "")
         for name in FIELDS
     ]
-    assert re.findall(r'"(\w+ must be .*?)"', code) == said
+    assert re.findall(r'"(\w+ must be .*?)"', code) == words
 
 
 def test_a_header_has_no_names_of_the_kernel_of_its_own(table: Surrogate) -> None:
@@ -274,15 +274,15 @@ def test_every_level_gives_the_librarys_bits(
         data, rows = table._with(quantity), np.empty((5, v.size))
         kernel.values(data, code, v, y, expected, bound, source)
         kernel.slopes(data, code, v, y, rows)
-        found = ask(driver.points, v.size, 9, code, v, y).T
-        assert same(found[0], expected)
-        assert same(found[8], expected)
-        assert same(found[1], bound)
-        assert same(found[6], source)
-        assert same(found[2:6], rows[1:])
+        result = ask(driver.points, v.size, 9, code, v, y).T
+        assert same(result[0], expected)
+        assert same(result[8], expected)
+        assert same(result[1], bound)
+        assert same(result[6], source)
+        assert same(result[2:6], rows[1:])
         assert same(ask(driver.values, v.size, 2, code, v, y).reshape(2, -1), [expected, bound])
-        assert np.array_equal(found[7] == 0, source >= 0)
-        assert np.array_equal(found[7] == 1, ~(v >= 0.0))
+        assert np.array_equal(result[7] == 0, source >= 0)
+        assert np.array_equal(result[7] == 1, ~(v >= 0.0))
     assert set(source) >= {-1, *range(atlas.SOURCES.index("rigid"))}
     assert same(ask(driver.borders, y.size, 1, y), kernel.border(table._data, y))
 
@@ -303,9 +303,9 @@ def test_other_options_move_the_last_digits_alone(
     with np.errstate(all="ignore"):
         away = np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-8
     mu, bound, _ = table.ratio_with_bound(v, y)
-    found = ask(build("gcc", *options).ratio_array, v.size, 1, v, y)
-    assert np.all(np.abs(found - mu) <= 2.0 * bound)
-    assert (np.abs(found - mu)[away] / np.spacing(mu[away])).max() <= apart
+    rows = ask(build("gcc", *options).ratio_array, v.size, 1, v, y)
+    assert np.all(np.abs(rows - mu) <= 2.0 * bound)
+    assert (np.abs(rows - mu)[away] / np.spacing(mu[away])).max() <= apart
 
 
 def cases(n: int) -> Any:
@@ -342,7 +342,7 @@ def test_cases_of_every_contact_and_direction_are_the_librarys(
     codes = CONTACTS.index(pair[0]), DIRECTIONS.index(pair[1])
     x = cases(20_000 if plain else 1000)
     answer = table.evaluate(dict(zip(kind.fields, x, strict=True)), gradient=True, **kind.names)
-    found = ask(best.cases, x.shape[1], 21, *codes, x).T
+    rows = ask(best.cases, x.shape[1], 21, *codes, x).T
     source, legal = answer.source_code, answer.source_code >= 0
     assert 0.15 < legal.mean() < 0.85
     expected = [
@@ -354,12 +354,12 @@ def test_cases_of_every_contact_and_direction_are_the_librarys(
         source,
     ]
     expected += [np.where(legal, atlas.REGIME_OF_SOURCE[source], -1)]
-    assert same(found[:7], expected)
-    assert same(found[7], [first_fault(case, kind.normal) for case in x.T])
-    assert same(found[8:14], list(answer.gradient.values()))
-    assert same(found[14:20], list(answer.gradient_bound.values()))
+    assert same(rows[:7], expected)
+    assert same(rows[7], [first_fault(case, kind.normal) for case in x.T])
+    assert same(rows[8:14], list(answer.gradient.values()))
+    assert same(rows[14:20], list(answer.gradient_bound.values()))
     if plain:
-        assert same(found[20], answer.mu_macro)
+        assert same(rows[20], answer.mu_macro)
         assert same(ask(best.case_arrays, x.shape[1], 2, x).reshape(2, -1), expected[:3:2])
 
 
@@ -370,16 +370,16 @@ def test_a_contact_or_direction_that_is_not_there_is_refused(best: Any) -> None:
         ((2, 0), -3, b"no such"),
         ((0, -1), -3, b"no such"),
     ):
-        found = ask(best.cases, 1, 21, *kind, np.ones((6, 1)))
-        assert found[0, 7] == error
-        assert np.isnan(found[0, :5]).all()
+        rows = ask(best.cases, 1, 21, *kind, np.ones((6, 1)))
+        assert rows[0, 7] == error
+        assert np.isnan(rows[0, :5]).all()
         assert about in best.mumacro_error_text(error)
     assert b"lifts off" in best.mumacro_error_text(7)
 
 
 def test_cycles_are_the_librarys(best: Any, table: Surrogate) -> None:
     x = cases(5000)
-    found = ask(best.cycles, x.shape[1], 6, x).T
+    result = ask(best.cycles, x.shape[1], 6, x).T
     with np.errstate(all="ignore"):
         answer = table.evaluate(dict(zip(FIELDS, x, strict=True)), groups=True)
         v, y, length = answer.v_tilde, answer.y_tilde, answer.length_scale
@@ -398,18 +398,18 @@ def test_cycles_are_the_librarys(best: Any, table: Surrogate) -> None:
         stick, stick_bound = table.stick_fraction_with_bound(v, y)
         rows = np.array([length * table.v_tilde_crit(y) * omega, unit * power, unit * bound])
     assert moving.sum() > 1000
-    assert same(found[:3, moving], rows[:, moving])
-    assert same(found[3, legal], stick[legal])
-    told = legal & ~((y == 0.0) & (v < np.inf) & (y0 > 0.0) & (omega > 0.0))
-    assert same(found[4, told], stick_bound[told])
-    assert np.all(found[4, legal & ~told] == 1.0)
+    assert same(result[:3, moving], rows[:, moving])
+    assert same(result[3, legal], stick[legal])
+    positive = legal & ~((y == 0.0) & (v < np.inf) & (y0 > 0.0) & (omega > 0.0))
+    assert same(result[4, positive], stick_bound[positive])
+    assert np.all(result[4, legal & ~positive] == 1.0)
     still = legal & ((y0 == 0.0) | (omega == 0.0))
-    assert np.all(found[:3, still] == 0.0)
+    assert np.all(result[:3, still] == 0.0)
     rigid = legal & np.isinf(stiffness) & ~still
     assert rigid.any()
-    assert np.all(found[0, rigid] == 0.0)
-    assert np.all(np.isnan(found[1:3, rigid]))
-    assert np.all(np.isnan(found[:5, ~legal]))
+    assert np.all(result[0, rigid] == 0.0)
+    assert np.all(np.isnan(result[1:3, rigid]))
+    assert np.all(np.isnan(result[:5, ~legal]))
 
 
 def test_only_the_documented_functions_of_the_library_are_called(

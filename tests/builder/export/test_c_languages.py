@@ -87,18 +87,18 @@ def test_fortran_has_the_same_answers(fortran: Any, table: Surrogate) -> None:
         "friction.f90",
         options=("-std=f2008", "-Wall", "-Wextra", "-pedantic", "-Werror"),
     )
-    found = ask(*({**CASE, "v0": v0}.values() for v0 in V0))
+    rows = ask(*({**CASE, "v0": v0}.values() for v0 in V0))
     answer = table.evaluate({**CASE, "v0": np.array(V0)}, gradient=True)
-    assert np.allclose(found[:, 0], answer.mu_macro, rtol=1e-14, atol=0.0)
-    assert np.allclose(found[:, 1], answer.error_bound, rtol=1e-6, atol=0.0)
+    assert np.allclose(rows[:, 0], answer.mu_macro, rtol=1e-14, atol=0.0)
+    assert np.allclose(rows[:, 1], answer.error_bound, rtol=1e-6, atol=0.0)
     for i, name in enumerate(FIELDS):
-        assert np.allclose(found[:, 2 + i], answer.gradient[name], rtol=1e-9, atol=0.0)
+        assert np.allclose(rows[:, 2 + i], answer.gradient[name], rtol=1e-9, atol=0.0)
     unit = CASE["mu0"] * CASE["Fz"] * answer.length_scale * CASE["omega"]
     assert np.allclose(
-        found[:, 8], table.power(answer.v_tilde, answer.y_tilde) * unit, rtol=1e-13, atol=0.0
+        rows[:, 8], table.power(answer.v_tilde, answer.y_tilde) * unit, rtol=1e-13, atol=0.0
     )
     assert np.allclose(
-        found[:, 9], table.stick_fraction(answer.v_tilde, answer.y_tilde), rtol=1e-9, atol=0.0
+        rows[:, 9], table.stick_fraction(answer.v_tilde, answer.y_tilde), rtol=1e-9, atol=0.0
     )
 
 
@@ -138,8 +138,8 @@ def test_abaqus_gets_the_coefficient_and_its_derivatives(fortran: Any, table: Su
         for p in (3e4, 1e5)
         for a, w in ((1.0, 1.0), (0.5, 2.0))
     ]
-    found = call(*cases)
-    for row, (v0, p, a, w) in zip(found, cases, strict=True):
+    result = call(*cases)
+    for row, (v0, p, a, w) in zip(result, cases, strict=True):
         case: Case = {
             "mu0": 0.3,
             "Fz": p,

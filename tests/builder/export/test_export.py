@@ -45,15 +45,15 @@ def test_the_grid_as_csv_has_a_row_a_node_with_all_digits(table: Table, written:
         header, *rows = csv.reader(stream)
     assert header == ["v_tilde", "y_tilde", *PLANES, "v_tilde_crit"]
     columns = dict(zip(header, zip(*rows, strict=True), strict=True))
-    found = {
+    result = {
         name: np.asarray(column, dtype=float).reshape(table.mu_ratio.shape)
         for name, column in columns.items()
     }
     for name in PLANES:
-        assert np.array_equal(found[name], getattr(table, name)), name
-    assert np.array_equal(found["v_tilde"][:, 0], table.v_tilde)
+        assert np.array_equal(result[name], getattr(table, name)), name
+    assert np.array_equal(result["v_tilde"][:, 0], table.v_tilde)
     for name in ("y_tilde", "v_tilde_crit"):
-        assert np.array_equal(found[name][7], getattr(table, name)), name
+        assert np.array_equal(result[name][7], getattr(table, name)), name
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -119,16 +119,16 @@ def test_what_the_command_cannot_export_is_reported_in_one_line(
     with pytest.raises(SystemExit) as end:
         sys.exit(main(["export", *arguments]))
     assert end.value.code == code
-    told = capsys.readouterr().err
-    assert said in told
-    assert len(told.splitlines()) == 1
+    output = capsys.readouterr().err
+    assert said in output
+    assert len(output.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 
 
 def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
     copy, folder = Path(shutil.copy(PATH, tmp_path / "table.nc")), tmp_path / "folder.h"
     folder.mkdir()
-    for path, kind, out, error, said in (
+    for path, kind, out, error, words in (
         *((PATH, kind, f"x.{kind}", ExportError, "is gone: use") for kind in GONE),
         (PATH, "xls", "x.xls", ExportError, "xls"),
         (tmp_path / "none.nc", "csv", "x.csv", TableError, "no such file"),
@@ -138,7 +138,7 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path) -
         (PATH, "c", "folder.h", ExportError, "is a folder"),
         (PATH, "c", "table.nc", ExportError, "is a file"),
     ):
-        with pytest.raises(error, match=said):
+        with pytest.raises(error, match=words):
             export_table(path, kind, tmp_path / out)
     assert {*tmp_path.rglob("*")} == {copy, folder}
     assert copy.read_bytes() == PATH.read_bytes()

@@ -67,26 +67,26 @@ def test_a_simulation_follows_its_inputs(
 ) -> None:
     time = np.linspace(0.0, 1.0, 41)
     v0 = 10.0 ** (-4.0 + 5.0 * time)
-    given = np.array(list(zip(time, v0, strict=True)), dtype=[("time", float), ("v0", float)])
+    inputs = np.array(list(zip(time, v0, strict=True)), dtype=[("time", float), ("v0", float)])
     outputs = ["mu_macro", "mu_ratio", "error_bound", "v_tilde", "y_tilde", "regime", "source"]
-    found = fmpy.simulate_fmu(
+    simulated = fmpy.simulate_fmu(
         str(unit),
         fmi_type=kind,
         stop_time=1.0,
         output_interval=0.025,
-        input=given,
+        input=inputs,
         output=["v0", *outputs],
         start_values={"Fz": 20.0, "mu0": 0.2},
     )
-    assert len(found) >= 41
-    answer = table.evaluate({**CASE, "Fz": 20.0, "mu0": 0.2, "v0": found["v0"]}, groups=True)
+    assert len(simulated) >= 41
+    answer = table.evaluate({**CASE, "Fz": 20.0, "mu0": 0.2, "v0": simulated["v0"]}, groups=True)
     for name in outputs[:5]:
         expected = getattr(answer, name)
         assert np.allclose(
-            found[name], expected, rtol=1e-6 if name == "error_bound" else 1e-13, atol=0.0
+            simulated[name], expected, rtol=1e-6 if name == "error_bound" else 1e-13, atol=0.0
         ), name
-    assert np.array_equal(found["source"], answer.source_code)
-    assert set(found["regime"]) == {0, 1}
+    assert np.array_equal(simulated["source"], answer.source_code)
+    assert set(simulated["regime"]) == {0, 1}
 
 
 class Loaded:
@@ -135,8 +135,8 @@ class Loaded:
 
     def slope(self, output: Any, **seeds: Any) -> Any:
         """The derivative of an output along a direction of the inputs."""
-        known = [self.at[name] for name in seeds]
-        return self.unit.getDirectionalDerivative([self.at[output]], known, list(seeds.values()))[0]
+        fixed = [self.at[name] for name in seeds]
+        return self.unit.getDirectionalDerivative([self.at[output]], fixed, list(seeds.values()))[0]
 
 
 def test_directional_derivatives_are_the_gradient(
@@ -154,17 +154,17 @@ def test_directional_derivatives_are_the_gradient(
         for name in FIELDS:
             of_ratio = (gradient[name] - answer.mu_ratio * (name == "mu0")) / case["mu0"]
             of_force = sign * (gradient[name] * case["Fz"] + answer.mu_macro * (name == "Fz"))
-            found = [
+            result = [
                 made.slope(output, **{name: 1.0}) for output in ("mu_macro", "mu_ratio", "force")
             ]
-            assert found == close([gradient[name], of_ratio, of_force], rel=1e-9)
+            assert result == close([gradient[name], of_ratio, of_force], rel=1e-9)
         seeds = {name: 1e-3 * value for name, value in case.items()}
         expected = sum(gradient[name] * seed for name, seed in seeds.items())
         assert made.slope("mu_macro", **seeds) == close(expected, rel=1e-9)
         if hasattr(made.unit, "getAdjointDerivative"):
-            known = [made.at[name] for name in FIELDS]
+            fixed = [made.at[name] for name in FIELDS]
             adjoint = made.unit.getAdjointDerivative(
-                [made.at["mu_macro"]], known, [2.0], len(FIELDS)
+                [made.at["mu_macro"]], fixed, [2.0], len(FIELDS)
             )
             assert adjoint == close([2.0 * slope for slope in gradient.values()], rel=1e-9)
 
@@ -172,18 +172,18 @@ def test_directional_derivatives_are_the_gradient(
 @pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
 def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path, pair: Any) -> None:
     kind = {"contact": CONTACTS.index(pair[0]), "direction": DIRECTIONS.index(pair[1])}
-    said, fields, _ = as_kind(CASE, pair)
+    words, fields, _ = as_kind(CASE, pair)
     case = {name: {**CASE, "Fz_amplitude": 4.0}[name] for name in fields}
     made = Loaded(fmpy, unit, tmp_path, **kind)
     made.put(Fz_amplitude=4.0)
     assert made.get(*kind, whole=True) == list(kind.values())
     for v0 in 10.0 ** np.linspace(-4.0, 1.0, 21):
         made.put(v0=v0)
-        answer = table.evaluate({**case, "v0": v0}, **said, groups=True)
+        answer = table.evaluate({**case, "v0": v0}, **words, groups=True)
         expected = [answer.mu_macro, answer.y_tilde, answer.mu_macro * CASE["Fz"]]
         assert made.get("mu_macro", "y_tilde", "force") == close(expected, rel=1e-13)
     made.put(v0=CASE["v0"])
-    exact = table.evaluate(case, **said, gradient=True).gradient
+    exact = table.evaluate(case, **words, gradient=True).gradient
     for name in (*FIELDS, "Fz_amplitude"):
         assert made.slope("mu_macro", **{name: 1.0}) == close(exact.get(name, 0.0), rel=1e-9)
     for name, wrong in (

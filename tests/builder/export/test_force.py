@@ -51,19 +51,19 @@ def library(sources: Any) -> Any:
     compilers.run(
         *compilers.compiler("gcc"), *options, *sorted(sources.glob("*.c")), "-o", made, "-lm"
     )
-    found = ctypes.CDLL(str(made))
-    found.mumacro_force.restype, found.mumacro_force.argtypes = NUMBER, [NUMBER] * 7
-    found.mumacro_evaluate_force.argtypes = [WHOLE, WHOLE, *[NUMBER] * 7, ARRAY, ARRAY]
-    found.mumacro_element_step.argtypes = [WHOLE, *[NUMBER] * 5, ARRAY, ARRAY]
-    found.mumacro_error_text.restype = ctypes.c_char_p
-    return found
+    loaded = ctypes.CDLL(str(made))
+    loaded.mumacro_force.restype, loaded.mumacro_force.argtypes = NUMBER, [NUMBER] * 7
+    loaded.mumacro_evaluate_force.argtypes = [WHOLE, WHOLE, *[NUMBER] * 7, ARRAY, ARRAY]
+    loaded.mumacro_element_step.argtypes = [WHOLE, *[NUMBER] * 5, ARRAY, ARRAY]
+    loaded.mumacro_error_text.restype = ctypes.c_char_p
+    return loaded
 
 
 def force(library: Any, v: Any, rest: Any = REST, **case: Any) -> Any:
     """The force at each velocity."""
-    given = {**CASE, **case}
+    inputs = {**CASE, **case}
     return np.array(
-        [library.mumacro_force(float(x), rest, *given.values()) for x in np.atleast_1d(v)]
+        [library.mumacro_force(float(x), rest, *inputs.values()) for x in np.atleast_1d(v)]
     )
 
 
@@ -81,15 +81,15 @@ def test_the_force_is_odd_smooth_and_rises(library: Any, table: Surrogate, case:
     v = np.concatenate(
         [[0.0, 5e-324, 1e-300], np.linspace(0.0, 2.0 * REST, 401)[1:], np.geomspace(1e-3, 10.0, 50)]
     )
-    found = force(library, v, **case)
-    assert np.array_equal(force(library, -v, **case), -found)
-    assert found[0] == 0.0
+    forces = force(library, v, **case)
+    assert np.array_equal(force(library, -v, **case), -forces)
+    assert forces[0] == 0.0
     # as far as the table's tolerance reaches
-    assert np.all(np.diff(found[3:]) >= -1e-4 * CASE["Fz"] * CASE["mu0"])
-    assert np.all(np.diff(found[3:203]) >= 0.0)
+    assert np.all(np.diff(forces[3:]) >= -1e-4 * CASE["Fz"] * CASE["mu0"])
+    assert np.all(np.diff(forces[3:203]) >= 0.0)
     # beyond v_rest it is the table's law, and meets it with the same slope
     law = table.evaluate(**case, v0=v[v >= REST]).mu_macro * case["Fz"]
-    assert np.abs(found[v >= REST] / law - 1.0).max() < 1e-13
+    assert np.abs(forces[v >= REST] / law - 1.0).max() < 1e-13
     below, above = force(library, np.nextafter(REST, [0.0, 1.0]), **case)
     assert below == close(above, rel=1e-12)
     step = 1e-5 * REST
@@ -153,16 +153,16 @@ def test_bad_input_gives_nan_and_the_reason(library: Any, bad: Any, error: Any, 
     for v0 in (0.0, 0.5 * REST, -1.0):
         v0, rest = bad.get("v0", v0), bad.get("rest", REST)
         assert np.isnan(force(library, v0, rest, **case)).all()
-        found, value, slopes = with_slopes(library, ("spring", "across"), v0, rest, case)
-        assert (found, math.isnan(value), np.isnan(slopes).all()) == (error, True, True)
+        result, value, slopes = with_slopes(library, ("spring", "across"), v0, rest, case)
+        assert (result, math.isnan(value), np.isnan(slopes).all()) == (error, True, True)
     assert library.mumacro_error_text(error).decode().startswith(says)
 
 
 def test_the_ends_of_v_rest_are_legal(library: Any) -> None:
     for rest in (5e-324, 1e-300, 1e300):
-        found = force(library, [0.0, 5e-324, rest, -rest, 0.5 * rest], rest)
-        assert np.isfinite(found).all()
-        assert np.abs(found).max() <= 3.0
+        forces = force(library, [0.0, 5e-324, rest, -rest, 0.5 * rest], rest)
+        assert np.isfinite(forces).all()
+        assert np.abs(forces).max() <= 3.0
     assert with_slopes(library, ("ball", "normal"), 1.0, REST, CASE)[0] == -4
     assert (
         library.mumacro_evaluate_force(0, 0, 1.0, REST, *CASE.values(), None, (NUMBER * 6)()) == -1
@@ -201,9 +201,9 @@ def test_steps_in_c_are_those_of_python(library: Any) -> None:
 def test_a_bad_step_moves_nothing_and_says_why(
     library: Any, bad: Any, error: Any, says: Any
 ) -> None:
-    given = {"springs": 2, "mu0": 0.3, "Fz": 10.0, "k": 1e6, "dx": 1e-6, "dy": 0.0, **bad}
+    inputs = {"springs": 2, "mu0": 0.3, "Fz": 10.0, "k": 1e6, "dx": 1e-6, "dy": 0.0, **bad}
     held, sums = (NUMBER * 4)(*[1.0] * 4), (NUMBER * 2)(5.0, 6.0)
-    assert library.mumacro_element_step(*given.values(), held, sums) == error
+    assert library.mumacro_element_step(*inputs.values(), held, sums) == error
     assert (list(held), list(sums)) == ([1.0] * 4, [5.0, 6.0])
     assert library.mumacro_error_text(error).decode().startswith(says)
     assert library.mumacro_element_step(1, 0.3, 10.0, 1e6, 0.0, 0.0, None, sums) == -1

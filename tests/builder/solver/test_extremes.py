@@ -30,15 +30,17 @@ def test_the_whole_range_is_solved(
     for v, y in zip(
         log_uniform(rng, *v_range, 1000), log_uniform(rng, *y_range, 1000), strict=True
     ):
-        found = solve(v, y)
-        assert found.ok, (v, y)
-        assert 0.0 < found.mu_ratio <= 1.0
-        assert 0.0 <= found.deficit <= 1.0
-        assert found.mu_ratio + found.deficit == close(1.0, abs=3e-16)
-        assert 0.0 <= found.stick_fraction <= 1.0
-        assert 0.0 <= found.power < math.inf
-        assert abs(v * found.mu_ratio + found.power - found.slip_speed) <= 5e-15 * found.slip_speed
-        assert found.error_estimate < 2e-15
+        solved = solve(v, y)
+        assert solved.ok, (v, y)
+        assert 0.0 < solved.mu_ratio <= 1.0
+        assert 0.0 <= solved.deficit <= 1.0
+        assert solved.mu_ratio + solved.deficit == close(1.0, abs=3e-16)
+        assert 0.0 <= solved.stick_fraction <= 1.0
+        assert 0.0 <= solved.power < math.inf
+        assert (
+            abs(v * solved.mu_ratio + solved.power - solved.slip_speed) <= 5e-15 * solved.slip_speed
+        )
+        assert solved.error_estimate < 2e-15
 
 
 # --- creep ----------------------------------------------------------------------------------------
@@ -48,10 +50,10 @@ def test_the_whole_range_is_solved(
 def test_mu_is_linear_in_creeping_speeds_above_one(y: float) -> None:
     expected = solve(1e-60, y)
     for v in (10.0**exponent for exponent in range(-40, -60, -3)):
-        found = solve(v, y)
-        assert found.mu_ratio / v == close(expected.mu_ratio / 1e-60, rel=3e-15)
-        assert found.power == close(expected.power, rel=1e-14)
-        assert found.stick_fraction == close(expected.stick_fraction, rel=1e-13)
+        solved = solve(v, y)
+        assert solved.mu_ratio / v == close(expected.mu_ratio / 1e-60, rel=3e-15)
+        assert solved.power == close(expected.power, rel=1e-14)
+        assert solved.stick_fraction == close(expected.stick_fraction, rel=1e-13)
 
 
 @pytest.mark.parametrize("y", [1.05, 1.3, 2.0, 5.0, 30.0, 1e3, 1.4e5])
@@ -59,9 +61,9 @@ def test_the_table_continues_the_solver_down_to_denormal_speeds(y: float) -> Non
     s = opened(1e-12)
     slope = solve(1e-60, y).mu_ratio / 1e-60
     for v in (1e-60, 1e-147, 1e-220, 1e-304):
-        found, bound, _ = s.ratio_with_bound(v, y)
-        assert found > 0.0
-        assert found == close(slope * v, rel=1e-11, abs=5e-324)
+        result, bound, _ = s.ratio_with_bound(v, y)
+        assert result > 0.0
+        assert result == close(slope * v, rel=1e-11, abs=5e-324)
         assert v > 1e-300 or bound < 1e-305
 
 
@@ -70,23 +72,23 @@ def test_the_static_limit_at_creep(y: float) -> None:
     expected = solve(1e-60, y).power / 1e-60
     assert expected > 0.0
     for v in (10.0**exponent for exponent in range(-40, -60, -3)):
-        found = solve(v, y)
-        assert found.mu_ratio == close(math.sqrt((1.0 - y) * (1.0 + y)), rel=3e-16)
+        solved = solve(v, y)
+        assert solved.mu_ratio == close(math.sqrt((1.0 - y) * (1.0 + y)), rel=3e-16)
         if y <= 1e-9:
-            assert found.power == close(v * y * y, rel=1e-14)  # v~ (1/2 + 1/2) y~^2
-        assert found.power / v == close(expected, rel=1e-12 if y > 0.99 else 1e-14)
+            assert solved.power == close(v * y * y, rel=1e-14)  # v~ (1/2 + 1/2) y~^2
+        assert solved.power / v == close(expected, rel=1e-12 if y > 0.99 else 1e-14)
 
 
 @pytest.mark.parametrize("eta", [0.0, 1e-17, -1e-17, 3e-30, -3e-30, 1e-60, -1e-90])
 def test_the_corner_at_any_speed_is_the_normal_form(eta: float) -> None:
     for v in (10.0**exponent for exponent in range(-30, -61, -3)):
-        found = solve(v, 1.0, eta)
-        mu = found.mu_ratio
+        solved = solve(v, 1.0, eta)
+        mu = solved.mu_ratio
         assert mu * mu * mu + 2.0 * eta * mu == close(
             math.pi * v, rel=1e-9, abs=1e-14 * (mu**3 + abs(eta * mu))
         )
-        assert 0.0 <= found.stick_fraction <= 1.0
-        assert found.power > 0.0
+        assert 0.0 <= solved.stick_fraction <= 1.0
+        assert solved.power > 0.0
     assert solve(1e-60, 1.0).mu_ratio == close((math.pi * 1e-60) ** (1.0 / 3.0), rel=4e-15)
 
 

@@ -213,10 +213,10 @@ def test_a_limit_has_the_order_of_its_error(
 @pytest.mark.parametrize("y", [0.1, 0.5, 0.9, 1.0])
 @pytest.mark.parametrize("v", [1e-10, 1e-12, 1e-16])
 def test_slip_shorter_than_any_scan_step_is_found(v: float, y: float) -> None:
-    found = solve(v, y)
-    assert found.ok
-    assert found.regime == "stick_slip"
-    slip_share = 1.0 - found.stick_fraction
+    solved = solve(v, y)
+    assert solved.ok
+    assert solved.regime == "stick_slip"
+    slip_share = 1.0 - solved.stick_fraction
     assert 0.0 < slip_share < 1.0 / 24.0  # the scan for the end of stick has 24 steps
     # next to the turn of the shaker slip lasts sqrt(2 pi v~ / (y~^2 phi)), phi from the normal form
     phi = math.sqrt(1.0 - y * y) if y < 1.0 else math.cbrt(math.pi * v)
@@ -270,9 +270,9 @@ def test_at_distances_down_to_the_last_digit_of_the_border_both_orbits_agree(swe
 def test_orbit_lost_on_the_border_itself_is_no_answer(v: float, y: float) -> None:
     # mu~ was once -0.39 here, as "success", or the section failed: its root equals its edge to
     # rounding
-    found = solve(v, y)
-    assert found.ok
-    assert found.mu_ratio == close(steady.border(y)[1], rel=1e-14)
+    solved = solve(v, y)
+    assert solved.ok
+    assert solved.mu_ratio == close(steady.border(y)[1], rel=1e-14)
 
 
 # --- inputs and failures --------------------------------------------------------------------------

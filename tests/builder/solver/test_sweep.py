@@ -29,12 +29,12 @@ def test_values_do_not_depend_on_workers_or_chunks(monkeypatch: pytest.MonkeyPat
     v, y = points(3 * CHUNK + 17)
     with Sweep(1) as one, Sweep(4) as four:
         expected = one.solve("full", v, y)
-        found = four.solve("full", v, y)
+        solved = four.solve("full", v, y)
     monkeypatch.setattr(module, "CHUNK", 7)
     with Sweep(2) as small:
         again = small.solve("full", v, y)
     for name in COLUMNS:
-        assert np.array_equal(found[name], expected[name])
+        assert np.array_equal(solved[name], expected[name])
         assert np.array_equal(again[name], expected[name])
 
 
@@ -89,7 +89,7 @@ def test_finished_work_is_kept_and_taken_up_again(
 
     with Sweep(1, checkpoint=folder) as sweep:
         monkeypatch.setattr(sweep, "_run", not_again)
-        found = sweep.solve("full", v, y)
+        solved = sweep.solve("full", v, y)
         assert sweep.n_solves == 50  # the count is the same, resumed or not
         with pytest.raises(AssertionError, match="solved again"):
             sweep.solve("continuous", v, y)
@@ -98,7 +98,7 @@ def test_finished_work_is_kept_and_taken_up_again(
         monkeypatch.setattr(module, "source_digest", lambda *_: "of another program")
         with pytest.raises(AssertionError, match="solved again"):
             sweep.solve("full", v, y)
-    assert all(np.array_equal(found[name], expected[name]) for name in COLUMNS)
+    assert all(np.array_equal(solved[name], expected[name]) for name in COLUMNS)
 
 
 @pytest.mark.parametrize("damage", [b"", b"no array", b"\x93NUMPY\x01\x00", None])

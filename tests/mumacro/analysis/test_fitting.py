@@ -286,11 +286,15 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
         (POINTS, {**RIG, "omga": 1.0}, "omga must be .* did you mean omega"),
         (POINTS, {**RIG, "v0": 1.0}, "v0 must be given once: as a column or as a keyword"),
         (POINTS, {"Fz": 10.0, "f": 2e4}, r"y0 must be given \[m\]"),
-        (POINTS, {"Fz": 10.0, "y0": 2e-6}, "omega must be given or f"),
+        (POINTS, {"Fz": 10.0, "y0": 2e-6}, "omega must be given, or f"),
         (POINTS, {**RIG, "y0": -1.0}, "y0 must be finite and >= 0"),
         ({"v0": [0.1, 0.2]}, RIG, "mu_macro must be a column of the data"),
         ([0.1, 0.2], RIG, "data must be a mapping, DataFrame"),
-        ({"v0": [0.1, 0.1, 0.1], "mu_macro": [0.2, 0.21, 0.2]}, RIG, "at least 2 different inputs"),
+        (
+            {"v0": [0.1, 0.1, 0.1], "mu_macro": [0.2, 0.21, 0.2]},
+            RIG,
+            "points at 2 different inputs or more",
+        ),
         (
             {"v0": [0.1, 0.2, 0.3], "mu_macro": [0.2, 0.21]},
             RIG,

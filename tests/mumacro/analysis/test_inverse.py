@@ -46,10 +46,10 @@ cases = st.fixed_dictionaries(
 def test_the_forward_answer_is_inverted(
     surrogate: Surrogate, pair: Any, case: Case, share: Any, place: Any
 ) -> None:
-    said, fields, case = as_kind(case, pair, share)
+    words, fields, case = as_kind(case, pair, share)
     unknown = fields[place]
-    forward: Any = surrogate.evaluate(**case, **said)
-    solution = solve_for(surrogate, unknown, forward.mu_macro, **without(case, unknown), **said)
+    forward: Any = surrogate.evaluate(**case, **words)
+    solution = solve_for(surrogate, unknown, forward.mu_macro, **without(case, unknown), **words)
     if solution.constant or not solution.roots[0]:
         # within the surrogate's error the input has no influence here, or its end equals the limit
         edge = min(
@@ -59,7 +59,7 @@ def test_the_forward_answer_is_inverted(
         assert edge <= 4.0 * forward.error_bound + 1e-9 * case["mu0"]
         return
     for root in solution.roots[0]:
-        there = surrogate.evaluate(**{**case, unknown: root.value, **said})
+        there = surrogate.evaluate(**{**case, unknown: root.value, **words})
         assert there.mu_macro == root.mu_macro
         assert root.mu_macro == close(forward.mu_macro, rel=1e-9, abs=2.0 * forward.error_bound)
         assert root.low <= root.value <= root.high
@@ -221,7 +221,7 @@ def test_no_root_is_missed_on_a_ray(
     # not on a plateau, where all are roots
     assume(mu.min() * (1.0 + 1e-9) < target < mu.max() * (1.0 - 1e-9))
     above = mu > target * (1.0 + 1e-12)
-    found = solve_for(
+    solution = solve_for(
         surrogate,
         unknown,
         target,
@@ -229,9 +229,9 @@ def test_no_root_is_missed_on_a_ray(
         within=(ray[0], ray[-1]),
         contact=contact,
     ).roots[0]
-    assert len(found) >= np.count_nonzero(above[1:] != above[:-1])
-    assert all(root.mu_macro == close(target, rel=1e-11) for root in found)
-    values = [root.value for root in found]
+    assert len(solution) >= np.count_nonzero(above[1:] != above[:-1])
+    assert all(root.mu_macro == close(target, rel=1e-11) for root in solution)
+    values = [root.value for root in solution]
     assert values == sorted(values)
 
 
@@ -240,8 +240,8 @@ def test_no_root_is_missed_on_a_ray(
 def test_along_and_normal_the_whole_friction_is_reached(
     surrogate: Surrogate, pair: Any, k: Any
 ) -> None:
-    said, _, case = as_kind({**CASE, "k": k}, pair)
-    solution = solve_for(surrogate, "v0", 0.3, **without(case, "v0"), **said)
+    words, _, case = as_kind({**CASE, "k": k}, pair)
+    solution = solve_for(surrogate, "v0", 0.3, **without(case, "v0"), **words)
     root = only_root(solution)
     # where the springs begin to slide all the time; the last digits before it are mu0, too
     z = case.get("Fz_amplitude", 0.0) / case["Fz"]
@@ -259,11 +259,11 @@ def test_along_and_normal_the_whole_friction_is_reached(
 
 
 def test_the_amplitude_of_the_force_stays_below_the_force(surrogate: Surrogate) -> None:
-    said, _, case = as_kind(CASE, ("spring", "normal"))
+    words, _, case = as_kind(CASE, ("spring", "normal"))
     for unknown, within in (("Fz_amplitude", (0.1, 10.0)), ("Fz", (4.0, 100.0))):
         with pytest.raises(InputError, match=r"range must be two ascending.*Fz_amplitude below Fz"):
-            solve_for(surrogate, unknown, 0.2, **without(case, unknown), within=within, **said)
-        reach = solve_for(surrogate, unknown, 0.2, **without(case, unknown), **said).reach
+            solve_for(surrogate, unknown, 0.2, **without(case, unknown), within=within, **words)
+        reach = solve_for(surrogate, unknown, 0.2, **without(case, unknown), **words).reach
         assert reach.high < 10.0 if unknown == "Fz_amplitude" else reach.low > 4.0
 
 
@@ -325,19 +325,19 @@ def test_a_bad_question_is_refused(
 def test_the_crossings_are_all_changes_of_the_regime(
     surrogate: Surrogate, pair: Any, place: Any, speed: Any
 ) -> None:
-    said, fields, case = as_kind({**CASE, "v0": speed}, pair)
+    words, fields, case = as_kind({**CASE, "v0": speed}, pair)
     along = fields[place]
     values = case[along] * np.geomspace(1e-3, 1e3, 3001)
-    if said["direction"] == "normal" and along in ("Fz", "Fz_amplitude"):
+    if words["direction"] == "normal" and along in ("Fz", "Fz_amplitude"):
         values = values[values > 4.0] if along == "Fz" else values[values < 10.0]
-    regime = surrogate.evaluate(**{**case, along: values}, **said).regime
+    regime = surrogate.evaluate(**{**case, along: values}, **words).regime
     (changes,) = np.nonzero(regime[1:] != regime[:-1])
-    marks = border_crossings(surrogate, along, without(case, along), values[0], values[-1], **said)
+    marks = border_crossings(surrogate, along, without(case, along), values[0], values[-1], **words)
     assert [mark.regimes for mark in marks] == [(regime[i], regime[i + 1]) for i in changes]
     for mark, i in zip(marks, changes, strict=True):
         assert values[i] < mark.value <= values[i + 1]
         there = surrogate.evaluate(
-            **{**case, along: np.array([np.nextafter(mark.value, 0.0), mark.value])}, **said
+            **{**case, along: np.array([np.nextafter(mark.value, 0.0), mark.value])}, **words
         )
         assert tuple(there.regime) == mark.regimes
         assert mark.mu_macro == there.mu_macro[1]
@@ -397,51 +397,51 @@ def curve_over(surrogate: Surrogate, name: str, **changed: Any) -> Any:
 
 
 def test_neighbouring_doubles_are_found_at_any_scale() -> None:
-    wanted = np.array([5e-324, 1e-300, 0.1, 1.0, math.pi, 1e300])
+    expected = np.array([5e-324, 1e-300, 0.1, 1.0, math.pi, 1e300])
 
     def below(x: Any) -> Any:
-        return x < wanted[:, None]
+        return x < expected[:, None]
 
     a, b = last_double(below, np.zeros(6), np.full(6, 1.7976931348623157e308))
-    assert b.tolist() == wanted.tolist()
-    assert a.tolist() == np.nextafter(wanted, 0.0).tolist()
+    assert b.tolist() == expected.tolist()
+    assert a.tolist() == np.nextafter(expected, 0.0).tolist()
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_levels_are_met_to_rounding_in_a_few_steps(sign: Any) -> None:
-    known = Known(lambda x: sign * np.arctan(x), lambda x: sign * x / (1.0 + x * x))
-    branch = branch_of(known, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
+    curve = Known(lambda x: sign * np.arctan(x), lambda x: sign * x / (1.0 + x * x))
+    branch = branch_of(curve, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
     level = sign * np.array([1e-290, 1e-12, 0.3, 0.78, 1.5, 1.57])
-    found = branch.meet(level)
+    roots = branch.meet(level)
     # 1,250 times flatter at 1.57 than at 0.3
-    assert found == close(np.tan(np.abs(level)), rel=1e-12)
-    assert np.all(np.abs(known.function(found) - level) <= 2.0 * 2.0**-52 * np.abs(level))
-    known.calls = 0
+    assert roots == close(np.tan(np.abs(level)), rel=1e-12)
+    assert np.all(np.abs(curve.function(roots) - level) <= 2.0 * 2.0**-52 * np.abs(level))
+    curve.calls = 0
     branch.meet(sign * np.array([0.3]))
-    assert known.calls <= 8
+    assert curve.calls <= 8
 
 
 def test_a_slope_that_vanishes_at_the_root_is_no_obstacle() -> None:
-    known = Known(lambda x: 1.0 + np.log(x) ** 3, lambda x: 3.0 * np.log(x) ** 2)
-    (found,) = branch_of(known, 1e-5, 1e4).meet(np.array([1.0]))
-    assert found == close(1.0, abs=1e-5)  # closer to the root the cube is below rounding
+    curve = Known(lambda x: 1.0 + np.log(x) ** 3, lambda x: 3.0 * np.log(x) ** 2)
+    (roots,) = branch_of(curve, 1e-5, 1e4).meet(np.array([1.0]))
+    assert roots == close(1.0, abs=1e-5)  # closer to the root the cube is below rounding
 
 
 @pytest.mark.parametrize("slope", [math.nan, math.inf, 0.0, -1.0, 1e-300, 1e300])
 def test_a_wrong_slope_costs_steps_but_no_digits(slope: Any) -> None:
-    known = Known(lambda x: np.where(x < math.pi, 0.25, 0.75), lambda x: np.full_like(x, slope))
-    branch = branch_of(known, 0.0, 1e300)
-    (found,) = branch.meet(np.array([0.5]))
-    assert found in (math.pi, math.nextafter(math.pi, 0.0))
-    assert known.calls < 200
+    curve = Known(lambda x: np.where(x < math.pi, 0.25, 0.75), lambda x: np.full_like(x, slope))
+    branch = branch_of(curve, 0.0, 1e300)
+    (roots,) = branch.meet(np.array([0.5]))
+    assert roots in (math.pi, math.nextafter(math.pi, 0.0))
+    assert curve.calls < 200
 
 
 def test_a_plateau_is_met_at_its_first_double_and_left_at_its_last() -> None:
     def stairs(x: Any) -> Any:
         return np.searchsorted([0.1, 10.0, 100.0], x, side="right") - 1.0
 
-    known = Known(stairs, np.zeros_like)
-    branch = branch_of(known, 1e-6, 1e-2, 1.0, 30.0, 1e6)
+    curve = Known(stairs, np.zeros_like)
+    branch = branch_of(curve, 1e-6, 1e-2, 1.0, 30.0, 1e6)
     assert branch.meet(np.array([1.0])).tolist() == [10.0]
     (left,) = branch.meet(np.array([1.0]), leave=True)
     assert left in (100.0, math.nextafter(100.0, 0.0))
@@ -450,10 +450,10 @@ def test_a_plateau_is_met_at_its_first_double_and_left_at_its_last() -> None:
 
 
 def test_a_level_that_is_never_reached_gives_an_end() -> None:
-    known = Known(np.arctan, lambda x: x / (1.0 + x * x))
-    branch = branch_of(known, 0.5, 2.0)
+    curve = Known(np.arctan, lambda x: x / (1.0 + x * x))
+    branch = branch_of(curve, 0.5, 2.0)
     assert branch.meet(np.array([0.1, 1.5])).tolist() == [0.5, 2.0]
-    assert known.calls == 0
+    assert curve.calls == 0
     assert branch.holds(np.array([0.1, math.atan(0.5), 1.0, 1.5])).tolist() == [
         False,
         True,
@@ -498,11 +498,11 @@ def test_the_cusp_of_the_static_limit_is_met(surrogate: Surrogate) -> None:
 def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> None:
     rest = without(CASE, "k", "y0")
     for ends in ({"k_range": (8e5, 1.25e6)}, {"k_low": 8e5, "k_high": 1.25e6}):
-        found = solve_for(surrogate, "y0", [0.15, 0.4], **{**rest, **ends})
-        assert found.ends == tuple(
+        solution = solve_for(surrogate, "y0", [0.15, 0.4], **{**rest, **ends})
+        assert solution.ends == tuple(
             solve_for(surrogate, "y0", [0.15, 0.4], **{**rest, "k": k}) for k in (8e5, 1.25e6)
         )
-        assert found.roots[0][0].value == close(
+        assert solution.roots[0][0].value == close(
             solve_for(surrogate, "y0", 0.15, **{**rest, "k": 1e6}).roots[0][0].value, rel=1e-9
         )
     with pytest.raises(InputError, match="k_range must be left out where k is the swept input"):

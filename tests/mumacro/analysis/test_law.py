@@ -30,9 +30,9 @@ def law_of(
     surrogate: Surrogate, pair: Any, change: Any = (), values: Any = SPEEDS, **options: Any
 ) -> Any:
     """A law over v0, the keywords of its kind, and its other inputs."""
-    said, _, case = as_kind(LINE, pair, 0.7)
+    words, _, case = as_kind(LINE, pair, 0.7)
     case = {**without(case, *("k" for name in change if name.startswith("k_"))), **dict(change)}
-    return friction_law(surrogate, values=values, **case, **said, **options), said, case
+    return friction_law(surrogate, values=values, **case, **words, **options), words, case
 
 
 # --- the range ------------------------------------------------------------------------------------
@@ -100,13 +100,13 @@ def test_a_law_goes_from_start_to_stop(surrogate: Surrogate) -> None:
 @every_pair
 @pytest.mark.parametrize("place", range(6))
 def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, place: Any) -> None:
-    said, fields, case = as_kind(CASE, pair, 0.009)
+    words, fields, case = as_kind(CASE, pair, 0.009)
     along = fields[place]
     values = sweep_values(along, 0.01 * case[along], 100.0 * case[along], 41, "log")
-    law = friction_law(surrogate, along, values=values, **without(case, along), **said)
-    assert law.kind.names == said
+    law = friction_law(surrogate, along, values=values, **without(case, along), **words)
+    assert law.kind.names == words
     moving, still = (
-        surrogate.evaluate(**{**case, along: values, **v0}, **said)
+        surrogate.evaluate(**{**case, along: values, **v0}, **words)
         for v0 in ({}, {"v0": np.zeros(41)})
     )
     assert law.answer.mu_macro == close(moving.mu_macro, rel=1e-15)
@@ -123,13 +123,13 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, pl
 def test_the_band_holds_every_stiffness_of_its_interval(
     surrogate: Surrogate, pair: Any, interval: Any
 ) -> None:
-    law, said, case = law_of(surrogate, pair, interval)
+    law, words, case = law_of(surrogate, pair, interval)
     low, high = law.band
     assert law.case["k"] == close(math.sqrt(0.8e6 * 1.2e6), rel=1e-15)
     assert ((low <= law.answer.mu_macro) & (law.answer.mu_macro <= high)).all()
     single = without(case, *interval)
     inside = [
-        surrogate.evaluate(**single, **said, k=k, v0=SPEEDS).mu_macro
+        surrogate.evaluate(**single, **words, k=k, v0=SPEEDS).mu_macro
         for k in np.geomspace(0.8e6, 1.2e6, 33)
     ]
     slack = 2.0 * law.answer.error_bound
@@ -162,12 +162,12 @@ def test_a_refined_law_is_straight_between_its_values(
     surrogate: Surrogate, pair: Any, scale: Any
 ) -> None:
     values = sweep_values("v0", 1e-4, 2.0, 25, scale)
-    law, said, case = law_of(surrogate, pair, values=values, refine=True)
+    law, words, case = law_of(surrogate, pair, values=values, refine=True)
     assert {*values, *(mark.value for mark in law.border)} <= set(law.values)
     assert (np.diff(law.values) > 0.0).all()
     mu = law.answer.mu_macro
     middle = surrogate.evaluate(
-        **case, **said, v0=np.sqrt(law.values[1:] * law.values[:-1])
+        **case, **words, v0=np.sqrt(law.values[1:] * law.values[:-1])
     ).mu_macro
     assert np.abs(middle - 0.5 * (mu[1:] + mu[:-1])).max() <= 1.1e-3 * np.ptp(mu)
     assert law.values.size < 150
@@ -223,8 +223,8 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
         assert {*ends} <= {*corners[corners[:, 0] == x, 1]}
     upright = [line.get_xdata()[0] for line in axes.lines if len({*line.get_xdata()}) == 1]
     assert upright == [mark.value for mark in law.border]
-    told = axes.get_legend_handles_labels()[1]
-    assert len(told) == len(set(told)) == 3 + len(law.border)
+    labels = axes.get_legend_handles_labels()[1]
+    assert len(labels) == len(set(labels)) == 3 + len(law.border)
     amplitudes = np.array([1.0, 9.0])
     other = friction_law(
         surrogate, "Fz_amplitude", values=amplitudes, **without(CASE, "y0"), direction="normal"
@@ -244,9 +244,9 @@ def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
         surrogate, values=np.asarray(v) * LENGTH * 3.0, **{**CONTACT, "y0": y * LENGTH}
     )
     borders = border_speeds(surrogate, law)
-    found = {name: x / 0.25 for name, x in approximations(surrogate, law).items()}
-    assert (list(found), list(borders)) == (list(APPROXIMATIONS), list(BORDERS))
-    return law, found, {name: x / (LENGTH * 3.0) for name, x in borders.items()}
+    result = {name: x / 0.25 for name, x in approximations(surrogate, law).items()}
+    assert (list(result), list(borders)) == (list(APPROXIMATIONS), list(BORDERS))
+    return law, result, {name: x / (LENGTH * 3.0) for name, x in borders.items()}
 
 
 @pytest.mark.parametrize(
@@ -267,8 +267,8 @@ def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
 def test_approximations_hold_where_they_should(
     surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any
 ) -> None:
-    law, found, _ = columns(surrogate, y, np.geomspace(ends[0], ends[1], 31))
-    assert np.max(np.abs(found[name] - law.answer.mu_ratio)) < off
+    law, result, _ = columns(surrogate, y, np.geomspace(ends[0], ends[1], 31))
+    assert np.max(np.abs(result[name] - law.answer.mu_ratio)) < off
 
 
 @pytest.mark.parametrize("y", [1e-3, 0.3, 0.45, 0.55, 0.999, 1.0, 1.45, 1.55, 3.0])
@@ -279,11 +279,11 @@ def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(
     v = np.unique(
         np.concatenate([crit * np.geomspace(1e-6, 1e6, 241), np.geomspace(1e-4, 0.99, 200)])
     )
-    law, found, borders = columns(surrogate, y, v)
+    law, result, borders = columns(surrogate, y, v)
     sliding, low = law.answer.regime == "continuous", y <= 1.0
     with np.errstate(over="ignore"):
         corner = (abs(y - 1.0) <= 0.5) & (v < 1.0) & (closed_forms.corner_root(v, y - 1.0) <= 0.7)
-    given = {
+    inputs = {
         "static": True,
         "rigid": True,
         "continuous": sliding,
@@ -292,11 +292,11 @@ def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(
         "master_curve": low & (v <= closed_forms.border_27(y)),
         "master_curve_limit": low & (v <= crit),
         "corner": corner,
-        "creep": np.isfinite(found["creep"]) & (found["creep"] <= 1.0) if y != 1.0 else False,
+        "creep": np.isfinite(result["creep"]) & (result["creep"] <= 1.0) if y != 1.0 else False,
     }
-    for name, where in given.items():
+    for name, where in inputs.items():
         near = np.abs(v / crit - 1.0) < 1e-9
-        assert ((np.isfinite(found[name]) == where) | near).all(), name
+        assert ((np.isfinite(result[name]) == where) | near).all(), name
     assert not corner.all()
     for name, where in {
         "eq_23": low,
@@ -310,23 +310,24 @@ def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(
     }.items():
         assert np.isfinite(borders[name]).all() == where, name
     # within their ranges they have the stated accuracy
-    assert np.nanmax(np.abs(found["continuous"] - law.answer.mu_ratio)) < 0.0401
+    assert np.nanmax(np.abs(result["continuous"] - law.answer.mu_ratio)) < 0.0401
     if low:
         assert (
-            np.nanmax(np.abs(found["small_amplitude"] - law.answer.mu_ratio)) <= 0.08 * y**4 + 4e-13
+            np.nanmax(np.abs(result["small_amplitude"] - law.answer.mu_ratio))
+            <= 0.08 * y**4 + 4e-13
         )
 
 
 def test_the_papers_law_of_small_amplitudes(surrogate: Surrogate) -> None:
     y, v = 0.4, np.linspace(0.0, 0.2, 201)
-    _, found, borders = columns(surrogate, y, v)
+    _, result, borders = columns(surrogate, y, v)
     low, top = math.sqrt(1.0 - y * y), 1.0 - 0.25 * y * y
     crit = 0.47 * y**2.5 / (y * y + 0.94 * y**0.5 / (1.0 + y * y))
     x = v / crit
     printed = low + (top - low) * (1.0 - (0.75 * (x - 1.0) ** 2 + 0.25 * (x - 1.0) ** 4))
-    assert found["master_curve"][x <= 1.0] == close(printed[x <= 1.0], rel=1e-13)
-    assert found["critical"] == close(top, rel=1e-15)
-    assert found["static"] == close(low, rel=1e-15)
+    assert result["master_curve"][x <= 1.0] == close(printed[x <= 1.0], rel=1e-13)
+    assert result["critical"] == close(top, rel=1e-15)
+    assert result["static"] == close(low, rel=1e-15)
     assert borders["eq_27"] == close(crit, rel=1e-13)
     # eq. (39) as it is printed, in metres and seconds
     printed = 0.5 * 3.0 * (math.sqrt(LENGTH**2 + 2.0 * (y * LENGTH) ** 2) - LENGTH)
@@ -372,13 +373,13 @@ def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(
     for changed in ({"k": "rigid"}, {"k": math.inf}, {"y0": 0.0}, {"omega": 0.0}):
         law = friction_law(surrogate, values=values, **{**without(CASE, "v0"), **changed})
         assert all((column == 0.0).all() for column in border_speeds(surrogate, law).values())
-        found = approximations(surrogate, law)
+        approximate = approximations(surrogate, law)
         if "k" in changed:
-            assert found["rigid"] == close(
+            assert approximate["rigid"] == close(
                 0.3 * closed_forms.outer(2e-6 * 1.3e5 / values), rel=1e-14
             )
             assert all(
-                np.isnan(found[name]).all()
+                np.isnan(approximate[name]).all()
                 for name in ("creep", "continuous", "corner", "small_amplitude")
             )
         assert (law.mu_static == (0.0 if "k" in changed else 0.3)).all()

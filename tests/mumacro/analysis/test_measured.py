@@ -20,9 +20,9 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     with pytest.MonkeyPatch.context() as patch:
         images = tmp_path_factory.mktemp("img")
         patch.setattr(measured, "IMAGES", images)
-        found = {name: section() for name, section in measured.SECTIONS.items()}
+        result = {name: section() for name, section in measured.SECTIONS.items()}
         assert (images / "measured.png").read_bytes().startswith(b"\x89PNG")
-    return {**found, "normal": validation.normal_oscillation()}
+    return {**result, "normal": validation.normal_oscillation()}
 
 
 def test_every_row_of_the_scripts_stands_on_the_page(
@@ -38,9 +38,9 @@ def test_the_sentences_have_the_figures_of_the_scripts(
     repository: Path, printed: dict[str, str]
 ) -> None:
     page = (repository / "docs" / "validation.md").read_text("utf-8")
-    told = re.findall(r"\d+\.\d+ to \d+\.\d+ N|k = [^:]*: \d+ % and \d+ %", printed["trends"])
-    assert len(told) == 2
-    assert [text for text in told if text not in page] == []
+    matches = re.findall(r"\d+\.\d+ to \d+\.\d+ N|k = [^:]*: \d+ % and \d+ %", printed["trends"])
+    assert len(matches) == 2
+    assert [text for text in matches if text not in page] == []
     assert "k has only an upper bound" in printed["trends"]
 
 
@@ -87,11 +87,11 @@ def test_the_normal_force_obeys_the_published_form(surrogate: Surrogate, alpha: 
 
 
 def test_the_plot_of_points_with_their_own_mu0_is_one_line_through_the_fit() -> None:
-    found = measured.fitted("ball")
-    axes = found.plot()
+    result = measured.fitted("ball")
+    axes = result.plot()
     fit_line = axes.get_lines()[-1]
     assert fit_line.get_xdata() == close(measured.points().v0, rel=1e-15)
-    assert fit_line.get_ydata() == close(found.predict()[0], rel=1e-15)
+    assert fit_line.get_ydata() == close(result.predict()[0], rel=1e-15)
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [
         "fit, at the inputs of each point",
         "95 % band of the fit",

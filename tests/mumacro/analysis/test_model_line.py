@@ -18,9 +18,11 @@ CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.0
 
 def rows(surrogate: Surrogate, contact: str = "spring", **changed: Any) -> Any:
     """Text and effect by row."""
-    found = model_rows(surrogate, {**CASE, **changed}, contact)
-    assert [one["row"] for one in found] == sorted({one["row"] for one in found}, key=ROWS.index)
-    return {one["row"]: (one["text"], one["effect"]) for one in found}
+    rows_of_model = model_rows(surrogate, {**CASE, **changed}, contact)
+    assert [one["row"] for one in rows_of_model] == sorted(
+        {one["row"] for one in rows_of_model}, key=ROWS.index
+    )
+    return {one["row"]: (one["text"], one["effect"]) for one in rows_of_model}
 
 
 def test_rows_are_those_of_the_document(repository: Path) -> None:
@@ -37,7 +39,7 @@ def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) ->
     text, effect = rows(surrogate)["k is known"]
     assert effect == close(max(off), rel=1e-9)
     assert f"{100.0 * effect:.2g} %" in text
-    assert k_effect(surrogate, CASE, known=1e-4) == close(
+    assert k_effect(surrogate, CASE, uncertainty=1e-4) == close(
         1e-4 * abs(surrogate.evaluate(**CASE, gradient=True).gradient["k"]) * 1e6 / mu, rel=1e-3
     )
     # at a maximum over k the slope is zero, and the effect is not
@@ -53,9 +55,9 @@ def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) ->
 
 
 def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate: Surrogate) -> None:
-    found = rows(surrogate, y0=2.0)
-    assert list(found) == ["units"]
-    assert "is y0 = 2 in metres?" in found["units"][0]
+    result = rows(surrogate, y0=2.0)
+    assert list(result) == ["units"]
+    assert "is y0 = 2 in metres?" in result["units"][0]
     assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
 
 
@@ -70,15 +72,15 @@ def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
 
 
 def test_slip_path_tilt_and_heat_have_their_sizes(surrogate: Surrogate) -> None:
-    found = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
-    way = 1e-6 * float(re.findall(r"slip path ([\d.]+) um a", found["Coulomb friction"][0])[0])
+    result = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
+    way = 1e-6 * float(re.findall(r"slip path ([\d.]+) um a", result["Coulomb friction"][0])[0])
     # the foot follows the motion but for l0 = 0.23 um at each turn
     assert way == close(4.0 * 5e-6, rel=0.1)
-    assert found["Coulomb friction"][1] == close(0.01 * math.log(100.0) / 0.3, rel=1e-12)
-    assert found["constant normal force"][1] == close(
+    assert result["Coulomb friction"][1] == close(0.01 * math.log(100.0) / 0.3, rel=1e-12)
+    assert result["constant normal force"][1] == close(
         1.21 * 0.3 * 0.01 * 5e-6 / (3.0 / 1.3e7), rel=1e-12
     )
-    watts = float(re.findall(r"turns ([\d.]+) W", found["no wear, no heating"][0])[0])
+    watts = float(re.findall(r"turns ([\d.]+) W", result["no wear, no heating"][0])[0])
     assert watts == close(3.0 * way * 20e3, rel=0.1)
     assert "constant normal force" not in rows(surrogate)
 
@@ -128,5 +130,5 @@ def test_digits_are_those_that_the_uncertainty_leaves() -> None:
 def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> None:
     with pytest.raises((InputError, TypeError), match=said):
         model_rows(surrogate, {**CASE, **changed})
-    with pytest.raises(InputError, match="known must be finite and > 0"):
-        k_effect(surrogate, CASE, known=0.0)
+    with pytest.raises(InputError, match="uncertainty must be finite and > 0"):
+        k_effect(surrogate, CASE, uncertainty=0.0)

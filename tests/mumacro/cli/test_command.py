@@ -52,7 +52,7 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(
         assert part in text
     shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
     assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
-    told = [f"model  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
+    told = [f"assumes  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
     told = [line.replace("k_range", "k=0.9..1.1N/um") for line in told]
     assert rows[-len(told) - 1 : -1] == told
     assert (
@@ -92,10 +92,8 @@ WRONG = {
     CASE + " fast": "'fast' is no name=value",
     CASE + " omega=1": "exactly one of omega [rad/s] and f [Hz]",
     CASE.replace("0.3", "0_3"): "give a plain number",
-    CASE.replace(
-        "2e-6", "2N"
-    ): "y0=2N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm",
-    CASE.replace("1e6", "1000 N / mm"): "'/' is no name=value",
+    CASE.replace("2e-6", "2N"): "y0=2N: give metres as a plain number, or with a unit: m, cm, mm",
+    CASE.replace("1e6", "1000 N / mm"): "'N', '/', 'mm' are no name=value",
     CASE.replace("0.3", "nan"): "mu0 must be finite",
     CASE.replace("1e6", "1000 furlongs"): "'furlongs' is no name=value",
     CASE.replace("0.3", "0,3"): "a point, 0.3",
@@ -172,10 +170,15 @@ def ended(capsys: Capture, code: int, *words: str) -> str:
 
 
 @pytest.mark.parametrize("word", [*COMMANDS, ""])
-def test_every_command_explains_itself(capsys: Capture, word: Any) -> None:
+def test_every_command_explains_itself_on_one_screen(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, word: Any
+) -> None:
     if word == "serve":
         pytest.importorskip("uvicorn")
+    monkeypatch.setenv("COLUMNS", "100")
     text = ended(capsys, 0, *word.split(), "--help")
+    assert len(text.splitlines()) <= 40
+    assert max(map(len, text.splitlines())) <= 100
     assert "usage: " in text
     assert word == "serve" or f"mumacro {word}" in text
     assert word not in ("", "law", "solve-for", "map") or all(
@@ -410,7 +413,12 @@ def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, meas
     ("text", "words", "code", "parts"),
     [
         ("", RIG, 1, ["line 1: must name the columns"]),
-        ("a\n1\n", RIG, 1, ["no column v0 [m/s]; there are 'a'", "no column mu_macro [-]"]),
+        (
+            "a\n1\n",
+            RIG,
+            1,
+            ["no column v0 [m/s]; there are 'a'", "mu_macro [-]: the mean friction force over Fz"],
+        ),
         (
             "speed,mu_macro\n1,0.2\n",
             RIG,

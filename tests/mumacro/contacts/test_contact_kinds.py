@@ -36,18 +36,18 @@ table = tables(1e-10)
 def test_the_gradient_is_that_of_the_answers(table: Surrogate, pair: Any) -> None:
     rng = np.random.default_rng(6)
     for _ in range(40):
-        said, fields, case = as_kind(
+        words, fields, case = as_kind(
             {name: x * 10.0 ** rng.uniform(-0.7, 0.7) for name, x in CASE.items()}, pair
         )
         if pair[1] == "normal":
             case["Fz_amplitude"] = rng.uniform(0.05, 0.95) * case["Fz"]
-        found = table.evaluate(**case, **said, gradient=True)
-        assert list(found.gradient) == list(fields)
+        answer = table.evaluate(**case, **words, gradient=True)
+        assert list(answer.gradient) == list(fields)
         for name, x in case.items():
             up, down = (
-                table.evaluate(**{**case, name: x * (1.0 + h)}, **said) for h in (1e-6, -1e-6)
+                table.evaluate(**{**case, name: x * (1.0 + h)}, **words) for h in (1e-6, -1e-6)
             )
-            if {up.source_code, down.source_code} != {found.source_code}:
+            if {up.source_code, down.source_code} != {answer.source_code}:
                 continue
             difference = (up.mu_macro - down.mu_macro) / (2e-6 * x)
             rounding = 1e-10 if pair[0] == "ball" else 1e-5
@@ -55,10 +55,12 @@ def test_the_gradient_is_that_of_the_answers(table: Surrogate, pair: Any) -> Non
                 min(up.error_bound + down.error_bound, 2e-12) / (2e-6 * x)
                 + rounding * case["mu0"] / x
             )
-            assert found.gradient[name] == close(difference, abs=noise + found.gradient_bound[name])
+            assert answer.gradient[name] == close(
+                difference, abs=noise + answer.gradient_bound[name]
+            )
             if pair == ("ball", "across"):
-                assert found.gradient_bound[name] < 1e-2 * max(
-                    abs(found.gradient[name]), found.mu_macro / x
+                assert answer.gradient_bound[name] < 1e-2 * max(
+                    abs(answer.gradient[name]), answer.mu_macro / x
                 )
 
 
@@ -86,11 +88,11 @@ def test_any_groups_have_an_answer_or_none(pair: Any) -> None:
 
 @every_other_pair
 def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table: Surrogate, pair: Any) -> None:
-    said, _, case = as_kind(CASE, pair)
+    words, _, case = as_kind(CASE, pair)
     v0 = np.geomspace(1e-6, 10.0, 400)
-    many = table.evaluate(**{**case, "v0": v0}, **said, gradient=True)
+    many = table.evaluate(**{**case, "v0": v0}, **words, gradient=True)
     for i in range(0, 400, 37):
-        one = table.evaluate(**{**case, "v0": v0[i]}, **said, gradient=True)
+        one = table.evaluate(**{**case, "v0": v0[i]}, **words, gradient=True)
         for name in (
             "mu_macro",
             "error_bound",
@@ -101,13 +103,13 @@ def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table: Surrogate, 
         ):
             assert getattr(one, name) == getattr(many, name)[i], name
         assert [*one.gradient.values()] == [slope[i] for slope in many.gradient.values()]
-        ratio, bound, _ = table.ratio_with_bound(one.v_tilde, one.y_tilde, **said)
+        ratio, bound, _ = table.ratio_with_bound(one.v_tilde, one.y_tilde, **words)
         assert (one.mu_macro, one.error_bound) == (ratio * CASE["mu0"], bound * CASE["mu0"])
     threaded = Surrogate.open(1e-10, threads=4)
     for other in (threaded, pickle.loads(pickle.dumps(threaded))):  # noqa: S301 - made here
-        found = other.evaluate(**{**case, "v0": np.tile(v0, 5)}, **said, gradient=True)
-        np.testing.assert_array_equal(found.mu_macro, np.tile(many.mu_macro, 5))
-        np.testing.assert_array_equal(found.gradient["v0"], np.tile(many.gradient["v0"], 5))
+        answer = other.evaluate(**{**case, "v0": np.tile(v0, 5)}, **words, gradient=True)
+        np.testing.assert_array_equal(answer.mu_macro, np.tile(many.mu_macro, 5))
+        np.testing.assert_array_equal(answer.gradient["v0"], np.tile(many.gradient["v0"], 5))
 
 
 REFUSED = [
@@ -141,10 +143,10 @@ REFUSED = [
 def test_what_does_not_belong_is_refused_by_name(
     table: Surrogate, changed: Any, field: str, said: Any
 ) -> None:
-    given = {**CASE, **changed}
-    left_out = [name for name in ("k", "y0") if given[name] is None]
+    inputs = {**CASE, **changed}
+    left_out = [name for name in ("k", "y0") if inputs[name] is None]
     with pytest.raises(InputError, match=said) as caught:
-        table.evaluate(**without(given, *left_out))
+        table.evaluate(**without(inputs, *left_out))
     assert caught.value.field == field
 
 
@@ -177,10 +179,10 @@ def test_labels_are_kept(table: Surrogate) -> None:
         {"partial_slip"},
     )
     force = {"Fz_amplitude": xr.DataArray([1.0, 4.0], dims="force"), "k_range": (1e6, 2e6)}
-    found = table.evaluate(**without(CASE, "k", "y0"), **force, **NORMAL, gradient=True)
-    assert found.mu_macro_low.dims == ("force",)
-    assert found.gradient["Fz_amplitude"].name == "d_mu_macro_d_Fz_amplitude"
-    assert np.all(found.mu_macro_low <= found.mu_macro_high)
+    answer = table.evaluate(**without(CASE, "k", "y0"), **force, **NORMAL, gradient=True)
+    assert answer.mu_macro_low.dims == ("force",)
+    assert answer.gradient["Fz_amplitude"].name == "d_mu_macro_d_Fz_amplitude"
+    assert np.all(answer.mu_macro_low <= answer.mu_macro_high)
 
 
 # --- an interval of k: the extremes of mu_macro over it, which may lie inside ---------------------
@@ -192,22 +194,22 @@ RAY: Case = {"mu0": 1.0, "Fz": 1.0, "y0": 20.0, "omega": 1.0, "v0": 1.0}
 def test_the_extremes_are_those_of_a_dense_sampling(table: Surrogate, pair: Any) -> None:
     rng = np.random.default_rng(1)
     for _ in range(40 if pair == PAIRS[0] else 12):
-        said, _, case = as_kind(
+        words, _, case = as_kind(
             {**CASE, "v0": 10.0 ** rng.uniform(-3, 0), "y0": 10.0 ** rng.uniform(-7, -4)}, pair
         )
         case, low = without(case, "k"), 10.0 ** rng.uniform(4, 8)
         high = low * 10.0 ** rng.uniform(0, 3)
-        found = table.evaluate(k_range=(low, high), **case, **said)
-        some = table.evaluate(k=np.geomspace(low, high, 3000), **case, **said)
-        slack = found.error_bound + some.error_bound.max()
+        answer = table.evaluate(k_range=(low, high), **case, **words)
+        some = table.evaluate(k=np.geomspace(low, high, 3000), **case, **words)
+        slack = answer.error_bound + some.error_bound.max()
         for end, sampled, sign in (
-            (found.mu_macro_low, some.mu_macro.min(), 1.0),
-            (found.mu_macro_high, some.mu_macro.max(), -1.0),
+            (answer.mu_macro_low, some.mu_macro.min(), 1.0),
+            (answer.mu_macro_high, some.mu_macro.max(), -1.0),
         ):
             assert sign * (sampled - end) >= -slack
             assert end == close(sampled, abs=slack + 1e-7)
-        middle = table.evaluate(k=math.sqrt(low) * math.sqrt(high), **case, **said)
-        assert (found.mu_macro, found.source, found.v_tilde) == (
+        middle = table.evaluate(k=math.sqrt(low) * math.sqrt(high), **case, **words)
+        assert (answer.mu_macro, answer.source, answer.v_tilde) == (
             middle.mu_macro,
             middle.source,
             middle.v_tilde,
@@ -225,13 +227,13 @@ def test_extremes_inside(table: Surrogate, pair: Any, ratio: Any) -> None:
     turns = k[1:][slope[1:] * slope[:-1] < 0.0]
     assert turns.size == 2
     ends = turns[0] / 1.5, turns[1] * 1.5
-    found = table.evaluate(k_range=ends, **ray, **kind)
+    answer = table.evaluate(k_range=ends, **ray, **kind)
     least, most, *both = (table.evaluate(k=x, **ray, **kind).mu_macro for x in (*turns, *ends))
     only = table.evaluate(k_range=(turns[0] / 1.1, turns[0] * 1.1), **ray, **kind)
     assert only.mu_macro_low == close(least, abs=1e-6)
     assert only.mu_macro_low < min(both[0], only.mu_macro_high)
-    assert found.mu_macro_low <= min(least, *both) + 1e-9
-    assert found.mu_macro_high >= max(most, *both) - 1e-9
+    assert answer.mu_macro_low <= min(least, *both) + 1e-9
+    assert answer.mu_macro_high >= max(most, *both) - 1e-9
     # however far away the other end is
     until = table.evaluate(k_range=(1e-300, turns[1] / 1.1), **ray, **kind)
     since = table.evaluate(k_range=(turns[0] * 1.1, 1e300), **ray, **kind)
@@ -246,10 +248,10 @@ def test_turns_closer_than_samples(table: Surrogate, ratio: Any) -> None:
     """Where both turns have just begun, an interval that ends between them, or next to them."""
     ray = {**RAY, "y0": ratio}
     for end in np.exp(np.linspace(-0.5, -0.3, 21)):
-        found = table.evaluate(k_range=(end * np.exp(-0.31), end), **ray)
+        answer = table.evaluate(k_range=(end * np.exp(-0.31), end), **ray)
         some = table.evaluate(k=end * np.exp(np.linspace(-0.31, 0.0, 5001)), **ray).mu_macro
-        assert found.mu_macro_low <= some.min() + found.error_bound
-        assert found.mu_macro_high >= some.max() - found.error_bound
+        assert answer.mu_macro_low <= some.min() + answer.error_bound
+        assert answer.mu_macro_high >= some.max() - answer.error_bound
 
 
 def test_intervals_in_arrays_columns_and_of_one_point(table: Any) -> None:
@@ -259,18 +261,18 @@ def test_intervals_in_arrays_columns_and_of_one_point(table: Any) -> None:
         1.2e6,
         np.array([[0.01], [0.1]]),
     )
-    found: Any = table.evaluate(k_range=(np.array(low), high), **{**case, "v0": v0}, gradient=True)
-    assert found.mu_macro_low.shape == (2, 5)
+    answer: Any = table.evaluate(k_range=(np.array(low), high), **{**case, "v0": v0}, gradient=True)
+    assert answer.mu_macro_low.shape == (2, 5)
     for i, j in np.ndindex(2, 3):
         one = table.evaluate(k_range=(low[j], high), **{**case, "v0": v0[i, 0]}, gradient=True)
         assert (one.mu_macro, one.gradient["k"]) == (
-            found.mu_macro[i, j],
-            found.gradient["k"][i, j],
+            answer.mu_macro[i, j],
+            answer.gradient["k"][i, j],
         )
-        assert one.mu_macro_low == close(found.mu_macro_low[i, j], abs=1e-12)
-        assert one.mu_macro_high == close(found.mu_macro_high[i, j], abs=1e-12)
-    assert np.isnan(found.mu_macro_low[:, 3:]).all()
-    assert (found.source_code[:, 3:] == -1).all()
+        assert one.mu_macro_low == close(answer.mu_macro_low[i, j], abs=1e-12)
+        assert one.mu_macro_high == close(answer.mu_macro_high[i, j], abs=1e-12)
+    assert np.isnan(answer.mu_macro_low[:, 3:]).all()
+    assert (answer.source_code[:, 3:] == -1).all()
     point = table.evaluate(k_range=(1e6, 1e6), **case)
     assert (
         point.mu_macro_low

@@ -69,9 +69,9 @@ def test_a_straight_step_is_exact(contact: str) -> None:
     dx, dy = way * np.cos(angle), way * np.sin(angle)
     expected = one.step(dx, dy)
     for _ in range(n):
-        found = many.step(dx / n, dy / n)
+        result = many.step(dx / n, dy / n)
     # opposite to the motion slip is unstable: the parts' rounding grows
-    assert np.abs(np.array(found) - expected).max(axis=0) / limit == close(0.0, abs=2e-11)
+    assert np.abs(np.array(result) - expected).max(axis=0) / limit == close(0.0, abs=2e-11)
 
 
 def test_slip_turns_the_force_as_its_closed_form_in_30_digits() -> None:
@@ -110,8 +110,8 @@ def test_a_straight_step_is_exact_while_the_normal_force_changes() -> None:
     dx, dy = way * np.cos(ends[1]), way * np.sin(ends[1])
     expected = one.step(dx, dy, Fz=last)
     for i in range(n):
-        found = many.step(dx / n, dy / n, Fz=first + (last - first) * ((i + 1) / n))
-    assert np.abs(np.array(found) - expected).max() < 1e-11
+        result = many.step(dx / n, dy / n, Fz=first + (last - first) * ((i + 1) / n))
+    assert np.abs(np.array(result) - expected).max() < 1e-11
     assert np.hypot(*expected) == close(np.minimum(np.hypot(*expected), last), rel=1e-14)
 
 
@@ -129,8 +129,8 @@ def test_a_contact_that_closes_within_a_step_is_exact() -> None:
     expected = np.minimum(way, last) * [np.cos(angle), np.sin(angle)]
     assert np.array(one.step(dx, dy, Fz=last)) == close(expected, rel=1e-14, abs=1e-15)
     for i in range(n):
-        found = many.step(dx / n, dy / n, Fz=last * ((i + 1) / n))
-    assert np.abs(np.array(found) - expected).max() < 1e-11
+        result = many.step(dx / n, dy / n, Fz=last * ((i + 1) / n))
+    assert np.abs(np.array(result) - expected).max() < 1e-11
 
 
 def test_a_force_against_the_motion_stays_on_its_line() -> None:
@@ -215,10 +215,10 @@ def test_arrays_are_the_single_contacts() -> None:
         for one in k[:, 0]
     ]
     for dx, dy in ((1e-6, 2e-6), (5e-6, 0.0), (-3e-6, 1e-6)):
-        found = many.step(dx, [[dy], [2.0 * dy]])
+        result = many.step(dx, [[dy], [2.0 * dy]])
         for i in range(2):
             for j in range(3):
-                assert (found[0][i, j], found[1][i, j]) == single[i][j].step(dx, (i + 1) * dy)
+                assert (result[0][i, j], result[1][i, j]) == single[i][j].step(dx, (i + 1) * dy)
     assert many.state.shape == (2, 3, 5, 2)
     assert many.force[0].shape == (2, 3)
     assert Element([0.3], [10.0], 1e6).step(0.0, 0.0)[0].shape == (1,)

@@ -35,14 +35,14 @@ def test_equal_bodies_have_mindlins_ratio(nu: float) -> None:
 
 
 def test_the_ball_follows_hertz() -> None:
-    found = ball_on_flat(5e-3, 10.0, STEEL, RIGID)
+    result = ball_on_flat(5e-3, 10.0, STEEL, RIGID)
     modulus = 210e9 / (1.0 - 0.09)
-    depth = found.half_width**2 / 5e-3
+    depth = result.half_width**2 / 5e-3
     assert 4.0 / 3.0 * modulus * math.sqrt(5e-3) * depth**1.5 == close(10.0, rel=1e-13)
     # the normal stiffness is the tangent of that law
-    assert found.k_normal == close(2.0 * modulus * math.sqrt(5e-3 * depth), rel=1e-13)
-    assert found.pressure * 2.0 / 3.0 * math.pi * found.half_width**2 == close(10.0, rel=1e-13)
-    assert ball_on_flat(5e-3, 80.0, STEEL, RIGID).k == close(2.0 * found.k, rel=1e-13)
+    assert result.k_normal == close(2.0 * modulus * math.sqrt(5e-3 * depth), rel=1e-13)
+    assert result.pressure * 2.0 / 3.0 * math.pi * result.half_width**2 == close(10.0, rel=1e-13)
+    assert ball_on_flat(5e-3, 80.0, STEEL, RIGID).k == close(2.0 * result.k, rel=1e-13)
     soft, alone = (ball_on_flat(1e-2, 0.5, RUBBER, other).k for other in (STEEL, RIGID))
     assert soft == close(alone, rel=1e-3)  # the soft body decides
 
@@ -182,12 +182,12 @@ def test_hertz_wants_a_small_contact() -> None:
     "shape", [("ball", {}), ("cylinder", {"length": 5e-3, "oscillation": "across"})]
 )
 def test_forgotten_gigapascals_are_told(second: Any, shape: tuple[str, Any]) -> None:
-    given = {"radius": 5e-3, "Fz": 10.0, "E": 210, "nu": 0.3, **second, **shape[1]}
+    inputs = {"radius": 5e-3, "Fz": 10.0, "E": 210, "nu": 0.3, **second, **shape[1]}
     with pytest.raises(InputError, match=r"^E must be in pascals: did you mean 210 GPa\?"):
-        contact_of(shape[0], **given)
-    assert contact_of(shape[0], **{**given, "E": 210e9}).warnings == ()
+        contact_of(shape[0], **inputs)
+    assert contact_of(shape[0], **{**inputs, "E": 210e9}).warnings == ()
     with pytest.raises(InputError, match=r"^radius must be"):  # GPa do not explain it
-        contact_of(shape[0], **{**given, "E": 210, "Fz": 1e12})
+        contact_of(shape[0], **{**inputs, "E": 210, "Fz": 1e12})
 
 
 # --- geometries by name ---------------------------------------------------------------------------
@@ -214,10 +214,10 @@ def test_a_named_geometry_is_its_function() -> None:
         1e-3, 10.0, STEEL, RUBBER
     )
     for axis in AXES:
-        found = contact_of(
+        contact = contact_of(
             "cylinder", radius=5e-3, length=5e-3, Fz=1e2, oscillation=axis, E2=math.inf, **steel
         )
-        assert found == cylinder_on_flat(5e-3, 5e-3, 1e2, STEEL, RIGID, axis)
+        assert contact == cylinder_on_flat(5e-3, 5e-3, 1e2, STEEL, RIGID, axis)
 
 
 @pytest.mark.parametrize(
@@ -249,13 +249,13 @@ def test_numbers_of_any_size_are_refused_or_give_a_contact(geometry: str) -> Non
         {"oscillation": "along"} if geometry == "cylinder" else {}
     )
     for numbers in itertools.product(sizes, repeat=len(names) + 1):
-        given = dict(zip([*names, "E"], numbers, strict=True))
+        inputs = dict(zip([*names, "E"], numbers, strict=True))
         try:
-            found = contact_of(geometry, **given, **rest)
+            contact = contact_of(geometry, **inputs, **rest)
         except InputError:
             continue
-        told = (found.k, found.k_normal, found.half_width, found.pressure)
-        assert all(0.0 < value < math.inf for value in told), (given, found)
+        stated = (contact.k, contact.k_normal, contact.half_width, contact.pressure)
+        assert all(0.0 < value < math.inf for value in stated), (inputs, contact)
 
 
 def test_arguments_are_read_with_units() -> None:

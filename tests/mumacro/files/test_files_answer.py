@@ -36,12 +36,12 @@ DOUBLES = st.floats(1e-9, 1e9) | st.sampled_from(ODD)
 def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any) -> None:
     surrogate = Surrogate.open()
     batch = pa.RecordBatch.from_pylist([dict(zip(NAMES, row, strict=True)) for row in rows])
-    found, rejects = answer(batch, surrogate, include=["gradient"])
-    assert found.num_rows == len(rows)
-    slopes = {name: found.column(f"d_mu_macro_d_{name}").to_pylist() for name in NAMES}
+    answers, rejects = answer(batch, surrogate, include=["gradient"])
+    assert answers.num_rows == len(rows)
+    slopes = {name: answers.column(f"d_mu_macro_d_{name}").to_pylist() for name in NAMES}
     bad = {reject["row"]: reject["field"] for reject in rejects.to_pylist()}
     for i, (row, said) in enumerate(
-        zip(rows, found.select(list(ANSWERS)).to_pylist(), strict=True)
+        zip(rows, answers.select(list(ANSWERS)).to_pylist(), strict=True)
     ):
         case = dict(zip(NAMES, row, strict=True))
         case["k"] = "rigid" if case["k"] == math.inf else case["k"]
@@ -101,18 +101,18 @@ def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any)
 def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type(
     surrogate: Surrogate, cell: Any, k: Any
 ) -> None:
-    found, rejects = answer(batch_of(k=cell), surrogate)
+    answers, rejects = answer(batch_of(k=cell), surrogate)
     if k == GAP:
-        assert found.column("mu_macro").null_count == 1
+        assert answers.column("mu_macro").null_count == 1
         assert [(reject["field"], reject["reason"]) for reject in rejects.to_pylist()] == [
             ("k", GAP)
         ]
     else:
         assert rejects.num_rows == 0
         assert (
-            found.column("mu_macro")[0].as_py() == surrogate.evaluate(**{**CASE, "k": k}).mu_macro
+            answers.column("mu_macro")[0].as_py() == surrogate.evaluate(**{**CASE, "k": k}).mu_macro
         )
-        assert (found.column("source")[0].as_py() == "rigid") == (k == "rigid")
+        assert (answers.column("source")[0].as_py() == "rigid") == (k == "rigid")
 
 
 @pytest.mark.parametrize(
@@ -140,9 +140,9 @@ def test_a_bad_cell_is_named_with_value_and_reason(
     name = column.partition(" ")[0]
     batch = batch_of(**{column: [cell]})
     batch = batch.drop_columns(["omega"] if name == "f" else [name] if name != column else [])
-    found, rejects = answer(batch, surrogate)
+    answers, rejects = answer(batch, surrogate)
     assert rejects.to_pylist() == [{"row": 0, "field": name, "value": cell, "reason": reason}]
-    assert found.column("mu_macro").null_count == found.column("source").null_count == 1
+    assert answers.column("mu_macro").null_count == answers.column("source").null_count == 1
 
 
 ORDER = "must be two stiffnesses [N/m] with 0 < low <= high, both finite"
@@ -182,13 +182,15 @@ def test_ends_of_k_and_amplitudes_are_refused(
     surrogate: Surrogate, left_out: Any, columns: Any, refused: Any
 ) -> None:
     batch = batch_of(**{name: [cell] for name, cell in columns.items()}).drop_columns(left_out)
-    found, rejects = answer(batch, surrogate, direction="normal" if left_out == "y0" else "across")
+    answers, rejects = answer(
+        batch, surrogate, direction="normal" if left_out == "y0" else "across"
+    )
     assert [(reject["field"], reject["reason"]) for reject in rejects.to_pylist()] == (
         [refused] if refused else []
     )
     if not refused and left_out == "k":
         low, middle, high = (
-            found.column(f"mu_macro{end}")[0].as_py() for end in ("_low", "", "_high")
+            answers.column(f"mu_macro{end}")[0].as_py() for end in ("_low", "", "_high")
         )
         assert low < middle < high or (low == middle == high and "1" in columns.values())
 
@@ -202,13 +204,13 @@ def test_units_in_brackets_are_converted_exactly(surrogate: Surrogate) -> None:
         "f [kHz]": [20.69],
         "v0 [mm/s]": [10.0],
     }
-    found, rejects = answer(pa.RecordBatch.from_pydict(columns), surrogate)
+    answers, rejects = answer(pa.RecordBatch.from_pydict(columns), surrogate)
     assert rejects.num_rows == 0
     assert (
-        found.column("mu_macro")[0].as_py()
+        answers.column("mu_macro")[0].as_py()
         == surrogate.evaluate(**{**CASE, "omega": math.tau * 20690.0}).mu_macro
     )
-    assert found.schema.names[: len(columns)] == list(columns)
+    assert answers.schema.names[: len(columns)] == list(columns)
 
 
 SIMILAR = "{!r} is similar: rename that column to {}"
@@ -266,9 +268,9 @@ def test_a_misnamed_column_is_never_ignored(names: Any, options: Any, parts: Any
 
 
 def test_rigid_can_be_given_for_a_batch_without_k(surrogate: Surrogate) -> None:
-    found, _ = answer(batch_of(speed=["slow"]).drop_columns("k"), surrogate, rigid=True)
-    assert found.column("speed").to_pylist() == ["slow"]
-    assert found.column("source")[0].as_py() == "rigid"
+    answers, _ = answer(batch_of(speed=["slow"]).drop_columns("k"), surrogate, rigid=True)
+    assert answers.column("speed").to_pylist() == ["slow"]
+    assert answers.column("source")[0].as_py() == "rigid"
 
 
 def test_a_column_without_numbers_is_refused_and_one_without_rows_answered(
@@ -276,6 +278,6 @@ def test_a_column_without_numbers_is_refused_and_one_without_rows_answered(
 ) -> None:
     with pytest.raises(FilesError, match="the column v0 holds bool, not numbers"):
         answer(batch_of(v0=[True]), surrogate)
-    found, rejects = answer(batch_of().slice(0, 0), surrogate)
-    assert found.num_rows == rejects.num_rows == 0
-    assert tuple(found.schema.names[6:]) == ANSWERS
+    answers, rejects = answer(batch_of().slice(0, 0), surrogate)
+    assert answers.num_rows == rejects.num_rows == 0
+    assert tuple(answers.schema.names[6:]) == ANSWERS

@@ -73,10 +73,10 @@ def rejects_of(path: Any) -> Any:
 def ran(capsys: Capture, code: Any, *words: Any) -> Any:
     """The last line of ``mumacro eval WORDS``; the only one if it fails."""
     assert main(["eval", *map(str, words)]) == code
-    said = capsys.readouterr()
-    assert "Traceback" not in said.err
-    assert code not in (1, 2) or len(said.err.splitlines()) == 1
-    return said.err if code in (1, 2) else said.out
+    output = capsys.readouterr()
+    assert "Traceback" not in output.err
+    assert code not in (1, 2) or len(output.err.splitlines()) == 1
+    return output.err if code in (1, 2) else output.out
 
 
 @pytest.mark.parametrize("start", KINDS)
@@ -85,21 +85,21 @@ def test_every_format_goes_into_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: Any, end: Any
 ) -> None:
     monkeypatch.setattr(reading, "ROWS", 70)  # several blocks
-    given = cases(300)
-    source, out = write(given, tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
+    inputs = cases(300)
+    source, out = write(inputs, tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
     summary = evaluate_files([source], out, TABLE)
     assert (summary.rows, summary.answered, summary.rejects) == (300, 300, None)
-    found = read(out)
-    columns = {name: given.column(name).to_numpy() for name in NAMES}
+    written = read(out)
+    columns = {name: inputs.column(name).to_numpy() for name in NAMES}
     expected = TABLE.evaluate(**columns)
-    assert list(found[0]) == [*NAMES, *ANSWERS]
+    assert list(written[0]) == [*NAMES, *ANSWERS]
     for name in (*NAMES, "mu_macro", "mu_ratio", "error_bound"):
-        wanted = columns[name] if name in NAMES else getattr(expected, name)
+        target = columns[name] if name in NAMES else getattr(expected, name)
         assert [
-            math.inf if row[name] == "rigid" else float(row[name]) for row in found
-        ] == wanted.tolist()
+            math.inf if row[name] == "rigid" else float(row[name]) for row in written
+        ] == target.tolist()
     for name in ("source", "regime"):
-        assert [row[name] for row in found] == getattr(expected, name).tolist()
+        assert [row[name] for row in written] == getattr(expected, name).tolist()
 
 
 def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path: Path) -> None:
@@ -113,15 +113,17 @@ def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path: Pat
         "list": pa.array([[1, 2]] * 300),
         "flag": pa.array([True, None] * 150),
     }
-    given = cases(300)
+    inputs = cases(300)
     for name, values in others.items():
-        given = given.append_column(name, values)
-    source = write(given, tmp_path / "cases.parquet")
+        inputs = inputs.append_column(name, values)
+    source = write(inputs, tmp_path / "cases.parquet")
     evaluate_files([source], tmp_path / "out.parquet", TABLE)
-    found, before = pq.read_table(tmp_path / "out.parquet"), pq.read_table(source)
-    assert found.select(before.schema.names).schema == before.schema
-    assert found.select(before.schema.names).drop_columns("f32").equals(before.drop_columns("f32"))
-    assert pa.types.is_dictionary(found.schema.field("regime").type)
+    written, before = pq.read_table(tmp_path / "out.parquet"), pq.read_table(source)
+    assert written.select(before.schema.names).schema == before.schema
+    assert (
+        written.select(before.schema.names).drop_columns("f32").equals(before.drop_columns("f32"))
+    )
+    assert pa.types.is_dictionary(written.schema.field("regime").type)
     for kind, nothing in (("ndjson", None), ("csv", "")):
         evaluate_files([source], tmp_path / f"out.{kind}", TABLE)
         rows = read(tmp_path / f"out.{kind}")
@@ -139,8 +141,8 @@ def test_text_comes_out_as_it_came_in(tmp_path: Path) -> None:
     ]
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
     evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", TABLE)
-    for line, given in zip((tmp_path / "out.ndjson").read_text().splitlines(), lines, strict=True):
-        assert line.startswith(given.rstrip("} "))
+    for line, inputs in zip((tmp_path / "out.ndjson").read_text().splitlines(), lines, strict=True):
+        assert line.startswith(inputs.rstrip("} "))
         json.loads(line)
     evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.csv", TABLE)
     assert [(row["id"], row["b"]) for row in read(tmp_path / "out.csv")] == [
@@ -153,8 +155,8 @@ def test_text_comes_out_as_it_came_in(tmp_path: Path) -> None:
     (tmp_path / "cases.csv").write_bytes(text.encode())
     for kind in ("csv", "parquet", "ndjson"):
         evaluate_files([tmp_path / "cases.csv"], tmp_path / f"o.{kind}", TABLE)
-        found = read(tmp_path / f"o.{kind}")
-        assert [row["name"] for row in found] == ['say "so",\nand more', "007", '5" pipe', ""]
+        written = read(tmp_path / f"o.{kind}")
+        assert [row["name"] for row in written] == ['say "so",\nand more', "007", '5" pipe', ""]
     assert (
         (tmp_path / "o.csv")
         .read_bytes()
@@ -194,11 +196,11 @@ def test_standard_input_output(
     tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
 ) -> None:
     bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
-    source, wanted = (
+    source, expected = (
         write(bad, tmp_path / f"cases.{kind}"),
         tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv"),
     )
-    rejects = evaluate_files([source], wanted, TABLE).rejects
+    rejects = evaluate_files([source], expected, TABLE).rejects
     assert rejects
     with source.open("rb") as stream:
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(stream))
@@ -206,7 +208,7 @@ def test_standard_input_output(
             sys, "stdout", io.TextIOWrapper(written := io.BytesIO(), write_through=True)
         )
         assert main(["eval", "-", "-o", "-"]) == 3
-        assert written.getvalue() == wanted.read_bytes()
+        assert written.getvalue() == expected.read_bytes()
     assert capfdbinary.readouterr().err.startswith(rejects.read_bytes() + b"49 of 50 rows")
 
 
@@ -290,15 +292,15 @@ def test_bad_lines_of_ndjson_land_in_the_side_file(
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
     out = tmp_path / f"out.{end}"
     ran(capsys, 3, tmp_path / "cases.ndjson", "-o", out)
-    found = read(out)
-    assert [row.get("tag") for row in found] == ["a", None, None, None]
-    assert [row["source"] for row in found] == [
+    written = read(out)
+    assert [row.get("tag") for row in written] == ["a", None, None, None]
+    assert [row["source"] for row in written] == [
         "stick_slip_low",
         "rigid",
         "stick_slip_low",
         "continuous_low",
     ]
-    assert found[0]["mu_macro"] == TABLE.evaluate(**CASE).mu_macro
+    assert written[0]["mu_macro"] == TABLE.evaluate(**CASE).mu_macro
     reasons = {row: (field, reason) for row, field, reason in rejects_of(out)}
     assert [row for row, (field, _) in reasons.items() if not field] == [3, 4, 5, 13, 14, 16, 17]
     assert reasons[2] == reasons[11] == ("k", MISSING_K)
@@ -378,7 +380,7 @@ def test_damaged_and_missing_files_are_reported_in_one_line(
     flipped = bytearray(good.read_bytes())
     flipped[2000:60_000:97] = bytes(byte ^ 255 for byte in flipped[2000:60_000:97])
     (tmp_path / "flipped.parquet").write_bytes(flipped)
-    for name, out, said in (
+    for name, out, words in (
         ("none.csv", "o.csv", "no such file"),
         ("*.none", "o.csv", "no such file"),
         ("text.parquet", "o.csv", "Is this a 'parquet' file?"),
@@ -389,7 +391,7 @@ def test_damaged_and_missing_files_are_reported_in_one_line(
         ("good.parquet", "none/o.csv", "No such file or directory"),
         ("good.parquet", ".", "must be the name of a file"),
     ):
-        assert said in ran(capsys, 1, tmp_path / name, "-o", tmp_path / out, "--force")
+        assert words in ran(capsys, 1, tmp_path / name, "-o", tmp_path / out, "--force")
     assert "several formats" in ran(
         capsys, 1, good, tmp_path / "latin.csv", "-o", tmp_path / "o.csv"
     )
@@ -439,8 +441,8 @@ def test_folders_patterns_and_hive_names(tmp_path: Path) -> None:
             )
     (tmp_path / "runs" / "notes.txt").write_text("no cases")
     evaluate_files([tmp_path / "runs"], tmp_path / "out.parquet", TABLE)
-    found = pq.read_table(tmp_path / "out.parquet")
-    assert found.column("year").to_pylist() == [2023] * 20 + [2024] * 20
+    written = pq.read_table(tmp_path / "out.parquet")
+    assert written.column("year").to_pylist() == [2023] * 20 + [2024] * 20
     pattern = str(tmp_path / "runs" / "*" / "a.parquet")
     assert evaluate_files([pattern], tmp_path / "a.csv", TABLE).rows == 20
     mixed = cases(10).set_column(0, "mu0", pa.array([1] * 10, pa.int32()))
@@ -474,26 +476,26 @@ def test_files_know_contact_and_ends_of_k(
 ) -> None:
     kind, more = ANSWERED[name]
     rng = np.random.default_rng(3)
-    given = {
+    inputs = {
         field: value * rng.uniform(0.9, 1.1, 40)
         for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()
     }
-    source, out = write(pa.table(given), tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
+    source, out = write(pa.table(inputs), tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
     options = [f"--{key}={value}" for key, value in kind.items()]
     ran(capsys, 0, source, "-o", out, *options, "--include", "gradient")
-    found = read(out)
-    expected = TABLE.evaluate(given, gradient=True, **kind)
+    written = read(out)
+    expected = TABLE.evaluate(inputs, gradient=True, **kind)
     names = [
         "mu_macro",
-        *(["mu_macro_low", "mu_macro_high"] if "k_low" in given else []),
+        *(["mu_macro_low", "mu_macro_high"] if "k_low" in inputs else []),
         *ANSWERS[1:],
     ]
     slopes = [f"d_mu_macro_d_{field}" for field in expected.gradient]
-    assert list(found[0]) == [*given, *names, *slopes]
+    assert list(written[0]) == [*inputs, *names, *slopes]
     for column in names:
         read_back = [
-            row[column] if column in ("regime", "source") else float(row[column]) for row in found
+            row[column] if column in ("regime", "source") else float(row[column]) for row in written
         ]
         assert read_back == getattr(expected, column).tolist()
     for field, slope in expected.gradient.items():
-        assert [float(row[f"d_mu_macro_d_{field}"]) for row in found] == slope.tolist()
+        assert [float(row[f"d_mu_macro_d_{field}"]) for row in written] == slope.tolist()

@@ -35,10 +35,10 @@ def small_blocks() -> Any:
 
 
 def table_of(n: int) -> Any:
-    given = random_cases(n)
-    mu0 = given["mu0"].to_numpy().copy()
+    inputs = random_cases(n)
+    mu0 = inputs["mu0"].to_numpy().copy()
     mu0[::999] *= -1.0  # rejected
-    return given.set_column(0, "mu0", pa.array(mu0))
+    return inputs.set_column(0, "mu0", pa.array(mu0))
 
 
 @pytest.fixture(scope="module")
@@ -91,17 +91,17 @@ def assert_whole(out: Any, cases: Any) -> None:
 def test_a_stopped_run_goes_on_with_the_same_bytes(
     tmp_path: Path, cases: Any, kind: Any, share: Any
 ) -> None:
-    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
+    source, out, words = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
     stopped(source, out, share)
     assert not out.exists()
-    summary = evaluate_files([source], out, TABLE, say=said.append)
+    summary = evaluate_files([source], out, TABLE, say=words.append)
     assert (summary.rows, summary.rejected) == (3000, 4)
-    assert said == [
-        f"{out}.parts: {summary.resumed:,} rows are done already ({said[0].partition('(')[2]}"
+    assert words == [
+        f"{out}.parts: {summary.resumed:,} rows are done already ({words[0].partition('(')[2]}"
     ]
     # Python 3.12 and newer read far ahead of what they unpack
-    known = 0.0 if kind == "csv.gz" else share
-    assert 3000 * (known - 0.1) <= summary.resumed < 3000
+    done = 0.0 if kind == "csv.gz" else share
+    assert 3000 * (done - 0.1) <= summary.resumed < 3000
     assert_whole(out, cases)
 
 
@@ -110,7 +110,7 @@ def test_a_stopped_run_goes_on_with_the_same_bytes(
 def test_finished_pieces_cut_or_changed_are_done_again(
     tmp_path: Path, cases: Any, kind: Any, harm: Any
 ) -> None:
-    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
+    source, out, words = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
     stopped(source, out)
     part = tmp_path / f"out.{kind}.parts" / "log"
     data = part.read_bytes()
@@ -120,9 +120,9 @@ def test_finished_pieces_cut_or_changed_are_done_again(
         at = 2 * len(data) // 3
         swapped = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
         part.write_bytes({"cut": data[:at], "changed": swapped, "longer": data + data[at:]}[harm])
-    summary = evaluate_files([source], out, TABLE, say=said.append)
+    summary = evaluate_files([source], out, TABLE, say=words.append)
     assert summary.rows == 3000
-    assert ("is done again" in "".join(said)) == (harm != "gone")
+    assert ("is done again" in "".join(words)) == (harm != "gone")
     assert_whole(out, cases)
 
 
@@ -169,9 +169,9 @@ def test_the_command_given_again_finds_all_done(
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     words = ["eval", str(source), "-o", str(out)]
     assert [main(words), main(words)] == [3, 3]
-    said = capsys.readouterr()
-    assert "3,000 were done already" in said.out
-    assert "is complete already" in said.err
+    output = capsys.readouterr()
+    assert "3,000 were done already" in output.out
+    assert "is complete already" in output.err
     assert_whole(out, cases)
     out.write_text("mine")  # what is no longer the output of that run is kept
     assert main(words) == 1
@@ -255,9 +255,9 @@ def test_a_fault_that_a_change_brings_in_is_told_as_a_change(
     def change(*_: Any) -> None:  # its first call comes before the file is opened
         source.write_bytes(half)
 
-    with pytest.raises(FilesError, match="changed while it was read") as told:
+    with pytest.raises(FilesError, match="changed while it was read") as failure:
         evaluate_files([source], out, TABLE, progress=change)
-    assert "quote" not in str(told.value)
+    assert "quote" not in str(failure.value)
     assert left(tmp_path) == [source.name]
     if kind.startswith("csv"):  # the fault alone is told as what it is
         with pytest.raises(FilesError, match=r"row 20: a quote is not closed"):
@@ -312,17 +312,17 @@ def test_an_output_never_replaces_an_input(
 def test_other_files_are_kept_and_a_second_run_is_refused(
     tmp_path: Path, cases: Any, capsys: Capture
 ) -> None:
-    source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", list[str]()
+    source, out, words = copied(cases, "csv", tmp_path), tmp_path / "out.csv", list[str]()
     (tmp_path / "out.csv.parts").mkdir()
     (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
 
     def other(*_: Any) -> None:
-        if not said:
+        if not words:
             assert main(["eval", str(source), "-o", str(out), "--force"]) == 1
-            said.append(capsys.readouterr().err)
+            words.append(capsys.readouterr().err)
 
     assert evaluate_files([source], out, TABLE, force=True, progress=other).rows == 3000
-    assert "out.csv.parts: another process is at work here; wait for it, or stop it" in said[0]
+    assert "out.csv.parts: another process is at work here; wait for it, or stop it" in words[0]
     assert (tmp_path / "out.csv.parts" / "precious.txt").read_text() == "mine"
 
 

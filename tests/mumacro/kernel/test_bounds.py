@@ -60,11 +60,11 @@ def test_the_last_digit_of_the_inputs_next_to_the_corner_is_covered(
         case = dict(zip(FIELDS, (mu0, Fz, k, y0, omega, v0), strict=True))
         _, eta = exact_groups(case)
         truth = math.sqrt(max(float(-eta * (2 + eta)), 0.0)) if still else corner_ratio(case)
-        found = table.evaluate(case)
-        bound = found.error_bound / mu0
-        assert abs(found.mu_ratio - truth) <= bound + truth**3
+        answer = table.evaluate(case)
+        bound = answer.error_bound / mu0
+        assert abs(answer.mu_ratio - truth) <= bound + truth**3
         assert bound < 1e-5
-        worst = max(worst, abs(found.mu_ratio - truth) / bound if bound else 0.0)
+        worst = max(worst, abs(answer.mu_ratio - truth) / bound if bound else 0.0)
     # such inputs exist, and the bound is not excessive
     assert worst > 0.2 or table.tolerance != 1e-12
 
@@ -78,13 +78,13 @@ def test_the_slope_along_speed_is_not_lost_where_the_group_underflows(
     # there v~ is an ordinary number
     slower = fine.evaluate({**case, "omega": 1e250}, gradient=True)
     zero = fine.evaluate({**case, "v0": 5e-324}, gradient=True)
-    found = fine.evaluate(case, gradient=True)
-    assert max(zero.v_tilde, found.v_tilde) < 1e-320
+    answer = fine.evaluate(case, gradient=True)
+    assert max(zero.v_tilde, answer.v_tilde) < 1e-320
     assert zero.gradient["v0"] == still.gradient["v0"] > 0.0
     for other, factor in ((still, 1.0), (slower, 1e-50)):
         expected = factor * other.gradient["v0"]
-        slack = found.gradient_bound["v0"] + factor * other.gradient_bound["v0"]
-        assert abs(found.gradient["v0"] - expected) <= slack + 1e-9 * expected
+        slack = answer.gradient_bound["v0"] + factor * other.gradient_bound["v0"]
+        assert abs(answer.gradient["v0"] - expected) <= slack + 1e-9 * expected
 
 
 def test_the_slope_from_rest_on_lies_within_its_bound(fine: Surrogate) -> None:
@@ -104,13 +104,13 @@ def test_a_regime_that_is_certain_is_that_of_a_fresh_solve(table: Surrogate, swe
     y, distance = 10.0 ** rng.uniform(-4.0, 6.0, n), 10.0 ** rng.uniform(-16.0, -2.0, n)
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
     v = crit * (1.0 + rng.choice([-1.0, 1.0], n) * distance)
-    found = table.evaluate({**UNIT, "y0": y, "v0": v}, groups=True)
-    np.testing.assert_array_equal(found.v_tilde, v)
-    right = (found.regime_code == CONTINUOUS) == (v >= crit)
-    assert np.all(right[found.regime_certain])
-    assert np.all(found.regime_certain[distance > 2.0 * table.border.max_rel_error + 2e-14])
-    np.testing.assert_array_equal(found.regime_code, REGIME_OF_SOURCE[found.source_code])
-    assert not found.regime_certain.all()  # next to the border it is reported as uncertain
+    answer = table.evaluate({**UNIT, "y0": y, "v0": v}, groups=True)
+    np.testing.assert_array_equal(answer.v_tilde, v)
+    right = (answer.regime_code == CONTINUOUS) == (v >= crit)
+    assert np.all(right[answer.regime_certain])
+    assert np.all(answer.regime_certain[distance > 2.0 * table.border.max_rel_error + 2e-14])
+    np.testing.assert_array_equal(answer.regime_code, REGIME_OF_SOURCE[answer.source_code])
+    assert not answer.regime_certain.all()  # next to the border it is reported as uncertain
     for extreme in (
         {"v0": 0.0},
         {"y0": 0.0},
@@ -136,13 +136,15 @@ def test_the_gradient_and_its_bound_follow_from_the_slopes(fine: Surrogate) -> N
     columns = {
         name: log_uniform(rng, *ends, n) for name, ends in {**ranges, "v0": (1e-7, 10.0)}.items()
     }
-    found = fine.evaluate(columns, gradient=True)
-    mu, along_v, along_y, bound_v, bound_y = fine.slopes(found.v_tilde, found.y_tilde, bounds=True)
+    answer = fine.evaluate(columns, gradient=True)
+    mu, along_v, along_y, bound_v, bound_y = fine.slopes(
+        answer.v_tilde, answer.y_tilde, bounds=True
+    )
     mu0, both, errors = columns["mu0"], along_v + along_y, bound_v + bound_y
     # along mu0 the error of mu~ counts, too: that of the point's cell where it is the smaller one
-    of_mu = found.gradient_bound["mu0"] - errors
-    assert np.all((of_mu >= 0.0) & (of_mu <= found.error_bound / mu0 * (1.0 + 1e-9)))
-    assert np.mean(of_mu < 0.5 * found.error_bound / mu0) > 0.2
+    of_mu = answer.gradient_bound["mu0"] - errors
+    assert np.all((of_mu >= 0.0) & (of_mu <= answer.error_bound / mu0 * (1.0 + 1e-9)))
+    assert np.mean(of_mu < 0.5 * answer.error_bound / mu0) > 0.2
     logarithmic = {
         "mu0": (mu - both, of_mu + errors),
         "Fz": (-both, errors),
@@ -154,9 +156,9 @@ def test_the_gradient_and_its_bound_follow_from_the_slopes(fine: Surrogate) -> N
     for name, (slope, bound) in logarithmic.items():
         scale = mu0 / columns[name]
         np.testing.assert_allclose(
-            found.gradient[name], scale * slope, rtol=1e-12, atol=1e-14 * np.abs(scale).max()
+            answer.gradient[name], scale * slope, rtol=1e-12, atol=1e-14 * np.abs(scale).max()
         )
-        np.testing.assert_allclose(found.gradient_bound[name], scale * bound, rtol=1e-9)
+        np.testing.assert_allclose(answer.gradient_bound[name], scale * bound, rtol=1e-9)
 
 
 def closed_form(mu0: Any, Fz: Any, k: Any, y0: Any, omega: Any, v0: Any) -> Any:

@@ -42,8 +42,8 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
     assert local.shape == (cells, WIDTH)
     for x in np.linspace(0.0, 1.0, 57):
         i = min(int(x * cells), cells - 1)
-        found = np.polyval(local[i], 2.0 * (x * cells - i) - 1.0)
-        assert found == close(chebyshev.chebval(2.0 * x - 1.0, c), abs=1e-11)
+        result = np.polyval(local[i], 2.0 * (x * cells - i) - 1.0)
+        assert result == close(chebyshev.chebval(2.0 * x - 1.0, c), abs=1e-11)
 
 
 # --- what the kernel reads ------------------------------------------------------------------------
@@ -65,9 +65,9 @@ def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
         cell[-1, -1] += 10.0  # below zero a power is cut off
         coef = np.zeros((len(CHARTS), WIDTH, WIDTH))
         coef[index] = cell
-        found = made.values(coef, v, y, kernel)
+        result = made.values(coef, v, y, kernel)
         expected = np.polynomial.polynomial.polyval2d(w, u, cell[::-1, ::-1])
-        assert found == close(expected, rel=1e-14)
+        assert result == close(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize("index", range(len(CHARTS)), ids=BLOCK_NAMES)
@@ -87,9 +87,9 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(
         mine = kernels[-1].places(made.data, v, y)[0] == index
         if chart.regime == atlas.CONTINUOUS or axis == 1:
             assert np.count_nonzero(mine) > 200
-        found = np.rint(made.tabulated(index, number, v[mine], y[mine])).astype(int)
-        assert np.all((found >= 0) & (found < n))
-        a, b = np.divmod(found, cells[1])
+        result = np.rint(made.tabulated(index, number, v[mine], y[mine])).astype(int)
+        assert np.all((result >= 0) & (result < n))
+        a, b = np.divmod(result, cells[1])
         moving, fixed = (a, b) if axis == 0 else (b, a)
         assert np.all(np.diff(moving) >= 0)
         assert np.all(np.diff(moving) <= 1)

@@ -47,10 +47,13 @@ def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surro
     assert np.all((block >= 0) & (block <= SOURCES.index("tail_fast")))
     for index, chart in enumerate(CHARTS):
         mine = block == index
-        for axis, found in ((chart.a, a[mine]), (chart.b, b[mine])):
+        for axis, result in ((chart.a, a[mine]), (chart.b, b[mine])):
             low, high = axis.to_evaluation(np.array([axis.low, axis.high]))
             slack = 1e-12 * max(abs(low), abs(high))
-            assert np.all((found >= low - slack) & (found <= high + slack)), (chart.name, axis.name)
+            assert np.all((result >= low - slack) & (result <= high + slack)), (
+                chart.name,
+                axis.name,
+            )
     sliding = REGIME_OF_SOURCE[block] == atlas.CONTINUOUS
     np.testing.assert_array_equal(sliding, v >= table.v_tilde_crit(y))
 

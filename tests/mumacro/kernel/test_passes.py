@@ -211,8 +211,8 @@ def test_contacts_and_directions_have_the_same_bits(
 
     def asked(kernel: Kernel, part: slice) -> list[Any]:
         columns = [np.ascontiguousarray(column[part]) for column in six]
-        answers = CaseRows.empty(columns[0].size, "gradient")
-        kernel.cases(data, columns[0].size, columns, answers, kind=kind)
+        answers = CaseRows.empty(columns[0].shape, "gradient")
+        kernel.cases(data, columns, answers, slice(0, columns[0].size), kind)
         return [answers.numbers, answers.source]
 
     best = asked(kernels[-1], slice(None))

@@ -20,8 +20,8 @@ table = tables()
 def test_solved_border_meets_the_reference_to_the_last_digit(reference_border: Array) -> None:
     assert len(reference_border) == 17
     for y, crit, mu in reference_border:
-        found, ratio = border(y)
-        assert found == close(crit, rel=5e-16)
+        result, ratio = border(y)
+        assert result == close(crit, rel=5e-16)
         assert ratio == close(mu, abs=3e-16)
 
 

@@ -250,7 +250,7 @@ def test_another_atlas_is_refused(
     """A release with other charts writes a table that is valid there; this one refuses it and names
     the difference."""
     path, index = tmp_path / "other.nc", CHARTS.index(MID)
-    new, told = ATLASES.get(change, (MID, "high: range is"))
+    new, stated = ATLASES.get(change, (MID, "high: range is"))
     part, (name, axis, quantity) = sound.blocks[index], BORDER_PIECES[2]
     for held in (part.nodes, part.cell_errors):  # the stick fraction, in stick-slip only
         if not new.holds(atlas.QUANTITIES[2]):
@@ -267,7 +267,7 @@ def test_another_atlas_is_refused(
             other.setattr(atlas, "BORDER_PIECES", (*BORDER_PIECES[:2], (name, wider, quantity)))
         checksum = write_table(sound, path)
         assert read_table(path).attributes["content_sha256"] == checksum
-    with pytest.raises(TableError, match=told):
+    with pytest.raises(TableError, match=stated):
         read_table(path)
 
 

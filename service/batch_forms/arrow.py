@@ -12,10 +12,10 @@ import pyarrow as pa
 from mumacro.inputs.fields import RIGID
 
 from ..batch import Batch, Body, Form, text_form, too_large
+from ..included import REGIME_OF, SOURCES
 from ..models.inputs import INPUTS
 from ..models.options import BatchOptions
 from ..problems import FieldFault, Kind, RequestError, refuse
-from ..quantities import REGIME_OF, SOURCES
 from ..reading import dump
 
 _SLICE = 32768  # cases of a record batch of the answer

@@ -16,11 +16,10 @@ from numpy.typing import ArrayLike
 from mumacro.errors import InputError
 from mumacro.inputs.cases import check, real
 from mumacro.inputs.k_range import ENDS
-from mumacro.inputs.kind import CONTACTS, Kind
+from mumacro.inputs.kind import CONTACTS, SPRINGS_OF, Kind
 from mumacro.kernel.arrays import Array
 
 EXPONENT = "stiffness_exponent"
-EXPONENTS = {"spring": 0.0, "ball": 1.0 / 3.0}  # by contact, the default
 ROUGH = 0.5, 1.0  # of rough surfaces (docs/validity.md)
 _BOUND = "one number from 0 to 1: 1/3 for a ball, 0.5 to 1 for rough surfaces, 0 for constant k"
 _FAR = 1e300  # stiffnesses and loads beyond it, or below its inverse, are not searched
@@ -89,7 +88,7 @@ def stiffening_of(
     if load is None:
         bound = "given [N] beside a stiffness exponent: the load at which k holds"
         raise InputError("Fz", None, bound)
-    power = EXPONENTS[CONTACTS[kind.contact]] if exponent is None else float(exponent)
+    power = SPRINGS_OF[CONTACTS[kind.contact]].exponent if exponent is None else float(exponent)
     if exponent is None and not power:
         bound = (
             "left out, because Fz is the unknown; beside a stiffness exponent it is the load at "

@@ -1,8 +1,8 @@
-"""The answer to cases: the default outputs, and the quantities that ``include`` can add.
+"""The answer to cases: the default outputs, and what ``include`` can add.
 
-A quantity is one function here, a member of ``models/answers.py`` with its unit and meaning, and a
-name in ``models/options.py``.  It takes one case in plain numbers, or many in columns, and gives
-its outputs by path: ``power.saved`` is ``saved`` within ``power``.  Equation numbers are those of
+Each is one function here, a member of ``models/answers.py`` with its unit and meaning, and a name
+in ``models/options.py``.  It takes one case in plain numbers, or many in columns, and gives its
+outputs by path: ``power.saved`` is ``saved`` within ``power``.  Equation numbers are those of
 Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations" (Friction,
 2018).
 """
@@ -32,9 +32,9 @@ Outputs = dict[str, Any]  # by path
 
 @dataclass
 class Answered:
-    """Cases with their answer, for which a quantity is computed: plain numbers, or columns (n,).
+    """Cases with their answer, for which more is computed: plain numbers, or columns (n,).
 
-    k = inf is rigid contact.  The slopes are there if a requested quantity needs them.  What is not
+    k = inf is rigid contact.  The slopes are there if what is included needs them.  What is not
     legal is NaN.
     """
 
@@ -78,7 +78,7 @@ def where(condition: Any, one: Any, other: Any) -> Any:
     return one if condition else other
 
 
-class Quantity(NamedTuple):
+class Includable(NamedTuple):
     """One name that ``include`` may hold."""
 
     compute: Callable[[Answered], Outputs]
@@ -87,20 +87,20 @@ class Quantity(NamedTuple):
     lacks: Mapping[str, str]  # direction or k_range that it cannot be computed for -> why
 
 
-QUANTITIES: dict[str, Quantity] = {}
+INCLUDABLE: dict[str, Includable] = {}
 
 
-def quantity(cost: float, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
+def includable(cost: float, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
     """Register the decorated function under its name."""
 
     def register(compute: Callable[[Answered], Outputs]) -> Callable[[Answered], Outputs]:
-        QUANTITIES[compute.__name__] = Quantity(compute, cost, slopes, lacks)
+        INCLUDABLE[compute.__name__] = Includable(compute, cost, slopes, lacks)
         return compute
 
     return register
 
 
-@quantity(cost=2)
+@includable(cost=2)
 def groups(cases: Answered) -> Outputs:
     """Dimensionless groups."""
     return {
@@ -110,7 +110,7 @@ def groups(cases: Answered) -> Outputs:
     }
 
 
-@quantity(cost=8)
+@includable(cost=8)
 def limits(cases: Answered) -> Outputs:
     """Marks on the friction law."""
     if cases.words["direction"] == "along":  # where the contact begins to slide backwards
@@ -126,7 +126,7 @@ def limits(cases: Answered) -> Outputs:
     }
 
 
-@quantity(cost=6, slopes=True)
+@includable(cost=6, slopes=True)
 def gradient(cases: Answered) -> Outputs:
     """d mu_macro / d input, with bounds."""
     slopes, bounds = cases.slopes()
@@ -136,7 +136,7 @@ def gradient(cases: Answered) -> Outputs:
     }
 
 
-@quantity(
+@includable(
     cost=8,
     slopes=True,
     k_range="it needs one k: give k with its standard deviation, or k_range without std",
@@ -161,7 +161,7 @@ def std(cases: Answered) -> Outputs:
     }
 
 
-@quantity(cost=4)
+@includable(cost=4)
 def stick_fraction(cases: Answered) -> Outputs:
     """Share of the period during which the contact sticks."""
     value, bound = cases.surrogate.stick_fraction_with_bound(
@@ -172,7 +172,7 @@ def stick_fraction(cases: Answered) -> Outputs:
     return {"stick_fraction": value, "stick_fraction_bound": where(lost, 1.0, bound)}
 
 
-@quantity(cost=5, normal="how far the load moves is not modelled")
+@includable(cost=5, normal="how far the load moves is not modelled")
 def power(cases: Answered) -> Outputs:
     """Mean powers of the shaker and of the drive."""
     mu0, load, omega, v0 = (cases.columns[name] for name in ("mu0", "Fz", "omega", "v0"))
@@ -192,7 +192,7 @@ def power(cases: Answered) -> Outputs:
 _DERIVED = "how a disturbance decays is derived for across only"
 
 
-@quantity(cost=5, along=_DERIVED, normal=_DERIVED)
+@includable(cost=5, along=_DERIVED, normal=_DERIVED)
 def settling(cases: Answered) -> Outputs:
     """Periods until a disturbed contact is within 1 % of its steady cycle."""
     settled = decay(cases.surrogate, **cases.columns, **cases.words)
@@ -205,7 +205,7 @@ def settling(cases: Answered) -> Outputs:
     }
 
 
-# --- what is asked --------------------------------------------------------------------------------
+# --- what is computed -----------------------------------------------------------------------------
 
 # in times of one spring, across, at one k
 _COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
@@ -213,9 +213,9 @@ _BALL_ALONG = 5.0  # times both: a sum over springs
 _INTERVAL = frozenset(("k_range", "k_low", "k_high"))
 
 
-class Asked(NamedTuple):
-    """What is asked of cases: their kind, the quantities beside the default outputs, and deviations
-    for ``std``."""
+class Plan(NamedTuple):
+    """What is asked of cases: their kind, what is included beside the default outputs, and
+    deviations for ``std``."""
 
     kind: Kind = SPRING
     interval: bool = False  # whether k is one
@@ -223,15 +223,15 @@ class Asked(NamedTuple):
     std: Mapping[str, float] = {}
 
     @classmethod
-    def of(cls, options: Any, inputs: Mapping[str, Any]) -> "Asked":
+    def of(cls, options: Any, inputs: Mapping[str, Any]) -> "Plan":
         """What options ask of such inputs; InputError where the cases do not have it."""
         kind, interval = options.kind, not _INTERVAL.isdisjoint(inputs)
         if not options.include:
             return cls(kind, interval)
-        include = tuple(name for name in QUANTITIES if name in options.include)  # once, in order
+        include = tuple(name for name in INCLUDABLE if name in options.include)  # once, in order
         for word in (kind.names["direction"], *(["k_range"] if interval else [])):
             for name in include:
-                if why := QUANTITIES[name].lacks.get(word):
+                if why := INCLUDABLE[name].lacks.get(word):
                     raise InputError("include", name, f"without {name} for {word}: {why}")
         deviations = options.std
         return cls(kind, interval, include, {} if deviations is None else deviations.by_field)
@@ -241,20 +241,18 @@ class Asked(NamedTuple):
         """Time of a case, in times of a plain answer."""
         if not self.include and self.kind == SPRING and not self.interval:
             return 1.0
-        cost = 1.0 + sum(QUANTITIES[name].cost for name in self.include)
+        cost = 1.0 + sum(INCLUDABLE[name].cost for name in self.include)
         words = (*self.kind.names.values(), *(["k_range"] if self.interval else []))
         if {"ball", "along"} <= {*words}:
             cost *= _BALL_ALONG
         return cost * math.prod(_COSTS.get(word, 1.0) for word in words)
 
 
-def answer_case(
-    surrogate: Surrogate, inputs: Mapping[str, Any], asked: Asked
-) -> tuple[Outputs, int]:
+def answer_case(surrogate: Surrogate, inputs: Mapping[str, Any], plan: Plan) -> tuple[Outputs, int]:
     """The answer to one case in plain numbers as JSON nests it, and the code of its source;
     InputError where the case is not legal."""
-    if not (asked.include or asked.interval):
-        answer: Any = surrogate.evaluate(**inputs, **asked.kind.names)
+    if not (plan.include or plan.interval):
+        answer: Any = surrogate.evaluate(**inputs, **plan.kind.names)
         code = answer.source_code
         return {
             "mu_macro": answer.mu_macro,
@@ -263,7 +261,7 @@ def answer_case(
             "error_bound": answer.error_bound,
             "source": SOURCES[code],
         }, code
-    outputs, codes = _answer(surrogate, inputs, asked)
+    outputs, codes = _answer(surrogate, inputs, plan)
     code = int(codes)
     outputs |= {"regime": REGIME_OF[code], "source": SOURCES[code]}
     return nested(
@@ -272,12 +270,12 @@ def answer_case(
 
 
 def answer_columns(
-    surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked
+    surrogate: Surrogate, columns: Mapping[str, Any], plan: Plan
 ) -> tuple[Outputs, Codes]:
     """The outputs of many cases by path, and their source codes: NaN and -1 for a case that is not
     legal.  Regime and source are codes, too."""
     with np.errstate(all="ignore"):
-        outputs, codes = _answer(surrogate, columns, asked)
+        outputs, codes = _answer(surrogate, columns, plan)
     legal = codes >= 0
     for path, column in outputs.items():
         if path not in ("regime", "source"):
@@ -285,9 +283,9 @@ def answer_columns(
     return outputs, codes
 
 
-def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> tuple[Outputs, Any]:
-    kind, include = asked.kind, asked.include
-    slopes = any(QUANTITIES[name].slopes for name in include)
+def _answer(surrogate: Surrogate, columns: Mapping[str, Any], plan: Plan) -> tuple[Outputs, Any]:
+    kind, include = plan.kind, plan.include
+    slopes = any(INCLUDABLE[name].slopes for name in include)
     answer: Any = surrogate.evaluate(**columns, **kind.names, gradient=slopes, groups=bool(include))
     codes = answer.source_code
     outputs = {
@@ -297,14 +295,14 @@ def _answer(surrogate: Surrogate, columns: Mapping[str, Any], asked: Asked) -> t
         "error_bound": answer.error_bound,
         "source": codes,
     }
-    if asked.interval:
+    if plan.interval:
         outputs |= {"mu_macro_low": answer.mu_macro_low, "mu_macro_high": answer.mu_macro_high}
     if include:
-        if asked.interval or "f" in columns:
+        if plan.interval or "f" in columns:
             columns = Cases.of(by_name(None, columns, kind), kind).columns
-        answered = Answered(surrogate, kind, columns, answer, asked.std)
+        answered = Answered(surrogate, kind, columns, answer, plan.std)
         for name in include:
-            outputs |= QUANTITIES[name].compute(answered)
+            outputs |= INCLUDABLE[name].compute(answered)
     return outputs, codes
 
 

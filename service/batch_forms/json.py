@@ -25,11 +25,11 @@ from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import Kind, kind_of
 
 from ..batch import Batch, Body, Form, Reason, too_large
+from ..included import REGIME_OF, SOURCES, Outputs, names_of, nested
 from ..models.inputs import EXAMPLE, MAX_REASONS, Case
 from ..models.options import BatchOptions, CaseColumns
 from ..problems import FieldFault, RequestError, faults_of, reason_of, refuse
 from ..problems import Kind as ProblemKind
-from ..quantities import SOURCES, Outputs, names_of, nested
 from ..reading import decode, dump
 
 _NAMES = (*CaseColumns.model_fields,)
@@ -43,15 +43,16 @@ _BETWEEN = re.compile(rb"\}\s*,")
 
 def read(text: bytearray, max_batch: int, options: BatchOptions) -> Body:
     """The cases and the options of a body: columns or one case, or a list of rows."""
-    _limit_values(text, max_batch)
-    if _OPENS_LIST.match(text):
+    if opening := _OPENS_LIST.match(text):
         kind = kind_of(options.contact or "spring", options.direction or "across")
-        if body := _quick_rows(text, max_batch, kind):
+        if body := _quick_rows(text, opening.end(), max_batch, kind):
             return body
+        _limit_values(text, max_batch)
         rows = decode(text, large=True)
         if len(rows) > max_batch:
             raise too_large(max_batch)
         return _one_by_one(rows, kind)
+    _limit_values(text, max_batch)
     members = _members(text)
     if not isinstance(members, dict):
         refuse([FieldFault((), "must be an object of columns or a list of rows", members)])
@@ -119,30 +120,35 @@ def _list(text: bytearray) -> Any:
 # --- rows -----------------------------------------------------------------------------------------
 
 
-def _quick_rows(text: bytearray, max_batch: int, kind: Kind) -> Body | None:
-    """Rows of numbers with the same names as columns; None for any other text.
+def _quick_rows(text: bytearray, at: int, max_batch: int, kind: Kind) -> Body | None:
+    """Rows of numbers with the same names as columns, from their first character on; None for any
+    other text.
 
     The text is read piece by piece.  A piece that does not end between two rows is no JSON.
     """
     names: tuple[str, ...] = ()
+    values_of: Any = None
     blocks: list[Any] = []
-    at = size = 0
+    size = 0
     while at < len(text):
-        cut = _BETWEEN.search(text, at + _READ)
-        piece = (
-            (b"[" if at else b"")
-            + text[at : cut.start() + 1 if cut else None]
-            + (b"]" if cut else b"")
-        )
+        cut = _BETWEEN.search(text, at + _READ, at + 2 * _READ)
+        end = cut.start() + 1 if cut else len(text)
+        if end - at > 2 * _READ:
+            return None
+        piece = b"".join((b"[", memoryview(text)[at:end], b"]" if cut else b""))
         try:
             rows = orjson.loads(piece)
-            names = names or _names_of(rows[0], kind)
-            members = sum(map(len, rows))
-            # one colon for each member: none is named twice, and all rows have as many as the first
-            if _count(piece, b":") != members or len(names) * len(rows) != members:
+            if not names:
+                names = _names_of(rows[0], kind)
+                values_of = itemgetter(*names)
+            members = len(names) * len(rows)
+            # Every row has all names, or values_of fails; one colon for each: nothing more, and
+            # none twice.
+            if _count(piece, b":") != members:
                 return None
-            values: Iterator[Any] = chain.from_iterable(map(itemgetter(*names), rows))
-            if _count(piece, b'"') != 2 * members or b"true" in piece or b"false" in piece:
+            values: Iterator[Any] = chain.from_iterable(map(values_of, rows))
+            # words, or true and false: no name has one of these letters
+            if _count(piece, b'"') != 2 * members or b"r" in piece or b"s" in piece:
                 values = iter(_checked(list(values), names))
             blocks.append(np.fromiter(values, np.float64, members).reshape(len(rows), -1))
         except (ValueError, TypeError, LookupError, InputError):
@@ -151,14 +157,16 @@ def _quick_rows(text: bytearray, max_batch: int, kind: Kind) -> Body | None:
         if size > max_batch:
             raise too_large(max_batch)
         at = cut.end() if cut else len(text)
-    columns = np.concatenate(blocks).T
+    if not blocks:
+        return None
+    columns = np.concatenate(blocks).T.copy()  # each as one piece of memory
     return Body(dict(zip(names, columns, strict=True)), rows=True)
 
 
 def _names_of(row: dict[str, Any], kind: Kind) -> tuple[str, ...]:
     """The names of a row, if they make a case; else InputError."""
     columns_of(_with_k(by_name(None, dict.fromkeys(row, 1.0), kind)), kind)
-    if unknown := row.keys() - {*kind.columns, *ENDS}:
+    if unknown := {*row} - {*kind.columns, *ENDS}:
         raise InputError(min(unknown), None, "the name of an input")
     return tuple(row)
 
@@ -230,7 +238,7 @@ def write(batch: Batch) -> Iterator[bytes]:
 
 def _write_columns(batch: Batch) -> Iterator[bytes]:
     slices = [outputs for outputs, _, _ in batch.slices(_ROWS)]
-    frame = _around(slices[0], b"[\0]")
+    frame = _around(slices[0])
     for opening, path in zip(frame, slices[0], strict=False):
         for outputs in slices:
             yield opening + _values(path, outputs[path])
@@ -239,36 +247,34 @@ def _write_columns(batch: Batch) -> Iterator[bytes]:
 
 
 def _write_rows(batch: Batch) -> Iterator[bytes]:
-    opening, row = b'{"results":[', b""
+    opening, patterns = b'{"results":[', {-1: b"null"}  # by code
     for outputs, codes, _ in batch.slices(_ROWS):
-        row = row or b"%b".join(text.replace(b"%", b"%%") for text in _around(outputs, b"\0"))
-        columns = [_cells(path, column) for path, column in outputs.items()]
-        made = [row % cells for cells in zip(*columns, strict=True)] if codes.size else []
-        for i in np.flatnonzero(codes < 0).tolist():
-            made[i] = b"null"
-        yield opening + b",".join(made)
+        sources = codes.tolist()
+        for code in {*sources} - patterns.keys():
+            patterns[code] = _pattern(outputs, code)
+        pattern = b",".join(map(patterns.__getitem__, sources))
+        columns = [column for path, column in outputs.items() if path not in _WORDS]
+        numbers = np.column_stack(columns)[codes >= 0].ravel()
+        yield opening
+        yield pattern % (*dump(numbers)[1:-1].split(b","),) if numbers.size else pattern
         opening = b","
     yield b"]," + dump(batch.end)[1:]
 
 
-def _around(outputs: Outputs, place: bytes) -> list[bytes]:
-    """What stands around the values of an answer; each ``place`` has a zero for a value."""
+def _pattern(outputs: Outputs, code: int) -> bytes:
+    """A row of this source, with a place for each number."""
+    words = {path: _WORDS[path][code] if path in _WORDS else "\0" for path in outputs}
+    return dump(nested(words)).replace(b"%", b"%%").replace(_PLACE, b"%b")
+
+
+def _around(outputs: Outputs) -> list[bytes]:
+    """What stands around the lists of an answer."""
     text = dump(nested(dict.fromkeys(outputs, "\0")))
-    return text.replace(b'"\\u0000"', place).split(b"\0")
+    return text.replace(_PLACE, b"[\0]").split(b"\0")
 
 
-def _cells(path: str, column: Any) -> list[bytes]:
-    """The values of a column, one by one."""
-    if path in _WORDS:
-        return list(map(_WORDS[path].__getitem__, column.tolist()))
-    return dump(column)[1:-1].split(b",")
-
-
-#: regimes and sources by code; -1 is none
-_WORDS = {
-    path: [dump(name) for name in names_of(path, np.array([*range(len(SOURCES)), -1]))]
-    for path in ("regime", "source")
-}
+_PLACE = dump("\0")
+_WORDS = {"regime": REGIME_OF, "source": SOURCES}  # by code
 
 
 def _values(path: str, column: Any) -> bytes:

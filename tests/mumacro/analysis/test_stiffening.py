@@ -16,8 +16,8 @@ from mumacro import InputError, Surrogate
 from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.borders import border_crossings
 from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.load import Stiffening
 from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.stiffening import Stiffening
 from mumacro.analysis.validity import load_rows
 from mumacro.cli.main import main
 from tests.support.cases import CASE, PAIRS, Case, as_kind, without
@@ -38,39 +38,39 @@ def grown(case: Case, m: float, loads: Any) -> Case:
 def test_a_law_is_that_of_each_load_with_its_own_stiffness(
     surrogate: Surrogate, pair: Any, m: float
 ) -> None:
-    said, _, case = as_kind(CASE, pair)
+    words, _, case = as_kind(CASE, pair)
     loads = LOADS[case.get("Fz_amplitude", 0.0) < LOADS]
-    law = friction_law(surrogate, "Fz", values=loads, **said, stiffness_exponent=m, **case)
+    law = friction_law(surrogate, "Fz", values=loads, **words, stiffness_exponent=m, **case)
     each = grown(case, m, loads)
-    expected = surrogate.evaluate(**each, **said)
+    expected = surrogate.evaluate(**each, **words)
     assert law.answer.mu_macro == close(expected.mu_macro, rel=1e-12)
     assert law.mu_static == close(
-        surrogate.evaluate(**{**each, "v0": 0.0}, **said).mu_macro, rel=1e-12, abs=1e-12
+        surrogate.evaluate(**{**each, "v0": 0.0}, **words).mu_macro, rel=1e-12, abs=1e-12
     )
     assert law.columns["k"] == close(each["k"], rel=1e-14)
     assert law.stiffening == Stiffening(m, CASE["Fz"])
     # at the load at which k holds, the case itself
     one = friction_law(
-        surrogate, "Fz", values=np.array([CASE["Fz"], 1e3]), **said, stiffness_exponent=m, **case
+        surrogate, "Fz", values=np.array([CASE["Fz"], 1e3]), **words, stiffness_exponent=m, **case
     )
-    assert one.answer.mu_macro[0] == surrogate.evaluate(**case, **said).mu_macro
+    assert one.answer.mu_macro[0] == surrogate.evaluate(**case, **words).mu_macro
 
 
 @pytest.mark.parametrize("pair", SHAKEN, ids=" ".join)
 def test_in_proportion_to_the_load_friction_does_not_depend_on_it(
     surrogate: Surrogate, pair: Any
 ) -> None:
-    said, _, case = as_kind(CASE, pair)
+    words, _, case = as_kind(CASE, pair)
     loads = np.geomspace(1e-6, 1e6, 201)
-    law = friction_law(surrogate, "Fz", values=loads, **said, stiffness_exponent=1.0, **case)
-    mu = surrogate.evaluate(**case, **said).mu_macro
+    law = friction_law(surrogate, "Fz", values=loads, **words, stiffness_exponent=1.0, **case)
+    mu = surrogate.evaluate(**case, **words).mu_macro
     assert law.answer.mu_macro == close(np.full(201, mu), rel=1e-13)
     assert not law.border
-    solution = solve_for(surrogate, "Fz", [mu, 0.9 * mu], **said, stiffness_exponent=1.0, **case)
+    solution = solve_for(surrogate, "Fz", [mu, 0.9 * mu], **words, stiffness_exponent=1.0, **case)
     assert solution.constant
     assert solution.roots == ((), ())
     # and with one k it does
-    other = friction_law(surrogate, "Fz", values=loads, **said, **without(case, "Fz"))
+    other = friction_law(surrogate, "Fz", values=loads, **words, **without(case, "Fz"))
     assert np.ptp(other.answer.mu_macro) > 0.1
 
 
@@ -92,8 +92,8 @@ def test_what_is_left_out_is_hertz_for_a_ball_and_constant_for_a_spring(
         assert alone.answer.mu_macro.tolist() == constant.answer.mu_macro.tolist()
         assert alone.answer.mu_macro.tolist() == one_k.tolist()
         assert "k" not in alone.columns
-    found = solve_for(surrogate, "Fz", 0.25, contact="ball", **CASE)
-    assert found.stiffening == Stiffening(1.0 / 3.0, CASE["Fz"])
+    solution = solve_for(surrogate, "Fz", 0.25, contact="ball", **CASE)
+    assert solution.stiffening == Stiffening(1.0 / 3.0, CASE["Fz"])
 
 
 def test_an_interval_of_stiffness_grows_as_a_whole(surrogate: Surrogate) -> None:
@@ -126,12 +126,12 @@ def test_an_interval_of_stiffness_grows_as_a_whole(surrogate: Surrogate) -> None
 def test_the_forward_answer_is_inverted(
     surrogate: Surrogate, pair: Any, log_v0: float, m: float, log_load: float, log_force: float
 ) -> None:
-    said, _, case = as_kind({**CASE, "v0": 10.0**log_v0}, pair)
+    words, _, case = as_kind({**CASE, "v0": 10.0**log_v0}, pair)
     force = CASE["Fz"] * 10.0**log_force
     assume(force > 1.01 * case.get("Fz_amplitude", 0.0))
     at = {**case, "Fz": CASE["Fz"] * 10.0**log_load}  # where k holds
-    forward: Any = surrogate.evaluate(**grown(at, m, force), **said)
-    solution = solve_for(surrogate, "Fz", forward.mu_macro, **said, stiffness_exponent=m, **at)
+    forward: Any = surrogate.evaluate(**grown(at, m, force), **words)
+    solution = solve_for(surrogate, "Fz", forward.mu_macro, **words, stiffness_exponent=m, **at)
     if solution.constant or not solution.roots[0]:
         edge = min(
             abs(forward.mu_macro - end) for end in (solution.reach.mu_min, solution.reach.mu_max)
@@ -139,7 +139,7 @@ def test_the_forward_answer_is_inverted(
         assert edge <= 4.0 * forward.error_bound + 1e-9 * case["mu0"]
         return
     for root in solution.roots[0]:
-        there = surrogate.evaluate(**grown(at, m, root.value), **said).mu_macro
+        there = surrogate.evaluate(**grown(at, m, root.value), **words).mu_macro
         assert there == close(root.mu_macro, rel=1e-11)
         assert root.mu_macro == close(forward.mu_macro, rel=1e-9, abs=2.0 * forward.error_bound)
         assert root.low <= root.value <= root.high
@@ -177,7 +177,7 @@ def test_no_root_is_missed(
     # not on a plateau, where all are roots
     assume(mu.min() * (1.0 + 1e-9) < target < mu.max() * (1.0 - 1e-9))
     above = mu > target * (1.0 + 1e-12)
-    found = solve_for(
+    solution = solve_for(
         surrogate,
         "Fz",
         target,
@@ -186,16 +186,16 @@ def test_no_root_is_missed(
         stiffness_exponent=m,
         **case,
     ).roots[0]
-    assert len(found) >= np.count_nonzero(above[1:] != above[:-1])
-    assert all(root.mu_macro == close(target, rel=1e-10) for root in found)
+    assert len(solution) >= np.count_nonzero(above[1:] != above[:-1])
+    assert all(root.mu_macro == close(target, rel=1e-10) for root in solution)
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=" ".join)
 @pytest.mark.parametrize("v0", [1e-3, 0.05, 0.3])
 def test_the_border_is_where_the_regime_changes(surrogate: Surrogate, pair: Any, v0: float) -> None:
-    said, _, case = as_kind({**CASE, "v0": v0}, pair)
+    words, _, case = as_kind({**CASE, "v0": v0}, pair)
     loads = np.geomspace(max(1e-4, 1.001 * case.get("Fz_amplitude", 0.0)), 1e5, 5001)
-    law = friction_law(surrogate, "Fz", values=loads, **said, stiffness_exponent=0.5, **case)
+    law = friction_law(surrogate, "Fz", values=loads, **words, stiffness_exponent=0.5, **case)
     regime = law.answer.regime
     changes = sum(
         np.count_nonzero((regime == name)[1:] != (regime == name)[:-1])
@@ -209,13 +209,13 @@ def test_the_border_is_where_the_regime_changes(surrogate: Surrogate, pair: Any,
 
 def test_approximations_follow_the_growing_stiffness(surrogate: Surrogate) -> None:
     law = friction_law(surrogate, "Fz", values=LOADS, stiffness_exponent=0.5, **CASE)
-    found, speeds = approximations(surrogate, law), border_speeds(surrogate, law)
+    approximate, speeds = approximations(surrogate, law), border_speeds(surrogate, law)
     inputs = {name: np.broadcast_to(x, LOADS.shape) for name, x in law.inputs.items()}
     for i in (3, 20, 33):
         five: Case = {name: float(x[i]) for name, x in inputs.items() if name != "v0"}
         one = friction_law(surrogate, "v0", values=np.array([CASE["v0"], 1.0]), **five)
         for name, column in approximations(surrogate, one).items():
-            np.testing.assert_allclose(found[name][i], column[0], rtol=1e-9, err_msg=name)
+            np.testing.assert_allclose(approximate[name][i], column[0], rtol=1e-9, err_msg=name)
         assert speeds["exact"][i] == close(border_speeds(surrogate, one)["exact"][0], rel=1e-9)
 
 
@@ -248,10 +248,10 @@ def test_a_rigid_contact_stays_rigid(surrogate: Surrogate) -> None:
 def test_what_cannot_be_is_refused(
     surrogate: Surrogate, question: str, along: str, case: Case, options: Any, message: str
 ) -> None:
-    asked: Any = friction_law if question == "law" else solve_for
+    request: Any = friction_law if question == "law" else solve_for
     two = {"values" if question == "law" else "target": [0.1, 0.2]}
     with pytest.raises(InputError, match=message):
-        asked(surrogate, along, **two, **options, **case)
+        request(surrogate, along, **two, **options, **case)
 
 
 def test_a_stiffness_beyond_all_numbers_is_refused(surrogate: Surrogate) -> None:
@@ -299,13 +299,13 @@ def run(capsys: Any, code: int, *words: str) -> str:
 
 def test_the_command_takes_the_load_at_which_k_holds(surrogate: Surrogate, capsys: Any) -> None:
     grows = ("--stiffness-exponent", "0.5")
-    found = json.loads(run(capsys, 0, "law", WORDS, *LAW, *grows, "--json"))
-    assert found["k"] == [close(1e6 * math.sqrt(x / 10.0), rel=1e-14) for x in found["Fz"]]
+    output = json.loads(run(capsys, 0, "law", WORDS, *LAW, *grows, "--json"))
+    assert output["k"] == [close(1e6 * math.sqrt(x / 10.0), rel=1e-14) for x in output["Fz"]]
     law = friction_law(
-        surrogate, "Fz", values=np.array(found["Fz"]), stiffness_exponent=0.5, **CASE
+        surrogate, "Fz", values=np.array(output["Fz"]), stiffness_exponent=0.5, **CASE
     )
-    assert found["mu_macro"] == [close(x, rel=1e-13) for x in law.answer.mu_macro]
-    assert "k grows as Fz^0.5" in found["model"][0]["text"]
+    assert output["mu_macro"] == [close(x, rel=1e-13) for x in law.answer.mu_macro]
+    assert "k grows as Fz^0.5" in output["model"][0]["text"]
     text = run(capsys, 0, "law", WORDS, *LAW, "--contact", "ball")
     assert "k [N/m]" in text
     assert text.splitlines()[-1].endswith("k grows as Fz^0.333 from its value at Fz = 10 N")
