@@ -1,23 +1,20 @@
-"""Cost of a ball and of oscillation along and normal beside one spring; and the errors of the
-ball's rules.
+"""Cost of a ball and of oscillation along and normal beside one spring: nanoseconds a point, one
+thread, log-uniform points.
 
-python benchmarks/contacts.py --only costs    # nanoseconds a point, one thread, log-uniform points
-python benchmarks/contacts.py --only errors   # the constants of contacts/quadrature.py, anew
+python benchmarks/contacts.py
 """
 
 from benchmarks.measuring import main, markdown, sections  # isort: split
 
 import functools
 import timeit
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate
-from mumacro.contacts import quadrature
-from mumacro.contacts.quadrature import driven_rule, put_rules, rules
+from mumacro.inputs.kind import Kind
 from mumacro.kernel import threads as shared_out
 
 Array = NDArray[np.float64]
@@ -29,25 +26,20 @@ KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "b
 def costs() -> str:
     """Beside one spring, per kind and table: v~ from 1e-6 to 1e4, y~ from 1e-4 to 1e4."""
     rng, rows = np.random.default_rng(1), []
-    v, y = 10.0 ** rng.uniform(-6, 4, 400), 10.0 ** rng.uniform(-4, 4, 400)
+    v, y = 10.0 ** rng.uniform(-6, 4, 20_000), 10.0 ** rng.uniform(-4, 4, 20_000)
     for tolerance in TOLERANCES:
         s = Surrogate.open(tolerance, threads=1)
-        put_rules(s._data, tolerance)
         spring = 0.0
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
-            ask = functools.partial(
-                shared_out.values, 0, s._data, v, amplitude, threads=1, kind=kind
-            )
+            data = s.cells("mu_ratio", Kind(*kind))
+            ask = functools.partial(shared_out.values, 0, data, v, amplitude, threads=1, kind=kind)
             each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
             spring = spring or each
             rows.append((name, f"{tolerance:g}", f"{1e9 * each:.0f}", f"{each / spring:.1f}"))
     return markdown(("contact", "table", "ns", "springs"), rows)
 
 
-# pieces; nodes of what counts as exact; a constant beside which rounding is nothing
-RULES, MANY, HUGE = 5, 160, 1e6
-CLOSE = 2  # has no relative error
 NAMES = ("mu_ratio", "power", "stick_fraction", "slope along v~", "slope along y~")
 
 
@@ -95,11 +87,8 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
     return v, y
 
 
-def asked(
-    s: Surrogate, v: Array, y: Array, direction: str, put: list[tuple[Array, Array]]
-) -> list[Array]:
-    """Rows (values, bounds) of :data:`NAMES` for a ball with these rules."""
-    s._data.put_rules(put, driven_rule())
+def asked(s: Surrogate, v: Array, y: Array, direction: str) -> list[Array]:
+    """Rows (values, bounds) of :data:`NAMES` for a ball."""
     kind: Any = {"contact": "ball", "direction": direction}
     found = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
     answer = s.evaluate(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y0=y, gradient=True, **kind)
@@ -111,62 +100,5 @@ def asked(
         return found + list(map(np.array, slopes))
 
 
-def largest(error: Array, scale: Array) -> float:
-    """The largest finite error / scale, of scales that are no underflow and not infinite."""
-    with np.errstate(all="ignore"):
-        share = np.where((scale > 1e-290) & (scale < 1e200), error / scale, 0.0)
-    return float(np.nanmax(np.where(np.isfinite(share), share, 0.0)))
-
-
-def errors(count: int = 15_000) -> str:
-    """Every rule against one with :data:`MANY` nodes, alone in the kernel: what
-    ``mumacro.inputs.kind._RULES`` states.
-
-    The kernel's own scales: the bound of a rule whose constant is huge.  Tables without errors
-    leave the bounds that rounding has; what these cover is no error of a rule.
-    """
-    s, none = Surrogate.open(1e-12), np.zeros((2, 5))
-    for code, (polynomials, of_values, of_slopes) in list(s._data.quantities.items()):
-        s._data.put(code, polynomials, 0.0 * of_values, 0.0 * of_slopes)
-    absolute = np.array([np.full(5, HUGE), np.full(5, 1e300)])  # the smaller counts
-    alone: list[tuple[Array, Array]] = [(np.zeros((0, 2)), none)] * RULES
-    v, y = hard_points(count, along=False)
-    whole = [np.abs(pair[0]) for pair in asked(s, v, y, "across", rules(1e-12))]
-
-    def by(piece: int, nodes: int, constants: Array) -> list[Array]:
-        alone[piece] = (quadrature.piece_rule(piece, nodes), constants)
-        found = asked(s, v, y, "across", alone)
-        alone[piece] = (np.zeros((0, 2)), none)
-        return found
-
-    def compared(piece: int, nodes: int) -> Iterator[tuple[Array, Array, Array]]:
-        """The errors, and the scales of the absolute and of the relative constant, of
-        :data:`NAMES`."""
-        exact, plain = by(piece, MANY, none), by(piece, nodes, none)
-        scales = (by(piece, nodes, constants) for constants in (absolute, absolute[::-1]))
-        for i, (true, rule, *high) in enumerate(zip(exact, plain, *scales, strict=True)):
-            error = np.maximum(
-                np.abs(true[0] - rule[0]) - true[1] - rule[1] - 4e-16 * whole[i], 0.0
-            )
-            yield error, *((bound[1] - rule[1]) / HUGE for bound in high)
-
-    said = list[str]()
-    for tolerance, pieces in quadrature._RULES.items():
-        said.append(f"    {tolerance!r}: (")
-        for piece, (nodes, *_) in enumerate(pieces):
-            constants = np.array(
-                [
-                    [largest(error, scale) for scale in both]
-                    for error, *both in compared(piece, nodes)
-                ]
-            ).T.tolist()
-            if piece == CLOSE:
-                constants[1] = []
-            rows = ("(" + ", ".join(f"{2.0 * x:.2g}" for x in row) + ")" for row in constants)
-            said.append(f"        ({nodes}, {', '.join(rows)}),")
-        said.append("    ),")
-    return "\n".join(said)
-
-
 if __name__ == "__main__":
-    main(__doc__, sections(costs, errors))
+    main(__doc__, sections(costs))

@@ -18,6 +18,7 @@ from benchmarks import extended
 from benchmarks.measuring import main, markdown, quantity
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
+from builder.tables.contacts import spring
 from builder.tables.quantities import SOLVED
 from builder.tables.verify import QUANTILES, Neighbours, bound_over_error, distribution
 from mumacro import Surrogate
@@ -165,7 +166,9 @@ def summed_slopes(sweep: Sweep, table: Surrogate, v: Array, y: Array) -> Rows:
         x = np.where(np.abs(x / crit - 1.0) < ROOM, crit * (1.0 + ROOM * np.sign(x - crit)), x)
         heavy = (weight * s > 1e-18) & (x != crit)  # the others add nothing
         s, weight = s[heavy], weight[heavy]
-        slopes, off = Neighbours(table, sweep, x[heavy], amplitude[heavy]).slopes("mu_ratio")
+        slopes, off = Neighbours(table, spring(sweep), x[heavy], amplitude[heavy]).slopes(
+            "mu_ratio"
+        )
         sums[:, i] = (1.5 * weight * s * slopes).sum(axis=1)
         noise[:, i] = (1.5 * weight * s * off).sum(axis=1)
     return {name: (sums[row], noise[row]) for row, name in enumerate(SLOPES)}

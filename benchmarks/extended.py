@@ -186,7 +186,7 @@ def reversing(at: Turning, v: Any, a: Any) -> Any:
 def shares(nodes: int, panels: int) -> Any:
     """The rule over the springs that slip backwards: in panels that halve towards the last one, (n,
     2)."""
-    rule = piece_rule(3, nodes).astype(Long)
+    rule = piece_rule(nodes).astype(Long)
     parts = [(Long(0.0), Long(0.5))] + [
         (1.0 - Long(0.5) ** k, Long(0.5) ** (k + 1)) for k in range(1, panels)
     ]

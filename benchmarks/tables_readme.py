@@ -32,6 +32,15 @@ HEADER = (
     "max abs error of the stick fraction",
     "max rel error of the power",
 )
+BALL_HEADER = (
+    "table",
+    "tolerance of the ball",
+    "max abs error",
+    "max rel error",
+    "max abs error of the stick fraction",
+    "max rel error of the power",
+    "max error of a logarithmic slope",
+)
 COMPANIONS = ("verified_max_stick_error", "verified_max_rel_power_error")
 BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
 
@@ -76,7 +85,7 @@ def tables(build: bool, workers: int) -> str:
         (Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")),
         key=lambda s: -s.tolerance,
     )
-    rows, builds = [], []
+    rows, balls, builds = [], [], []
     for s in opened:
         counts = (int(str(s.attributes["n_solves"])), s.path.stat().st_size, s.memory)
         errors = (
@@ -86,6 +95,15 @@ def tables(build: bool, workers: int) -> str:
         )
         numbers = (*(f"{count:,}" for count in counts), *(f"{error:.2e}" for error in errors))
         rows.append([f"`{s.path.name}`", f"{s.tolerance:.0e}", *numbers])
+        ball = (
+            "max_abs_error",
+            "max_rel_error",
+            "max_stick_error",
+            "max_rel_power_error",
+            "max_slope_error",
+        )
+        found = (f"{float(str(s.attributes[f'ball_verified_{name}'])):.2e}" for name in ball)
+        balls.append([f"`{s.path.name}`", f"{s.ball_tolerance:.0e}", *found])
         cost = rebuilt(s, workers) if build else kept(old, s.checksum)
         builds.append([f"`{s.path.name}`", *cost, f"`{s.checksum}`"])
     builds_of_all = "\n".join(
@@ -107,7 +125,15 @@ def tables(build: bool, workers: int) -> str:
         "solves, off the nodes."
     )
     return "\n\n".join(
-        [commands, verified, markdown(HEADER, rows), said, markdown(BUILD_HEADER, builds, 1)]
+        [
+            commands,
+            verified,
+            markdown(HEADER, rows),
+            "Of a ball that is shaken across, with as many fresh quadratures:",
+            markdown(BALL_HEADER, balls),
+            said,
+            markdown(BUILD_HEADER, builds, 1),
+        ]
     )
 
 

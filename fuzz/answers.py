@@ -19,11 +19,15 @@ from numpy.typing import NDArray
 from benchmarks import extended
 from benchmarks.measuring import main, markdown, quantity, sections
 from benchmarks.support.driven import answered, hard, ordinary
+from builder.solver.ball import Springs
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
+from builder.tables.contacts import Contact, ball
+from builder.tables.verify import BALL_CASES, Neighbours, bound_over_error
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
 from mumacro.kernel.binding import CaseRows, kernels
+from mumacro.table.atlas import QUANTITY_NAMES
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]
@@ -236,9 +240,74 @@ def nearby(rng: np.random.Generator, v: Array, y: Array, size: float) -> tuple[A
     return np.where(slow < moved, slow, v), np.where(slow < moved, moved, y)
 
 
+Found = dict[str, tuple[Array, Array]]  # by row: error over bound, bound over error
+
+
+def compared(table: Surrogate, of: Contact, v: Array, y: Array, slopes: bool) -> Found:
+    """A ball across at v~ and y~ of its middle spring against fresh quadratures, beyond what those
+    may be wrong by."""
+    found = {}
+    if slopes:
+        true, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
+        rows = of.slopes(table, "mu_ratio", v, y)
+        parts = zip(extended.ROWS[3:], rows[1:3], rows[3:5], true, noise, strict=True)
+    else:
+        solved = of.solve(v, y)
+        answers = [of.quantity(table, name, v, y)[:2] for name in QUANTITY_NAMES]
+        parts = zip(
+            QUANTITY_NAMES,
+            *zip(*answers, strict=True),
+            [solved[name] for name in QUANTITY_NAMES],
+            [of.noise(name, v, y, solved, False) for name in QUANTITY_NAMES],
+            strict=True,
+        )
+    for name, value, bound, truth, unsure in parts:
+        error = np.abs(value - truth)
+        with np.errstate(all="ignore"):
+            beyond = np.where(error > unsure, (error - unsure) / bound, 0.0)
+            found[name] = beyond, bound_over_error(bound, unsure, error)
+    return found
+
+
+def across(share: float) -> list[list[str]]:
+    """Rows of :func:`driven` for a ball across: border, corner, ridge, seams, then around the
+    worst."""
+    rng, rows = np.random.default_rng(22), []
+    springs = Springs(Surrogate.open(1e-12))
+    for tolerance in (1e-7, 1e-10):
+        table = Surrogate.open(tolerance)
+        of = ball(springs, tolerance, os.cpu_count() or 1)
+        for slopes, n in ((False, N // 5), (True, N // 100)):
+            n = max(500, int(n * share))
+            drawn = [how(rng, math.ceil(part * n), table) for part, how in BALL_CASES.values()]
+            v, y = (np.concatenate(x) for x in zip(*drawn, strict=True))
+            v, y = of.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
+            found = compared(table, of, v, y, slopes)
+            medians = {name: np.nanmedian(over) for name, (_, over) in found.items()}
+            worst = {name: beyond for name, (beyond, _) in found.items()}
+            for size in (0.3, 0.03, 0.003):
+                best = np.unique(
+                    [np.argsort(x)[-max(20, int(200 * share)) :] for x in worst.values()]
+                )
+                near_v, near_y = of.as_asked(
+                    *(
+                        np.repeat(x[best], 4) * np.exp(size * rng.standard_normal(4 * best.size))
+                        for x in (v, y)
+                    )
+                )
+                near = compared(table, of, near_v, near_y, slopes)
+                v, y = np.append(v, near_v), np.append(y, near_y)
+                worst = {name: np.append(x, near[name][0]) for name, x in worst.items()}
+            for name, beyond in worst.items():
+                what = f"across, table of {tolerance:g}"
+                largest, median = f"{beyond.max():.2f}", quantity(float(medians[name]))
+                rows.append(["ball", what, name, f"{v.size:,}", largest, median])
+    return rows
+
+
 def driven(share: float) -> str:
-    """Bounds of oscillation along and of the normal force, against more digits: random, hard,
-    around the worst."""
+    """Bounds of oscillation along and of the normal force, against more digits, and of a ball
+    across, against fresh quadratures: random, hard, around the worst."""
     if not extended.HAS_EXTENDED:
         return "numpy.longdouble has the digits of a double on this machine: no reference."
     table, rng, rows = Surrogate.open(1e-10), np.random.default_rng(21), []
@@ -297,6 +366,7 @@ def driven(share: float) -> str:
                 rows.append(
                     [contact, direction, name, f"{v.size:,}", f"{row.max():.2f}", quantity(median)]
                 )
+    rows += across(share)
     return markdown(
         (
             "contact",

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mumacro import closed_forms, plotting
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
-from mumacro.contacts.quadrature import put_rules
+from mumacro.contacts.quadrature import put_driven
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
@@ -27,6 +27,7 @@ from mumacro.inputs.cases import (
 )
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import (
+    BALL,
     SPRING,
     ContactName,
     DirectionName,
@@ -40,6 +41,7 @@ from mumacro.kernel.threads import default_threads
 from mumacro.table import atlas
 from mumacro.table.blocks import BorderPiece, Table
 from mumacro.table.bundled import bundled_tables
+from mumacro.table.netcdf import BALL as BALL_ATTRIBUTES
 from mumacro.table.netcdf import error_distribution, json_attributes, parse_table, read_image
 from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
 
@@ -84,6 +86,8 @@ class Surrogate:
         _check_border(table.border, self.path)
         self._data = Data(*self.border.arrays, block_rows(table.blocks), outer_cells())
         self._data.put(atlas.MU, *quantity_cells(table.blocks, atlas.MU))
+        #: what the kernel reads of a ball that is shaken across; made on first use
+        self._ball: Data | None = None
         self._pointer = self._data.pointer
 
     @classmethod
@@ -224,8 +228,20 @@ class Surrogate:
         return error_distribution(self.table)
 
     @property
+    def ball_tolerance(self) -> float:
+        """The tolerance of mu~ of a ball that is shaken across [-]; NaN for a table without a
+        ball."""
+        return float(self.table.attributes.get(f"{BALL_ATTRIBUTES}tolerance", math.nan))
+
+    @property
+    def ball_error_distribution(self) -> dict[str, dict[str, float]]:
+        """The same of a ball that is shaken across, without the border; empty for a table without
+        a ball."""
+        return error_distribution(self.table, BALL_ATTRIBUTES)
+
+    @property
     def memory(self) -> int:
-        """Bytes of the cells that an evaluation of mu~ reads."""
+        """Bytes of the cells that an evaluation of mu~ of one spring reads."""
         data = self._data
         return sum(
             array.nbytes
@@ -409,9 +425,12 @@ class Surrogate:
         (0.012142, True, 5)
         """
         data, kind = self._with(name), kind_of(contact, direction)
-        if kind == SPRING and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
+        if not kind.direction and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
+            code = _CODES[name]
+            if kind.contact:
+                data = self._data_of(kind, code)
             try:
-                scalar = _SCALAR_KERNEL.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+                scalar = _SCALAR_KERNEL.value(data, code, v_tilde, y_tilde, kind.contact)  # type: ignore[arg-type]
                 if scalar[2] >= 0:
                     return scalar
             except OverflowError:  # a whole number beyond double range
@@ -424,7 +443,7 @@ class Surrogate:
             )
         v, y, shape = _flat_groups(v_tilde, y_tilde)
         value, bound, source = shared_out.values(
-            _CODES[name], self._data_of(kind), v, y, self._thread_limit, kind
+            _CODES[name], self._data_of(kind, _CODES[name]), v, y, self._thread_limit, kind
         )
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
@@ -672,19 +691,20 @@ class Surrogate:
             cases is None
             and k_range is k_low is k_high is Fz_amplitude is ABSENT
             and (f is ABSENT or omega is ABSENT)
-            and contact == "spring"
+            and (contact == "spring" or (contact == "ball" and self.table.ball))
             and direction == "across"
             and illegal in ILLEGAL
             and not unknown
         ):
-            # One spring across in plain numbers and arrays takes this short way, which saves most
-            # of the time of a call.  Illegal inputs go the long way, which has the messages.
+            # Contacts across in plain numbers and arrays take this short way, which saves most of
+            # the time of a call.  Illegal inputs go the long way, which has the messages.
+            short = SPRING if contact == "spring" else BALL
             rate, rate_name = (omega, "omega") if f is ABSENT else (f, "f")
             types = {*map(type, (mu0, Fz, k, y0, rate, v0))}
             if types <= NUMBERS:
                 with suppress(OverflowError):  # a whole number beyond double range
                     angular = omega if f is ABSENT else RAD_PER_CYCLE * float(f)
-                    answer = self._scalar_answer((mu0, Fz, k, y0, angular, v0), gradient)
+                    answer = self._scalar_answer((mu0, Fz, k, y0, angular, v0), gradient, short)
                     if answer.source_code >= 0:
                         return answer
             elif types <= NUMBERS_AND_ARRAYS:
@@ -729,8 +749,8 @@ class Surrogate:
     def answer(self, cases: Cases, gradient: bool = False, groups: bool = False) -> Answer[Any]:
         """:meth:`evaluate` of cases in their one form."""
         kind, columns, shape = cases.kind, cases.columns, cases.shape or (1,)
-        if not cases.shape and kind == SPRING and cases.ends is None:
-            return self._scalar_answer([*columns.values()], gradient)
+        if not cases.shape and not kind.direction and cases.ends is None:
+            return self._scalar_answer([*columns.values()], gradient, kind)
         groups = groups or gradient or not cases.shape
         detail: Detail = "gradient" if gradient else "groups" if groups else "values"
         six, data = [*columns.values()], self._data_of(kind)
@@ -763,14 +783,21 @@ class Surrogate:
             answer.gradient_bound = dict(zip(kind.fields, rows.gradient_bound, strict=True))
         return answer if cases.shape else single(answer)
 
-    def _scalar_answer(self, six: Sequence[Any], gradient: bool) -> Answer[float]:
-        """The answer to one case of one spring across; NaN where it is illegal."""
-        row = _SCALAR_KERNEL.one(self._pointer, six, gradient)
+    def _scalar_answer(
+        self, six: Sequence[Any], gradient: bool, kind: Kind = SPRING
+    ) -> Answer[float]:
+        """The answer to one case across; NaN where it is illegal."""
+        certain, border, pointer = self._certain, self.v_tilde_crit, self._pointer
+        if kind.contact:
+            certain = functools.partial(self._certain, kind=kind)
+            border = functools.partial(self.v_tilde_crit, **kind.names)
+            pointer = self._data_of(kind).pointer
+        row = _SCALAR_KERNEL.one(pointer, six, gradient, kind.contact)
         groups = (row.v_tilde, row.y_tilde, row.length_scale)
         answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
-            row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, self._certain
+            row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, certain
         )
-        answer._border = self.v_tilde_crit
+        answer._border = border
         if gradient:
             answer.gradient = dict(zip(FIELDS, row.gradient, strict=True))
             answer.gradient_bound = dict(zip(FIELDS, row.gradient_bound, strict=True))
@@ -784,11 +811,31 @@ class Surrogate:
         row = _SCALAR_KERNEL.one(self._pointer, (mu0, Fz, k, y0, omega, v0), False)
         return row.mu_macro, row.mu_ratio, row.error_bound, row.source
 
-    def _data_of(self, kind: Kind) -> Data:
-        """The data that the kernel reads; for a ball with its rules of quadrature."""
-        if kind.contact:
-            put_rules(self._data, self.tolerance)
-        return self._data
+    def cells(self, name: str, kind: Kind = SPRING) -> Data:
+        """What the kernel reads of a quantity of a kind, for callers of the kernel itself."""
+        return self._data_of(kind, _CODES[name]) if kind.contact else self._with(name)
+
+    def _data_of(self, kind: Kind, quantity: int = atlas.MU) -> Data:
+        """What the kernel reads of a kind; cells are cut on first use."""
+        if kind != BALL:
+            if kind.contact:
+                put_driven(self._data)
+            return self._data
+        if not self.table.ball:
+            raise InputError(
+                "contact",
+                "ball",
+                f"spring: the table {self.path.name} has no ball, which a table of this program's "
+                "builder has; python -m builder ball adds it to a table",
+            )
+        found = self._ball
+        if found is None:
+            rows = block_rows(self.table.ball, atlas.BALL_CHARTS)
+            found = self._ball = Data(*self.border.arrays, rows, outer_cells())
+        if quantity not in found.quantities:
+            cells = quantity_cells(self.table.ball, quantity, atlas.BALL_CHARTS)
+            found.put(quantity, *cells)
+        return found
 
     def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
         """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~

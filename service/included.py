@@ -208,7 +208,8 @@ def settling(cases: Answered) -> Outputs:
 # --- what is computed -----------------------------------------------------------------------------
 
 # in times of one spring, across, at one k
-_COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
+_COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}
+_BALL_ALONG = 5.0  # times both: a sum over springs
 _INTERVAL = frozenset(("k_range", "k_low", "k_high"))
 
 
@@ -242,6 +243,8 @@ class Plan(NamedTuple):
             return 1.0
         cost = 1.0 + sum(INCLUDABLE[name].cost for name in self.include)
         words = (*self.kind.names.values(), *(["k_range"] if self.interval else []))
+        if {"ball", "along"} <= {*words}:
+            cost *= _BALL_ALONG
         return cost * math.prod(_COSTS.get(word, 1.0) for word in words)
 
 

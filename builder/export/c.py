@@ -6,16 +6,19 @@ other packages this module needs only what the library itself needs.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 import mumacro
-from mumacro.contacts.quadrature import driven_rule, rules
+from mumacro.contacts.quadrature import driven_rule
 from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas
+from mumacro.table.atlas import Chart
 from mumacro.table.atomic import write_whole
-from mumacro.table.blocks import Table
+from mumacro.table.blocks import Block, Table
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.version import __version__
 
@@ -124,49 +127,52 @@ def _file(name: str) -> str:
 def table_text(table: Table, linkage: str) -> str:
     """The arrays of :class:`mumacro.kernel.binding.Data` as constants, and ``mumacro_table``."""
     border, pieces = border_cells(table.border)
-    arrays = {
-        "border": border,
-        "pieces": pieces,
-        "blocks": block_rows(table.blocks),
-        "outer": outer_cells(),
-    }
-    rows = [f"{len(border)}, {_names('', arrays)}"]
-    quantity_texts = []
-    for code, name in enumerate(atlas.QUANTITY_NAMES):
-        if name not in table.quantities:
-            quantity_texts.append("{0, 0, NULL, NULL, NULL}")
-            continue
-        polynomials, errors, slope_errors = quantity_cells(table.blocks, code)
-        # the stick fraction is zero in continuous sliding
-        first = int(polynomials.any(axis=(1, 2)).argmax())
-        parts = {
-            "cells": polynomials[first:],
-            "errors": errors,
-            "slope_errors": slope_errors[first:],
-        }
-        arrays |= {f"{name}_{part}": array for part, array in parts.items()}
-        quantity_texts.append(
-            f"{{{first}, {len(polynomials) - first}, {_names(f'{name}_', parts)}}}"
-        )
-    rows.append("{" + ",\n      ".join(quantity_texts) + "}")
-    attributes = table.attributes
-    quadrature = []
-    for index, (rule, errors) in enumerate(rules(float(attributes["tolerance"]))):
-        arrays[f"rule_{index}"] = rule
-        numbers = ("{" + ",".join(map(_number, row)) + "}" for row in errors.tolist())
-        quadrature.append(f"{{{len(rule)}, mumacro_table_rule_{index}, {{{', '.join(numbers)}}}}}")
-    rows.append("{" + ",\n      ".join(quadrature) + "}")
+    arrays: dict[str, Array] = {"border": border, "pieces": pieces, "outer": outer_cells()}
     arrays["rule_driven"] = driven_rule()
-    rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")
+    spring = _contact_text("", table, table.blocks, atlas.CHARTS, arrays)
+    ball = _contact_text("ball_", table, table.ball, atlas.BALL_CHARTS, arrays)
+    attributes = table.attributes
     text = f'{float(attributes["tolerance"])!r}, "{attributes["content_sha256"]}", "{__version__}"'
     definition = (
-        f"{linkage}const mumacro_export mumacro_table = {{\n    "
-        f"{{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"
+        f"{linkage}const mumacro_export mumacro_table = {{\n    {spring},\n    {ball},\n"
+        f"    {text}}};\n\n"
     )
     return (
         "".join(_array(f"mumacro_table_{name}", array) for name, array in arrays.items())
         + definition
     )
+
+
+def _contact_text(
+    prefix: str,
+    table: Table,
+    blocks: Sequence[Block],
+    charts: Sequence[Chart],
+    arrays: dict[str, Array],
+) -> str:
+    """The initializer of one contact's ``mumacro_data``, whose arrays are added; no cells where the
+    table does not have it."""
+    arrays[f"{prefix}blocks"] = block_rows(blocks, charts)
+    shared = _names("", ("border", "pieces"))
+    own, outer = _names(prefix, ("blocks",)), _names("", ("outer",))
+    rows = [f"{len(arrays['border'])}, {shared}, {own}, {outer}"]
+    quantities = []
+    for code, name in enumerate(atlas.QUANTITY_NAMES):
+        if name not in table.quantities or not blocks:
+            quantities.append("{0, 0, NULL, NULL, NULL}")
+            continue
+        polynomials, errors, slope_errors = quantity_cells(blocks, code, charts)
+        # the stick fraction is zero in continuous sliding
+        first = int(polynomials.any(axis=(1, 2)).argmax())
+        # no slope is asked of a ball's power and stick fraction
+        sloped = slope_errors[first:] if slope_errors.any() else np.zeros((1, 3))
+        parts = {"cells": polynomials[first:], "errors": errors, "slope_errors": sloped}
+        arrays |= {f"{prefix}{name}_{part}": array for part, array in parts.items()}
+        names = _names(f"{prefix}{name}_", parts)
+        quantities.append(f"{{{first}, {len(polynomials) - first}, {names}}}")
+    rows.append("{" + ",\n      ".join(quantities) + "}")
+    rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")
+    return f"{{{f',{chr(10)}     '.join(rows)}}}"
 
 
 def _names(prefix: str, parts: Iterable[str]) -> str:

@@ -82,6 +82,7 @@ class Sweep:
     def __init__(self, workers: int = 1, checkpoint: Path | None = None) -> None:
         self.n_solves = 0
         self.checkpoint = checkpoint
+        self.workers = workers
         self._pool = ThreadPoolExecutor(max_workers=workers)
 
     def __enter__(self) -> Self:

@@ -7,7 +7,6 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
-from mumacro.table import atlas
 from mumacro.table.atlas import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
 from mumacro.table.blocks import Block, BorderPiece
 from mumacro.table.polynomials import (
@@ -21,7 +20,8 @@ from mumacro.table.polynomials import (
 )
 
 from ..solver.sweep import Sweep
-from .quantities import SOLVED, solver_noise
+from .contacts import Contact
+from .quantities import SOLVED
 
 MAX_NODES = 96
 MAX_CELLS = 160
@@ -31,7 +31,7 @@ NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more
 
 
 def solve_nodes(
-    index: int, shape: tuple[int, int], border: Border, sweep: Sweep
+    of: Contact, index: int, shape: tuple[int, int], border: Border
 ) -> tuple[Array, Array, dict[str, Array], dict[str, Array]]:
     """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from
     fresh solves.
@@ -40,22 +40,33 @@ def solve_nodes(
     keep their digits, but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to
     0.
     """
-    chart, found, cancelled = atlas.CHARTS[index], {}, {}
+    chart, found, cancelled = of.charts[index], {}, {}
     a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
     v, y, eta = chart.point(a[:, None], b[None, :], border)
-    solved = sweep.solve("continuous" if chart.regime == CONTINUOUS else "full", v, y, eta)
+    solved = of.solve(v, y, eta, continuous=chart.regime == CONTINUOUS)
     for code, quantity in enumerate(QUANTITIES):
         if chart.holds(quantity):
-            base, factor = kernels[-1].forms(code, index, v, y, eta)
+            base, factor = kernels[-1].forms(code, index, v, y, eta, of.kind.contact)
             rest, complement = solved[quantity.name] - base, SOLVED[quantity.name].complement
             if complement:  # next to 1 it has the digits
                 rest = np.where(base == 1.0, -solved[complement], rest)
+            exact = (base == 0.0) | (base == 1.0)
+            if chart.a.name in _LOGARITHMIC and quantity.name == "mu_ratio":
+                rest, exact = _small_rest(chart, v, y, solved), np.full(v.shape, True)
             found[quantity.name] = rest / factor
-            noise = solver_noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
-            cancelled[quantity.name] = np.where(
-                (base == 0.0) | (base == 1.0), 0.0, noise / np.abs(factor)
-            )
+            noise = of.noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
+            cancelled[quantity.name] = np.where(exact, 0.0, noise / np.abs(factor))
     return a, b, found, cancelled
+
+
+#: coordinates of blocks whose base is 1 and a logarithm
+_LOGARITHMIC = ("y_root", "v_root", "ray_root")
+
+
+def _small_rest(chart: Chart, v: Array, y: Array, solved: dict[str, Array]) -> Array:
+    """mu~ less a base of 1 and a logarithm, by 1 - mu~, whose digits are left where y~ is small."""
+    level = 0.375 * np.log(y) if chart.a.name == "y_root" else 0.1875 * np.log(v)
+    return np.asarray(-solved["deficit"] - y * y * level)
 
 
 def _next(n: int) -> int:
@@ -81,7 +92,7 @@ def _fewest(axis: Axis, exact: Callable[[Array], Array], wanted: float, relative
     ``wanted``.
     """
     low, high = axis.span
-    step = 2 if axis.name == "s" else 1  # the knot of sigma is an edge of cells
+    step = 2 if axis.knotted else 1  # the knot of sigma is an edge of cells
     for cells in range(step, MAX_CELLS + 1, step):
         centre = 2.0 * np.arange(cells)[:, None] + 1.0
         at, check = (low + (high - low) * 0.5 * (centre + x) / cells for x in (LOCAL, _CHECK))
@@ -147,22 +158,22 @@ def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
 
 
 def build_block(
+    of: Contact,
     index: int,
     border: Border,
-    sweep: Sweep,
     tolerance: float,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Block:
     """Solve nodes until the Chebyshev tail in both directions is below SHARE * tolerance, then cut
     the cells."""
-    chart = atlas.CHARTS[index]
+    chart = of.charts[index]
     wanted = max(SHARE * tolerance, NODE_FLOOR)
     tail_block = chart.a.name == "inverse_y"
     na, nb = 3 if tail_block else 8, 8
     best, stuck = [math.inf, math.inf], [0, 0]
     while True:
         progress(f"{chart.name} {na} x {nb}")
-        a, b, found, _ = solve_nodes(index, (na, nb), border, sweep)
+        a, b, found, _ = solve_nodes(of, index, (na, nb), border)
         values = found["mu_ratio"]
         left = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):

@@ -13,17 +13,19 @@ import numpy as np
 
 from mumacro import MumacroError, Surrogate
 from mumacro.kernel.arrays import Array
-from mumacro.table.atlas import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
+from mumacro.table.atlas import BALL_CHARTS, CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
 from mumacro.table.blocks import Block, Table
-from mumacro.table.netcdf import read_table, write_table
+from mumacro.table.netcdf import BALL, read_table, write_table
 from mumacro.table.polynomials import Border
 from mumacro.version import __version__
 
+from ..solver.ball import Springs
 from ..solver.sweep import Sweep
 from .blocks import build_block, build_border
+from .contacts import FINE, Contact, ball, fine_springs, spring
 from .measure import block_errors, border_errors
 from .quantities import ABS_TO_REL, SOLVED
-from .verify import QUANTILES, holds, uncovered, verify
+from .verify import QUANTILES, holds, uncovered, verify, verify_ball
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
 SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
@@ -34,6 +36,8 @@ CELL_SAFETY = 1.5
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 ATTEMPTS = 4
+#: the least tolerance of a ball, whatever that of its table: beside the ridge the ring misses 1e-11
+BALL_TOLERANCE = 1e-10
 #: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to
 #: rounding
 STEPS = 256
@@ -90,7 +94,12 @@ def round_block(block: Block, tolerance: float) -> Block:
 
 def stages() -> int:
     """The least number of calls of ``progress``, one for each finished stage."""
-    return 1 + len(CHARTS) + 3
+    return 1 + len(CHARTS) + 3 + ball_stages()
+
+
+def ball_stages() -> int:
+    """The same of :func:`add_ball`."""
+    return 1 + len(CHARTS) + len(BALL_CHARTS) + 2
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
@@ -137,11 +146,11 @@ def build_table(
     for piece in pieces:
         piece.max_rel_error = SAFETY * largest
     progress("border", True)
-    targets = [tolerance] * len(CHARTS)
+    targets, one = [tolerance] * len(CHARTS), spring(sweep)
 
     def build(i: int) -> Block:
         return round_block(
-            build_block(i, border, sweep, targets[i], lambda text: progress(text, False)),
+            build_block(one, i, border, targets[i], lambda text: progress(text, False)),
             targets[i],
         )
 
@@ -154,7 +163,7 @@ def build_table(
     for attempt in range(ATTEMPTS):
         table = Table(pieces, blocks, **grid)
         table.attributes = {"tolerance": tolerance, "quantities": " ".join(QUANTITY_NAMES)}
-        late = _state_errors(table, out, sweep, attempt)
+        late = _state_errors(table, out, one, attempt, tolerance)
         if not late or attempt == ATTEMPTS - 1:
             break
         for i in late:
@@ -164,18 +173,99 @@ def build_table(
     return _finish(table, out, targets, sweep, progress)
 
 
-def _state_errors(table: Table, out: Path, sweep: Sweep, seed: int) -> list[int]:
+def add_ball(
+    table: Table,
+    out: Path,
+    sweep: Sweep,
+    progress: Callable[[str, bool], None] = lambda _text, _done: None,
+) -> Table:
+    """The table with a ball of its tolerance, but not below :data:`BALL_TOLERANCE`, verified; its
+    springs are the same.
+
+    A ball is integrated over springs of the tolerance :data:`.contacts.FINE`, which are solved for
+    that first.
+
+    Raises
+    ------
+    BuildError
+        When the verified error does not come below the tolerance.
+    """
+    tolerance = max(float(table.attributes["tolerance"]), BALL_TOLERANCE)
+    of = ball(solved_springs(sweep, progress), tolerance, sweep.workers)
+    border, targets = Border(table.border), [tolerance] * len(BALL_CHARTS)
+
+    def build(i: int) -> Block:
+        return round_block(
+            build_block(of, i, border, targets[i], lambda text: progress(f"ball {text}", False)),
+            targets[i],
+        )
+
+    blocks: list[Block] = []
+    for i, chart in enumerate(BALL_CHARTS):
+        blocks.append(build(i))
+        progress(f"ball {chart.name}", True)
+    for attempt in range(ATTEMPTS):
+        table = dataclasses.replace(table, ball=blocks)
+        late = _state_errors(table, out, of, attempt, tolerance)
+        if not late or attempt == ATTEMPTS - 1:
+            break
+        for i in late:
+            targets[i] /= 3.0
+            blocks[i] = build(i)
+    progress("errors of the ball", True)
+    report = verify_ball(Surrogate(table, out), of, FINAL_POINTS)
+    progress("fresh balls", True)
+    if not holds(report, tolerance):
+        raise _missed(report, tolerance)
+    stated = verified_attributes(report, table.quantities)
+    table.attributes = (
+        table.attributes
+        | {f"{BALL}tolerance": tolerance}
+        | {f"{BALL}{name}": x for name, x in stated.items()}
+    )
+    return table
+
+
+def solved_springs(
+    sweep: Sweep, progress: Callable[[str, bool], None] = lambda _text, _done: None
+) -> Springs:
+    """Springs of the tolerance :data:`.contacts.FINE`, solved anew or from a checkpoint."""
+    border = Border(pieces := build_border(sweep, FINE))
+    for piece in pieces:
+        piece.max_rel_error = 1e-14
+    progress("fine border", True)
+    blocks = []
+    for i, chart in enumerate(CHARTS):
+        blocks.append(
+            build_block(
+                spring(sweep), i, border, FINE, lambda text: progress(f"fine {text}", False)
+            )
+        )
+        progress(f"fine {chart.name}", True)
+    return fine_springs(pieces, blocks)
+
+
+def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
+    missed = {what: count for what, count in uncovered(report).items() if count}
+    return BuildError(
+        f"verified error {report['max_abs_error']:.2e} absolute, {report['max_rel_error']:.2e} "
+        f"relative against a tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; "
+        f"outside their bound: {missed or 'none'}; no table was written"
+    )
+
+
+def _state_errors(table: Table, out: Path, of: Contact, seed: int, tolerance: float) -> list[int]:
     """Measure the errors of the blocks and write them into the table; the blocks that miss its
     tolerance."""
-    tolerance = float(table.attributes["tolerance"])
     late = []
-    for i, found in enumerate(block_errors(Surrogate(table, out), sweep, BLOCK_POINTS, seed)):
-        block = table.blocks[i]
+    for i, found in enumerate(block_errors(Surrogate(table, out), of, BLOCK_POINTS, seed)):
+        block = of.blocks(table)[i]
         for name, value in found.values.items():
-            block.cell_errors[name] = to_bits(CELL_SAFETY * found.cells[name], ERROR_BITS, up=True)
-            block.errors[name] = np.array(
-                [SAFETY * value, *block.cell_errors[name].max(axis=0)[1:]]
-            )
+            slopes = np.zeros(2)
+            if name in found.cells:
+                errors = to_bits(CELL_SAFETY * found.cells[name], ERROR_BITS, up=True)
+                block.cell_errors[name], slopes = errors, errors.max(axis=0)[1:]
+            block.errors[name] = np.array([SAFETY * value, *slopes])
         block.max_abs_error, block.max_rel_error = found.absolute, found.relative
         if found.absolute > 0.8 * tolerance or found.relative > 0.8 * ABS_TO_REL * tolerance:
             late.append(i)
@@ -219,6 +309,9 @@ def write_verified(path: Path, report: dict[str, Any]) -> None:
     other number of it changes."""
     table = read_table(path)
     table.attributes |= verified_attributes(report, table.quantities)
+    if "ball" in report:
+        stated = verified_attributes(report["ball"], table.quantities)
+        table.attributes |= {f"{BALL}{name}": x for name, x in stated.items()}
     write_table(table, path)
 
 
@@ -235,12 +328,7 @@ def _finish(
     report = verify(surrogate, sweep, FINAL_POINTS)
     progress("fresh solves", True)
     if not holds(report, tolerance):
-        missed = {what: count for what, count in uncovered(report).items() if count}
-        raise BuildError(
-            f"verified error {report['max_abs_error']:.2e} absolute, {report['max_rel_error']:.2e} "
-            f"relative against a tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; "
-            f"outside their bound: {missed or 'none'}; no table was written"
-        )
+        raise _missed(report, tolerance)
     table.attributes = {
         "title": "Macroscopic friction coefficient under transverse oscillation",
         "summary": "mu_macro/mu0 of a contact dragged at constant speed and shaken across, as a "
@@ -258,6 +346,8 @@ def _finish(
         "n_solves": np.int32(sweep.n_solves),
         "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),
     }
+    table = add_ball(table, out, sweep, progress)
+    table.attributes["n_solves"] = np.int32(sweep.n_solves)
     write_table(table, out)
     if sweep.checkpoint is not None:
         shutil.rmtree(sweep.checkpoint, ignore_errors=True)

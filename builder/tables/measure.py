@@ -17,10 +17,19 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from mumacro import Surrogate
+from mumacro.inputs.kind import BALL
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import CHARTS, CONTINUOUS, QUANTITIES, SQRT2, Axis, Chart
+from mumacro.table.atlas import (
+    CONTINUOUS,
+    QUANTITIES,
+    QUANTITY_NAMES,
+    STEEPEST,
+    STEEPEST_Y,
+    Axis,
+    Chart,
+)
 from mumacro.table.blocks import Block
 from mumacro.table.polynomials import (
     WIDTH,
@@ -33,7 +42,8 @@ from mumacro.table.polynomials import (
 
 from ..solver.sweep import Sweep
 from .blocks import solve_nodes
-from .quantities import solver_noise
+from .contacts import Contact
+from .quantities import SOLVED
 
 
 class BlockErrors(NamedTuple):
@@ -77,6 +87,32 @@ def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, A
     return v, y
 
 
+BALL_SEAMS = (atlas.Y_STICK_LO, STEEPEST_Y, atlas.Y_MID, atlas.Y_HIGH, atlas.Y_TAIL)
+
+
+def near_ball_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
+    """The same of a ball: v~ and y~ of its middle spring."""
+    y, v = log_uniform(rng, 1e-3, 1e6, n), log_uniform(rng, 1e-6, 1e4, n)
+    off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
+    which = rng.integers(0, 8, n)
+    y = np.where(which < 2, rng.choice(BALL_SEAMS, n) * off, y)
+    cut, fast, ray, slow, border, ridge = (which == i for i in range(2, 8))
+    y[cut] = rng.uniform(atlas.Y_STICK_LO, STEEPEST_Y, int(cut.sum()))
+    v[cut] = s.v_tilde_crit(y[cut]) * atlas.SIGMA_CUT**2 * off[cut]
+    y[fast] = log_uniform(rng, STEEPEST_Y, 1e6, int(fast.sum()))
+    v[fast] = atlas.RHO_MAX * s.v_tilde_crit(y[fast]) * off[fast]
+    y[ray] = log_uniform(rng, 1e-6, STEEPEST_Y, int(ray.sum()))
+    v[ray] = STEEPEST * y[ray] * off[ray]
+    y[slow] = log_uniform(rng, 1e-3, STEEPEST_Y, int(slow.sum()))
+    v[slow] = atlas.SLOW * off[slow]
+    v[border] = s.v_tilde_crit(y[border]) * off[border]
+    # the ridge, where the steepest ray touches the border
+    other = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 0.2, n)
+    y[ridge] = STEEPEST_Y * other[ridge]
+    v[ridge] = atlas.SLOW * (1.0 + rng.uniform(-2.0, 2.0, n) * (other - 1.0))[ridge]
+    return v, y
+
+
 def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int) -> Array:
     """Relative errors of v~crit on ``n`` fresh solves, (n,)."""
     y = 10.0 ** rng.uniform(-4.0, 6.0, n)
@@ -84,7 +120,7 @@ def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int
     return np.asarray(np.abs(border(y) / exact - 1.0))
 
 
-def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:
+def _stating(surrogate: Surrogate, of: Contact, error: float, of_border: float) -> Surrogate:
     """The same table with one error for all that it tabulates, and a share of the border's.
 
     With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the
@@ -95,55 +131,103 @@ def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:
         replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border
     ]
     stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
-    blocks = [replace(block, errors=stated) for block in table.blocks]
+    blocks = [replace(block, errors=stated) for block in of.blocks(table)]
     return Surrogate(
-        replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads
+        of.with_blocks(replace(table, border=border), blocks), surrogate.path, surrogate.threads
     )
 
 
-def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:
+def block_errors(surrogate: Surrogate, of: Contact, n: int, seed: int) -> list[BlockErrors]:
     """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
     neighbour."""
-    stating = tuple(_stating(surrogate, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
+    stating = tuple(_stating(surrogate, of, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
     found = []
-    for index, block in enumerate(surrogate.table.blocks):
+    for index, block in enumerate(of.blocks(surrogate.table)):
         errors = _value_errors(
-            surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n
+            surrogate, stating, of, index, np.random.default_rng([seed, index]), n
         )
-        _, _, *exact = solve_nodes(
-            index, finer((block.a.size, block.b.size)), surrogate.border, sweep
-        )
-        found.append(BlockErrors(*errors, cell_errors(index, block, *exact)))
+        _, _, *exact = solve_nodes(of, index, finer((block.a.size, block.b.size)), surrogate.border)
+        cells = cell_errors(of, index, block, *exact)
+        chart = of.charts[index]
+        if of.border is not None and chart.b.name in _FROM_BORDER and chart.a.name != "inverse_y":
+            for name, rows in cells.items():
+                bends = _bends(surrogate, of, of.border, index, name)
+                rows[:, 1] += bends.max(axis=(1, 3)).ravel()
+        found.append(BlockErrors(*errors, cells))
     return found
+
+
+#: coordinates that are a function of v~/v~crit
+_FROM_BORDER = ("ln_rho", "s", "s_root")
+BESIDE = 24  # steps of the border between two points of a cell
+
+
+def _bends(surrogate: Surrogate, of: Contact, true: Border, index: int, name: str) -> Array:
+    """What a slope along a is off by, over its share, because the table's border is not the true
+    one, (cells a, POINTS, cells b, POINTS).
+
+    That border is in the coordinate along b and has cells and pieces of its own: what a block
+    tabulates bends where they meet, between the nodes of the block and those of the finer
+    interpolant.  A slope at a fixed v~ is then off by the error of the border's slope times the
+    slope along ln v~.
+    """
+    chart, block = of.charts[index], of.blocks(surrogate.table)[index]
+    a, b = (_Along(axis, n, 2) for axis, n in zip((chart.a, chart.b), block.cells, strict=True))
+    steps = a.x[:, :1] + np.linspace(0.0, 1.0, BESIDE * (POINTS - 1) + 1) * a.wide[:, None]
+    at = np.clip(chart.a.to_file(steps.ravel()), chart.a.low, chart.a.high)
+    y = np.maximum(chart.a.amplitude(at), 1e-60)
+    off = np.log(surrogate.border(y) / true(y)).reshape(steps.shape)
+    step = a.wide / (BESIDE * (POINTS - 1))
+    slope = np.abs(np.diff(off, axis=1)) / np.where(step > 0.0, step, np.inf)[:, None]
+    ends = np.searchsorted(np.linspace(-1.0, 1.0, steps.shape[1] - 1), _AT)
+    low, high = (np.clip(ends + side * BESIDE, 0, slope.shape[1]) for side in (-1, 1))
+    around = np.stack([slope[:, i:j].max(axis=1) for i, j in zip(low, high, strict=True)], axis=1)
+    file_a, file_b = (
+        np.clip(axis.to_file(x.x.ravel()), axis.low, axis.high)
+        for axis, x in ((chart.a, a), (chart.b, b))
+    )
+    v, y, eta = chart.point(file_a[:, None], file_b[None, :], surrogate.border)
+    v, y, eta = (x.ravel() for x in np.broadcast_arrays(v, y, eta))
+    code, lively = QUANTITY_NAMES.index(name), v > 0.0
+    along, scale = np.zeros(v.size), np.ones(v.size)
+    along[lively] = of.slopes(surrogate, name, v[lively], y[lively])[1]
+    scale[lively] = kernels[-1].forms(
+        code, index, v[lively], y[lively], eta[lively], of.kind.contact
+    )[1]
+    moved = np.abs(np.divide(along, scale, out=np.zeros(v.size), where=scale != 0.0))
+    wide = (*a.x.shape, *b.x.shape)
+    return np.asarray(moved.reshape(wide) * (around / a.shares)[:, :, None, None])
 
 
 def _value_errors(
     surrogate: Surrogate,
     stating: tuple[Surrogate, ...],
-    sweep: Sweep,
+    of: Contact,
     index: int,
     rng: np.random.Generator,
     n: int,
 ) -> tuple[dict[str, float], float, float]:
     """Of what is tabulated by quantity; absolute and relative of mu~."""
-    chart = CHARTS[index]
+    chart = of.charts[index]
     v, y, _ = chart.point(_crowded(rng, chart.a, n), _crowded(rng, chart.b, n), surrogate.border)
-    v_seam, y_seam = near_seams(rng, 2 * n, surrogate)
-    v, y = np.concatenate([v, v_seam]), np.concatenate([y, y_seam])
-    mu, _, source = surrogate.ratio_with_bound(v, y)
-    v, y, mu = v[source == index], y[source == index], mu[source == index]
-    solved = sweep.solve("full", v, y)
+    v_seam, y_seam = (near_ball_seams if of.kind == BALL else near_seams)(rng, 2 * n, surrogate)
+    v, y = of.as_asked(np.concatenate([v, v_seam]), np.concatenate([y, y_seam]))
+    here = of.places(surrogate, v, y) == index
+    v, y = v[here], y[here]
+    mu = of.quantity(surrogate, "mu_ratio", v, y)[0]
+    solved = of.solve(v, y)
     error = np.abs(mu - solved["mu_ratio"])
     errors = {}
-    for name in surrogate.table.blocks[index].nodes:
-        value, *_ = surrogate.quantity(name, v, y)
-        scale, beside, rounding = (table.quantity(name, v, y)[1] for table in stating)
+    for name in of.blocks(surrogate.table)[index].nodes:
+        value, *_ = of.quantity(surrogate, name, v, y)
+        truth, complement = solved[name], SOLVED[name].complement
+        if of.kind == BALL and complement:  # next to 1 it has the digits
+            truth = np.where(truth > 0.5, 1.0 - solved[complement], truth)
+        scale, beside, rounding = (of.quantity(table, name, v, y)[1] for table in stating)
         # what the bound allows anyway: half of rounding, and what the border's error does, of which
         # it states twice
-        noise = (
-            solver_noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
-        )
-        errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
+        noise = of.allowed(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
+        errors[name] = float((np.maximum(np.abs(value - truth) - noise, 0.0) / scale).max())
     return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
 
 
@@ -203,17 +287,17 @@ class _Along:
 
 
 def _difference(
-    chart: Chart, block: Block, values: Array, exact: Array, noise: Array
+    chart: Chart, block: Block, values: Array, exact: Array
 ) -> tuple[Array, _Along, _Along]:
-    """Cells through node ``values`` minus the interpolant through ``exact``, (cells a, POINTS,
-    cells b, POINTS)."""
+    """Cells through node ``values`` minus the interpolant with coefficients ``exact``, (cells a,
+    POINTS, cells b, POINTS)."""
     a, b = (
         _Along(axis, n, m)
         for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
     )
     own = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
     found = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
-    return found - (a.follow @ _without_noise(exact, noise) @ b.follow.T).reshape(found.shape), a, b
+    return found - (a.follow @ exact @ b.follow.T).reshape(found.shape), a, b
 
 
 #: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to
@@ -239,7 +323,7 @@ def _without_noise(exact: Array, noise: Array) -> Array:
     return c
 
 
-def _without_edge(off: Array, b: _Along, cells: int) -> None:
+def _without_edge(off: Array, b: _Along, axis: Axis, cells: int) -> None:
     """Errors along b of the last cells below the border as evaluation has them, see
     ``mumacro/kernel/points.c``.
 
@@ -247,15 +331,16 @@ def _without_edge(off: Array, b: _Along, cells: int) -> None:
     the border, by which the chain rule divides; the bound counts it at most half the number of
     cells per unit of b times.
     """
-    root = SQRT2 - b.x[-1, :-1]
-    weight = np.maximum(1.0, (1.0 - root * root) / root / (cells / SQRT2))
+    end, scale = axis.edge
+    root = (end - b.x[-1, :-1]) / scale
+    weight = np.maximum(1.0, scale * (1.0 - root * root) / root / (cells / end))
     b.shares[-1] = b.share_at_border
     off[:, :, -1, :-1] = (off[:, :, -1, :-1] - off[:, :, -1, -1:]) * weight
     off[:, :, -1, -1] = off[:, :, -1, -2]
 
 
 def cell_errors(
-    index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
+    of: Contact, index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
 ) -> dict[str, Array]:
     """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and
     along b.
@@ -263,19 +348,33 @@ def cell_errors(
     ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`;
     ``noise`` their rounding.
     """
-    chart, found = CHARTS[index], {}
-    for quantity in QUANTITIES:
-        if quantity.name in block.nodes:
-            name = quantity.name
-            off, a, b = _difference(chart, block, block.nodes[name], exact[name], noise[name])
-            along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)
-            along_b = np.einsum("jrq,ipjq->ipjr", b.to_derivative, off)
-            if quantity.smooth_at_border and chart.regime != CONTINUOUS and chart.b.name == "s":
-                _without_edge(along_b, b, block.cells[1])
-            along_a /= a.shares[:, :, None, None]
-            along_b /= b.shares
-            largest = np.stack(
-                [np.abs(x).max(axis=(1, 3)) for x in (off, along_a, along_b)], axis=-1
-            )
-            found[quantity.name] = largest.reshape(-1, 3)
+    found: dict[str, Array] = {}
+    for name in QUANTITY_NAMES:
+        if name in block.nodes and name in of.sloped:
+            for coefficients in _truths(of, exact[name], noise[name]):
+                largest = _largest(of, index, block, name, coefficients)
+                found[name] = np.maximum(found.get(name, 0.0), largest)
     return found
+
+
+def _truths(of: Contact, exact: Array, noise: Array) -> list[Array]:
+    """Chebyshev coefficients of the model: without what may be rounding; of a ball also all of
+    them, since its quadrature's error is no rounding of the nodes."""
+    clean = _without_noise(exact, noise)
+    return [clean, chebyshev_coefficients(exact)] if of.kind == BALL else [clean]
+
+
+def _largest(of: Contact, index: int, block: Block, name: str, exact: Array) -> Array:
+    """A quantity's largest errors over every cell, (cells, 3)."""
+    chart, quantity = of.charts[index], QUANTITIES[QUANTITY_NAMES.index(name)]
+    off, a, b = _difference(chart, block, block.nodes[name], exact)
+    along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)
+    along_b = np.einsum("jrq,ipjq->ipjr", b.to_derivative, off)
+    if quantity.smooth_at_border and chart.regime != CONTINUOUS and chart.b.knotted:
+        _without_edge(along_b, b, chart.b, block.cells[1])
+    if chart.a.name == "ray_root":
+        _without_edge(along_a.transpose(2, 3, 0, 1), a, chart.a, block.cells[0])
+    along_a /= a.shares[:, :, None, None]
+    along_b /= b.shares
+    largest = np.stack([np.abs(x).max(axis=(1, 3)) for x in (off, along_a, along_b)], axis=-1)
+    return largest.reshape(-1, 3)

@@ -8,14 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate
+from mumacro.inputs.kind import BALL, SPRING, Kind
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas
-from mumacro.table.atlas import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
+from mumacro.table.atlas import (
+    CONTINUOUS,
+    QUANTITIES,
+    QUANTITY_NAMES,
+    REGIME_OF_SOURCE,
+    SOURCES,
+    STEEPEST,
+    STEEPEST_Y,
+)
 
 from ..solver.sweep import Sweep
-from .measure import SEAMS, border_errors, fast_from, near_seams
+from .contacts import Contact, ratio_of, slopes_of, spring
+from .measure import BALL_SEAMS, SEAMS, border_errors, fast_from, near_ball_seams, near_seams
 from .measure import log_uniform as _log
-from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE, solver_noise
+from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE
 
 # of v~crit: nearer, slopes of what is not smooth at the border are not compared
 BESIDE_BORDER = 1e-3
@@ -66,6 +76,26 @@ CASES: dict[str, tuple[float, _How]] = {
 }
 
 
+def _ring(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
+    """Between the steepest ray and the border, and beside both, below and above the ridge where
+    they meet."""
+    y = np.where(rng.random(n) < 0.5, _log(rng, 1e-6, STEEPEST_Y, n), _log(rng, 1.0, 1.7, n))
+    crit, top = s.v_tilde_crit(y), STEEPEST * y
+    within = crit * (top / crit) ** rng.random(n)
+    off = 1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 0.1, n)
+    which = rng.integers(0, 3, n)
+    return np.where(which == 0, within, np.where(which == 1, crit, top) * off), y
+
+
+#: the same of a ball: v~ and y~ of its middle spring
+BALL_CASES: dict[str, tuple[float, _How]] = {
+    **{name: (share, how) for name, (share, how) in CASES.items() if name != "seams"},
+    "random": (0.22, CASES["random"][1]),
+    "ring": (0.08, _ring),
+    "seams": (0.10, near_ball_seams),
+}
+
+
 def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
     """``n`` points (v~, y~) of one kind of :data:`CASES`."""
     return CASES[case][1](np.random.default_rng(seed), n, surrogate)
@@ -89,29 +119,66 @@ def _both_sides(
     yield (v := fast_from(surrogate, y)) * low, v * high, y, y
 
 
-def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
+def _both_sides_of_ball(
+    surrogate: Surrogate, n: int, seed: int
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """The same of a ball, and on the steepest ray."""
+    rng = np.random.default_rng(seed)
+    low, high = 1 - 1e-13, 1 + 1e-13
+    for seam in BALL_SEAMS:
+        v = _log(rng, 1e-9, 1e5, n)
+        yield v, v, np.full(n, seam * low), np.full(n, seam * high)
+    y = _log(rng, 1e-3, 1e7, n)
+    yield (v := surrogate.v_tilde_crit(y)) * low, v * high, y, y
+    y = rng.uniform(atlas.Y_STICK_LO, STEEPEST_Y, n)
+    yield (v := surrogate.v_tilde_crit(y) * atlas.SIGMA_CUT**2) * low, v * high, y, y
+    y = _log(rng, 1e-6, STEEPEST_Y, n)
+    yield (v := STEEPEST * y) * low, v * high, y, y
+    yield (v := np.full(n, atlas.SLOW)) * low, v * high, y, y
+    y = _log(rng, STEEPEST_Y, 1e8, n)
+    yield (v := atlas.RHO_MAX * surrogate.v_tilde_crit(y)) * low, v * high, y, y
+
+
+def _sides(
+    surrogate: Surrogate, n: int, seed: int, kind: Kind
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    return (_both_sides_of_ball if kind == BALL else _both_sides)(surrogate, n, seed)
+
+
+def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING) -> float:
     """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13
     apart."""
-    pairs = _both_sides(surrogate, n, seed)
-    sides = ((surrogate.mu_ratio(v1, y1), surrogate.mu_ratio(v2, y2)) for v1, v2, y1, y2 in pairs)
+    sides = (
+        (ratio_of(surrogate, kind, v1, y1), ratio_of(surrogate, kind, v2, y2))
+        for v1, v2, y1, y2 in _sides(surrogate, n, seed, kind)
+    )
     return max(float((np.abs(one - two) / np.maximum(one, two)).max()) for one, two in sides)
 
 
-def seam_slope_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
+def seam_slope_jumps(
+    surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING
+) -> float:
     """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are
     continuous, too."""
-    pairs = _both_sides(surrogate, n, seed)
-    sides = ((surrogate.slopes(v1, y1), surrogate.slopes(v2, y2)) for v1, v2, y1, y2 in pairs)
-    return max(float(np.abs(np.subtract(one[1:], two[1:])).max()) for one, two in sides)
+    sides = (
+        [slopes_of(surrogate, kind, "mu_ratio", v, y)[1:3] for v, y in ((v1, y1), (v2, y2))]
+        for v1, v2, y1, y2 in _sides(surrogate, n, seed, kind)
+    )
+    return max(float(np.abs(one - two).max()) for one, two in sides)
 
 
-def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11) -> float:
+def monotony(
+    surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11, kind: Kind = SPRING
+) -> float:
     """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across
     all seams [-]."""
     rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
     for fixed in _log(np.random.default_rng(seed), 1e-4, 1e6, lines):
-        steps = -np.diff(surrogate.mu_ratio(rise, fixed)), np.diff(surrogate.mu_ratio(fixed, rise))
-        worst = max(worst, float(np.max(steps)))
+        line = np.full(n, fixed)
+        along_v, along_y = (
+            ratio_of(surrogate, kind, v, y) for v, y in ((rise, line), (line, rise))
+        )
+        worst = max(worst, float(np.max([-np.diff(along_v), np.diff(along_y)])))
     return worst
 
 
@@ -121,9 +188,13 @@ class Neighbours:
     A step is a share of the distance to what is not smooth: border and corner.
     """
 
-    def __init__(self, surrogate: Surrogate, sweep: Sweep, v: Array, y: Array) -> None:
+    def __init__(self, surrogate: Surrogate, of: Contact, v: Array, y: Array) -> None:
         self.v, self.y, self.crit, mu = v, y, surrogate.v_tilde_crit(y), surrogate.mu_ratio(v, y)
+        self.noise = of.noise
         gap = np.abs(np.log(v / self.crit))
+        if of.kind == BALL:
+            ray = np.where(y < 1.1 * STEEPEST_Y, np.abs(np.log(v / (STEEPEST * y))), np.inf)
+            gap = np.minimum(gap, ray)
         stiff = np.maximum(mu * mu, np.abs(1.0 - y * y))
         self.steps = (
             np.minimum(_STEP, gap / 32.0),
@@ -134,8 +205,8 @@ class Neighbours:
             for x, step in zip((v, y), self.steps, strict=True)
         )
         self.solved = (
-            sweep.solve("full", around_v, y[:, None]),
-            sweep.solve("full", v[:, None], around_y),
+            of.solve(around_v, y[:, None]),
+            of.solve(v[:, None], around_y),
         )
 
     def slopes(self, name: str) -> tuple[Array, Array]:
@@ -147,7 +218,7 @@ class Neighbours:
             slope[row] = solved[name] @ _SIXTH_ORDER / step
             # what the fourth order leaves out; the sixth leaves out up to a seventh of it
             left_out = np.abs(slope[row] - solved[name] @ _FOURTH_ORDER / step)
-            each = solver_noise(name, self.v[:, None], self.y[:, None], solved, sliding).max(axis=1)
+            each = self.noise(name, self.v[:, None], self.y[:, None], solved, sliding).max(axis=1)
             noise[row] = (2.0 * each + 4e-16 * np.abs(slope[row])) / step + 0.2 * left_out
         return slope, noise
 
@@ -175,11 +246,11 @@ def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
 
 
 def _values(
-    surrogate: Surrogate, name: str, v: Array, y: Array, solved: dict[str, Array]
+    surrogate: Surrogate, of: Contact, name: str, v: Array, y: Array, solved: dict[str, Array]
 ) -> _Compared:
-    value, bound, source = surrogate.quantity(name, v, y)
+    value, bound, source = of.quantity(surrogate, name, v, y)
     truth = solved[name]
-    noise = solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
+    noise = of.noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
     error = np.abs(value - truth)
     missed, over = error > bound + noise, bound_over_error(bound, noise, error)
     if name != "mu_ratio":
@@ -188,11 +259,11 @@ def _values(
     return _Compared(error, error / scale, bound, over, missed, source)
 
 
-def _slopes(surrogate: Surrogate, around: Neighbours, name: str) -> _Compared:
+def _slopes(surrogate: Surrogate, of: Contact, around: Neighbours, name: str) -> _Compared:
     """The logarithmic slopes, both of each point."""
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
-    source = surrogate.ratio_with_bound(v, y)[2]
-    _, along_v, along_y, *bounds = surrogate.slopes(v, y, name, bounds=True)
+    source = of.quantity(surrogate, "mu_ratio", v, y)[2]
+    _, along_v, along_y, *bounds = of.slopes(surrogate, name, v, y)
     difference, bound = np.abs(np.stack((along_v, along_y)) - truth), np.stack(bounds)
     off, over = np.maximum(difference - noise, 0.0), bound_over_error(bound, noise, difference)
     # at the border of one that is not smooth there, the last digits of v~crit decide
@@ -236,7 +307,7 @@ def distribution(error: Array, over: Array) -> dict[str, list[float]]:
 
 
 def _distributions(
-    values: dict[str, list[_Compared]], slopes: list[_Compared], border: _Compared
+    values: dict[str, list[_Compared]], slopes: list[_Compared], border: _Compared | None
 ) -> dict[str, dict[str, list[float]]]:
     """By quantity, then of the slopes of mu~ along ln v~ and ln y~, and of v~crit, relative."""
     found = {}
@@ -249,7 +320,8 @@ def _distributions(
             for column in ([part.error for part in slopes], [part.over for part in slopes])
         )
         found[name] = np.concatenate(error), np.concatenate(over)
-    found["border"] = border.relative, border.over
+    if border is not None:
+        found["border"] = border.relative, border.over
     return {name: distribution(*both) for name, both in found.items()}
 
 
@@ -274,8 +346,13 @@ def _border_found(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) 
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
     """Of the report of :func:`verify`: how many values and slopes of each quantity, and
     speeds of the border, miss their bound."""
-    found = {name: report.get(name, report)["not_covered"] for name in report["slopes"]}
-    found["border"] = report["border"]["not_covered"]
+    found = {
+        name: report.get(name, report)["not_covered"]
+        for name in report["distribution"]
+        if name in QUANTITY_NAMES
+    }
+    if "border" in report:
+        found["border"] = report["border"]["not_covered"]
     return found | {
         f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()
     }
@@ -290,7 +367,7 @@ def holds(report: dict[str, Any], tolerance: float) -> bool:
 
 
 def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
-    """Compare the table with ``points`` fresh solves drawn as in :data:`CASES`.
+    """Compare the springs of a table with ``points`` fresh solves drawn as in :data:`CASES`.
 
     Returns
     -------
@@ -302,26 +379,44 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         the slopes of each along ln v~ and ln y~, absolute, of one point in twenty; in ``border`` of
         v~crit, relative.  ``distribution``: errors at :data:`QUANTILES` and bounds over errors.
     """
-    names = surrogate.table.quantities
-    values: dict[str, list[_Compared]] = {name: [] for name in names}
-    slopes: dict[str, list[_Compared]] = {name: [] for name in names}
-    for i, (share, how) in enumerate(CASES.values()):
-        v, y = how(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
-        v, y = v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)]
-        solved = sweep.solve("full", v, y)
-        around = Neighbours(surrogate, sweep, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
-        for name in names:
-            values[name].append(_values(surrogate, name, v, y, solved))
-            slopes[name].append(_slopes(surrogate, around, name))
     border = _border_found(surrogate, sweep, np.random.default_rng([seed, len(CASES)]))
+    return _verify(surrogate, spring(sweep), CASES, points, seed, border)
+
+
+def verify_ball(surrogate: Surrogate, of: Contact, points: int, seed: int = 2018) -> dict[str, Any]:
+    """The same of a ball with fresh quadratures, drawn as in :data:`BALL_CASES`; no border."""
+    return _verify(surrogate, of, BALL_CASES, points, seed, None)
+
+
+def _verify(
+    surrogate: Surrogate,
+    of: Contact,
+    cases: dict[str, tuple[float, _How]],
+    points: int,
+    seed: int,
+    border: _Compared | None,
+) -> dict[str, Any]:
+    names = surrogate.table.quantities
+    sloped = [name for name in names if name in of.sloped]
+    values: dict[str, list[_Compared]] = {name: [] for name in names}
+    slopes: dict[str, list[_Compared]] = {name: [] for name in sloped}
+    for i, (share, how) in enumerate(cases.values()):
+        v, y = how(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
+        v, y = of.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
+        solved = of.solve(v, y)
+        around = Neighbours(surrogate, of, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
+        for name in names:
+            values[name].append(_values(surrogate, of, name, v, y, solved))
+        for name in sloped:
+            slopes[name].append(_slopes(surrogate, of, around, name))
     return {
         **_report(values["mu_ratio"]),
-        "cases": {case: _said(part) for case, part in zip(CASES, values["mu_ratio"], strict=True)},
+        "cases": {case: _said(part) for case, part in zip(cases, values["mu_ratio"], strict=True)},
         **{name: _report(values[name]) for name in names[1:]},
         "slopes": {name: _report(parts) for name, parts in slopes.items()},
-        "border": _said(border),
+        **({} if border is None else {"border": _said(border)}),
         "distribution": _distributions(values, slopes["mu_ratio"], border),
-        "seam_jump": seam_jumps(surrogate),
-        "seam_slope_jump": seam_slope_jumps(surrogate),
-        "monotony": monotony(surrogate),
+        "seam_jump": seam_jumps(surrogate, kind=of.kind),
+        "seam_slope_jump": seam_slope_jumps(surrogate, kind=of.kind),
+        "monotony": monotony(surrogate, kind=of.kind),
     }

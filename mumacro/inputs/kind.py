@@ -71,7 +71,7 @@ class Kind(NamedTuple):
         return (*self.fields, "f")
 
 
-SPRING = Kind(0, 0)
+SPRING, BALL = Kind(0, 0), Kind(1, 0)  # across
 _KINDS: dict[tuple[str, str], Kind] = {
     (contact, direction): Kind(i, j)
     for i, contact in enumerate(CONTACTS)

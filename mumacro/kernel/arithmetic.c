@@ -75,6 +75,15 @@ static double mu_cube_root_near(double x) {
     return subnormal ? root / 262144.0 : root; /* 2^18 */
 }
 
+/* The cube root of normal x > 0 in lanes, off by at most 4e-16 of itself: as above, and then to the fourth order. */
+MU_INLINE mu_lanes mu_cube_root(mu_lanes x) {
+    const mu_mask third = ((((MU_BITS(x) >> 32) * 0x55555556) >> 32) << 32) + 0x2a9f7893782da1ce;
+    mu_lanes root = MU_NUMBER(third), cube = root * root * root, off;
+    root = root * ((cube + 2.0 * x) / (2.0 * cube + x));
+    off = (x - root * root * root) / x;
+    return mu_fma(root * off, mu_fma(off, mu_fma(off, mu_all(14.0 / 81.0), mu_all(2.0 / 9.0)), mu_all(1.0 / 3.0)), root);
+}
+
 /* x = m 2^e with 1/2 <= m < 1, of finite x > 0: returns m. */
 static double mu_split(double x, int64_t *exponent) {
     const int subnormal = x < 2.2250738585072014e-308;

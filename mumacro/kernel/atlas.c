@@ -1,5 +1,6 @@
-/* The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the chart of each.  This file is the only list of
- * blocks and of pieces of the border, records.c that of quantities; Python reads them through the shared object.
+/* The atlas of one spring: how the quadrant v~, y~ >= 0 is divided into blocks, and the chart of each.  This file is the
+ * only list of its blocks and of pieces of the border, ball_atlas.c that of a ball's blocks, records.c that of
+ * quantities; Python reads them through the shared object.
  *
  * A chart maps (v~, y~) to two coordinates (a, b) in which what the block tabulates is a smooth function q(a, b); each
  * quantity is value = base + factor q.
@@ -29,6 +30,7 @@
 #define MU_LN_Y_TAIL 11.783502069519070
 #define MU_LN_RHO_MAX 4.852030263919617
 
+enum { MU_SPRING, MU_BALL, MU_CONTACTS };
 enum { MU_CONTINUOUS, MU_STICK_SLIP, MU_STATIC, MU_PARTIAL_SLIP, MU_REVERSE_SLIP, MU_REGIMES };
 /* Sources: first the blocks, those of a regime in the order of y~; then what is known in closed form. */
 enum {

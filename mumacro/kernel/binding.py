@@ -184,9 +184,6 @@ class Data:
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _FFI.new("mumacro_data *")
         self._kept: list[Any] = []
-        #: points (nodes, 2) and errors (2, 5) of the pieces of a ball, see ``mumacro_rule``; none
-        #: until they are put
-        self.rules: list[tuple[Array, Array]] = []
         #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by
         #: code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
@@ -211,15 +208,10 @@ class Data:
             self._keep(place, "slope_errors", slope_errors),
         )
 
-    def put_rules(self, rules: Sequence[tuple[Array, Array]], driven: Array) -> None:
-        """Add the quadrature of a ball, see :attr:`rules` and ``mumacro_driven_rule``."""
-        for place, (points, errors) in zip(self.pointer.rules, rules, strict=True):
-            self._keep(place, "points", points)
-            place.errors = errors.tolist()
-            place.nodes = points.shape[0]
-        self._keep(self.pointer.driven, "points", driven)
-        self.pointer.driven.nodes = driven.shape[0]
-        self.rules = list(rules)
+    def put_driven(self, points: Array) -> None:
+        """Add the rule of a ball that is shaken along, see ``mumacro_driven_rule``."""
+        self._keep(self.pointer.driven, "points", points)
+        self.pointer.driven.nodes = points.shape[0]
 
     def _keep(self, place: Any, name: str, array: Array) -> Array:
         """Point ``place.name`` to the numbers, which live as long as this object."""
@@ -272,19 +264,28 @@ class Kernel:
         arrays = _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
         self._values(data.pointer, *kind, quantity, v.size, *arrays)
 
-    def value(self, data: Data, quantity: int, v: float, y: float) -> tuple[float, float, int]:
+    def value(
+        self, data: Data, quantity: int, v: float, y: float, contact: int = 0
+    ) -> tuple[float, float, int]:
         """A quantity at one point in plain numbers, its bound and the source."""
         point, code = _new(_POINT, (v, y)), _new(_CODE)
-        self._values(data.pointer, 0, 0, quantity, 1, point, point + 1, point + 2, point + 3, code)
+        at = point, point + 1, point + 2, point + 3
+        self._values(data.pointer, contact, 0, quantity, 1, *at, code)
         return point[2], point[3], code[0]
 
     def slopes(
-        self, data: Data, quantity: int, v: Array, y: Array, rows: SlopeRows, start: int = 0
+        self,
+        data: Data,
+        quantity: int,
+        v: Array,
+        y: Array,
+        rows: SlopeRows,
+        start: int = 0,
+        contact: int = 0,
     ) -> None:
         """A quantity and its slopes at points (n,): fill ``rows`` from ``start`` on."""
-        self._found.slopes(
-            data.pointer, quantity, v.size, _numbers(v), _numbers(y), *_out(rows, start)
-        )
+        points = _numbers(v), _numbers(y)
+        self._found.slopes(data.pointer, contact, quantity, v.size, *points, *_out(rows, start))
 
     def cases(
         self,
@@ -319,11 +320,11 @@ class Kernel:
         six, ends = _columns_of(columns, start), _numbers(high) + start
         self._found.intervals(data.pointer, *kind, n, six, ends, *_out(rows, start))
 
-    def one(self, pointer: Any, six: Sequence[float], with_gradient: bool) -> Any:
+    def one(self, pointer: Any, six: Sequence[float], with_gradient: bool, contact: int = 0) -> Any:
         """One case in plain numbers: a ``mumacro_case``, its gradient only where asked for."""
         # named: a call with *six takes longer
         answer, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six
-        self._one(pointer, mu0, Fz, k, y0, omega, v0, with_gradient, answer)
+        self._one(pointer, contact, mu0, Fz, k, y0, omega, v0, with_gradient, answer)
         return answer
 
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
@@ -332,14 +333,15 @@ class Kernel:
         self._found.border_as(data.pointer, *kind, y.size, _numbers(y), _numbers(out))
         return out
 
-    def places(self, data: Data, v: Array, y: Array) -> tuple[Codes, Array, Array]:
-        """Blocks of points (n,) with 0 < v~, y~ < infinity, and their coordinates as evaluation
-        counts them."""
+    def places(
+        self, data: Data, v: Array, y: Array, contact: int = 0
+    ) -> tuple[Codes, Array, Array]:
+        """Blocks of points (n,) with 0 < v~, y~ < infinity, of a ball those of its middle spring,
+        and their coordinates as evaluation counts them."""
         block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
         codes = _from_buffer(_CODES, block)
-        self._found.places(
-            data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
-        )
+        arrays = _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
+        self._found.places(data.pointer, contact, v.size, *arrays)
         return block, a, b
 
     def element_steps(
@@ -408,13 +410,14 @@ class Kernel:
     # --- for the builder --------------------------------------------------------------------------
 
     def forms(
-        self, quantity: int, block: int, v: Array, y: Array, eta: Array
+        self, quantity: int, block: int, v: Array, y: Array, eta: Array, contact: int = 0
     ) -> tuple[Array, Array]:
         """(base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1 counts
         in the corner."""
         base, factor = np.empty(v.shape), np.empty(v.shape)
         v, y, eta = (np.ascontiguousarray(x, np.float64) for x in (v, y, eta))
-        self._found.forms(quantity, block, v.size, *map(_numbers, (v, y, eta, base, factor)))
+        numbers = map(_numbers, (v, y, eta, base, factor))
+        self._found.forms(contact, quantity, block, v.size, *numbers)
         return base, factor
 
     def border_scales(self, piece: int, y: Array) -> tuple[Array, Array]:
@@ -434,6 +437,14 @@ class Kernel:
             w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border))
         )
         return inside, at_border
+
+    def entries(self, t: Array) -> Array:
+        """y~ at which rays v~/y~ = t times the steepest enter stick-slip, of any shape, 0 < t <=
+        1."""
+        t = np.ascontiguousarray(t, np.float64)
+        out = np.empty(t.shape)
+        self._found.entries(t.size, _numbers(t), _numbers(out))
+        return out
 
     def normal_form_root(self, v: Array, eta: Array) -> Array:
         """Positive root of phi^3 + 2 eta phi = pi v~, (n,)."""

@@ -6,6 +6,14 @@ typedef struct {
     double v, y, a, b, phi, crit, tilt;
 } mu_place;
 
+/* The corner, where a and b are polar. */
+MU_INLINE int mu_is_corner(int64_t block) { return block == MU_CORNER || block == MU_B_CORNER; }
+
+/* Whether springs slide all the time in a block: in all of a ball's, but for those of partial slip. */
+MU_INLINE int mu_is_sliding_block(int block) {
+    return mu_is_ball(block) ? block < MU_B_RING : block < MU_S_LOW;
+}
+
 /* --- many points: selections, no branches ----------------------------------------------------------- */
 
 /* The one quotient of all common charts: 1/(1 + v~^2), 1/(v~^2 + y~^2) or, in stick-slip, 1/y~. */
@@ -113,6 +121,8 @@ static mu_place mu_locate(const mumacro_data *data, double v, double y) {
 typedef struct {
     double a_v, a_y, b_v, b_y;
     double phi_v, phi_y; /* of ln phi, in the corner */
+    double edge_v, edge_y; /* of ln x, where b = end - scale sqrt(1 - x) below the border x = 1 */
+    double end, scale;
 } mu_turn;
 
 static mu_turn mu_turn_corner(const mu_place *at) {
@@ -121,7 +131,7 @@ static mu_turn mu_turn_corner(const mu_place *at) {
     const double phi_v = MU_PI * v / stiff, phi_y = -2.0 * phi * y / stiff;
     const double s_v = 0.5 * s0 * (1.0 - phi_v / phi), s_y = -0.5 * s0 * phi_y / phi;
     const double turn = 0.5 * (1.0 + at->b * at->b) / (at->a * at->a); /* d tan(psi/2) / d psi, over R^2 */
-    mu_turn out;
+    mu_turn out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0};
     out.a_v = (0.5 * s0 * s_v + 2.0 * phi * phi_v) / at->a;
     out.a_y = (0.5 * s0 * s_y + 2.0 * phi * phi_y) / at->a;
     out.b_v = turn * (s0 * phi_v - phi * s_v);
@@ -138,10 +148,10 @@ MU_INLINE double mu_speed_share(double v) {
 }
 
 /* In the last 1e-9 of sigma below the border the derivative of b is that 1e-9 below it. */
-MU_INLINE mu_turn mu_turn_of(const mu_place *at) {
+MU_INLINE mu_turn mu_turn_of_spring(const mu_place *at) {
     /* a is this power of y~; where it is 0, ln y~ */
     static const signed char power[MU_CHARTS] = {2, 0, 0, 0, -1, 2, 1, 0, 0, 0, 0, -1};
-    mu_turn out = {0.0, 1.0, 1.0, -at->tilt, 0.0, 0.0};
+    mu_turn out = {0.0, 1.0, 1.0, -at->tilt, 0.0, 0.0, 1.0, -at->tilt, MU_SQRT2, 1.0};
     if (at->block == MU_CORNER) return mu_turn_corner(at);
     if (power[at->block]) out.a_y = power[at->block] * at->a;
     if (at->block >= MU_S_LOW) {

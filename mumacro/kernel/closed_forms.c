@@ -57,6 +57,19 @@ static mu_outer mu_outer_expansion(double r) {
 #define MU_OUTER_LOG_MAX 4.0
 #define MU_OUTER_MAX 54.598150033144236 /* exp(MU_OUTER_LOG_MAX) */
 
+/* f and g + r f'/2 at 1 <= t = 1 + r^2 < MU_OUTER_MAX, from the cells. */
+MU_INLINE void mu_outer_terms(const double *cells, double t, double *first, double *rest) {
+    const double x = mu_first(mu_log(mu_all(t))) * (MU_OUTER_CELLS / MU_OUTER_LOG_MAX);
+    const int cell = (int)mu_min(mu_max(0.0, x), MU_OUTER_CELLS - 1.0);
+    const double u = 2.0 * (x - cell) - 1.0, *row = cells + 16 * cell;
+    *first = row[0];
+    *rest = row[8];
+    for (int i = 1; i < 8; ++i) {
+        *first = mu_fma1(*first, u, row[i]);
+        *rest = mu_fma1(*rest, u, row[8 + i]);
+    }
+}
+
 /* mu~ and its bound for large v~: two terms.  For 1 + r^2 below MU_OUTER_MAX f and g + r f'/2 are read from cells of
  * ln(1 + r^2), (MU_OUTER_CELLS, 2, 8), to rounding: its singularities are at +-i pi and beyond. */
 static double mu_fast_ratio(const double *cells, double v, double y, double *bound) {
@@ -66,15 +79,7 @@ static double mu_fast_ratio(const double *cells, double v, double y, double *bou
     const double t = 1.0 + (plain ? y * y * share : (y / v) * (y / v));
     double first, rest, correction;
     if (t < MU_OUTER_MAX) {
-        const double x = mu_first(mu_log(mu_all(t))) * (MU_OUTER_CELLS / MU_OUTER_LOG_MAX);
-        const int cell = (int)mu_min(mu_max(0.0, x), MU_OUTER_CELLS - 1.0);
-        const double u = 2.0 * (x - cell) - 1.0, *row = cells + 16 * cell;
-        first = row[0];
-        rest = row[8];
-        for (int i = 1; i < 8; ++i) {
-            first = mu_fma1(first, u, row[i]);
-            rest = mu_fma1(rest, u, row[8 + i]);
-        }
+        mu_outer_terms(cells, t, &first, &rest);
     } else {
         const mu_outer outer = mu_outer_expansion(y / mu_hypot(v, 1.0));
         first = outer.first;

@@ -3,242 +3,34 @@
  *
  *     mu~(v~, y~) = 3/2 int_0^1 s mu~_spring(v~ / (1.5 s), y~ / (1.5 s)) d xi:
  *
- * from the middle outwards the springs are the points of a ray, from (v~, y~)/1.5 to infinity.  A ray with
- * y~ > 2.98 v~ enters stick-slip at an amplitude below 1.29 and leaves it at one above; at y~ = 1 it passes the corner.
- * There the integral is split, into pieces with a rule each.  Logarithmic slopes are averaged as mu~ is. */
+ * from the middle outwards the springs are the points of a ray, from (v~, y~)/1.5 to infinity.  Across, a table holds
+ * that (ball_atlas.c).  Along, it is an integral over closed forms, taken here. */
 
-enum { MU_SPRING, MU_BALL, MU_CONTACTS };
-/* The pieces: before stick-slip; in it below y~ = 1, just above that, further above; after it. */
-enum { MU_BEFORE, MU_BELOW, MU_CLOSE, MU_ABOVE, MU_BEYOND, MU_RULES };
-/* Errors of a rule: first those of the quantities. */
-enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y };
 #define MU_DRIVEN_COLUMNS 5 /* of a node of the rule of oscillation along */
-
-#define MU_MIDDLE 1.5 /* load of the middle spring over the mean: gross slip begins at y0 = 1.5 l0 */
-#define MU_STEEPEST 0.33516779066085 /* the largest v~crit / y~, and its amplitude */
-#define MU_STEEPEST_Y 1.29079076185
 #define MU_HUGE 1e280 /* groups beyond which all springs are as the middle one to rounding */
-
-/* The springs that the rules take: v~, y~, s and share of the load of each; pieces from first[k] to first[k + 1], and
- * between the values edge[k] and edge[k + 1] of 1 - xi. */
-typedef struct {
-    int n, first[MU_RULES + 1];
-    double edge[MU_RULES + 1];
-    double v[MU_CHUNK], y[MU_CHUNK], s[MU_CHUNK], share[MU_CHUNK];
-} mu_springs;
-
-/* Amplitudes at which the ray y~ = r v~ enters stick-slip and leaves it: v~crit/y~ is concave below its largest value,
- * its inverse squared is convex above, so Newton's method comes from one side. */
-static void mu_crossings(const mumacro_data *data, double r, double *entry, double *leave) {
-    *entry = 2.0 / r;
-    *leave = HUGE_VAL;
-    if (!(r < 1e140)) return;
-    *leave = mu_max(r * r / 4.402914, MU_STEEPEST_Y);
-    for (int i = 0; i < 30; ++i) {
-        double tilt;
-        const double share = r * mu_border(data, *entry, &tilt, NULL) / *entry;
-        const double step = (1.0 - 1.0 / share) / (tilt - 1.0);
-        *entry = mu_min(*entry * (1.0 - step), MU_STEEPEST_Y);
-        if (!(fabs(step) > 1e-9)) break;
-    }
-    for (int i = 0; i < 30; ++i) {
-        double tilt;
-        const double share = r * mu_border(data, *leave, &tilt, NULL) / *leave;
-        const double step = 0.5 * (1.0 - share * share) / (1.0 - tilt);
-        *leave = mu_max(*leave * (1.0 - step), MU_STEEPEST_Y);
-        if (!(fabs(step) > 1e-9)) break;
-    }
-}
 
 /* 1 - xi of the spring with the load s. */
 MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s)) : 1.0; }
 
-/* The springs of one piece, between two values of 1 - xi. */
-static void mu_take_piece(const mumacro_rule *rule, double from, double to, double v, double y, mu_springs *out) {
-    const double length = from - to, least = mu_max(mu_max(v, y), 1.0) / 1e300;
-    for (int64_t i = 0; length > 0.0 && i < rule->nodes && out->n < MU_CHUNK; ++i) {
-        const double rest = to + length * rule->points[2 * i], s = mu_max(rest * (2.0 - rest), least);
-        const int n = out->n++;
-        out->s[n] = s;
-        out->v[n] = v / (MU_MIDDLE * s);
-        out->y[n] = y / (MU_MIDDLE * s);
-        out->share[n] = MU_MIDDLE * s * length * rule->points[2 * i + 1];
-    }
-}
-
-static void mu_springs_of(const mumacro_data *data, double v, double y, mu_springs *out) {
-    const double corner = mu_outside(y / MU_MIDDLE);
-    double *edge = out->edge;
-    for (int k = 1; k < MU_RULES; ++k) edge[k] = corner;
-    edge[0] = 1.0;
-    edge[MU_RULES] = 0.0;
-    out->n = 0;
-    if (v < MU_STEEPEST * y) {
-        double entry, leave;
-        mu_crossings(data, y / v, &entry, &leave);
-        edge[1] = mu_outside(y / (MU_MIDDLE * entry));
-        edge[2] = mu_min(corner, edge[1]);
-        edge[4] = mu_min(edge[2], mu_outside(y / (MU_MIDDLE * leave)));
-        /* mu~ changes within (v~/y~)^(2/3) of y~ = 1: half way to that, in logarithms, the rules share the work */
-        edge[3] = mu_outside(y / (MU_MIDDLE * (1.0 + (v > 0.0 ? mu_cube_root_near(v / y) : 0.0))));
-        edge[3] = edge[3] > edge[4] ? mu_min(edge[3], edge[2]) : edge[2];
-    }
-    for (int k = 0; k < MU_RULES; ++k) {
-        out->first[k] = out->n;
-        mu_take_piece(&data->rules[k], edge[k], edge[k + 1], v, y, out);
-    }
-    out->first[MU_RULES] = out->n;
-}
-
-/* What a rule may leave out: its error of `scale`, or that of `least`, a measure of what it integrates, where one holds
- * at any v~ and y~.  That is not so from y~ = 1 on: mu~ falls within (v~/y~)^(2/3) of it, more steeply than any rule
- * follows. */
-static double mu_left_out(const mumacro_data *data, int piece, int error, double scale, double least, double y) {
-    const mumacro_rule *rule = &data->rules[piece];
-    const double most = rule->errors[0][error] * scale;
-    if (piece == MU_CLOSE || (piece == MU_ABOVE && !(y > 1.1 * MU_MIDDLE))) return most;
-    return mu_min(most, rule->errors[1][error] * least);
-}
-
-/* The smaller of what a piece carries and what it lacks of its load. */
-static double mu_least_share(double sum, double load) {
-    return mu_min(sum, fabs(load - sum) + 4.0 * MU_ROUNDING * load);
-}
-
-/* The slope along y~ is not a share of the load: beside y~ = 1 it grows like the load per length of the piece, squared,
- * and over its xi, down to the root of y~'s last digit. */
-static double mu_slope_scale(const mu_springs *c, int piece, double load) {
-    const double from = c->edge[piece], to = c->edge[piece + 1], density = load / (from - to);
-    if (!(from > to) || (piece != MU_BELOW && piece != MU_CLOSE)) return load;
-    return density * density / mu_max(1.0 - 0.5 * (from + to), 1e-8);
-}
-
-/* The static limit, y~ < 1.5: sqrt(1 + e) (E - e K) with e = y~/1.5 and elliptic integrals of the parameter
- * (1 - e)/(1 + e); its slope along ln y~ is -3/2 e^2 K / sqrt(1 + e). */
-static double mu_ball_at_rest(double y, double *slope) {
-    const double e = y / MU_MIDDLE, root = sqrt(1.0 + e);
-    const mu_outer outer = mu_outer_expansion(sqrt(0.5 * (1.0 - e) / e));
-    const double k = 0.5 * MU_PI * outer.first * outer.h;
-    *slope = 0.0;
-    if (!(e < 1.0)) return 0.0;
-    if (e < 1e-300) return 1.0;
-    *slope = -1.5 * e * (e * k) / root;
-    return mu_min(mu_max(root * (0.5 * MU_PI * outer.i3 - e * k), 0.0), 1.0);
-}
-
-/* --- one ball ----------------------------------------------------------------------------------------- */
-
-static int mu_ball_source(double v, double crit) {
-    return v == 0.0 ? MU_STATIC_LIMIT : v < crit ? MU_BALL_PARTLY : MU_BALL_SLIDES;
-}
-
 /* v~ from which all springs slide: the slowest for its amplitude is the middle one, or the one of the steepest ray. */
-static double mu_ball_border(const mumacro_data *data, double y) {
+MU_INLINE double mu_ball_border(const mumacro_data *data, double y) {
     if (!(y > MU_MIDDLE * MU_STEEPEST_Y)) return y >= 0.0 ? MU_STEEPEST * y : NAN;
     return MU_MIDDLE * mu_border_at(data, y / MU_MIDDLE);
 }
 
-/* Whether a point is one for quadrature: not illegal, zero or beyond MU_HUGE. */
-static int mu_is_spread(double v, double y) { return v >= 0.0 && y > 0.0 && v < MU_HUGE && y < MU_HUGE; }
-
-static mu_answer mu_ball_answer(const mumacro_data *data, int quantity, double v, double y) {
-    mu_answer out;
-    mu_springs c;
-    double value[MU_CHUNK], bound[MU_CHUNK];
-    if (!mu_is_spread(v, y)) {
-        out = mu_answer_at(data, quantity, v, y);
-        if (out.source == MU_NO_OSCILLATION || out.source < 0) return out;
-        out.source = mu_ball_source(v, mu_ball_border(data, y));
-        if (quantity == MU_MU_RATIO && v < 1e150) out.bound += out.value;
-        return out;
-    }
-    out = mu_limit(0.0, MU_DENORMAL, mu_ball_source(v, mu_ball_border(data, y)));
-    if (v == 0.0 && quantity == MU_MU_RATIO) {
-        double slope;
-        out.value = mu_ball_at_rest(y, &slope);
-        out.bound = MU_ROUNDING;
-        return out;
-    }
-    mu_springs_of(data, v, y, &c);
-    mu_values(data, quantity, c.n, c.v, c.y, value, bound, NULL);
-    for (int k = 0; k < MU_RULES; ++k) {
-        double sum = 0.0, load = 0.0, errors = 0.0;
-        for (int i = c.first[k]; i < c.first[k + 1]; ++i) {
-            const double share = quantity == MU_POWER ? c.share[i] * MU_MIDDLE * c.s[i] : c.share[i];
-            sum += share * value[i];
-            load += share;
-            errors += share * bound[i];
-        }
-        out.value += sum;
-        out.bound += errors + mu_left_out(data, k, quantity, load, quantity == MU_POWER ? sum : mu_least_share(sum, load), y);
-    }
-    out.bound += MU_ROUNDING * out.value;
-    if (quantity == MU_STICK) { /* whether a spring sticks at all is not known next to the border */
-        const double off = mu_border_error(data), crit = mu_ball_border(data, y);
-        if (fabs(v - MU_STEEPEST * y) < 0.01 * v || fabs(v - crit) < 2.0 * off * v) out.bound += 4.0 * off;
-    }
-    out.value = mu_min(out.value, MU_QUANTITY[quantity].most);
-    return out;
-}
-
-/* d mu~ / d v~ at v~ = 0: the mean of the springs' own; infinite from rest on for y~ <= 1.5, like a logarithm. */
+/* d mu~ / d v~ at v~ = 0: infinite from rest on for y~ <= 1.5, like a logarithm; else read off the table at a speed that
+ * stands for the limit. */
 static double mu_ball_speed_slope(const mumacro_data *data, double y, double *bound) {
-    double found[2] = {0.0, 0.0};
+    double v;
+    mu_answer found;
     *bound = HUGE_VAL;
     if (!(y > MU_MIDDLE)) return HUGE_VAL;
     *bound = 0.0;
-    for (int k = 0; k < 2; ++k) {
-        mu_springs c;
-        c.n = 0;
-        mu_take_piece(&data->rules[k ? MU_BELOW : MU_CLOSE], 1.0, 0.0, 0.0, y, &c);
-        for (int i = 0; i < c.n; ++i) {
-            double error;
-            found[k] += c.share[i] / (MU_MIDDLE * c.s[i]) * mu_speed_slope_at_zero(data, c.y[i], &error);
-            *bound += k ? 0.0 : c.share[i] / (MU_MIDDLE * c.s[i]) * error;
-        }
-    }
-    *bound += 2.0 * fabs(found[0] - found[1]); /* two rules whose nodes stand close at opposite ends */
-    return found[0];
-}
-
-static mu_slopes mu_ball_slopes(const mumacro_data *data, double v, double y) {
-    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-    mu_springs c;
-    double rows[MU_SLOPE_ROWS * MU_CHUNK];
-    if (!mu_is_spread(v, y)) {
-        out = mu_slopes_at(data, MU_MU_RATIO, v, y);
-        if (v < 1e150) {
-            out.bound_v += fabs(out.along_v);
-            out.bound_y += fabs(out.along_y);
-        }
-        return out;
-    }
-    if (v == 0.0) {
-        out.value = mu_ball_at_rest(y, &out.along_y);
-        /* which jumps at y~ = 1.5 */
-        out.bound_y = 8.0 * MU_ROUNDING * fabs(out.along_y) + (fabs(y - MU_MIDDLE) < 2.0 * MU_ROUNDING ? 1.7 : 0.0);
-        return out;
-    }
-    mu_springs_of(data, v, y, &c);
-    mu_slopes_of_points(data, MU_MU_RATIO, c.n, c.v, c.y, rows, MU_CHUNK);
-    out.bound = MU_ROUNDING;
-    for (int k = 0; k < MU_RULES; ++k) {
-        double load = 0.0, sum = 0.0, along_y = 0.0;
-        for (int i = c.first[k]; i < c.first[k + 1]; ++i) {
-            const double share = c.share[i];
-            load += share;
-            sum += share * rows[MU_SLOPE_VALUE * MU_CHUNK + i];
-            out.along_v += share * rows[MU_SLOPE_V * MU_CHUNK + i];
-            out.along_y += share * rows[MU_SLOPE_Y * MU_CHUNK + i];
-            out.bound_v += share * rows[MU_SLOPE_V_BOUND * MU_CHUNK + i];
-            out.bound_y += share * rows[MU_SLOPE_Y_BOUND * MU_CHUNK + i];
-            along_y += share * fabs(rows[MU_SLOPE_Y * MU_CHUNK + i]);
-        }
-        out.value += sum;
-        out.bound_v += mu_left_out(data, k, MU_ERROR_V, load, mu_least_share(sum, load), y);
-        out.bound_y += mu_left_out(data, k, MU_ERROR_Y, mu_slope_scale(&c, k, load), along_y, y);
-    }
-    return out;
+    if (y == HUGE_VAL) return 0.0;
+    v = MU_CREEP * mu_min(1.0, y / MU_MIDDLE - 1.0);
+    found = mu_answer_at(data, MU_BALL, MU_MU_RATIO, v, y / MU_MIDDLE);
+    *bound = found.bound / (MU_MIDDLE * v);
+    return found.value / (MU_MIDDLE * v);
 }
 
 /* --- along and normal ----------------------------------------------------------------------------------- */
@@ -483,13 +275,12 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
         if (quantity == MU_STICK) return mu_limit(line->stick, found.stick_bound, line->source);
         return mu_limit(line->mu, found.bound, line->source);
     }
-    if (contact == MU_SPRING) { /* the same bits as in any array */
+    { /* the same bits as in any array */
         int8_t source;
         mu_answer out;
-        mu_values(data, quantity, 1, &v, &y, &out.value, &out.bound, &source);
+        mu_values(data, contact, quantity, 1, &v, &y, &out.value, &out.bound, &source);
         return mu_limit(out.value, out.bound, source);
     }
-    return mu_ball_answer(data, quantity, v, y);
 }
 
 static mu_slopes mu_slopes_of_driven(const mu_driven *found) {
@@ -503,7 +294,8 @@ static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int directi
         const mu_driven found = mu_drive(data, contact, direction, v, y);
         return mu_slopes_of_driven(&found);
     }
-    return contact == MU_BALL ? mu_ball_slopes(data, v, y) : mu_slopes_at(data, MU_MU_RATIO, v, y);
+    return contact == MU_BALL ? mu_slopes_at(data, MU_BALL, MU_MU_RATIO, v / MU_MIDDLE, y / MU_MIDDLE)
+                              : mu_slopes_at(data, MU_SPRING, MU_MU_RATIO, v, y);
 }
 
 /* d mu~ / d v~ at v~ = 0; along and normal it is h^2 / pi = pi for springs that have not begun to slip backwards. */

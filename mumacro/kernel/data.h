@@ -12,19 +12,9 @@ typedef struct {
     const double *polynomials, *errors, *slope_errors;
 } mumacro_cells;
 
-/* Quadrature over one piece of a ball: points (nodes, 2), the share of the piece beyond a node, and its weight;
- * the largest errors, times the load of the piece, and times the smaller of mu~'s integral and what it lacks of that
- * load, of which the smaller counts: of mu~, power (relative to power), stick fraction, slopes along v~ and along y~
- * (absolute: times mu_slope_scale; relative to its absolute value). */
-typedef struct {
-    int64_t nodes;
-    const double *points;
-    double errors[2][5];
-} mumacro_rule;
-
 /* Quadrature over the springs of a ball that slip backwards, under oscillation along the sliding direction: points
- * (nodes, 5), as above and then three null rules, which are the coefficients of the integrand's three highest Legendre
- * polynomials. */
+ * (nodes, 5), the share of the radius beyond a node, its weight, and then three null rules, which are the coefficients
+ * of the integrand's three highest Legendre polynomials. */
 typedef struct {
     int64_t nodes;
     const double *points;
@@ -47,13 +37,13 @@ enum mumacro_piece_column { MU_PIECE_FIRST, MU_PIECE_OFFSET, MU_PIECE_STEP, MU_P
 
 /* border (border_cells, 8): polynomials of v~crit, highest power first; pieces (3, MU_PIECE_COLUMNS); blocks (sources +
  * 1, MU_BLOCK_COLUMNS), zero for sources without cells.  outer (outer_cells, 2, 8): the two terms of large speed, in
- * cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of
- * them is read.  rules: of a ball's pieces, see contact.c; no nodes where they are not wanted. */
+ * cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of them is read.  A ball that is
+ * shaken across has blocks and quantities of its own, with the same border; driven is for one that is shaken along,
+ * without nodes where that is not wanted. */
 typedef struct {
     int64_t border_cells;
     const double *border, *pieces, *blocks, *outer;
     mumacro_cells quantities[8];
-    mumacro_rule rules[5];
     mumacro_driven_rule driven;
 } mumacro_data;
 
@@ -91,7 +81,7 @@ typedef struct {
 
 /* A table as the export writes it: mumacro_table. */
 typedef struct {
-    mumacro_data data;
+    mumacro_data data, ball; /* without cells where the table has no ball */
     double tolerance;
     const char *checksum, *version;
 } mumacro_export;

@@ -103,11 +103,16 @@ static void mu_chain_rule(int direction, int n, double in[6][MU_CHUNK], double k
     }
 }
 
+/* Whether slopes bring a bound of the value by its cell with them. */
+MU_INLINE int mu_has_cells(int source) {
+    return source < MU_CHARTS || source == MU_BALL_SLIDES || source == MU_BALL_PARTLY;
+}
+
 static void mu_know(mu_answer found, mu_slopes at, double known[MU_KNOWN][MU_CHUNK], int i) {
     known[MU_OF_MU][i] = found.value;
     known[MU_OF_V][i] = at.along_v;
     known[MU_OF_Y][i] = at.along_y;
-    known[MU_OF_BOUND][i] = found.source < MU_CHARTS ? mu_min(found.bound, at.bound) : found.bound;
+    known[MU_OF_BOUND][i] = mu_has_cells(found.source) ? mu_min(found.bound, at.bound) : found.bound;
     known[MU_OF_BOUND_V][i] = at.bound_v;
     known[MU_OF_BOUND_Y][i] = at.bound_y;
 }
@@ -182,21 +187,21 @@ static double mu_length_scale(double mu0, double Fz, double k) {
 }
 
 /* Up to MU_CHUNK cases; in: the six inputs, filled up to whole lanes. */
-static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_CHUNK], int rows, double *out,
-                              int64_t stride, int8_t *source) {
+MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n, double in[6][MU_CHUNK], int rows,
+                                 double *out, int64_t stride, int8_t *source) {
     double v[MU_CHUNK], y[MU_CHUNK], *mu = out + MU_ROW_MU_RATIO * stride, *bound = out + MU_ROW_ERROR_BOUND * stride;
     double *slopes = rows == MU_ROWS ? out + MU_ROW_GRADIENT * stride : NULL;
     mu_chunk c;
     mu_slope slope[MU_CHUNK];
     int left;
     mu_pass_groups(n, in, v, y);
-    left = mu_chunk_of_ratios(data, n, v, y, &c, slopes ? slope : NULL, mu, bound, source);
+    left = mu_chunk_of_ratios(data, contact, n, v, y, &c, slopes ? slope : NULL, mu, bound, source);
     if (slopes) {
         double known[MU_KNOWN][MU_CHUNK];
         const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
         for (int i = 0; i < n; ++i) {
             const int later = mu_is_left(c.block[i]);
-            const mu_slopes at = later ? none : mu_slopes_of(data, MU_MU_RATIO, &c, slope, i, v[i], y[i]);
+            const mu_slopes at = later ? none : mu_slopes_of(data, contact, MU_MU_RATIO, &c, slope, i, v[i], y[i]);
             mu_know(mu_limit(at.value, bound[i], source[i]), at, known, i);
         }
         mu_chain_rule(MU_ACROSS, n, in, known, slopes, stride);
@@ -205,11 +210,11 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
         const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
         mu_answer found = {mu[i], bound[i], source[i]};
         if (!mu_is_left(c.block[i])) continue;
-        if (v[i] == -1.0) found = mu_any_case(data, MU_SPRING, MU_ACROSS, &six, v + i, y + i, NULL);
+        if (v[i] == -1.0) found = mu_any_case(data, contact, MU_ACROSS, &six, v + i, y + i, NULL);
         mu[i] = found.value;
         bound[i] = found.bound;
         source[i] = (int8_t)found.source;
-        if (slopes) mu_gradient(data, MU_SPRING, MU_ACROSS, &six, found, NULL, v[i], y[i], slopes + i, stride);
+        if (slopes) mu_gradient(data, contact, MU_ACROSS, &six, found, NULL, v[i], y[i], slopes + i, stride);
     }
     for (int i = 0; i < n; ++i) {
         out[i] = mu[i] * in[0][i];
@@ -224,8 +229,8 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
     }
 }
 
-static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides,
-                     int rows, double *out, int64_t stride, int8_t *source) {
+MU_INLINE void mu_cases_of(const mumacro_data *data, int contact, int64_t n, const double *const *columns,
+                           const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
     for (int64_t start = 0; start < n; start += MU_CHUNK) {
         const int few = mu_few(n - start);
         const int whole = (few + MU_LANES - 1) / MU_LANES * MU_LANES;
@@ -234,22 +239,28 @@ static void mu_cases(const mumacro_data *data, int64_t n, const double *const *c
             if (strides[i]) memcpy(in[i], columns[i] + start, (size_t)few * sizeof **in);
             for (int j = strides[i] ? few : 0; j < whole; ++j) in[i][j] = strides[i] ? 1.0 : columns[i][0];
         }
-        mu_chunk_of_cases(data, few, in, rows, out + start, stride, source + start);
+        mu_chunk_of_cases(data, contact, few, in, rows, out + start, stride, source + start);
     }
+}
+
+static void mu_cases(const mumacro_data *data, int contact, int64_t n, const double *const *columns,
+                     const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
+    if (contact == MU_BALL) mu_cases_of(data, MU_BALL, n, columns, strides, rows, out, stride, source);
+    else mu_cases_of(data, MU_SPRING, n, columns, strides, rows, out, stride, source);
 }
 
 /* As mu_cases, of any contact and direction; where the normal force oscillates, y0's column holds its amplitude. */
 static void mu_cases_as(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
                         const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
-    if (contact == MU_SPRING && direction == MU_ACROSS) {
-        mu_cases(data, n, columns, strides, rows, out, stride, source);
+    if (direction == MU_ACROSS) {
+        mu_cases(data, contact, n, columns, strides, rows, out, stride, source);
         return;
     }
     for (int64_t i = 0; i < n; ++i) {
         double in[6], v, y;
         mu_inputs six;
         mu_answer found;
-        mu_slopes at, *slopes = rows == MU_ROWS && direction != MU_ACROSS ? &at : NULL;
+        mu_slopes at, *slopes = rows == MU_ROWS ? &at : NULL;
         for (int j = 0; j < 6; ++j) in[j] = columns[j][strides[j] ? i : 0];
         memcpy(&six, in, sizeof six);
         found = mu_any_case(data, contact, direction, &six, &v, &y, slopes);
@@ -268,14 +279,16 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
     }
 }
 
-static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
-                   int with_gradient, mumacro_case *out) {
+static void mu_one(const mumacro_data *data, int contact, double mu0, double Fz, double k, double y0, double omega,
+                   double v0, int with_gradient, mumacro_case *out) {
     double in[6][MU_CHUNK], rows[MU_ROWS];
     const double six[6] = {mu0, Fz, k, y0, omega, v0};
     int8_t source;
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
-    mu_chunk_of_cases(data, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
+    if (contact == MU_BALL)
+        mu_chunk_of_cases(data, MU_BALL, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
+    else mu_chunk_of_cases(data, MU_SPRING, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
     out->mu_macro = rows[MU_ROW_MU_MACRO];
     out->mu_ratio = rows[MU_ROW_MU_RATIO];
     out->error_bound = rows[MU_ROW_ERROR_BOUND];

@@ -2,6 +2,11 @@
 
 static const mumacro_data *const MU_TABLE = &mumacro_table.data;
 
+/* What a contact is read from: along and normal there are closed forms, which need a rule at most. */
+static const mumacro_data *mu_table_of(int contact, int direction) {
+    return contact == MU_BALL && direction == MU_ACROSS ? &mumacro_table.ball : MU_TABLE;
+}
+
 /* A table may hold fewer quantities than there are. */
 static int mu_is_held(int quantity) {
     return quantity >= 0 && quantity < MU_QUANTITIES && MU_TABLE->quantities[quantity].cells > 0;
@@ -11,7 +16,7 @@ static int mu_is_held(int quantity) {
 static double mu_held_value(int quantity, double v, double y, double *bound) {
     double value = NAN;
     if (bound) *bound = NAN;
-    if (mu_is_held(quantity)) mu_values(MU_TABLE, quantity, 1, &v, &y, &value, bound, NULL);
+    if (mu_is_held(quantity)) mu_values(MU_TABLE, MU_SPRING, quantity, 1, &v, &y, &value, bound, NULL);
     return value;
 }
 
@@ -47,7 +52,9 @@ MUMACRO_API int mumacro_evaluate_as(int contact, int direction, double mu0, doub
     if (contact < 0 || contact >= MU_CONTACTS || direction < 0 || direction >= MU_DIRECTIONS)
         return mu_fill(rows, -1, MUMACRO_NO_CONTACT, out);
     if (contact == MU_BALL && direction == MU_NORMAL) return mu_fill(rows, -1, MUMACRO_NO_NORMAL_BALL, out);
-    mu_cases_as(MU_TABLE, contact, direction, 1, columns, strides, MU_ROWS, rows, 1, &source);
+    if (mu_table_of(contact, direction)->quantities[MU_MU_RATIO].cells == 0)
+        return mu_fill(rows, -1, MUMACRO_NO_CONTACT, out);
+    mu_cases_as(mu_table_of(contact, direction), contact, direction, 1, columns, strides, MU_ROWS, rows, 1, &source);
     bad = mu_first_bad(direction, &in);
     return mu_fill(rows, source, bad == 4 && direction == MU_NORMAL ? MUMACRO_LIFT_OFF : bad, out);
 }
@@ -88,7 +95,7 @@ MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y
 
 MUMACRO_API double mumacro_mu_macro(double mu0, double Fz, double k, double y0, double omega, double v0) {
     mumacro_case answer;
-    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, 0, &answer);
+    mu_one(MU_TABLE, MU_SPRING, mu0, Fz, k, y0, omega, v0, 0, &answer);
     return answer.mu_macro;
 }
 
@@ -100,7 +107,7 @@ MUMACRO_API void mumacro_mu_macros(int64_t n, const double *mu0, const double *F
         const int few = mu_few(n - i);
         double rows[MU_ROW_V_TILDE * MU_CHUNK];
         int8_t source[MU_CHUNK];
-        mu_cases(MU_TABLE, few, columns, strides, MU_ROW_V_TILDE, rows, MU_CHUNK, source);
+        mu_cases(MU_TABLE, MU_SPRING, few, columns, strides, MU_ROW_V_TILDE, rows, MU_CHUNK, source);
         memcpy(mu_macro + i, rows + MU_ROW_MU_MACRO * MU_CHUNK, (size_t)few * sizeof *rows);
         if (bound) memcpy(bound + i, rows + MU_ROW_ERROR_BOUND * MU_CHUNK, (size_t)few * sizeof *rows);
     }
@@ -113,8 +120,8 @@ MUMACRO_API int mumacro_evaluate_point(int quantity, double v_tilde, double y_ti
     if (out == NULL) return MUMACRO_NO_OUTPUT;
     *out = nothing;
     if (!mu_is_held(quantity)) return MUMACRO_NO_QUANTITY;
-    mu_values(MU_TABLE, quantity, 1, &v_tilde, &y_tilde, &out->value, &out->bound, &source);
-    mu_slopes_of_points(MU_TABLE, quantity, 1, &v_tilde, &y_tilde, slopes, 1);
+    mu_values(MU_TABLE, MU_SPRING, quantity, 1, &v_tilde, &y_tilde, &out->value, &out->bound, &source);
+    mu_slopes_of_points(MU_TABLE, MU_SPRING, quantity, 1, &v_tilde, &y_tilde, slopes, 1);
     out->slope_v = slopes[MU_SLOPE_V];
     out->slope_y = slopes[MU_SLOPE_Y];
     out->slope_v_bound = slopes[MU_SLOPE_V_BOUND];
@@ -126,7 +133,7 @@ MUMACRO_API int mumacro_evaluate_point(int quantity, double v_tilde, double y_ti
 MUMACRO_API int mumacro_values(int quantity, int64_t n, const double *v_tilde, const double *y_tilde, double *value,
                                double *bound) {
     if (!mu_is_held(quantity)) return MUMACRO_NO_QUANTITY;
-    mu_values(MU_TABLE, quantity, n, v_tilde, y_tilde, value, bound, NULL);
+    mu_values(MU_TABLE, MU_SPRING, quantity, n, v_tilde, y_tilde, value, bound, NULL);
     return 0;
 }
 

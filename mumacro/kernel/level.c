@@ -6,8 +6,8 @@
 
 static void mu_values_as(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
                          const double *y, double *value, double *bound, int8_t *source) {
-    if (contact == MU_SPRING && direction == MU_ACROSS) {
-        mu_values(data, quantity, n, v, y, value, bound, source);
+    if (direction == MU_ACROSS) {
+        mu_values(data, contact, quantity, n, v, y, value, bound, source);
         return;
     }
     for (int64_t i = 0; i < n; ++i) {
@@ -61,11 +61,11 @@ static void mu_intervals(const mumacro_data *data, int contact, int direction, i
     }
 }
 
-static void mu_places_of(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block,
-                         double *a, double *b) {
+static void mu_places_of(const mumacro_data *data, int contact, int64_t n, const double *v, const double *y,
+                         int8_t *block, double *a, double *b) {
     for (int64_t i = 0; i < n; ++i) {
-        const mu_place at = mu_locate(data, v[i], y[i]);
-        block[i] = (int8_t)at.block;
+        const mu_place at = mu_locate_as(data, contact, v[i], y[i]);
+        block[i] = (int8_t)MU_PLACE_OF(at.block);
         a[i] = at.a;
         b[i] = at.b;
     }
@@ -78,12 +78,16 @@ static void mu_border_scales(int piece, int64_t n, const double *y, double *of_n
     }
 }
 
-static void mu_forms(int quantity, int block, int64_t n, const double *v, const double *y, const double *eta,
-                     double *base, double *factor) {
-    const mu_form form = MU_QUANTITY[quantity].forms[block];
+static void mu_forms(int contact, int quantity, int place, int64_t n, const double *v, const double *y,
+                     const double *eta, double *base, double *factor) {
+    const int block = contact == MU_BALL ? MU_BALL_BLOCKS + place : place;
+    const mu_form form = mu_form_in(block, quantity);
     for (int64_t i = 0; i < n; ++i) {
         mu_place at = {block, v[i], y[i], 0.0, 0.0, 0.0, 0.0, 0.0};
-        if (block == MU_CORNER) at.phi = mu_normal_form_root(v[i], eta[i]);
+        if (mu_is_corner(block)) {
+            at.phi = mu_normal_form_root(v[i], eta[i]);
+            at.a = sqrt(MU_PI * v[i] / at.phi + 2.0 * at.phi * at.phi);
+        }
         base[i] = mu_base(form.base, &at);
         factor[i] = mu_factor(form.factor, &at);
     }
@@ -93,6 +97,13 @@ static void mu_cell_shares(int64_t n, const double *w, double *inside, double *a
     for (int64_t i = 0; i < n; ++i) {
         inside[i] = mu_edge_share(w[i]);
         at_border[i] = mu_border_share(w[i]);
+    }
+}
+
+static void mu_entries(int64_t n, const double *t, double *entry) {
+    for (int64_t i = 0; i < n; ++i) {
+        const mu_mask half = t[i] < 0.5 ? mu_all_whole(-1) : mu_all_whole(0);
+        entry[i] = mu_first(mu_entry(mu_all(t[i]), half, mu_all(sqrt(mu_max(1.0 - t[i], 0.0)))));
     }
 }
 
@@ -108,13 +119,14 @@ static void mu_outers(int64_t n, const double *r, double *out) {
 }
 
 static const mumacro_quantity *mu_about(int code) {
-    return code >= 0 && code < MU_QUANTITIES ? &MU_QUANTITY[code].about : NULL;
+    return code >= 0 && code < MU_QUANTITIES ? &MU_SPRING_QUANTITY[code].about : NULL;
 }
 
 static const mumacro_atlas MU_ATLAS = {
     MU_Y_STICK_LO, MU_Y_STICK_HI, MU_Y_CONT, MU_Y_MID, MU_Y_HIGH, MU_Y_TAIL, MU_S_CUT, MU_SIGMA_CUT, MU_RHO_MAX,
     MU_FAST_KAPPA, MU_ROUNDING, MU_OUTER_LOG_MAX, MU_CHARTS, MU_SOURCES, MU_PIECES, MU_QUANTITIES, MU_REGIMES,
     MU_OUTER_CELLS, MU_CHART, MU_PIECE, MU_SOURCE_NAME, MU_REGIME_NAME, MU_REGIME_OF_SOURCE,
+    MU_MIDDLE, MU_STEEPEST, MU_STEEPEST_Y, MU_SLOW, MU_FOLD_KNOT, MU_FOLD_SCALE, MU_BALL_CHARTS, MU_BALL_CHART,
 };
 
 #define MU_TEXT(x) #x
@@ -127,5 +139,5 @@ const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points,
     mu_cases_of_columns,
     mu_intervals, mu_ratio_alone, mu_one, mu_borders_as, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares,
-    mu_roots, mu_outers, mu_element_steps, mu_motions, mu_motion_cycle,
+    mu_entries, mu_roots, mu_outers, mu_element_steps, mu_motions, mu_motion_cycle,
 };

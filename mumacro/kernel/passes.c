@@ -9,7 +9,7 @@
 MU_INLINE int mu_few(int64_t n) { return n < MU_CHUNK ? (int)n : MU_CHUNK; }
 
 typedef struct {
-    double v[MU_CHUNK], y[MU_CHUNK]; /* 1 where a point is not common */
+    double v[MU_CHUNK], y[MU_CHUNK]; /* of a ball V, Y; 1 where a point is not common */
     double crit[MU_CHUNK], ln_y[MU_CHUNK], a[MU_CHUNK], b[MU_CHUNK], base[MU_CHUNK], factor[MU_CHUNK];
     double local[MU_CHUNK]; /* coordinate in the border's cell */
     double u[MU_CHUNK], w[MU_CHUNK]; /* coordinates in the cell */
@@ -18,7 +18,8 @@ typedef struct {
 } mu_chunk;
 
 /* Points into the chunk, the border's cell, v~crit. */
-MU_INLINE void mu_pass_borders(const mumacro_data *data, int n, const double *v, const double *y, mu_chunk *c) {
+MU_INLINE void mu_pass_borders(const mumacro_data *data, int contact, int n, const double *v, const double *y,
+                               mu_chunk *c) {
     const int rest = n % MU_LANES;
     for (int i = 0; i < n; i += MU_LANES) {
         double few[2][MU_LANES];
@@ -36,6 +37,10 @@ MU_INLINE void mu_pass_borders(const mumacro_data *data, int n, const double *v,
             speed = mu_load(v + i);
             amplitude = mu_load(y + i);
         }
+        if (contact == MU_BALL) {
+            speed = speed / MU_MIDDLE;
+            amplitude = amplitude / MU_MIDDLE;
+        }
         common = mu_is_common(speed, amplitude);
         speed = mu_select(common, speed, mu_all(1.0));
         amplitude = mu_select(common, amplitude, mu_all(1.0));
@@ -52,17 +57,22 @@ MU_INLINE void mu_pass_borders(const mumacro_data *data, int n, const double *v,
 }
 
 /* Blocks, coordinates and forms of mu~; returns how many points are left to be answered one by one. */
-MU_INLINE int mu_pass_places(int n, mu_chunk *c) {
+MU_INLINE int mu_pass_places(const mumacro_data *data, int contact, int n, mu_chunk *c) {
+    const double steepest = contact == MU_BALL ? mu_steepest_of(data) : 0.0;
     mu_mask left = mu_all_whole(0);
     int count = 0;
     for (int i = n; i % MU_LANES; ++i) c->crit[i] = 1.0;
     for (int i = 0; i < n; i += MU_LANES) {
         mu_mask known, block;
+        const mu_lanes v = mu_load(c->v + i), y = mu_load(c->y + i);
+        const mu_lanes crit = mu_load(c->crit + i), ln_y = mu_load(c->ln_y + i);
         const mu_places found =
-            mu_place_common(mu_load(c->v + i), mu_load(c->y + i), mu_load(c->crit + i), mu_load(c->ln_y + i));
+            contact == MU_BALL ? mu_place_ball(steepest, v, y, crit, ln_y) : mu_place_common(v, y, crit, ln_y);
         memcpy(&known, c->block + i, sizeof known);
         block = mu_select_whole(MU_WHERE(known == 0), found.block, known);
-        left |= MU_WHERE(block >= mu_all_whole(MU_FAST)) | MU_WHERE(block == mu_all_whole(MU_CORNER));
+        left |= MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_CORNER : (int)MU_CORNER)) |
+                MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_FAST : (int)MU_FAST)) |
+                MU_WHERE(block == mu_all_whole(MU_OTHER));
         mu_store(c->a + i, found.a);
         mu_store(c->b + i, found.b);
         mu_store(c->base + i, found.base);
@@ -104,7 +114,7 @@ MU_INLINE mu_lanes mu_look_up(const mu_column *column, mu_mask block) {
     int64_t row[MU_LANES];
     double found[MU_LANES];
     memcpy(row, &block, sizeof block);
-    for (int i = 0; i < MU_LANES; ++i) found[i] = (*column)[row[i] * MU_BLOCK_COLUMNS];
+    for (int i = 0; i < MU_LANES; ++i) found[i] = (*column)[MU_PLACE_OF(row[i]) * MU_BLOCK_COLUMNS];
     return mu_load(found);
 }
 #endif
@@ -169,39 +179,63 @@ MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c
 MU_INLINE mu_place mu_place_of(const mumacro_data *data, const mu_chunk *c, int i, int slope) {
     mu_place at = {(int)c->block[i], c->v[i], c->y[i], c->a[i], c->b[i], 0.0, c->crit[i], 0.0};
     if (at.block == MU_CORNER) mu_place_corner(&at);
+    else if (at.block == MU_B_CORNER) mu_place_ball_corner(&at);
     else if (slope) at.tilt = mu_border_slope(data->pieces, data->border + 8 * c->border[i], c->local[i], c->y[i]);
     return at;
 }
 
 /* What the passes leave: the corner, closed forms, zero and extreme inputs. */
-MU_INLINE int mu_is_left(int64_t block) { return block >= MU_FAST || block == MU_CORNER; }
+MU_INLINE int mu_is_left(int64_t block) {
+    return mu_is_ball(block) ? block == MU_B_FAST || block == MU_B_CORNER : block >= MU_FAST || block == MU_CORNER;
+}
 
-static mu_answer mu_answer_left(const mumacro_data *data, int quantity, const mu_chunk *c, int i, double v, double y) {
+/* What is told of where a ball's answer comes from. */
+static int mu_ball_source(int source) {
+    if (source == -1 || source == MU_NO_OSCILLATION || source == MU_STATIC_LIMIT) return source;
+    if (mu_is_ball(source)) return source == MU_B_FAST || mu_is_sliding_block(source) ? MU_BALL_SLIDES : MU_BALL_PARTLY;
+    return source == MU_FAST ? MU_BALL_SLIDES : MU_BALL_PARTLY;
+}
+
+static mu_answer mu_answer_left(const mumacro_data *data, int contact, int quantity, const mu_chunk *c, int i, double v,
+                                double y) {
+    mu_answer out;
+    if (contact == MU_BALL) {
+        if (c->block[i] == MU_B_CORNER) {
+            const mu_place at = mu_place_of(data, c, i, 0);
+            out = mu_in_block(data, quantity, &at);
+        } else {
+            out = mu_answer_at(data, MU_BALL, quantity, v / MU_MIDDLE, y / MU_MIDDLE);
+        }
+        out.source = mu_ball_source(out.source);
+        return out;
+    }
     if (c->block[i] == MU_CORNER) {
         const mu_place at = mu_place_of(data, c, i, 0);
         return mu_in_block(data, quantity, &at);
     }
-    return c->block[i] == MU_FAST ? MU_QUANTITY[quantity].fast(data, v, y) : mu_answer_at(data, quantity, v, y);
+    return c->block[i] == MU_FAST ? MU_SPRING_QUANTITY[quantity].fast(data, v, y)
+                                  : mu_answer_at(data, MU_SPRING, quantity, v, y);
 }
 
 /* mu~ at up to MU_CHUNK points, and where slope is not NULL, q and its derivatives; returns as mu_pass_places. */
-MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, mu_chunk *c,
-                                 mu_slope *slope, double *value, double *bound, int8_t *source) {
+MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, const double *v, const double *y,
+                                 mu_chunk *c, mu_slope *slope, double *value, double *bound, int8_t *source) {
     const double *errors = data->quantities[MU_MU_RATIO].errors;
     int left;
-    mu_pass_borders(data, n, v, y, c);
-    left = mu_pass_places(n, c);
+    mu_pass_borders(data, contact, n, v, y, c);
+    left = mu_pass_places(data, contact, n, c);
     mu_pass_cells(data, n, c);
     if (slope) mu_pass_slopes(data, n, c, slope);
     mu_pass_values(data, n, c, slope, value);
     for (int i = 0; bound && i < n; ++i) {
-        const double *error = errors + 2 * c->block[i];
+        const double *error = errors + 2 * MU_PLACE_OF(c->block[i]);
         bound[i] = fabs(c->factor[i]) * error[0] + error[1];
     }
-    for (int i = 0; source && i < n; ++i) source[i] = (int8_t)c->block[i];
+    for (int i = 0; source && i < n; ++i)
+        source[i] = (int8_t)(contact != MU_BALL ? c->block[i] : (int64_t)(c->block[i] < MU_B_RING ? MU_BALL_SLIDES : MU_BALL_PARTLY));
     for (int i = 0; left && i < n; ++i) {
         if (mu_is_left(c->block[i])) {
-            const mu_answer found = mu_answer_left(data, MU_MU_RATIO, c, i, v[i], y[i]);
+            const mu_answer found = mu_answer_left(data, contact, MU_MU_RATIO, c, i, v[i], y[i]);
             value[i] = found.value;
             if (bound) bound[i] = found.bound;
             if (source) source[i] = (int8_t)found.source;
@@ -211,16 +245,17 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int n, const double *
 }
 
 /* Another quantity at up to MU_CHUNK points. */
-static void mu_chunk_of_others(const mumacro_data *data, int quantity, int n, const double *v, const double *y,
-                               mu_chunk *c, double *value, double *bound, int8_t *source) {
-    mu_pass_borders(data, n, v, y, c);
-    mu_pass_places(n, c);
+MU_INLINE void mu_chunk_of_others(const mumacro_data *data, int contact, int quantity, int n, const double *v,
+                                  const double *y, mu_chunk *c, double *value, double *bound, int8_t *source) {
+    mu_pass_borders(data, contact, n, v, y, c);
+    mu_pass_places(data, contact, n, c);
     for (int i = 0; i < n; ++i) {
         mu_answer found;
-        if (mu_is_left(c->block[i])) found = mu_answer_left(data, quantity, c, i, v[i], y[i]);
+        if (mu_is_left(c->block[i])) found = mu_answer_left(data, contact, quantity, c, i, v[i], y[i]);
         else {
             const mu_place at = mu_place_of(data, c, i, 0);
             found = mu_in_block(data, quantity, &at);
+            if (contact == MU_BALL) found.source = mu_ball_source(found.source);
         }
         value[i] = found.value;
         if (bound) bound[i] = found.bound;
@@ -228,53 +263,63 @@ static void mu_chunk_of_others(const mumacro_data *data, int quantity, int n, co
     }
 }
 
-static void mu_values(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
-                      double *value, double *bound, int8_t *source) {
+MU_INLINE void mu_values_of(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
+                            const double *y, double *value, double *bound, int8_t *source) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const int few = mu_few(n - i);
         double *error = bound ? bound + i : NULL;
         int8_t *from = source ? source + i : NULL;
         mu_chunk c;
-        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, few, v + i, y + i, &c, NULL, value + i, error, from);
-        else mu_chunk_of_others(data, quantity, few, v + i, y + i, &c, value + i, error, from);
+        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, contact, few, v + i, y + i, &c, NULL, value + i, error, from);
+        else mu_chunk_of_others(data, contact, quantity, few, v + i, y + i, &c, value + i, error, from);
     }
+}
+
+/* The passes once for each contact, so that no point has to ask for it. */
+static void mu_values(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v, const double *y,
+                      double *value, double *bound, int8_t *source) {
+    if (contact == MU_BALL) mu_values_of(data, MU_BALL, quantity, n, v, y, value, bound, source);
+    else mu_values_of(data, MU_SPRING, quantity, n, v, y, value, bound, source);
 }
 
 static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
     double mu;
-    mu_values(data, MU_MU_RATIO, 1, &v, &y, &mu, NULL, NULL);
+    mu_values(data, MU_SPRING, MU_MU_RATIO, 1, &v, &y, &mu, NULL, NULL);
     return mu;
 }
 
-/* Slopes at a point of the chunk; slope: of mu_pass_slopes, which counts for mu~ only. */
-MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const mu_chunk *c, const mu_slope *slope, int i,
-                                 double v, double y) {
-    const mu_form form = MU_QUANTITY[quantity].forms[c->block[i] < MU_CHARTS ? c->block[i] : 0];
-    if (c->block[i] < MU_CHARTS && form.factor != MU_NOTHING) {
+/* Slopes at a point of the chunk; slope: of mu_pass_slopes for mu~, NULL for other quantities. */
+MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quantity, const mu_chunk *c,
+                                 const mu_slope *slope, int i, double v, double y) {
+    const int charted = contact == MU_BALL ? c->block[i] >= MU_B_LOW && c->block[i] < MU_B_END : c->block[i] < MU_CHARTS;
+    if (charted && mu_form_in((int)c->block[i], quantity).factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
-        if (quantity == MU_MU_RATIO && at.block != MU_CORNER) {
+        if (slope != NULL && !mu_is_corner(at.block)) {
             const mu_spot spot = {c->cell[i], c->u[i], c->w[i]};
             return mu_slopes_in_block(data, quantity, &at, spot, slope[i], c->base[i], c->factor[i]);
         }
         return mu_slopes_at_place(data, quantity, &at);
     }
-    return mu_slopes_at(data, quantity, v, y);
+    return contact == MU_BALL ? mu_slopes_at(data, MU_BALL, quantity, v / MU_MIDDLE, y / MU_MIDDLE)
+                              : mu_slopes_at(data, MU_SPRING, quantity, v, y);
 }
 
-static void mu_slopes_of_points(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
-                                double *out, int64_t stride) {
+MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
+                                    const double *y, double *out, int64_t stride) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const int few = mu_few(n - i);
         mu_chunk c;
         mu_slope slope[MU_CHUNK];
-        mu_pass_borders(data, few, v + i, y + i, &c);
-        mu_pass_places(few, &c);
+        const mu_slope *known = NULL;
+        mu_pass_borders(data, contact, few, v + i, y + i, &c);
+        mu_pass_places(data, contact, few, &c);
         if (quantity == MU_MU_RATIO) {
             mu_pass_cells(data, few, &c);
             mu_pass_slopes(data, few, &c, slope);
+            known = slope;
         }
         for (int j = 0; j < few; ++j) {
-            const mu_slopes found = mu_slopes_of(data, quantity, &c, slope, j, v[i + j], y[i + j]);
+            const mu_slopes found = mu_slopes_of(data, contact, quantity, &c, known, j, v[i + j], y[i + j]);
             out[MU_SLOPE_VALUE * stride + i + j] = found.value;
             out[MU_SLOPE_V * stride + i + j] = found.along_v;
             out[MU_SLOPE_Y * stride + i + j] = found.along_y;
@@ -282,4 +327,10 @@ static void mu_slopes_of_points(const mumacro_data *data, int quantity, int64_t 
             out[MU_SLOPE_Y_BOUND * stride + i + j] = found.bound_y;
         }
     }
+}
+
+static void mu_slopes_of_points(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
+                                const double *y, double *out, int64_t stride) {
+    if (contact == MU_BALL) mu_slopes_of_contact(data, MU_BALL, quantity, n, v, y, out, stride);
+    else mu_slopes_of_contact(data, MU_SPRING, quantity, n, v, y, out, stride);
 }

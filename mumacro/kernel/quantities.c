@@ -8,7 +8,13 @@
  * the table's error; and what is known where there is no table. */
 
 /* base */
-enum { MU_NO_BASE, MU_ONE, MU_OUTER, MU_OUTER_LAYER, MU_FIRST_POWER };
+enum {
+    MU_NO_BASE, MU_ONE, MU_OUTER, MU_OUTER_LAYER, MU_FIRST_POWER,
+    MU_ONE_LN_V,     /* 1 + 3/16 y~^2 ln v~ */
+    MU_ONE_LN_Y,     /* 1 + 3/8 y~^2 ln y~ */
+    MU_POWER_LN_V,   /* -9/16 v~ y~^2 ln v~ */
+    MU_BALL_POWER    /* MU_FIRST_POWER of a ball */
+};
 /* factor; in brackets what it is */
 enum {
     MU_NOTHING,      /* 0 */
@@ -24,7 +30,9 @@ enum {
     MU_SLIP_POWER,   /* v~ y~^2 / (1 + v~^2) */
     MU_SWEPT_POWER,  /* y~^2 / sqrt(v~^2 + y~^2) */
     MU_PHI,          /* phi, the root of the corner's normal form */
-    MU_V_OVER_PHI    /* v~/phi */
+    MU_V_OVER_PHI,   /* v~/phi */
+    MU_Y3,           /* y~^3 */
+    MU_PHI_R         /* phi R */
 };
 
 typedef struct {
@@ -44,7 +52,7 @@ typedef struct {
 typedef struct {
     mumacro_quantity about;
     double most; /* end of the range that starts at 0 */
-    mu_form forms[MU_CHARTS];
+    mu_form forms[MU_BALL_CHARTS]; /* by block; one spring has two less */
     double (*slack)(const mumacro_data *data, const mu_place *at, double value, double factor);
     mu_answer (*limit)(double v, double y);
     mu_answer (*fast)(const mumacro_data *data, double v, double y);
@@ -56,9 +64,10 @@ typedef struct {
 /* mu~ of a block as mu_place_common has it. */
 static double mu_ratio_factor(const mu_place *at) {
     const mu_mask yes = mu_all_whole(-1), no = mu_all_whole(0);
-    const int low = at->block == MU_C_LOW || at->block == MU_S_LOW;
-    const mu_mask sliding = at->block < MU_S_LOW ? yes : no, small = low ? yes : no;
-    const mu_mask lowest = at->block == MU_S_LOW ? yes : no;
+    const int deep = at->block == MU_S_LOW || at->block == MU_B_S_LOW || at->block == MU_B_RING || at->block == MU_B_SLOW;
+    const int low = at->block == MU_C_LOW || at->block == MU_B_LOW || deep;
+    const mu_mask sliding = mu_is_sliding_block(at->block) && !deep ? yes : no, small = low ? yes : no;
+    const mu_mask lowest = deep ? yes : no;
     const mu_lanes v = mu_all(at->v), y = mu_all(at->y), share = mu_share(v, y, sliding, small);
     mu_lanes base, factor;
     mu_ratio_form(v, y, sliding, small, lowest, share, mu_sqrt(v * v * share), &base, &factor);
@@ -92,6 +101,10 @@ static double mu_factor(int factor, const mu_place *at) {
         return at->phi;
     case MU_V_OVER_PHI:
         return v / at->phi;
+    case MU_Y3:
+        return y * y * y;
+    case MU_PHI_R:
+        return at->phi * at->a;
     default:
         return 0.0;
     }
@@ -114,6 +127,14 @@ static double mu_base(int base, const mu_place *at) {
         return mu_outer_layer(at->v, at->y);
     case MU_FIRST_POWER:
         return mu_power_expansion(at->v, at->y).first;
+    case MU_BALL_POWER:
+        return MU_MIDDLE * mu_power_expansion(at->v, at->y).first;
+    case MU_ONE_LN_V:
+        return mu_fma1(at->y * at->y, 0.1875 * mu_log1(at->v), 1.0);
+    case MU_ONE_LN_Y:
+        return mu_fma1(at->y * at->y, 0.375 * mu_log1(at->y), 1.0);
+    case MU_POWER_LN_V:
+        return -0.5625 * at->v * at->y * at->y * mu_log1(at->v);
     default:
         return 0.0;
     }
@@ -126,7 +147,12 @@ typedef struct {
 
 static void mu_base_slopes(int base, const mu_place *at, mu_form_slopes *out) {
     const double v = at->v, y = at->y, factor = v / y;
-    if (base == MU_FIRST_POWER) {
+    if (base == MU_ONE_LN_V) {
+        out->base_v = 0.1875 * y * y;
+        out->base_y = 0.375 * y * y * mu_log1(v);
+    } else if (base == MU_ONE_LN_Y) {
+        out->base_y = 0.375 * y * y * (1.0 + 2.0 * mu_log1(y));
+    } else if (base == MU_FIRST_POWER) {
         const mu_power_terms power = mu_power_expansion(v, y);
         out->base_v = power.first_v;
         out->base_y = power.first_y;
@@ -146,6 +172,7 @@ MU_INLINE mu_form_slopes mu_slopes_of_form(mu_form form, const mu_place *at, con
     static const signed char powers[][2] = {
         /* twice the powers of v~ and y~ in each factor, in their order */
         {0, 0}, {0, 0}, {0, 2}, {2, 4}, {2, -2}, {4, -2}, {0, -1}, {0, 4}, {0, 4}, {0, 0}, {2, 4}, {0, 2}, {0, 0}, {2, 0},
+        {0, 6}, {0, 0},
     };
     const signed char *power = powers[(int)form.factor];
     mu_form_slopes out = {0.0, 0.0, 0.5 * power[0], 0.5 * power[1]};
@@ -173,6 +200,10 @@ MU_INLINE mu_form_slopes mu_slopes_of_form(mu_form form, const mu_place *at, con
     case MU_V_OVER_PHI:
         out.factor_v -= turn->phi_v;
         out.factor_y -= turn->phi_y;
+        break;
+    case MU_PHI_R:
+        out.factor_v += turn->phi_v + turn->a_v / at->a;
+        out.factor_y += turn->phi_y + turn->a_y / at->a;
         break;
     default:
         break;

@@ -113,15 +113,19 @@ static double mu_corner_digit(const mu_place *at) {
     return digit < 1e-3 ? digit : (mu_normal_form_root(at->v, eta - MU_ROUNDING) - at->phi) / at->phi;
 }
 
+MU_INLINE int mu_is_tail(int block) {
+    return block == MU_C_TAIL || block == MU_S_TAIL || block == MU_B_TAIL || block == MU_B_S_TAIL;
+}
+
 static double mu_ratio_slack(const mumacro_data *data, const mu_place *at, double value, double factor) {
     double terms;
     (void)data;
     if (at->block == MU_CORNER) return MU_ROUNDING * at->phi + at->phi * mu_corner_digit(at);
     /* that of common charts is in the table's errors */
-    if (at->block != MU_C_TAIL && at->block != MU_S_TAIL) return 0.0;
+    if (!mu_is_tail(at->block)) return 0.0;
     /* the terms that are added up: the outer solution, and the layer's logarithm */
     terms = value + (factor > 0.0 ? factor * fabs(mu_log1(at->v) - 0.5 * mu_log1(at->y)) : 0.0);
-    return 8.0 * MU_ROUNDING * terms + (at->block == MU_S_TAIL ? 16.0 * MU_ROUNDING * factor : 0.0) + MU_DENORMAL;
+    return 8.0 * MU_ROUNDING * terms + (mu_is_sliding_block(at->block) ? 0.0 : 16.0 * MU_ROUNDING * factor) + MU_DENORMAL;
 }
 
 static double mu_power_slack(const mumacro_data *data, const mu_place *at, double value, double factor) {
@@ -155,7 +159,7 @@ static double mu_stick_slack(const mumacro_data *data, const mu_place *at, doubl
 
 /* --- the records ------------------------------------------------------------------------------------ */
 
-static const mu_quantity MU_QUANTITY[MU_QUANTITIES] = {
+static const mu_quantity MU_SPRING_QUANTITY[MU_QUANTITIES] = {
     {{"mu_ratio", "value", "macroscopic over Coulomb friction coefficient", 1, 1},
      1.0,
      {{MU_ONE, MU_SLIP_DEFICIT}, {MU_NO_BASE, MU_COSINE}, {MU_NO_BASE, MU_COSINE}, {MU_NO_BASE, MU_COSINE},

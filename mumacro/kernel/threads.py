@@ -18,9 +18,15 @@ from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRow
 
 SLICE = 16_384  # points of a slice: its arrays stay in the second cache
 FEW = 65_536  # points that one thread evaluates before a second one has started
-COST = 64  # of a ball, about, in springs
+COST = 64  # of a ball that is shaken along, about, in springs
 INTERVAL = 64  # of an interval of k, about, in cases
 _KERNEL = kernels[-1]
+
+
+def _cost(kind: tuple[int, int]) -> int:
+    """Of a point of a kind, about, in springs that are shaken across."""
+    contact, direction = kind
+    return COST if direction else 1 + contact
 
 
 @functools.cache
@@ -87,7 +93,7 @@ def values(
             data, quantity, v[part], y[part], value[part], bound[part], source[part], kind
         )
 
-    share_out(v.size, threads, work, COST if any(kind) else 1)
+    share_out(v.size, threads, work, _cost(kind))
     return value, bound, source
 
 
@@ -102,13 +108,15 @@ def alone(quantity: int, data: Data, v: Array, y: Array, threads: int | None) ->
     return value
 
 
-def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int | None) -> SlopeRows:
+def slopes(
+    quantity: int, data: Data, v: Array, y: Array, threads: int | None, contact: int = 0
+) -> SlopeRows:
     """Any quantity at (n,) points with its slopes and their bounds."""
     rows = SlopeRows.empty(v.size)
     share_out(
         v.size,
         threads,
-        lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start),
+        lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start, contact),
     )
     return rows
 
@@ -127,7 +135,7 @@ def cases(
         answers.source.size,
         threads,
         lambda part: _KERNEL.cases(data, columns, answers, part, kind),
-        COST if any(kind) else 1,
+        _cost(kind),
     )
     return answers
 
@@ -147,6 +155,6 @@ def intervals(
         high.size,
         threads,
         lambda part: _KERNEL.intervals(data, columns, high, rows, part, kind),
-        INTERVAL * (COST if any(kind) else 1),
+        INTERVAL * _cost(kind),
     )
     return rows

@@ -1,8 +1,8 @@
 """The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of each.
 
-The list of blocks, of pieces of the border and of quantities is in ``kernel/atlas.c`` and
-``kernel/records.c``; this module reads it.  What a table file calls a coordinate is defined here,
-with both ways between a chart and (v~, y~).
+The list of blocks, of pieces of the border and of quantities is in ``kernel/atlas.c``,
+``kernel/ball_atlas.c`` and ``kernel/records.c``; this module reads it.  What a table file calls a
+coordinate is defined here, with both ways between a chart and (v~, y~).
 
 Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the
 drive is v~ mu~. The stick fraction f is the share of the period during which the contact sticks.
@@ -27,6 +27,11 @@ S_CUT, SIGMA_CUT = _ATLAS.s_cut, _ATLAS.sigma_cut
 RHO_MAX, FAST_KAPPA = _ATLAS.rho_max, _ATLAS.fast_kappa
 ROUNDING = _ATLAS.rounding  # of coordinates and sums, relative to the scale of the value
 SQRT2 = math.sqrt(2.0)
+#: load of a ball's middle spring over the mean; the steepest ray v~/y~ that touches the border,
+#: y~ and v~ where it does
+MIDDLE, STEEPEST, STEEPEST_Y = _ATLAS.middle, _ATLAS.steepest, _ATLAS.steepest_y
+SLOW = _ATLAS.slow
+_KNOT, _SCALE = _ATLAS.fold_knot, _ATLAS.fold_scale
 REGIMES = tuple(_text(_ATLAS.regime_name[i]) for i in range(_ATLAS.regimes))
 CONTINUOUS, STICK_SLIP, STATIC = (
     REGIMES.index(name) for name in ("continuous", "stick_slip", "static")
@@ -44,7 +49,16 @@ COORDINATES = {
     "y": "dimensionless amplitude y_tilde",
     "radius": "distance R from the corner y_tilde = 1, v_tilde = 0 in normal-form coordinates",
     "angle": "polar angle of the normal form, 2 psi/pi",
+    "y_root": "sixth root of y_tilde",
+    "v_root": "sixth root of v_tilde over its largest value here, 0.43263",
+    "ray_squared": "(0.33517 y_tilde/v_tilde)^2",
+    "ray_root": "x with v_tilde/y_tilde = 0.33517 sin^2(pi x^3/2)",
+    "way_root": "x with y_tilde = sin^2(pi x^3/2) times that at which the ray enters stick-slip",
+    "s_root": "x with v_tilde = v_tilde_crit sin^2(pi x^3/2)",
+    "angle_root": "x with 1 - x^3 = 2 psi/pi, the polar angle of the normal form",
 }
+#: whose cells have an edge in the middle, where evaluation changes its formula
+_FOLDED = ("ray_root", "way_root", "s_root")
 
 
 @dataclass(frozen=True)
@@ -54,7 +68,8 @@ class Axis:
     Evaluation uses a coordinate that costs less than the file's where the two differ: sigma for s
     and tan(psi/2) for the angle.  sigma is sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho =
     v~/v~crit = 1/2 on: both square-root edges become smooth for one square root, and the knot
-    between the halves is an edge of cells.
+    between the halves is an edge of cells.  A folded coordinate has the sixth root in place of the
+    square root at its lower end, and the second half scaled to the length of the first.
     """
 
     name: str
@@ -62,14 +77,31 @@ class Axis:
     high: float
 
     @property
+    def knotted(self) -> bool:
+        """Whether the middle must be an edge of cells."""
+        return self.name == "s" or self.name in _FOLDED
+
+    @property
+    def edge(self) -> tuple[float, float]:
+        """(end, scale) of evaluation's coordinate, end - scale sqrt(1 - x) next to x = 1."""
+        return (2.0 * _KNOT, _SCALE) if self.name in _FOLDED else (SQRT2, 1.0)
+
+    @property
     def span(self) -> tuple[float, float]:
         """The range of evaluation's coordinate; along s the cells cover all of [0, sqrt 2]."""
-        return (0.0, SQRT2) if self.name == "s" else (self.low, self.high)
+        return (0.0, self.edge[0]) if self.knotted else (self.low, self.high)
 
     def to_file(self, x: Array) -> Array:
         """The table file's coordinate at evaluation's ``x`` (n,)."""
         if self.name == "angle":
             return np.asarray(4.0 / np.pi * np.arctan(x), dtype=np.float64)
+        if self.name == "angle_root":
+            return np.asarray(np.cbrt(4.0 / np.pi * np.arctan(x**3)), dtype=np.float64)
+        if self.name in _FOLDED:
+            low = np.arcsin(np.minimum(x, _KNOT) ** 3)
+            rest = np.clip((2.0 * _KNOT - x) / _SCALE, 0.0, math.sqrt(0.5))
+            s = 2.0 / math.pi * np.where(x <= _KNOT, low, 0.5 * math.pi - np.arcsin(rest))
+            return np.asarray(np.cbrt(s), dtype=np.float64)
         if self.name != "s":
             return x
         low = np.arcsin(np.minimum(x, math.sqrt(0.5)))
@@ -80,6 +112,12 @@ class Axis:
         """Evaluation's coordinate at the table file's ``x`` (n,)."""
         if self.name == "angle":
             return np.asarray(np.tan(0.25 * np.pi * x), dtype=np.float64)
+        if self.name == "angle_root":
+            return np.asarray(np.cbrt(np.tan(0.25 * np.pi * x**3)), dtype=np.float64)
+        if self.name in _FOLDED:
+            angle = 0.5 * np.pi * x**3
+            high = 2.0 * _KNOT - _SCALE * np.cos(angle)
+            return np.where(angle <= 0.25 * np.pi, np.cbrt(np.sin(angle)), high)
         if self.name != "s":
             return x
         return np.where(x <= 0.5, np.sin(0.5 * np.pi * x), SQRT2 - np.cos(0.5 * np.pi * x))
@@ -90,7 +128,16 @@ class Axis:
             return np.asarray(np.sqrt(x), dtype=np.float64)
         if self.name == "ln_y":
             return np.asarray(np.exp(x), dtype=np.float64)
+        if self.name == "y_root":
+            return np.asarray(x**6, dtype=np.float64)
         return np.asarray(1.0 / x if self.name == "inverse_y" else x.copy(), dtype=np.float64)
+
+
+def _cosine(share: Array, rest: Array, name: str) -> Array:
+    """cos(pi/2 share), by the sine of the rest where that is what is known."""
+    return np.asarray(
+        np.cos(0.5 * math.pi * share) if name == "angle" else np.sin(0.5 * math.pi * rest)
+    )
 
 
 @dataclass(frozen=True)
@@ -135,10 +182,21 @@ class Chart:
         """
         a, b = np.broadcast_arrays(a, b)
         if self.a.name == "radius":
-            phi = a * np.sin(0.5 * math.pi * b) / SQRT2
-            s0 = SQRT2 * a * np.cos(0.5 * math.pi * b)
+            share = b if self.b.name == "angle" else 1.0 - b**3
+            rest = 1.0 - b if self.b.name == "angle" else b**3
+            phi = a * np.sin(0.5 * math.pi * share) / SQRT2
+            # the sine of what is left keeps its digits next to the static limit
+            s0 = SQRT2 * a * _cosine(share, rest, self.b.name)
             eta = 0.25 * s0 * s0 - 0.5 * phi * phi
             return phi * s0 * s0 / (2.0 * math.pi), 1.0 + eta, eta
+        if self.a.name == "v_root":
+            v = SLOW * a**6
+            y = np.sqrt(b) * v / STEEPEST
+            return v, y, y - 1.0
+        if self.a.name == "ray_root":
+            ray = np.sin(0.5 * math.pi * a**3) ** 2
+            y = kernels[-1].entries(ray) * np.sin(0.5 * math.pi * b**3) ** 2
+            return STEEPEST * ray * y, y, y - 1.0
         y = self.a.amplitude(a)
         if self.b.name == "v_squared_share":
             v = np.sqrt(b / (1.0 - b))
@@ -146,6 +204,8 @@ class Chart:
             v = np.exp(b) * border_of(y)
         elif self.b.name == "ln_kappa":
             v = np.exp(b) * np.sqrt(y)
+        elif self.b.name == "s_root":
+            v = border_of(y) * np.sin(0.5 * math.pi * b**3) ** 2
         else:
             v = border_of(y) * np.sin(0.5 * math.pi * b) ** 2
         return v, y, y - 1.0
@@ -164,11 +224,21 @@ def _quantity(q: Any) -> Quantity:
     return Quantity(*texts, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
+def _charts(listed: Any, count: int) -> tuple[Chart, ...]:
+    return tuple(
+        Chart(
+            _text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding
+        )
+        for c in (listed[i] for i in range(count))
+    )
+
+
 #: a block's place in this list is the source code of its values
-CHARTS = tuple(
-    Chart(_text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding)
-    for c in (_ATLAS.chart[i] for i in range(_ATLAS.charts))
-)
+CHARTS = _charts(_ATLAS.chart, _ATLAS.charts)
+#: the blocks of a ball, of v~/1.5 and y~/1.5
+BALL_CHARTS = _charts(_ATLAS.ball_chart, _ATLAS.ball_charts)
+#: by code of the contact
+CHARTS_OF = (CHARTS, BALL_CHARTS)
 BLOCK_NAMES = tuple(chart.name for chart in CHARTS)
 #: v~crit in pieces: name, coordinate, what its nodes hold
 BORDER_PIECES = tuple(

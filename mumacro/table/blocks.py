@@ -61,6 +61,8 @@ class Table:
     error_estimate: Array
     v_tilde_crit: Array
     attributes: dict[str, Any] = field(default_factory=dict)
+    #: the blocks of a ball in the order of ``atlas.BALL_CHARTS``; none in an older table
+    ball: list[Block] = field(default_factory=list)
 
     @property
     def quantities(self) -> list[str]:

@@ -1,14 +1,16 @@
-"""The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, checked on
+"""The table file, format 4: netCDF-4 with CF-1.11 conventions; written atomically, checked on
 reading.
 
 docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
-the blocks inside. The netCDF library writes, and is not thread-safe: a lock is held while it works.
+the blocks inside, those of a ball in ``border/ball``, which a file of format 3 has not. The netCDF
+library writes, and is not thread-safe: a lock is held while it works.
 For reading see ``mumacro.table.hdf5``.
 """
 
 import hashlib
 import json
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +23,14 @@ from mumacro.table.atomic import write_whole
 from mumacro.table.blocks import BY_NAME, Block, BorderPiece, Table, names_in
 from mumacro.table.polynomials import nodes
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
+WITHOUT_BALL = 3  # the version of a file that has no ball
 # More is refused before memory is taken; of the largest table that the builder makes:
 MOST_BYTES = 16 * 2**20  # of a file: 425 kB
 MOST_NUMBERS = 200_000  # of a variable: 14,641
 MOST_NODES = 1024  # along an axis: 91; preparing cells takes matrices of its square
 MOST_CELLS = 1024  # along an axis: 156
-MOST_PATCHES = 8192  # cells of a block: 646, of 512 bytes each and quantity
+MOST_PATCHES = 8192  # cells of a block: 1833, of 512 bytes each and quantity
 
 _netcdf_lock = threading.Lock()
 
@@ -48,10 +51,23 @@ _PLAIN = {
         ("y_tilde",),
     ),
 }
+BALL = "ball_"  # before the names of attributes at the root that tell of a ball
 #: the statistics of bound over error in the attribute ``verified_bound_over_error``
 RATIOS = ("least", "median", "largest")
+#: quantities of a ball whose slopes a table gives
+BALL_SLOPES = ("mu_ratio",)
 CELL_AXES = ("quantity", "cell", "derivative")
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
+
+
+def _version(table: Table) -> int:
+    return FORMAT_VERSION if table.ball else WITHOUT_BALL
+
+
+def _contacts(table: Table) -> list[tuple[Sequence[atlas.Chart], list[Block]]]:
+    """The charts and blocks of every contact that a table has."""
+    found: list[tuple[Sequence[atlas.Chart], list[Block]]] = [(atlas.CHARTS, table.blocks)]
+    return [*found, (atlas.BALL_CHARTS, table.ball)] if table.ball else found
 
 
 def _digest(table: Table) -> str:
@@ -68,21 +84,22 @@ def _digest(table: Table) -> str:
                 else repr(part).encode()
             )
 
-    put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
+    put("mumacro", _version(table), float(table.attributes["tolerance"]))
     put(*(getattr(table, name) for name in _PLAIN))
     for geometry, piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
         put(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
-    for chart, block in zip(atlas.CHARTS, table.blocks, strict=True):
-        put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
-        put(*(block.errors[name] for name in table.quantities), block.a, block.b)
-        put(
-            *(
-                part[name]
-                for part in (block.nodes, block.cell_errors)
-                for name in table.quantities
-                if name in part
+    for charts, blocks in _contacts(table):
+        for chart, block in zip(charts, blocks, strict=True):
+            put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
+            put(*(block.errors[name] for name in table.quantities), block.a, block.b)
+            put(
+                *(
+                    part[name]
+                    for part in (block.nodes, block.cell_errors)
+                    for name in table.quantities
+                    if name in part
+                )
             )
-        )
     return h.hexdigest()
 
 
@@ -107,20 +124,18 @@ def _put(
     variable[...] = data
 
 
-def _put_cell_errors(group: Any, table: Table) -> None:
+def _put_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> None:
     """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and
     a dimension too."""
 
     def rows(block: Block, name: str) -> Array:
         return (
             block.cell_errors[name]
-            if name in block.nodes
+            if name in block.cell_errors
             else np.zeros((block.cells[0] * block.cells[1], 3))
         )
 
-    errors = np.stack(
-        [np.concatenate([rows(block, name) for block in table.blocks]) for name in table.quantities]
-    )
+    errors = np.stack([np.concatenate([rows(block, name) for block in blocks]) for name in names])
     for axis, size in zip(CELL_AXES, errors.shape, strict=True):
         group.createDimension(axis, size)
     long_name = (
@@ -158,23 +173,35 @@ def _fill(root: Any, table: Table) -> None:
         )
     # inside the border, which they are fitted to: with a second group at the root the CF checker
     # looks for "time"
-    blocks = border.createGroup("blocks")
-    if any(block.cell_errors for block in table.blocks):
-        _put_cell_errors(blocks, table)
-    for chart, block in zip(atlas.CHARTS, table.blocks, strict=True):
-        group = blocks.createGroup(chart.name)
+    _fill_blocks(border.createGroup("blocks"), table, atlas.CHARTS, table.blocks, table.quantities)
+    if table.ball:
+        _fill_blocks(border.createGroup("ball"), table, atlas.BALL_CHARTS, table.ball, BALL_SLOPES)
+
+
+def _fill_blocks(
+    group: Any,
+    table: Table,
+    charts: Sequence[atlas.Chart],
+    blocks: list[Block],
+    sloped: Sequence[str],
+) -> None:
+    """The blocks of a contact, with errors in every cell of the quantities that are ``sloped``."""
+    if any(block.cell_errors for block in blocks):
+        _put_cell_errors(group, blocks, sloped)
+    for chart, block in zip(charts, blocks, strict=True):
+        one = group.createGroup(chart.name)
         axes = (chart.a.name, chart.b.name)
-        _put(group, axes[0], block.a, atlas.COORDINATES[axes[0]])
-        _put(group, axes[1], block.b, atlas.COORDINATES[axes[1]])
+        _put(one, axes[0], block.a, atlas.COORDINATES[axes[0]])
+        _put(one, axes[1], block.b, atlas.COORDINATES[axes[1]])
         for quantity in table.held(chart):
             meaning = (
                 chart.quantity
                 if quantity.name == "mu_ratio"
                 else f"{quantity.meaning}, scaled for this block"
             )
-            _put(group, quantity.variable, block.nodes[quantity.name], meaning, axes)
+            _put(one, quantity.variable, block.nodes[quantity.name], meaning, axes)
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
-        group.setncatts(
+        one.setncatts(
             {
                 **_geometry(chart),
                 "cells": np.array(block.cells, dtype=np.int32),
@@ -195,7 +222,7 @@ def write_table(table: Table, path: str | Path) -> str:
     import tempfile  # only writing needs it: reading a table starts sooner without
 
     path = Path(path)
-    table.attributes["format_version"] = np.int32(FORMAT_VERSION)
+    table.attributes["format_version"] = np.int32(_version(table))
     table.attributes["content_sha256"] = _digest(table)
     try:
         image = _image(table)
@@ -276,17 +303,15 @@ def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
         )
 
 
-def _check_distribution(root: hdf5.Group, attributes: dict[str, Any]) -> None:
+def _check_distribution(root: hdf5.Group, attributes: dict[str, Any], of: str) -> None:
     """Refuse a damaged distribution of errors; older tables have no distribution."""
-    if "verified_quantities" not in attributes:
+    if f"{of}verified_quantities" not in attributes:
         return
-    shares, names = (
-        root.attribute("verified_quantiles"),
-        str(attributes["verified_quantities"]).split(),
-    )
+    shares = root.attribute(f"{of}verified_quantiles")
+    names = str(attributes[f"{of}verified_quantities"]).split()
     for name, count in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
-        if np.any(root.numbers(f"verified_{name}", count * len(names)) < 0.0):
-            raise root.refuse(f"attribute 'verified_{name}' has a negative number")
+        if np.any(root.numbers(f"{of}verified_{name}", count * len(names)) < 0.0):
+            raise root.refuse(f"attribute '{of}verified_{name}' has a negative number")
 
 
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
@@ -296,13 +321,20 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
             "not a mumacro table: format_version, tolerance or content_sha256 is missing"
         )
     version = root.attribute("format_version")
-    if not np.array_equal(version, FORMAT_VERSION):
-        raise root.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
+    if not any(np.array_equal(version, known) for known in (WITHOUT_BALL, FORMAT_VERSION)):
+        raise root.refuse(
+            f"format version {version}, this program reads {WITHOUT_BALL} and {FORMAT_VERSION}"
+        )
     attributes = root.attributes()
-    for name in ("tolerance", *(key for key in attributes if key.startswith("verified_max_"))):
+    for name in (
+        "tolerance",
+        *([f"{BALL}tolerance"] if np.array_equal(version, FORMAT_VERSION) else []),
+        *(key for key in attributes if key.removeprefix(BALL).startswith("verified_max_")),
+    ):
         if not root.numbers(name, 1)[0] > 0.0:
             raise root.refuse(f"attribute {name!r} must be > 0, got {attributes[name]!r}")
-    _check_distribution(root, attributes)
+    for of in ("", BALL):
+        _check_distribution(root, attributes, of)
     if not isinstance(attributes["content_sha256"], str):
         raise root.refuse("attribute 'content_sha256' is no text")
     try:
@@ -348,7 +380,7 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
     return block
 
 
-def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: list[str]) -> None:
+def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str]) -> None:
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
     stored = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
     for name, errors in zip(names, _errors(group, "cell_errors", stored), strict=True):
@@ -367,13 +399,18 @@ def _read(root: hdf5.Group) -> Table:
     ]
     blocks = [_block(below_blocks.group(chart.name), chart, names) for chart in atlas.CHARTS]
     _add_cell_errors(below_blocks, blocks, names)
+    ball = []
+    if np.array_equal(attributes["format_version"], FORMAT_VERSION):
+        below_ball = below_border.group("ball")
+        ball = [_block(below_ball.group(chart.name), chart, names) for chart in atlas.BALL_CHARTS]
+        _add_cell_errors(below_ball, ball, BALL_SLOPES)
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         shape = tuple(plain[axis].size for axis in axes) if axes else None
         plain[name] = root.array(name, MOST_NUMBERS, shape)
         if not axes and plain[name].ndim != 1:
             raise root.refuse(f"variable {name!r} in / is no axis")
-    return Table(border=border, blocks=blocks, attributes=attributes, **plain)
+    return Table(border=border, blocks=blocks, attributes=attributes, ball=ball, **plain)
 
 
 def read_table(path: str | Path) -> Table:
@@ -423,16 +460,19 @@ def read_image(path: str | Path) -> bytes:
         raise TableError(path, f"cannot be read: {error.strerror or error}") from error
 
 
-def error_distribution(table: Table) -> dict[str, dict[str, float]]:
+def error_distribution(table: Table, of: str = "") -> dict[str, dict[str, float]]:
     """By quantity: the error that a share of the verified points does not exceed ("0.5" to "1"),
-    and the :data:`RATIOS` of bound over error; empty for a table that does not state them."""
+    and the :data:`RATIOS` of bound over error; empty for a table that does not state them.
+
+    ``of``: :data:`BALL` for those of a ball.
+    """
     attributes = table.attributes
-    names = str(attributes.get("verified_quantities", "")).split()
+    names = str(attributes.get(f"{of}verified_quantities", "")).split()
     if not names:
         return {}
-    heads = [f"{share:g}" for share in attributes["verified_quantiles"]]
-    errors = np.reshape(attributes["verified_error_quantiles"], (len(names), -1)).tolist()
-    ratios = np.reshape(attributes["verified_bound_over_error"], (len(names), -1)).tolist()
+    heads = [f"{share:g}" for share in attributes[f"{of}verified_quantiles"]]
+    errors = np.reshape(attributes[f"{of}verified_error_quantiles"], (len(names), -1)).tolist()
+    ratios = np.reshape(attributes[f"{of}verified_bound_over_error"], (len(names), -1)).tolist()
     return {
         name: dict(zip(heads, error, strict=True)) | dict(zip(RATIOS, ratio, strict=True))
         for name, error, ratio in zip(names, errors, ratios, strict=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import BLOCK_ROW, PIECE_ROW, Data, kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import Axis
+from mumacro.table.atlas import Axis, Chart
 from mumacro.table.blocks import Block, BorderPiece
 
 WIDTH = 8  # coefficients of a cell along each coordinate: one vector
@@ -159,10 +159,10 @@ def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
     return np.concatenate(coefficients), _as_numbers(rows)
 
 
-def block_rows(blocks: Sequence[Block]) -> Array:
+def block_rows(blocks: Sequence[Block], charts: Sequence[Chart] = atlas.CHARTS) -> Array:
     """The geometry of the blocks for evaluation: a row for each source, and one for none."""
     rows, first = np.zeros(len(atlas.SOURCES) + 1, BLOCK_ROW), 0
-    for row, chart, block in zip(rows, atlas.CHARTS, blocks, strict=False):
+    for row, chart, block in zip(rows, charts, blocks, strict=False):
         na, nb = block.cells
         row["first"], row["cells_b"] = first, nb
         row["offset_a"], row["step_a"] = _count(chart.a, na)
@@ -176,12 +176,14 @@ def _as_numbers(rows: NDArray[np.void]) -> Array:
     return rows.view(np.float64).reshape(len(rows), -1)
 
 
-def quantity_cells(blocks: Sequence[Block], code: int) -> tuple[Array, Array, Array]:
+def quantity_cells(
+    blocks: Sequence[Block], code: int, charts: Sequence[Chart] = atlas.CHARTS
+) -> tuple[Array, Array, Array]:
     """A quantity for :meth:`mumacro.kernel.binding.Data.put`: polynomials, errors, errors in every
     cell."""
     name, errors = atlas.QUANTITY_NAMES[code], np.zeros((len(atlas.SOURCES) + 1, 2))
     patches, in_cells = [], []
-    for error, chart, block in zip(errors, atlas.CHARTS, blocks, strict=False):
+    for error, chart, block in zip(errors, charts, blocks, strict=False):
         cells = block.cells[0] * block.cells[1]
         nodes = block.nodes.get(name)
         patches.append(

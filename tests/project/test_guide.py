@@ -89,6 +89,10 @@ ELSEWHERE = {
         "tests/project/test_benchmarks.py",
         '"error_distribution --share',
     ),
+    "python -m builder ball TABLE": (
+        "tests/builder/test_builder_cli.py",
+        'run_builder("ball", old, "--out", new)',
+    ),
     "python -m builder verify TABLE --write": (
         "tests/builder/test_builder_cli.py",
         'here(*words, "--write")',

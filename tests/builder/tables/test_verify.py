@@ -9,6 +9,7 @@ import pytest
 
 from builder.solver.sweep import Sweep
 from builder.tables.blocks import solve_nodes
+from builder.tables.contacts import spring
 from builder.tables.measure import SEAMS, block_errors, cell_errors, fast_from, finer
 from builder.tables.quantities import SOLVED, solver_noise
 from builder.tables.verify import (
@@ -160,7 +161,7 @@ def test_a_block_off_by_a_hundred_thousandth_is_found_and_named(
     assert part["not_covered"] == uncovered(found)[key] > 0
     assert [name for name, source in part["sources"].items() if source["not_covered"]] == [block]
     assert [name for name in QUANTITY_NAMES if uncovered(found)[name]] == [key]
-    errors = block_errors(wrong, sweep, 200, seed=1)[BLOCK_NAMES.index(block)]
+    errors = block_errors(wrong, spring(sweep), 200, seed=1)[BLOCK_NAMES.index(block)]
     assert errors.values[key] > 1e-6
     if (key, block) == ("mu_ratio", "corner"):
         assert errors.values[key] == close(1e-5, rel=0.3)
@@ -212,7 +213,7 @@ def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
 def test_the_errors_that_are_measured_are_those_that_the_table_states(
     sound: Surrogate, sweep: Sweep
 ) -> None:
-    found = block_errors(sound, sweep, 200, seed=1)
+    found = block_errors(sound, spring(sweep), 200, seed=1)
     for chart, block, errors in zip(CHARTS, sound.table.blocks, found, strict=True):
         assert errors.values.keys() == errors.cells.keys() == block.nodes.keys()
         for name in block.nodes:
@@ -236,7 +237,7 @@ def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(
     table, index = opened(tolerance), BLOCK_NAMES.index("continuous_tail")
     block = table.table.blocks[index]
     _, _, exact, noise = solve_nodes(
-        index, finer((block.a.size, block.b.size)), table.border, sweep
+        spring(sweep), index, finer((block.a.size, block.b.size)), table.border
     )
     assert noise["power"].max() > 1e3 * noise["mu_ratio"].max() > 0.0
     c = chebyshev_coefficients(exact["power"])
@@ -245,7 +246,7 @@ def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(
     for seed in range(4):
         drawn = 0.5 * noise["power"] * np.random.default_rng(seed).standard_normal(c.shape)
         other = exact | {"power": to_a @ c @ to_b.T + drawn}
-        found = cell_errors(index, block, other, noise)["power"]
+        found = cell_errors(spring(sweep), index, block, other, noise)["power"]
         assert np.all(found <= block.cell_errors["power"])
         assert np.all(found[:, 0] > 0.0)
 
@@ -258,7 +259,7 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
     part = table.blocks[index]
     values = part.nodes["mu_ratio"]
     values += 0.25 * part.errors["mu_ratio"][0] * (-1.0) ** np.arange(values.shape[1])
-    found = block_errors(Surrogate(table, TABLE), sweep, 200, seed=1)[index]
+    found = block_errors(Surrogate(table, TABLE), spring(sweep), 200, seed=1)[index]
     assert np.any(found.cells["mu_ratio"][:, 2] > part.cell_errors["mu_ratio"][:, 2])
     for name in part.nodes.keys() - {"mu_ratio"}:
         assert found.values[name] <= part.errors[name][0]
@@ -270,5 +271,6 @@ def test_an_error_along_one_edge_of_a_block_counts_whole(sweep: Sweep, block: st
     table, index = read_table(TABLE), BLOCK_NAMES.index(block)
     table.blocks[index].nodes["mu_ratio"][:, -1] *= 1.0 + 1e-5
     assert (
-        block_errors(Surrogate(table, TABLE), sweep, 200, seed=1)[index].values["mu_ratio"] > 5e-6
+        block_errors(Surrogate(table, TABLE), spring(sweep), 200, seed=1)[index].values["mu_ratio"]
+        > 5e-6
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.contacts.quadrature import put_rules
+from mumacro.inputs.kind import Kind
 from mumacro.kernel import threads as shared_out
 from mumacro.kernel.binding import CaseRows, Kernel, kernels
 from mumacro.table import atlas
@@ -207,12 +207,12 @@ def test_contacts_and_directions_have_the_same_bits(
     if kind[1] == 2:
         six[3] = six[1] * rng.uniform(0.0, 1.0, n)
     six[5][:20], six[3][20:40], six[2][40:60] = 0.0, 0.0, np.inf
-    put_rules(table._data, table.tolerance)
+    data = table.cells("mu_ratio", Kind(*kind))
 
     def asked(kernel: Kernel, part: slice) -> list[Any]:
         columns = [np.ascontiguousarray(column[part]) for column in six]
         answers = CaseRows.empty(columns[0].shape, "gradient")
-        kernel.cases(table._data, columns, answers, slice(0, columns[0].size), kind)
+        kernel.cases(data, columns, answers, slice(0, columns[0].size), kind)
         return [answers.numbers, answers.source]
 
     best = asked(kernels[-1], slice(None))

@@ -66,7 +66,8 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, NULL);
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, source);
         kernel->values(data, 0, 0, quantity, n, v, y, again, bound, NULL);
-        kernel->slopes(data, quantity, n, v, y, rows, n);
+        for (int contact = 0; contact < MU_CONTACTS; ++contact)
+            kernel->slopes(data, contact, quantity, n, v, y, rows, n);
         for (int64_t i = 0; i < n; ++i)
             if (source[i] < -1 || source[i] >= MU_SOURCES) wrong("a source that there is not");
     }
@@ -110,7 +111,7 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
         mumacro_case *answer = (mumacro_case *)malloc(sizeof *answer);
         if (answer == NULL) exit(2);
         for (int j = 0; j < 6; ++j) x[j] = columns[j][j == single ? 0 : i];
-        kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2, answer);
+        kernel->one(data, 0, x[0], x[1], x[2], x[3], x[4], x[5], i % 2, answer);
         free(answer);
     }
     free(rows[0]), free(rows[1]), free(rows[2]), free(high), free(extremes), free(source);

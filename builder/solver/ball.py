@@ -1,0 +1,245 @@
+"""The ball: a quadrature over its springs, which stand on a ray through the plane of one spring.
+
+With V = v~/1.5 and Y = y~/1.5, which are those of the middle spring, that at the share xi of the
+contact radius has v~ = V/s and y~ = Y/s with s = 1 - xi^2:
+
+    mu~(v~, y~) = 3/2 int_0^1 s mu~_spring(V/s, Y/s) d xi
+
+and the power has the factor 1.5 s more.  The ray is cut where a spring begins or ceases to stick
+and at y~ = 1, where the corner makes a step of the width (V/Y)^(2/3).  On every piece the rule of
+tanh and sinh crowds its points towards both ends, so that roots, logarithms and steps there cost
+nothing: it converges like exp(-c n / ln n) whatever they are.  A spring is the interpolant of a
+table that is finer than the one to be built, with 1 - mu~ known to its own digits.
+"""
+
+import itertools
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from mumacro import Surrogate
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import kernels
+from mumacro.table import atlas
+from mumacro.table.atlas import MIDDLE, STEEPEST, STEEPEST_Y
+from mumacro.table.polynomials import quantity_cells
+
+from .compiled import solver_kernel
+
+CORNER = atlas.BLOCK_NAMES.index("corner")
+POINTS = 73  # on either side of the middle of a piece
+#: tolerance from which as many are enough
+FEWER_POINTS = {1e-5: 34, 1e-8: 46}
+LAST = 3.3  # of the rule's variable: beyond, weights are below 1e-17
+BISECTIONS = 62  # of an interval of less than e^64 to its last digit
+LONGEST = 4.0  # piece, in ln s
+#: springs that are evaluated together
+TOGETHER = 100_000
+
+
+def _rule(points: int) -> tuple[Array, Array]:
+    """Of [0, 1]: the distances from the left end, ascending, and weights, both (2 points + 1,)."""
+    t = np.linspace(-LAST, LAST, 2 * points + 1)
+    turn = math.pi * np.sinh(t)
+    share = 1.0 / (1.0 + np.exp(-turn))
+    weight = math.pi * np.cosh(t) * share / (1.0 + np.exp(turn)) * (t[1] - t[0])
+    return share, weight
+
+
+def points_for(tolerance: float) -> int:
+    """Points on either side with which a quadrature errs by far less than ``tolerance``."""
+    return next((few for least, few in FEWER_POINTS.items() if tolerance >= least), POINTS)
+
+
+class Springs:
+    """One spring at many points from the table of ``fine``: mu~, 1 - mu~, power, stick fraction."""
+
+    def __init__(self, fine: Surrogate) -> None:
+        self.fine, self._data = fine, fine._data
+        self._cells = [
+            np.ascontiguousarray(quantity_cells(fine.table.blocks, code)[0])
+            for code in range(len(atlas.QUANTITIES))
+        ]
+
+    def crit(self, y: Array) -> Array:
+        """v~crit of one spring."""
+        return self.fine.border(y)
+
+    def __call__(self, v: Array, y: Array, eta: Array) -> tuple[Array, Array, Array, Array]:
+        """At points (n,) with v~, y~ > 0, finite; eta = y~ - 1 counts in the corner."""
+        block, a, b = kernels[-1].places(self._data, v, y)
+        at = np.flatnonzero(block == CORNER)
+        a[at], b[at] = _corner(v[at], eta[at])
+        out = [np.zeros(v.size) for _ in range(3)]
+        deficit = np.empty(v.size)
+        rows = self._data.blocks
+        for index in np.unique(block):
+            at = np.flatnonzero(block == index)
+            vs, ys = v[at], y[at]
+            if index >= len(atlas.CHARTS):
+                values = [self.fine.quantity(name, vs, ys)[0] for name in atlas.QUANTITY_NAMES]
+                for found, value in zip(out, values, strict=True):
+                    found[at] = value
+                deficit[at] = _fast_deficit(vs, ys)
+                continue
+            for code, quantity in enumerate(atlas.QUANTITIES):
+                if not atlas.CHARTS[index].holds(quantity):
+                    continue
+                base, factor = kernels[-1].forms(code, int(index), vs, ys, eta[at])
+                q = np.empty(at.size)
+                _cell_values(self._cells[code], rows[index], a[at], b[at], q)
+                out[code][at] = base + factor * q
+                if code == atlas.MU:
+                    plain = 1.0 - base - factor * q
+                    deficit[at] = np.where(base == 1.0, -factor * q, plain)
+        return out[0], deficit, out[1], out[2]
+
+
+def _corner(v: Array, eta: Array) -> tuple[Array, Array]:
+    """The corner's coordinates as evaluation has them, without a rounded y~ in between."""
+    phi = kernels[-1].normal_form_root(v, eta)
+    s0 = np.sqrt(2.0 * math.pi * v / phi)
+    radius = np.sqrt(0.5 * s0 * s0 + 2.0 * phi * phi)
+    return radius, 2.0 * phi / (math.sqrt(2.0) * radius + s0)
+
+
+@solver_kernel
+def _cell_values(cells: Array, row: Array, a: Array, b: Array, out: Array) -> None:
+    """The polynomials of a block with the geometry ``row`` at (a, b), (n,)."""
+    first, cells_b = int(row[0]), int(row[1])
+    last = cells.shape[0] - 1
+    for n in range(a.size):
+        x, z = row[3] * a[n] + row[2], row[5] * b[n] + row[4]
+        i, j = max(int(x), 0), max(int(z), 0)
+        u, w = 2.0 * (x - i) - 1.0, 2.0 * (z - j) - 1.0
+        cell = cells[min(first + i * cells_b + j, last)]
+        total = 0.0
+        for k in range(8):
+            line = 0.0
+            for m in range(8):
+                line = line * u + cell[k, m]
+            total = total * w + line
+        out[n] = total
+
+
+def _fast_deficit(v: Array, y: Array) -> Array:
+    """1 - mu~ for large v~, with the digits that it has."""
+    share = 1.0 / (1.0 + v * v)
+    r = y / np.hypot(1.0, v)
+    n = np.square(np.minimum(r, 1.0))
+    terms, total = np.ones_like(n), np.zeros_like(n)
+    for k in range(1, 24):  # (2/pi) K(i r) in powers of r^2
+        terms = terms * -n * ((2 * k - 1) / (2 * k)) ** 2
+        total = total - terms
+    found = kernels[-1].outer_expansion(r)
+    return np.where(
+        n < 0.1, total - (found[:, 1] + 0.5 * found[:, 2]) * share, 1.0 - _mu_fast(found, share)
+    )
+
+
+def _mu_fast(found: Array, share: Array) -> Array:
+    return found[:, 0] + (found[:, 1] + 0.5 * found[:, 2]) * share
+
+
+class Ball:
+    """Solves the ball at many points (V, Y) of its middle spring."""
+
+    def __init__(self, springs: Springs, points: int = POINTS, workers: int = 1) -> None:
+        self.springs = springs
+        self._pool = ThreadPoolExecutor(max_workers=workers)
+        self._share, self._weight = _rule(points)
+
+    def crossings(self, ratio: Array) -> tuple[Array, Array]:
+        """y~ at which rays V/Y = ``ratio`` (n,), below the steepest, enter stick-slip and leave
+        it."""
+        steep = math.log(STEEPEST_Y)
+        low, high = np.log(1.5 * ratio), np.full(ratio.shape, steep)
+        entry = self._bisect(ratio, np.minimum(low, steep - 1e-9), high, 1.0)
+        top = np.log(np.maximum(0.4 / (ratio * ratio), STEEPEST_Y * 1.000001))
+        return entry, self._bisect(ratio, np.full(ratio.shape, steep), top, -1.0)
+
+    def _bisect(self, ratio: Array, low: Array, high: Array, rising: float) -> Array:
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            y = np.exp(middle)
+            below = rising * (self.springs.crit(y) / y - ratio) < 0.0
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return np.exp(0.5 * (low + high))
+
+    def _edges(self, v: Array, y: Array) -> Array:
+        """Values of s (n, edges), descending from 1 to 0, between which springs are smooth and of
+        like size."""
+        ratio = v / y
+        cuts = ratio < STEEPEST * (1.0 - 1e-15)
+        entry, leave = self.crossings(np.where(cuts, ratio, 0.1))
+        inner, outer = (np.where(cuts, y / at, 1.0) for at in (entry, leave))
+        last = np.where(cuts, outer, np.maximum(v, y))
+        width = np.minimum(3.0 * np.cbrt(ratio * ratio), 0.5)
+        beyond = np.minimum(np.maximum(width, 3.0 * np.abs(y - 1.0)), 0.5)
+        # beyond the corner xi grows by ten from piece to piece
+        rising = (y / (1.0 + np.minimum(beyond * 100.0**i, 0.5)) for i in range(5))
+        steps = (inner, y / (1.0 - width), y, y / (1.0 + width), *rising, last)
+        # those beyond the border's last crossing may be on this side of it, next to the ridge
+        edges = -np.sort(-np.minimum([np.ones(v.shape), *steps], 1.0), axis=0)
+        decades = [edges[0]]
+        for above, below in itertools.pairwise(edges):
+            parts = math.ceil(float(np.log(above / below).max()) / LONGEST)
+            decades += [
+                np.maximum(above * math.exp(-LONGEST * i), below) for i in range(1, parts)
+            ] + [below]
+        return np.stack([*decades, np.zeros(v.shape)], axis=1)
+
+    def solve(self, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
+        """mu_ratio, deficit, power, stick_fraction at V = ``v``, Y = ``y``, of one shape; eta = Y -
+        1."""
+        v, y = np.broadcast_arrays(v, y)
+        shape = v.shape
+        eta = y - 1.0 if eta is None else np.broadcast_to(eta, shape)
+        v, y, eta = (np.ascontiguousarray(x, np.float64).ravel() for x in (v, y, eta))
+        step = max(1, TOGETHER // (4 * self._share.size))
+        parts = self._pool.map(
+            lambda i: self._solve(v[i : i + step], y[i : i + step], eta[i : i + step]),
+            range(0, v.size, step),
+        )
+        rows = np.concatenate([np.empty((len(NAMES), 0)), *parts], axis=1)
+        return {name: row.reshape(shape) for name, row in zip(NAMES, rows, strict=True)}
+
+    def _solve(self, v: Array, y: Array, eta: Array) -> Array:
+        edges, out = self._edges(v, y), np.zeros((4, v.size))
+        # xi and 1 - xi of the edges, each with its own digits; eta = y - 1 has those of s = y
+        at_corner = edges == y[:, None]
+        lacking = np.where(at_corner, -eta[:, None], 1.0 - edges)
+        xi_of = np.sqrt(lacking)
+        rest_of = edges / (1.0 + xi_of)
+        for piece in range(edges.shape[1] - 1):
+            at = np.flatnonzero(edges[:, piece] > edges[:, piece + 1])
+            if not at.size:
+                continue
+            left, right, last = (
+                xi_of[at, piece, None],
+                xi_of[at, piece + 1, None],
+                rest_of[at, piece + 1, None],
+            )
+            length = np.where(left > 0.5, rest_of[at, piece, None] - last, right - left)
+            before, behind = length * self._share, length * self._share[::-1]
+            first_half = self._share < 0.5
+            xi = np.where(first_half, left + before, right - behind)
+            rest = np.where(first_half & (left < 0.5), 1.0 - xi, last + behind)
+            s = np.maximum(rest * (1.0 + xi), 1e-290)
+            # Y - s by the distance from the corner, where that is an edge, and beyond it
+            excess = np.where(s > 0.01, eta[at, None] + xi * xi, np.inf)
+            excess = np.where(at_corner[at, piece, None], before * (xi + left), excess)
+            excess = np.where(at_corner[at, piece + 1, None], -behind * (xi + right), excess)
+            near = np.abs(excess) < 0.3 * s
+            amplitude = np.where(near, 1.0 + excess / s, y[at, None] / s)
+            off = np.where(near, excess / s, amplitude - 1.0)
+            found = self.springs((v[at, None] / s).ravel(), amplitude.ravel(), off.ravel())
+            share = MIDDLE * s * length * self._weight
+            weights = (share, share, share * MIDDLE * s, share)
+            for row, values, weight in zip(out, found, weights, strict=True):
+                row[at] += (values.reshape(s.shape) * weight).sum(axis=1)
+        return out
+
+
+NAMES = ("mu_ratio", "deficit", "power", "stick_fraction")

@@ -1,0 +1,291 @@
+"""The table of a ball: its solver, its charts, its hidden corners, and a table without it."""
+
+import dataclasses
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import ellipe, ellipk
+
+from builder.solver.ball import NAMES, Ball, Springs
+from builder.solver.sweep import Sweep
+from builder.tables.contacts import BALL_NOISE, Contact, ball, ratio_of
+from builder.tables.measure import block_errors
+from builder.tables.verify import BALL_CASES, Neighbours, seam_jumps
+from mumacro import InputError, Surrogate, closed_forms
+from mumacro.inputs.kind import BALL
+from mumacro.kernel.binding import kernels
+from mumacro.table.atlas import BALL_CHARTS, MIDDLE, QUANTITY_NAMES, SLOW, STEEPEST, STEEPEST_Y
+from mumacro.table.netcdf import FORMAT_VERSION, WITHOUT_BALL, read_table, write_table
+from tests.support.cases import Array, opened
+from tests.support.comparing import close
+
+COARSE = 1e-7
+
+
+@pytest.fixture(scope="module")
+def springs() -> Springs:
+    return Springs(opened(1e-12))
+
+
+@pytest.fixture(scope="module")
+def of(springs: Springs) -> Contact:
+    return ball(springs)
+
+
+def wide(n: int, seed: int) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    return 10.0 ** rng.uniform(-8, 4, n), 10.0 ** rng.uniform(-5, 5, n)
+
+
+# --- the solver -----------------------------------------------------------------------------------
+
+
+def test_twice_the_points_give_the_same(springs: Springs, of: Contact) -> None:
+    v, y = wide(60, 1)
+    few, many = Ball(springs).solve(v, y), Ball(springs, 146).solve(v, y)
+    for name in NAMES:
+        noise = BALL_NOISE if name == "deficit" else of.noise(name, v, y, many, False)
+        assert np.all(np.abs(few[name] - many[name]) <= noise), name
+    # each of both has its own digits
+    np.testing.assert_allclose(few["deficit"] + few["mu_ratio"], 1.0, rtol=0.0, atol=2e-12)
+
+
+def test_springs_that_are_solved_one_by_one_give_the_same(springs: Springs, sweep: Sweep) -> None:
+    """Gauss's rule in halves of halves towards what is not smooth: another quadrature over another
+    source."""
+    x, weight = np.polynomial.legendre.leggauss(24)
+    share = np.concatenate([[0.0], 0.5 ** np.arange(24, -1, -1)])
+    for v, y in ((0.05, 0.4), (0.25, 0.9), (1e-3, 0.98), (0.4, 2.0), (3.0, 1.0)):
+        ratio = np.array([v / y])
+        ends = [0.0, 1.0]
+        if ratio[0] < STEEPEST:
+            ends += [math.sqrt(max(1.0 - y / at[0], 0.0)) for at in Ball(springs).crossings(ratio)]
+        ends = sorted({*ends, math.sqrt(max(1.0 - y, 0.0))})
+        found = dict.fromkeys(QUANTITY_NAMES, 0.0)
+        for left, right in itertools.pairwise(ends):
+            half = 0.5 * (right - left)
+            edges = np.concatenate([left + half * share, (right - half * share)[::-1][1:]])
+            wide = 0.5 * np.diff(edges)[:, None]
+            xi = (edges[:-1, None] + wide * (1.0 + x)).ravel()
+            s = np.maximum((1.0 - xi) * (1.0 + xi), 1e-9)
+            solved = sweep.solve("full", v / s, y / s)
+            for name in QUANTITY_NAMES:
+                load = MIDDLE * s * (MIDDLE * s if name == "power" else 1.0)
+                found[name] += float(((wide * weight).ravel() * load * solved[name]).sum())
+        ours = Ball(springs).solve(np.array([v]), np.array([y]))
+        for name in QUANTITY_NAMES:
+            assert ours[name][0] == close(found[name], abs=2e-11), (v, y, name)
+
+
+def test_at_rest_it_is_the_closed_form_and_slides_like_a_rigid_contact(springs: Springs) -> None:
+    y = np.array([1e-3, 0.1, 0.5, 0.9, 0.999])
+    m = (1.0 - y) / (1.0 + y)
+    still = np.sqrt(1.0 + y) * (ellipe(m) - y * ellipk(m))
+    found = Ball(springs).solve(np.full(y.size, 1e-17), y)
+    np.testing.assert_allclose(found["mu_ratio"], still, rtol=0.0, atol=3e-13)
+    v = np.array([1e6, 1e7])
+    fast = Ball(springs).solve(v, 0.7 * v)["mu_ratio"]
+    np.testing.assert_allclose(fast, closed_forms.outer(0.7), rtol=0.0, atol=3e-12)
+
+
+def test_next_to_the_ridge_the_last_crossing_is_an_edge(springs: Springs) -> None:
+    """A ray leaves stick-slip below y~ = 1.5 there; a quadrature that runs across errs by 5e-12."""
+    y = 0.9508120035041991
+    v = 0.3178542013643792 * np.exp(np.linspace(-2e-3, 2e-3, 41))
+    few, many = (Ball(springs, n).solve(v, np.full(v.size, y)) for n in (73, 146))
+    assert np.abs(few["mu_ratio"] - many["mu_ratio"]).max() <= BALL_NOISE
+    edges = Ball(springs)._edges(v, np.full(v.size, y))
+    for at in Ball(springs).crossings(v / y):
+        assert np.abs(edges * (at / y)[:, None] - 1.0).min(axis=1).max() <= 1e-12
+
+
+# --- charts ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("index", range(len(BALL_CHARTS)))
+def test_file_and_evaluation_agree_on_coordinates(index: int) -> None:
+    table, chart = opened(1e-12), BALL_CHARTS[index]  # whose border is that of the charts
+    rng = np.random.default_rng(index)
+    a, b = (
+        axis.low + (axis.high - axis.low) * rng.uniform(0.02, 0.98, 2000)
+        for axis in (chart.a, chart.b)
+    )
+    v, y, _ = chart.point(a, b, table.border)
+    block, at_a, at_b = kernels[-1].places(table.cells("mu_ratio", BALL), v, y, 1)
+    here = block == index
+    assert here.mean() > (0.2 if chart.name == "corner" else 0.95)
+    for axis, x, at in ((chart.a, a, at_a), (chart.b, b, at_b)):
+        np.testing.assert_allclose(axis.to_file(at[here]), x[here], rtol=0.0, atol=2e-12)
+        np.testing.assert_allclose(
+            axis.to_evaluation(x),
+            axis.to_evaluation(axis.to_file(axis.to_evaluation(x))),
+            rtol=0.0,
+            atol=1e-14,
+        )
+
+
+# --- hidden corners -------------------------------------------------------------------------------
+
+
+def beside(at: float, n: int, seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    return np.asarray(at * (1.0 + rng.choice([-1.0, 1.0], n) * 10.0 ** rng.uniform(-12, -1, n)))
+
+
+CORNERS: dict[str, Any] = {
+    "ridge": lambda n: (beside(SLOW, n, 1), beside(STEEPEST_Y, n, 2)),
+    "gross slip at rest": lambda n: (10.0 ** np.linspace(-20, -1, n), beside(1.0, n, 3)),
+    "corner at creep": lambda n: (beside(1e-9, n, 4), 1.0 + beside(1e-6, n, 5)),
+    "steepest ray": lambda n: (beside(STEEPEST * 0.3, n, 6), np.full(n, 0.3)),
+    "small": lambda n: (10.0 ** np.linspace(-14, -3, n), 10.0 ** np.linspace(-7, -2, n)),
+}
+
+
+@pytest.mark.parametrize("name", QUANTITY_NAMES)
+@pytest.mark.parametrize("corner", CORNERS)
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10])
+def test_no_error_is_beyond_its_bound(
+    of: Contact, tolerance: float, corner: str, name: str
+) -> None:
+    table = opened(tolerance)
+    v, y = of.as_asked(*CORNERS[corner](60))
+    solved = of.solve(v, y)
+    value, bound, _ = of.quantity(table, name, v, y)
+    noise = of.noise(name, v, y, solved, False)
+    assert np.all(np.abs(value - solved[name]) <= bound + noise)
+    if name == "mu_ratio":
+        assert np.abs(value - solved[name]).max() <= tolerance
+
+
+@pytest.mark.parametrize("corner", ["ridge", "corner at creep", "steepest ray"])
+def test_no_slope_is_beyond_its_bound(of: Contact, corner: str) -> None:
+    table = opened(COARSE)
+    v, y = of.as_asked(*CORNERS[corner](40))
+    truth, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
+    rows = of.slopes(table, "mu_ratio", v, y)
+    assert np.all(np.abs(rows[1:3] - truth) <= rows[3:5] + noise)
+    # on the steepest ray itself slopes are those on either side of it
+    v = STEEPEST * y * (1.0 + np.array([-1e-13, 0.0, 1e-13])[:, None])
+    line = np.broadcast_to(y, v.shape)
+    along = of.slopes(table, "mu_ratio", v.ravel(), line.ravel())[1].reshape(v.shape)
+    if corner == "steepest ray":
+        assert np.ptp(along, axis=0).max() <= 1e-4
+
+
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-10])
+def test_power_at_large_speeds_is_known_in_closed_form(tolerance: float) -> None:
+    """A quadrature's own error is within the bounds: powers here differ by 1e-13 of their value."""
+    v, y = (
+        np.array([3.97134e4, 6.36416e4, 6.06508e4, 1e5]),
+        np.array([2.9556e5, 7.8218e5, 6.7737e5, 3e5]),
+    )
+    power, bound, _ = opened(tolerance).quantity("power", v, y, contact="ball")
+    m = -((y / v) ** 2)
+    first = 2.0 / math.pi * v * (ellipe(m) - ellipk(m))
+    # the second term is that of one spring at v~ of the middle, times the mean of s^2
+    spring, _, _ = opened(1e-12).quantity("power", v, y)
+    exact = first + (spring - first) * MIDDLE**2 * 24.0 / 35.0
+    assert np.all(np.abs(power - exact) <= bound + 2e-14 * exact)
+    assert np.all(bound <= tolerance * exact)
+
+
+def test_a_slope_where_the_border_has_a_knot_is_within_its_bound(of: Contact) -> None:
+    """The border's pieces meet at y~ = 1.5, within a block of the ball."""
+    table = opened(COARSE)
+    y = 1.5 + np.linspace(-0.05, 0.01, 121)
+    v, y = of.as_asked(np.full(y.size, 0.1742), y)
+    truth, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
+    rows = of.slopes(table, "mu_ratio", v, y)
+    assert np.all(np.abs(rows[1:3] - truth) <= rows[3:5] + noise)
+
+
+def test_seams_are_invisible() -> None:
+    table = opened(COARSE)
+    assert seam_jumps(table, 500, kind=BALL) <= 20.0 * table.tolerance
+    rise = np.geomspace(1e-9, 1e7, 3000)
+    for fixed in (1e-3, 0.1, 1.0, STEEPEST_Y, 30.0):
+        along = ratio_of(table, BALL, rise, np.full(rise.size, fixed))
+        assert np.diff(along).min() >= -table.tolerance
+
+
+@pytest.mark.slow
+def test_the_errors_that_are_measured_are_those_that_the_table_states(of: Contact) -> None:
+    table = opened(1e-4)
+    for chart, block, found in zip(
+        BALL_CHARTS, table.table.ball, block_errors(table, of, 300, seed=4), strict=True
+    ):
+        assert found.cells.keys() == {"mu_ratio"}
+        for name in block.nodes:
+            assert 0.0 < found.values[name] <= block.errors[name][0], chart.name
+        assert found.absolute <= table.ball_tolerance
+
+
+def test_an_error_of_a_block_is_found(of: Contact) -> None:
+    table = read_table(opened(1e-4).path)
+    index = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
+    table.ball[index].nodes["mu_ratio"][-3:] *= 1.01
+    wrong = Surrogate(table, "wrong.nc")
+    v, y = BALL_CASES["ring"][1](np.random.default_rng(1), 400, wrong)
+    v, y = of.as_asked(v, y)
+    value, bound, _ = of.quantity(wrong, "mu_ratio", v, y)
+    assert np.any(np.abs(value - of.solve(v, y)["mu_ratio"]) > bound)
+
+
+# --- plain numbers --------------------------------------------------------------------------------
+
+
+def test_plain_numbers_answer_as_arrays_do() -> None:
+    table = opened(COARSE)
+    v, y = wide(40, 6)
+    v[:3], y[:4] = (0.0, 0.0, 0.2), (0.0, 0.5, 0.0, 1.5)
+    for name in QUANTITY_NAMES:
+        rows = table.quantity(name, v, y, contact="ball")
+        for i in range(v.size):
+            one = table.quantity(name, float(v[i]), float(y[i]), contact="ball")
+            assert one == tuple(row[i] for row in rows), (name, i)
+    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5, "contact": "ball"}
+    v0, y0 = 0.3 * v, 3e-6 * y
+    many = table.evaluate(**case, v0=v0, y0=y0, gradient=True)
+    for i in range(v.size):
+        alone = table.evaluate(**case, v0=float(v0[i]), y0=float(y0[i]), gradient=True)
+        assert (alone.mu_macro, alone.error_bound) == (many.mu_macro[i], many.error_bound[i])
+        assert (alone.source_code, alone.regime) == (many.source_code[i], many.regime[i])
+        assert alone.gradient == {name: x[i] for name, x in many.gradient.items()}
+        assert alone.regime_certain == many.regime_certain[i]
+        assert alone._border(2.0) == table.v_tilde_crit(2.0, contact="ball")
+
+
+@pytest.mark.parametrize(("name", "value"), [("mu0", -0.3), ("v0", math.nan), ("k", 0.0)])
+def test_an_illegal_plain_number_is_refused(name: str, value: float) -> None:
+    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5, "y0": 2e-6, "v0": 0.01}
+    with pytest.raises(InputError, match=name):
+        opened(COARSE).evaluate(**{**case, name: value}, contact="ball")
+    with pytest.raises(InputError, match="v_tilde"):
+        opened(COARSE).quantity("mu_ratio", -1.0, 0.5, contact="ball")
+
+
+# --- a table without a ball -----------------------------------------------------------------------
+
+
+def test_an_older_table_opens_and_names_the_remedy(tmp_path: Path) -> None:
+    whole = read_table(opened(1e-4).path)
+    kept = {name: x for name, x in whole.attributes.items() if not name.startswith("ball_")}
+    write_table(dataclasses.replace(whole, ball=[], attributes=kept), tmp_path / "old.nc")
+    old = Surrogate.open(tmp_path / "old.nc")
+    assert (old.attributes["format_version"], FORMAT_VERSION) == (WITHOUT_BALL, 4)
+    v, y = wide(500, 2)
+    np.testing.assert_array_equal(old.mu_ratio(v, y), opened(1e-4).mu_ratio(v, y))
+    for ask in (
+        lambda: old.quantity("mu_ratio", 0.1, 0.5, contact="ball"),
+        lambda: old.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1e5, v0=0.01, contact="ball"),
+    ):
+        with pytest.raises(InputError, match="builder"):
+            ask()
+    along = old.quantity("mu_ratio", 0.1, 0.5, contact="ball", direction="along")
+    assert along == opened(1e-4).quantity("mu_ratio", 0.1, 0.5, contact="ball", direction="along")
+    assert math.isnan(old.ball_tolerance)
+    assert old.ball_error_distribution == {}
