@@ -77,7 +77,7 @@ static double mu_cube_root_near(double x) {
 
 /* The cube root of normal x > 0 in lanes, off by at most 4e-16 of itself: as above, and then to the fourth order. */
 MU_INLINE mu_lanes mu_cube_root(mu_lanes x) {
-    const mu_mask third = ((((MU_BITS(x) >> 32) * 0x55555556) >> 32) << 32) + 0x2a9f7893782da1ce;
+    const mu_mask third = (((MU_BITS(x) >> 32) * 0x55555556) & ~(int64_t)0xffffffff) + 0x2a9f7893782da1ce;
     mu_lanes root = MU_NUMBER(third), cube = root * root * root, off;
     root = root * ((cube + 2.0 * x) / (2.0 * cube + x));
     off = (x - root * root * root) / x;

@@ -32,7 +32,7 @@ typedef struct {
      * may be NULL across */
     void (*values)(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
                    const double *y, double *value, double *bound, int8_t *source);
-    /* a quantity and its slopes: mumacro_slope_row, stride apart */
+    /* a quantity and its slopes: mumacro_slope_row, stride apart; of a ball mu~ alone has them, others are NaN */
     void (*slopes)(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v, const double *y, double *out,
                    int64_t stride);
     /* dimensional cases; out has the first `rows` of mumacro_row, stride apart: those before v~, those before the gradient, or all */

@@ -331,6 +331,9 @@ MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int q
 
 static void mu_slopes_of_points(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
                                 const double *y, double *out, int64_t stride) {
-    if (contact == MU_BALL) mu_slopes_of_contact(data, MU_BALL, quantity, n, v, y, out, stride);
+    if (contact == MU_BALL && quantity != MU_MU_RATIO) { /* a table has no errors of these */
+        for (int row = 0; row < MU_SLOPE_ROWS; ++row)
+            for (int64_t i = 0; i < n; ++i) out[row * stride + i] = NAN;
+    } else if (contact == MU_BALL) mu_slopes_of_contact(data, MU_BALL, quantity, n, v, y, out, stride);
     else mu_slopes_of_contact(data, MU_SPRING, quantity, n, v, y, out, stride);
 }

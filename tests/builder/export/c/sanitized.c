@@ -66,7 +66,8 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, NULL);
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, source);
         kernel->values(data, 0, 0, quantity, n, v, y, again, bound, NULL);
-        for (int contact = 0; contact < MU_CONTACTS; ++contact)
+        /* the ball's cells have no errors of slopes but those of mu~, which is all that is asked of a ball */
+        for (int contact = data == &mumacro_table.ball; contact < MU_CONTACTS; ++contact)
             kernel->slopes(data, contact, quantity, n, v, y, rows, n);
         for (int64_t i = 0; i < n; ++i)
             if (source[i] < -1 || source[i] >= MU_SOURCES) wrong("a source that there is not");
@@ -111,7 +112,7 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
         mumacro_case *answer = (mumacro_case *)malloc(sizeof *answer);
         if (answer == NULL) exit(2);
         for (int j = 0; j < 6; ++j) x[j] = columns[j][j == single ? 0 : i];
-        kernel->one(data, 0, x[0], x[1], x[2], x[3], x[4], x[5], i % 2, answer);
+        kernel->one(data, i % 4 / 2, x[0], x[1], x[2], x[3], x[4], x[5], i % 2, answer);
         free(answer);
     }
     free(rows[0]), free(rows[1]), free(rows[2]), free(high), free(extremes), free(source);
@@ -201,8 +202,11 @@ static void ask_calls(const double *x, double v_rest) {
 static void ask_builder(const mumacro_kernel *kernel, int64_t n, const double *v, const double *y) {
     double *one = numbers((size_t)n), *two = numbers((size_t)n), *rows = numbers(5 * (size_t)n);
     for (int quantity = 0; quantity < 3; ++quantity)
-        for (int block = 0; block < MU_CHARTS; ++block) kernel->forms(quantity, block, n, v, y, y, one, two);
+        for (int contact = 0; contact < MU_CONTACTS; ++contact)
+            for (int block = 0; block < (contact ? (int)MU_BALL_CHARTS : (int)MU_CHARTS); ++block)
+                kernel->forms(contact, quantity, block, n, v, y, y, one, two);
     for (int piece = 0; piece < MU_PIECES; ++piece) kernel->border_scales(piece, n, y, one, two);
+    kernel->entries(n, v, one);
     kernel->normal_form_root(n, v, y, one);
     kernel->outer_expansion(n, v, rows);
     kernel->cell_shares(n, v, one, two);
@@ -264,10 +268,6 @@ static void ask_nonsense(const mumacro_kernel *kernel) {
         cells->errors = held[n++] = nonsense((MU_SOURCES + 1) * 2);
         cells->slope_errors = held[n++] = nonsense(3 * (size_t)cells->cells);
     }
-    for (int i = 0; i < MU_RULES; ++i) {
-        data.rules[i].nodes = (int)(drawn() * 200.0);
-        data.rules[i].points = held[n++] = nonsense(2 * (size_t)data.rules[i].nodes + 1);
-    }
     data.driven.nodes = (int)(drawn() * 40.0);
     data.driven.points = held[n++] = nonsense(5 * (size_t)data.driven.nodes + 1);
     ask_all(kernel, &data, 61, ordinary, -1);
@@ -284,7 +284,7 @@ int main(int count, char **words) {
     check_misuse();
     for (int i = 0; asked < random; ++i) {
         const int64_t n = lengths[i % 8];
-        ask_all(kernel, &mumacro_table.data, n, ordinary, i % 7 - 1);
+        ask_all(kernel, i % 4 == 1 ? &mumacro_table.ball : &mumacro_table.data, n, ordinary, i % 7 - 1);
         asked += (long)n;
     }
     while (combinations < hostile) {
