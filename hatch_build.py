@@ -37,6 +37,8 @@ DEBUG = [
     "-fno-sanitize-recover=all",
 ]
 FLAGS = ["-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC"]
+# a mistake that newer compilers refuse, and older ones do not
+FLAGS += ["-Werror=implicit-function-declaration"]
 FLAGS += DEBUG if os.environ.get("MUMACRO_BUILD_DEBUG") else ["-O3", "-DNDEBUG"]
 AVX2 = ["-mavx2", "-mfma"]
 AVX512 = [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl", "-mavx512bw", "-mprefer-vector-width=512"]

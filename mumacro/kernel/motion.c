@@ -1102,8 +1102,11 @@ static double mu_division(const mu_shaken *m, const mu_panel *panel, double tole
     const double middle = 0.5 * (panel->low + panel->high), near = 0.02 * (panel->high - panel->low);
     int best = -1;
     *kink = 0;
-    for (int i = 0; i < 14; ++i)
-        if (panel->sticks[i] != panel->sticks[i + 1] && (best < 0 || abs(2 * i - 13) < abs(2 * best - 13))) best = i;
+    double nearest = HUGE_VAL;
+    for (int i = 0; i < 14; ++i) {
+        const double distance = fabs(i - 6.5);
+        if (panel->sticks[i] != panel->sticks[i + 1] && distance < nearest) best = i, nearest = distance;
+    }
     if (best >= 0) {
         const double at = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best], tolerance, grid, steps, f);
         *kink = at - panel->low > near && panel->high - at > near;

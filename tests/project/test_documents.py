@@ -44,6 +44,9 @@ def test_links_within_the_project_lead_somewhere(page: Path) -> None:
         path, _, anchor = link.partition("#")
         target = (page.parent / path).resolve() if path else page
         assert target.exists(), f"{page.name}: {link}"
+        docs = ROOT / "docs"
+        on_site = docs not in page.parents or target.suffix != ".md" or docs in target.parents
+        assert on_site, f"{page.name}: the site has no page for {link}"
         if anchor:
             assert anchor in anchors(target), f"{page.name}: {link}"
 
