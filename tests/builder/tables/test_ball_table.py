@@ -220,7 +220,9 @@ def test_the_errors_that_are_measured_are_those_that_the_table_states(of: Contac
     ):
         assert found.cells.keys() == {"mu_ratio"}
         for name in block.nodes:
-            assert 0.0 < found.values[name] <= block.errors[name][0], chart.name
+            assert found.values[name] <= block.errors[name][0], (chart.name, name)
+            # where a stick fraction's own noise is larger than what the cells err by, none is left
+            assert found.values[name] > 0.0 or name == "stick_fraction", (chart.name, name)
         assert found.absolute <= table.ball_tolerance
 
 

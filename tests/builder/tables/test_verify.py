@@ -179,8 +179,8 @@ class Stepped:
     ) -> None:
         self.v_tilde_crit = table.v_tilde_crit
         self.mu_ratio = lambda v, y: table.mu_ratio(v, y) * (1.0 + 1e-3 * beyond(table, v, y))
-        self.slopes = lambda v, y: [
-            part + 1e-3 * beyond(table, v, y) for part in table.slopes(v, y)
+        self.slopes = lambda v, y, *words, **names: [
+            part + 1e-3 * beyond(table, v, y) for part in table.slopes(v, y, *words, **names)
         ]
 
 

@@ -102,11 +102,10 @@ def test_a_bound_may_not_be_halved_and_is_never_missed(operation: str, coarse: f
     assert median <= widest
 
 
-@pytest.mark.parametrize(
-    "tolerance", [1e-4, *(pytest.param(x, marks=pytest.mark.slow) for x in (1e-7, 1e-10))]
-)
+@pytest.mark.parametrize("tolerance", [1e-4, pytest.param(1e-7, marks=pytest.mark.slow)])
 def test_a_ball_is_never_beyond_its_bounds(tolerance: float) -> None:
-    """Over all of the legal range, beside the finest table."""
+    """Over all of the legal range, beside the finest table.  Its ball is the one of 1e-10, which
+    test_ball_table.py compares with fresh quadratures."""
     v, y = hard_points(3000, along=False, seed=11)
     truths, found = asked(opened(1e-12), v, y, "across"), {}
     rows = zip(BALL_NAMES, asked(opened(tolerance), v, y, "across"), truths, strict=True)
