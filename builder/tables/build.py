@@ -160,15 +160,9 @@ def build_table(
         progress(chart.name, True)
     grid = plain_grid(sweep, tolerance)
     progress("plain grid", True)
-    for attempt in range(ATTEMPTS):
-        table = Table(pieces, blocks, **grid)
-        table.attributes = {"tolerance": tolerance, "quantities": " ".join(QUANTITY_NAMES)}
-        late = _state_errors(table, out, one, attempt, tolerance)
-        if not late or attempt == ATTEMPTS - 1:
-            break
-        for i in late:
-            targets[i] /= 3.0
-            blocks[i] = build(i)
+    table = Table(pieces, blocks, **grid)
+    table.attributes = {"tolerance": tolerance, "quantities": " ".join(QUANTITY_NAMES)}
+    _meet_tolerance(table, out, one, tolerance, targets, build)
     progress("errors of the blocks", True)
     return _finish(table, out, targets, sweep, progress)
 
@@ -204,14 +198,8 @@ def add_ball(
     for i, chart in enumerate(BALL_CHARTS):
         blocks.append(build(i))
         progress(f"ball {chart.name}", True)
-    for attempt in range(ATTEMPTS):
-        table = dataclasses.replace(table, ball=blocks)
-        late = _state_errors(table, out, of, attempt, tolerance)
-        if not late or attempt == ATTEMPTS - 1:
-            break
-        for i in late:
-            targets[i] /= 3.0
-            blocks[i] = build(i)
+    table = of.with_blocks(table, blocks)
+    _meet_tolerance(table, out, of, tolerance, targets, build)
     progress("errors of the ball", True)
     report = verify_ball(Surrogate(table, out), of, FINAL_POINTS)
     progress("fresh balls", True)
@@ -252,6 +240,25 @@ def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
         f"relative against a tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; "
         f"outside their bound: {missed or 'none'}; no table was written"
     )
+
+
+def _meet_tolerance(
+    table: Table,
+    out: Path,
+    of: Contact,
+    tolerance: float,
+    targets: list[float],
+    build: Callable[[int], Block],
+) -> None:
+    """State the errors of a contact's blocks; those that miss the tolerance are built again, for a
+    third of their target, at most :data:`ATTEMPTS` times in all."""
+    for attempt in range(ATTEMPTS):
+        late = _state_errors(table, out, of, attempt, tolerance)
+        if not late or attempt == ATTEMPTS - 1:
+            return
+        for i in late:
+            targets[i] /= 3.0
+            of.blocks(table)[i] = build(i)
 
 
 def _state_errors(table: Table, out: Path, of: Contact, seed: int, tolerance: float) -> list[int]:

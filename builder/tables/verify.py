@@ -1,7 +1,7 @@
 """The table against fresh solves: error off the nodes, coverage of every bound, seams, monotony."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -101,20 +101,31 @@ def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Arr
     return CASES[case][1](np.random.default_rng(seed), n, surrogate)
 
 
-def _both_sides(
-    surrogate: Surrogate, n: int, seed: int
+#: factors to either side of a line
+SIDES = (1 - 1e-13, 1 + 1e-13)
+
+
+def _common_sides(
+    surrogate: Surrogate, rng: np.random.Generator, n: int, seams: Sequence[float], end: float
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of
-    the closed form."""
-    rng = np.random.default_rng(seed)
-    low, high = 1 - 1e-13, 1 + 1e-13
-    for seam in SEAMS:
+    the corner up to y = ``end``."""
+    low, high = SIDES
+    for seam in seams:
         v = _log(rng, 1e-9, 1e5, n)
         yield v, v, np.full(n, seam * low), np.full(n, seam * high)
     y = _log(rng, 1e-3, 1e7, n)
     yield (v := surrogate.v_tilde_crit(y)) * low, v * high, y, y
-    y = rng.uniform(atlas.Y_STICK_LO, atlas.Y_STICK_HI, n)
+    y = rng.uniform(atlas.Y_STICK_LO, end, n)
     yield (v := surrogate.v_tilde_crit(y) * atlas.SIGMA_CUT**2) * low, v * high, y, y
+
+
+def _both_sides(
+    surrogate: Surrogate, n: int, seed: int
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Those of one spring, and of the edge of its closed form."""
+    rng, (low, high) = np.random.default_rng(seed), SIDES
+    yield from _common_sides(surrogate, rng, n, SEAMS, atlas.Y_STICK_HI)
     y = _log(rng, atlas.Y_CONT, 1e8, n)
     yield (v := fast_from(surrogate, y)) * low, v * high, y, y
 
@@ -122,16 +133,9 @@ def _both_sides(
 def _both_sides_of_ball(
     surrogate: Surrogate, n: int, seed: int
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """The same of a ball, and on the steepest ray."""
-    rng = np.random.default_rng(seed)
-    low, high = 1 - 1e-13, 1 + 1e-13
-    for seam in BALL_SEAMS:
-        v = _log(rng, 1e-9, 1e5, n)
-        yield v, v, np.full(n, seam * low), np.full(n, seam * high)
-    y = _log(rng, 1e-3, 1e7, n)
-    yield (v := surrogate.v_tilde_crit(y)) * low, v * high, y, y
-    y = rng.uniform(atlas.Y_STICK_LO, STEEPEST_Y, n)
-    yield (v := surrogate.v_tilde_crit(y) * atlas.SIGMA_CUT**2) * low, v * high, y, y
+    """Those of a ball, and of its steepest ray."""
+    rng, (low, high) = np.random.default_rng(seed), SIDES
+    yield from _common_sides(surrogate, rng, n, BALL_SEAMS, STEEPEST_Y)
     y = _log(rng, 1e-6, STEEPEST_Y, n)
     yield (v := STEEPEST * y) * low, v * high, y, y
     yield (v := np.full(n, atlas.SLOW)) * low, v * high, y, y

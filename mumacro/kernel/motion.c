@@ -14,7 +14,10 @@
  * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of the last two over
  * all marks, which cannot cancel.  A ball is many independent springs, see element.c. */
 
-enum { MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6, MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4 };
+enum {
+    MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6,
+    MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
+};
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
@@ -98,27 +101,27 @@ static inline void mu_sine_cosine(double x, double *sine, double *cosine) {
     }
 }
 
-/* The motion at MU_MOMENTS times. */
-static void mu_moments_at(const mu_shaken *m, const double *tau, mu_moment *moments) {
+/* The motion at n <= MU_MOMENTS times; n is a constant where it is called. */
+MU_INLINE void mu_moments(const mu_shaken *m, int n, const double *tau, mu_moment *moments) {
     double sum[6][MU_MOMENTS] = {{0.0}}, sine[MU_MOMENTS], cosine[MU_MOMENTS], s[MU_MOMENTS], c[MU_MOMENTS];
     if (m->highest) { /* sin and cos of n tau from those of (n - 1) tau */
-        for (int j = 0; j < MU_MOMENTS; ++j) {
+        for (int j = 0; j < n; ++j) {
             mu_sine_cosine(tau[j], &sine[j], &cosine[j]);
             s[j] = 0.0;
             c[j] = 1.0;
         }
         for (int i = 0; i < m->highest; ++i) {
-            const double *part = m->parts[i], n = i + 1.0;
-            for (int j = 0; j < MU_MOMENTS; ++j) {
+            const double *part = m->parts[i], order = i + 1.0;
+            for (int j = 0; j < n; ++j) {
                 const double next = s[j] * cosine[j] + c[j] * sine[j];
                 c[j] = c[j] * cosine[j] - s[j] * sine[j];
                 s[j] = next;
                 sum[0][j] += part[0] * s[j] + part[1] * c[j];
                 sum[1][j] += part[2] * s[j] + part[3] * c[j];
-                sum[2][j] += n * (part[0] * c[j] - part[1] * s[j]);
-                sum[3][j] += n * (part[2] * c[j] - part[3] * s[j]);
+                sum[2][j] += order * (part[0] * c[j] - part[1] * s[j]);
+                sum[3][j] += order * (part[2] * c[j] - part[3] * s[j]);
                 sum[4][j] += part[4] * s[j] + part[5] * c[j];
-                sum[5][j] += n * (part[4] * c[j] - part[5] * s[j]);
+                sum[5][j] += order * (part[4] * c[j] - part[5] * s[j]);
             }
         }
     } else {
@@ -126,7 +129,7 @@ static void mu_moments_at(const mu_shaken *m, const double *tau, mu_moment *mome
         for (int part = 0; part < 3; ++part) {
             const int way = part < 2 ? part : 4, velocity = part < 2 ? part + 2 : 5;
             for (int i = 0; i < m->counts[part]; ++i, ++order, term += 2) {
-                for (int j = 0; j < MU_MOMENTS; ++j) {
+                for (int j = 0; j < n; ++j) {
                     mu_sine_cosine(*order * tau[j] + term[1], &sine[j], &cosine[j]);
                     sum[way][j] += term[0] * sine[j];
                     sum[velocity][j] += *order * term[0] * cosine[j];
@@ -134,7 +137,7 @@ static void mu_moments_at(const mu_shaken *m, const double *tau, mu_moment *mome
             }
         }
     }
-    for (int j = 0; j < MU_MOMENTS; ++j) {
+    for (int j = 0; j < n; ++j) {
         const mu_moment one = {tau[j],
                                m->scale * (m->drag * tau[j] + sum[0][j]),
                                m->scale * sum[1][j],
@@ -146,43 +149,14 @@ static void mu_moments_at(const mu_shaken *m, const double *tau, mu_moment *mome
     }
 }
 
-/* The same at one time. */
+static void mu_moments_at(const mu_shaken *m, const double *tau, mu_moment *moments) {
+    mu_moments(m, MU_MOMENTS, tau, moments);
+}
+
 static mu_moment mu_moment_at(const mu_shaken *m, double tau) {
-    const double *order = m->orders, *term = m->terms;
-    double sum[6] = {0.0}, sine, cosine;
-    if (m->highest) {
-        double s = 0.0, c = 1.0;
-        mu_sine_cosine(tau, &sine, &cosine);
-        for (int i = 0; i < m->highest; ++i) {
-            const double *part = m->parts[i], n = i + 1.0, next = s * cosine + c * sine;
-            c = c * cosine - s * sine;
-            s = next;
-            sum[0] += part[0] * s + part[1] * c;
-            sum[1] += part[2] * s + part[3] * c;
-            sum[2] += n * (part[0] * c - part[1] * s);
-            sum[3] += n * (part[2] * c - part[3] * s);
-            sum[4] += part[4] * s + part[5] * c;
-            sum[5] += n * (part[4] * c - part[5] * s);
-        }
-    } else {
-        for (int part = 0; part < 3; ++part) {
-            for (int i = 0; i < m->counts[part]; ++i, ++order, term += 2) {
-                mu_sine_cosine(*order * tau + term[1], &sine, &cosine);
-                sum[part < 2 ? part : 4] += term[0] * sine;
-                sum[part < 2 ? part + 2 : 5] += *order * term[0] * cosine;
-            }
-        }
-    }
-    {
-        const mu_moment at = {tau,
-                              m->scale * (m->drag * tau + sum[0]),
-                              m->scale * sum[1],
-                              m->scale * (m->drag + sum[2]),
-                              m->scale * sum[3],
-                              1.0 + sum[4],
-                              sum[5]};
-        return at;
-    }
+    mu_moment out;
+    mu_moments(m, 1, &tau, &out);
+    return out;
 }
 
 /* sin(half) / half of half <= 0.2, to 1e-17. */
@@ -1183,7 +1157,9 @@ static void mu_motions(int contact, int64_t n, const int32_t *counts, const doub
     for (int64_t i = 0; i < n; ++i, cases += numbers, out += MU_MEANS + 2) {
         const mu_shaken m = mu_shaken_as(counts, orders, cases);
         double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
-        const mu_steady found = contact == MU_BALL ? mu_ball_motion(&m, tolerance, &grid, &steps) : mu_spring_motion(&m, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
+        const mu_steady found =
+            contact == MU_BALL ? mu_ball_motion(&m, tolerance, &grid, &steps)
+                               : mu_spring_motion(&m, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
         memcpy(out, found.mean, sizeof found.mean);
         out[MU_MEANS] = found.decay;
         out[MU_MEANS + 1] = found.error;

@@ -232,7 +232,7 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, c
         bound[i] = fabs(c->factor[i]) * error[0] + error[1];
     }
     for (int i = 0; source && i < n; ++i)
-        source[i] = (int8_t)(contact != MU_BALL ? c->block[i] : (int64_t)(c->block[i] < MU_B_RING ? MU_BALL_SLIDES : MU_BALL_PARTLY));
+        source[i] = (int8_t)(contact == MU_BALL ? mu_ball_source((int)c->block[i]) : (int)c->block[i]);
     for (int i = 0; left && i < n; ++i) {
         if (mu_is_left(c->block[i])) {
             const mu_answer found = mu_answer_left(data, contact, MU_MU_RATIO, c, i, v[i], y[i]);
