@@ -76,7 +76,7 @@ def _build(chosen: Namespace) -> str:
             "tolerance": tolerance,
             "verified_max_abs_error": surrogate.max_abs_error,
             "verified_max_rel_error": surrogate.max_rel_error,
-            "n_solves": int(surrogate.attributes["n_solves"]),
+            "n_solves": surrogate.attributes["n_solves"],
             "bytes": out.stat().st_size,
             "content_sha256": surrogate.checksum,
         }
