@@ -19,7 +19,7 @@ from mumacro.kernel.arrays import Codes
 from .included import Outputs, Plan, answer_columns
 from .models.inputs import MAX_REASONS, Column
 from .models.options import MODEL, BatchOptions, CaseColumns
-from .problems import FieldFault, Kind, RequestError, reason_of, refuse
+from .problems import FieldFault, ProblemKind, RequestError, reason_of, refuse
 from .reading import of_members
 from .tables import LoadedTable, Tables
 
@@ -43,7 +43,7 @@ def too_large(max_batch: int) -> RequestError:
         f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it "
         "as NDJSON"
     )
-    return RequestError(Kind.BATCH_TOO_LARGE, detail, max_batch=max_batch)
+    return RequestError(ProblemKind.BATCH_TOO_LARGE, detail, max_batch=max_batch)
 
 
 def both(members: Mapping[str, Any], options: BatchOptions) -> dict[str, Any]:
@@ -107,11 +107,6 @@ class Batch:
         in_query = options.tolerance is not None
         table = tables.pick(model.tolerance, True if in_query else None)
         return cls(table, plan, columns, size, reasons, bool(lengths), body.rows, **more)
-
-    @property
-    def cost(self) -> float:
-        """Time of all cases, in times of a plain one."""
-        return self.size * self.plan.cost
 
     def slices(self, step: int) -> Iterator[tuple[Outputs, Codes, list[str | None]]]:
         """Outputs by path, source codes and reasons of ``step`` cases after another.

@@ -17,12 +17,15 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.analysis.settling import settling as decay
+from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
-from mumacro.inputs.kind import SPRING, Kind
+from mumacro.inputs.kind import SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, ROUNDING
 from mumacro.table.atlas import SOURCES as _SOURCES
+
+from .models.options import MODEL
 
 SOURCES = tuple(_SOURCES)
 #: name of the regime of every source code
@@ -214,59 +217,66 @@ _INTERVAL = frozenset(("k_range", "k_low", "k_high"))
 
 
 class Plan(NamedTuple):
-    """What is asked of cases: their kind, what is included beside the default outputs, and
+    """What is computed of cases: their kind, what is included beside the default outputs, and
     deviations for ``std``."""
 
     kind: Kind = SPRING
     interval: bool = False  # whether k is one
     include: tuple[str, ...] = ()
     std: Mapping[str, float] = {}
+    model: bool = False  # whether remarks on the model are included, for one case only
+    cost: float = 1.0  # time of a case, in times of a plain answer
 
     @classmethod
     def of(cls, options: Any, inputs: Mapping[str, Any]) -> "Plan":
         """What options ask of such inputs; InputError where the cases do not have it."""
-        kind, interval = options.kind, not _INTERVAL.isdisjoint(inputs)
-        if not options.include:
-            return cls(kind, interval)
-        include = tuple(name for name in INCLUDABLE if name in options.include)  # once, in order
-        for word in (kind.names["direction"], *(["k_range"] if interval else [])):
+        kind = kind_of(options.contact, options.direction)
+        interval = not _INTERVAL.isdisjoint(inputs)
+        if kind == SPRING and not interval and not options.include:
+            return _PLAIN
+        names = options.include or ()
+        include = tuple(name for name in INCLUDABLE if name in names)  # once, in order
+        words = (*kind.names.values(), *(["k_range"] if interval else []))
+        for word in words:
             for name in include:
                 if why := INCLUDABLE[name].lacks.get(word):
                     raise InputError("include", name, f"without {name} for {word}: {why}")
-        deviations = options.std
-        return cls(kind, interval, include, {} if deviations is None else deviations.by_field)
-
-    @property
-    def cost(self) -> float:
-        """Time of a case, in times of a plain answer."""
-        if not self.include and self.kind == SPRING and not self.interval:
-            return 1.0
-        cost = 1.0 + sum(INCLUDABLE[name].cost for name in self.include)
-        words = (*self.kind.names.values(), *(["k_range"] if self.interval else []))
+        std = options.std.by_field if include and options.std is not None else {}
+        cost = 1.0 + sum(INCLUDABLE[name].cost for name in include)
         if {"ball", "along"} <= {*words}:
             cost *= _BALL_ALONG
-        return cost * math.prod(_COSTS.get(word, 1.0) for word in words)
+        cost *= math.prod(_COSTS.get(word, 1.0) for word in words)
+        return cls(kind, interval, include, std, MODEL in names, cost)
+
+
+_PLAIN = Plan()
 
 
 def answer_case(surrogate: Surrogate, inputs: Mapping[str, Any], plan: Plan) -> tuple[Outputs, int]:
     """The answer to one case in plain numbers as JSON nests it, and the code of its source;
     InputError where the case is not legal."""
-    if not (plan.include or plan.interval):
+    if plan.include or plan.interval:
+        outputs, codes = _answer(surrogate, inputs, plan)
+        code = int(codes)
+        outputs |= {"regime": REGIME_OF[code], "source": SOURCES[code]}
+        values = nested(
+            {path: x if isinstance(x, str) else float(x) for path, x in outputs.items()}
+        )
+    else:
         answer: Any = surrogate.evaluate(**inputs, **plan.kind.names)
         code = answer.source_code
-        return {
+        values = {
             "mu_macro": answer.mu_macro,
             "mu_ratio": answer.mu_ratio,
             "regime": REGIME_OF[code],
             "error_bound": answer.error_bound,
             "source": SOURCES[code],
-        }, code
-    outputs, codes = _answer(surrogate, inputs, plan)
-    code = int(codes)
-    outputs |= {"regime": REGIME_OF[code], "source": SOURCES[code]}
-    return nested(
-        {path: x if isinstance(x, str) else float(x) for path, x in outputs.items()}
-    ), code
+        }
+    if plan.model:  # rows of docs/validity.md, and the digits that k supports
+        words = plan.kind.names
+        values[MODEL] = model_rows(surrogate, inputs, **words)
+        values["digits"] = digits(k_effect(surrogate, inputs, **words))
+    return values, code
 
 
 def answer_columns(

@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from mumacro.kernel.threads import processors
 
-from .problems import Kind, RequestError, path_in
+from .problems import ProblemKind, RequestError, path_in
 from .security import HEALTH_PATHS
 from .settings import Settings
 
@@ -46,10 +46,12 @@ def form_of(headers: Mapping[bytes, bytes], forms: Mapping[str, T]) -> T:
     if form is None or (parameters and _OTHER_CHARSET.search(parameters)):
         offer = ", ".join(forms)
         detail = f"send {offer}, not {media_type[:80]}"
-        raise RequestError(Kind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": offer})
+        raise RequestError(ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": offer})
     if headers.get(b"content-encoding", b"identity").lower() != b"identity":
         detail = "send the body without Content-Encoding"
-        raise RequestError(Kind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"})
+        raise RequestError(
+            ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"}
+        )
     return form
 
 
@@ -70,7 +72,7 @@ async def read_body(
                 "Content-Length, reading while you send"
             )
             raise RequestError(
-                Kind.BODY_TOO_LARGE,
+                ProblemKind.BODY_TOO_LARGE,
                 f"a body may have up to {limit} bytes: {remedy}",
                 max_bytes=limit,
             )
@@ -99,7 +101,7 @@ class Slots:
         """Take a slot; the code that called this gives it back."""
         if self.used >= self.number:
             raise RequestError(
-                Kind.OVERLOADED, f"{self.used} {self._name} are being answered already"
+                ProblemKind.OVERLOADED, f"{self.used} {self._name} are being answered already"
             )
         self.used += 1
 
@@ -135,7 +137,7 @@ class Work:
 
     async def client(self, move: Awaitable[T]) -> T:
         """Wait for the client to send or to read."""
-        async with within(self.settings.client_timeout_s, Kind.SLOW_CLIENT):
+        async with within(self.settings.client_timeout_s, ProblemKind.SLOW_CLIENT):
             return await move
 
 
@@ -149,7 +151,7 @@ Working = Annotated[Work, Depends(_work)]
 
 
 @asynccontextmanager
-async def within(limit: int, late: Kind = Kind.TOOK_TOO_LONG) -> AsyncIterator[None]:
+async def within(limit: int, late: ProblemKind = ProblemKind.TOOK_TOO_LONG) -> AsyncIterator[None]:
     """A time limit: of a whole answer, its reading, computing and sending, or of a client's next
     move."""
     try:
@@ -169,5 +171,5 @@ class Room:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request pass if there is room for it."""
         if "full" in scope.get("state", ()) and path_in(scope) not in HEALTH_PATHS:
-            raise RequestError(Kind.OVERLOADED, "too many connections are open")
+            raise RequestError(ProblemKind.OVERLOADED, "too many connections are open")
         await self._app(scope, receive, send)

@@ -103,7 +103,7 @@ def refused(faults: Sequence[FieldFault], **members: Any) -> "RequestError":
     first = faults[0]
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return RequestError(
-        Kind.INVALID_VALUE,
+        ProblemKind.INVALID_VALUE,
         f"{first.as_json(False)['field']}: {first.reason}{more}",
         faults,
         **members,
@@ -220,7 +220,7 @@ _ALTERNATIVES = {
 }
 
 
-class Kind(Enum):
+class ProblemKind(Enum):
     """A type of problem: status, title, and headers.  The connection closes where the rest of a
     request is not read."""
 
@@ -253,7 +253,7 @@ class RequestError(MumacroError):
 
     def __init__(
         self,
-        kind: Kind,
+        kind: ProblemKind,
         detail: str,
         faults: Sequence[FieldFault] = (),
         headers: Mapping[str, str] | None = None,
@@ -285,10 +285,14 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
     if error.status_code == 405:  # Starlette names the methods of one route of the path
         allowed = scope["app"].state.methods.get(path_in(scope), "GET, HEAD")
         detail = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
-        return RequestError(Kind.METHOD_NOT_ALLOWED, detail, headers={"Allow": allowed})
-    kinds = (Kind.MALFORMED_BODY, Kind.NOT_FOUND, Kind.RANGE_NOT_SATISFIABLE)
-    kind = next((one for one in kinds if one.status == error.status_code), Kind.UNEXPECTED)
-    detail = "no such path: /docs describes all of them" if kind is Kind.NOT_FOUND else error.detail
+        return RequestError(ProblemKind.METHOD_NOT_ALLOWED, detail, headers={"Allow": allowed})
+    kinds = (ProblemKind.MALFORMED_BODY, ProblemKind.NOT_FOUND, ProblemKind.RANGE_NOT_SATISFIABLE)
+    kind = next((one for one in kinds if one.status == error.status_code), ProblemKind.UNEXPECTED)
+    detail = (
+        "no such path: /docs describes all of them"
+        if kind is ProblemKind.NOT_FOUND
+        else error.detail
+    )
     return RequestError(kind, detail, headers=error.headers)
 
 
@@ -299,11 +303,11 @@ def _of_input(error: InputError, _: Scope) -> RequestError:
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:
-    return RequestError(Kind.NOT_READY, f"table {error.path.name}: {error.reason}")
+    return RequestError(ProblemKind.NOT_READY, f"table {error.path.name}: {error.reason}")
 
 
 def _of_memory(_error: MemoryError, _: Scope) -> RequestError:
-    return RequestError(Kind.OUT_OF_MEMORY, "send a smaller request, or send it later")
+    return RequestError(ProblemKind.OUT_OF_MEMORY, "send a smaller request, or send it later")
 
 
 #: exception -> what it means for its request
@@ -324,7 +328,7 @@ def meaning(error: Exception, scope: Scope) -> RequestError:
             request_error: RequestError = means(error, scope)
             return request_error
     detail = "The request could not be answered; the log has the reason under its request id."
-    return RequestError(Kind.UNEXPECTED, detail)
+    return RequestError(ProblemKind.UNEXPECTED, detail)
 
 
 def document_of(error: RequestError, scope: Scope) -> dict[str, Any]:
@@ -364,7 +368,7 @@ HANDLERS: Any = dict.fromkeys(_MEANINGS, handle)
 async def drained(error: RequestError, request: Request) -> None:
     """Read and drop the rest of a body that is refused, for a while: else many clients see a reset
     and no reason."""
-    late = error.kind in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
+    late = error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)
     if "Connection" not in error.kind.headers or late or "expect" in request.headers:
         return
     count, more = 0, True

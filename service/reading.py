@@ -10,6 +10,7 @@ solves nothing else: FastAPI's own reading of a case takes longer than its answe
 import json
 import string
 from collections.abc import Callable, Coroutine, Mapping
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import parse_qsl
 
@@ -20,13 +21,15 @@ from pydantic import ValidationError
 from starlette.datastructures import ImmutableMultiDict
 
 from .limits import SMALL_BODY, form_of, read_body
-from .problems import FieldFault, Kind, RequestError, invalid, refuse
+from .problems import FieldFault, ProblemKind, RequestError, invalid, refuse
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 JSON = "application/json"
 # of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _LISTS = frozenset(("include",))
+_WITH_ARRAYS = orjson.OPT_SERIALIZE_NUMPY
+_NO_HEADERS: Mapping[str, str] = MappingProxyType({})
 
 
 # --- JSON -----------------------------------------------------------------------------------------
@@ -53,7 +56,7 @@ _DECODER = json.JSONDecoder(
 def decode(text: bytes | bytearray, large: bool = False) -> Any:
     """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later."""
     if not text:
-        raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
+        raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
     try:
         quick = None if large else orjson.loads(text)
         # One colon for each member: none is named twice, and none stands in an object within.
@@ -64,27 +67,29 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
     try:
         return _DECODER.decode(text.decode())
     except RecursionError:
-        raise RequestError(Kind.MALFORMED_BODY, "the body is nested too deeply") from None
+        raise RequestError(ProblemKind.MALFORMED_BODY, "the body is nested too deeply") from None
     except ValueError as error:
-        raise RequestError(Kind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
+        raise RequestError(ProblemKind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
 
 
 def dump(values: Any) -> bytes:
     """Write JSON; numbers that are not finite become null."""
-    return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
+    return orjson.dumps(values, option=_WITH_ARRAYS)
 
 
 class Json(Response):
     """An answer as JSON; Starlette's own looks for what the headers may lack, which takes as long
     as a case."""
 
-    def __init__(self, content: Any, headers: Mapping[str, str] | None = None) -> None:
-        self.status_code, self.body, self.background = 200, dump(content), None
+    def __init__(self, content: Any, headers: Mapping[str, str] = _NO_HEADERS) -> None:
+        self.status_code, self.background = 200, None
+        self.body = orjson.dumps(content, option=_WITH_ARRAYS)
         self.raw_headers = [
             (b"content-length", b"%d" % len(self.body)),
             (b"content-type", b"application/json"),
-            *((name.lower().encode(), value.encode()) for name, value in (headers or {}).items()),
         ]
+        for name, value in headers.items():
+            self.raw_headers.append((name.lower().encode(), value.encode()))
 
 
 # --- requests -------------------------------------------------------------------------------------
@@ -160,7 +165,9 @@ def _pairs(query: bytes) -> list[tuple[str, str]]:
     try:
         return parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)
     except (ValueError, UnicodeDecodeError) as error:
-        raise RequestError(Kind.MALFORMED_BODY, f"the query cannot be read: {error}") from None
+        raise RequestError(
+            ProblemKind.MALFORMED_BODY, f"the query cannot be read: {error}"
+        ) from None
 
 
 def _number(text: str) -> Any:

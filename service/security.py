@@ -6,7 +6,7 @@ from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from .problems import Kind, RequestError, path_in
+from .problems import ProblemKind, RequestError, path_in
 
 #: as OpenAPI names the two ways to send a key
 SCHEMES = {
@@ -57,7 +57,7 @@ class Keys:
         if not names:
             detail = "send the API key as X-API-Key or as Authorization: Bearer"
             headers_back = {"WWW-Authenticate": "Bearer"}
-            raise RequestError(Kind.UNAUTHORIZED, detail, headers=headers_back)
+            raise RequestError(ProblemKind.UNAUTHORIZED, detail, headers=headers_back)
         return names[0]
 
 
@@ -78,15 +78,15 @@ class Heads:
 def _check(scope: Scope, headers: Mapping[bytes, Any]) -> None:
     version = scope["http_version"]
     if version not in ("1.0", "1.1") or (version == "1.1" and b"host" not in headers):
-        raise RequestError(Kind.MALFORMED_HTTP, "a request is of HTTP/1.1 and has one Host")
+        raise RequestError(ProblemKind.MALFORMED_HTTP, "a request is of HTTP/1.1 and has one Host")
     if headers.get(b"transfer-encoding", b"chunked").lower().strip(b" \t,") != b"chunked":
-        raise RequestError(Kind.MALFORMED_HTTP, "the only transfer coding is chunked")
+        raise RequestError(ProblemKind.MALFORMED_HTTP, "the only transfer coding is chunked")
     if len(headers) != len(scope["headers"]):
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
             if names.count(name) > 1:
                 detail = f"the header {name.decode()} is given more than once"
-                raise RequestError(Kind.MALFORMED_HTTP, detail)
+                raise RequestError(ProblemKind.MALFORMED_HTTP, detail)
     if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
         detail = "this service does not upgrade connections: send no Upgrade"
-        raise RequestError(Kind.MALFORMED_HTTP, detail)
+        raise RequestError(ProblemKind.MALFORMED_HTTP, detail)

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from .problems import Kind, RequestError, problem_of
+from .problems import ProblemKind, RequestError, problem_of
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
@@ -20,7 +20,7 @@ _PIECE = 2048  # bytes of a head that are read before its fields are counted
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
 _LOOK_EVERY_S = 0.25  # whether the time of a connection is over
 _TOO_LARGE = RequestError(
-    Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
+    ProblemKind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
 )
 
 
@@ -90,7 +90,8 @@ class Connection(HttpToolsProtocol):
         if now > self._due and (self._in_head or self._busy) and now <= self._end:
             self._refuse(
                 RequestError(
-                    Kind.SLOW_CLIENT, f"a client may take up to {self._settings.client_timeout_s} s"
+                    ProblemKind.SLOW_CLIENT,
+                    f"a client may take up to {self._settings.client_timeout_s} s",
                 )
             )
         elif now > min(self._due, self._end):
@@ -153,7 +154,7 @@ class Connection(HttpToolsProtocol):
     def send_400_response(self, msg: str) -> None:
         """Refuse what the parser, or a limit here, has refused."""
         if not self._second:
-            self._refuse(self._refusal or RequestError(Kind.MALFORMED_HTTP, msg))
+            self._refuse(self._refusal or RequestError(ProblemKind.MALFORMED_HTTP, msg))
 
     def pause_writing(self) -> None:
         """Give the client its time to read."""

@@ -11,7 +11,7 @@ from fastapi import Depends, Request
 from mumacro import Surrogate, TableError
 
 from . import API_VERSION
-from .problems import FieldFault, Kind, RequestError, refuse
+from .problems import FieldFault, ProblemKind, RequestError, refuse
 
 _log = logging.getLogger("mumacro.tables")
 
@@ -107,7 +107,7 @@ class Tables:
         """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0
         [-])."""
         if self.fault is not None:
-            raise RequestError(Kind.NOT_READY, self.fault)
+            raise RequestError(ProblemKind.NOT_READY, self.fault)
         tables = self.loaded
         if tolerance is None:
             return tables[0]

@@ -15,7 +15,7 @@ from ..batch import Batch, Body, Form, text_form, too_large
 from ..included import REGIME_OF, SOURCES
 from ..models.inputs import INPUTS
 from ..models.options import BatchOptions
-from ..problems import FieldFault, Kind, RequestError, refuse
+from ..problems import FieldFault, ProblemKind, RequestError, refuse
 from ..reading import dump
 
 _SLICE = 32768  # cases of a record batch of the answer
@@ -39,7 +39,7 @@ def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
             for message in pa.ipc.MessageReader.open_stream(buffer):
                 if message.type == "record batch" and _is_compressed(message.metadata):
                     detail = "the body is a compressed Arrow stream: send it uncompressed"
-                    raise RequestError(Kind.MALFORMED_BODY, detail)
+                    raise RequestError(ProblemKind.MALFORMED_BODY, detail)
             table = reader.read_all()
         table.validate()
         if table.num_rows > max_batch:
@@ -50,7 +50,7 @@ def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
             raise
         reason = (str(fault).splitlines() or [type(fault).__name__])[0][:200]
         raise RequestError(
-            Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}"
+            ProblemKind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}"
         ) from None
 
 

@@ -20,7 +20,7 @@ from mumacro.inputs.units import UNITS_OF, Scale, scale_of, split_unit
 from ..batch import Batch, Body, Form, Reason, text_form, too_large
 from ..models.inputs import INPUTS
 from ..models.options import BatchOptions
-from ..problems import FieldFault, Kind, RequestError, refuse
+from ..problems import FieldFault, ProblemKind, RequestError, refuse
 from .arrow import tables_of, twice
 
 _LONGEST_HEAD = 64 * 1024  # bytes
@@ -35,7 +35,7 @@ def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
     head, start = (b"", start) if first_line is None else (first_line[1], first_line.end())
     if len(head) > _LONGEST_HEAD:
         detail = f"the first line of the body has more than {_LONGEST_HEAD} bytes"
-        raise RequestError(Kind.MALFORMED_BODY, detail)
+        raise RequestError(ProblemKind.MALFORMED_BODY, detail)
     wrong: list[Any] = []
     columns: dict[str, list[Any]] = {}
     size = 0
@@ -51,7 +51,7 @@ def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
                 columns.setdefault(name, []).append(cells)
     except (UnicodeDecodeError, csv.Error, pa.ArrowInvalid) as error:
         reason = str(error).splitlines()[0][:200]
-        raise RequestError(Kind.MALFORMED_BODY, f"the body is not CSV: {reason}") from None
+        raise RequestError(ProblemKind.MALFORMED_BODY, f"the body is not CSV: {reason}") from None
     if size + len(wrong) > max_batch:
         raise too_large(max_batch)
     reasons: dict[int, Reason] = {

@@ -28,8 +28,7 @@ from ..batch import Batch, Body, Form, Reason, too_large
 from ..included import REGIME_OF, SOURCES, Outputs, names_of, nested
 from ..models.inputs import EXAMPLE, MAX_REASONS, Case
 from ..models.options import BatchOptions, CaseColumns
-from ..problems import FieldFault, RequestError, faults_of, reason_of, refuse
-from ..problems import Kind as ProblemKind
+from ..problems import FieldFault, ProblemKind, RequestError, faults_of, reason_of, refuse
 from ..reading import decode, dump
 
 _NAMES = (*CaseColumns.model_fields,)

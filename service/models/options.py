@@ -47,7 +47,7 @@ class Choice(Strict):
     tolerance: Positive | None = optional(_TOLERANCE)
 
     @model_validator(mode="after")
-    def _a_kind_that_exists(self) -> Self:
+    def _consistent(self) -> Self:
         kind_of(self.contact, self.direction)
         return self
 
@@ -104,7 +104,8 @@ class Options(Choice):
     std: InputStd | None = optional("Standard deviations of the inputs, for include=std")
 
     @model_validator(mode="after")
-    def _std_beside_include(self) -> Self:
+    def _consistent(self) -> Self:  # in place of that of Choice
+        kind_of(self.contact, self.direction)
         if self.include or self.std is not None:
             check_std(self.std, self.include, self.direction)
         return self
@@ -164,7 +165,8 @@ class QueryOptions(Deviations, Choice):
     )
 
     @model_validator(mode="after")
-    def _std_beside_include(self) -> Self:
+    def _consistent(self) -> Self:  # in place of that of Choice
+        kind_of(self.contact, self.direction)
         std = self.std
         if self.include or std is not None:
             check_std(std, self.include, self.direction)
@@ -182,7 +184,7 @@ class BatchOptions(Deviations):
     )
 
     @model_validator(mode="after")
-    def _together(self) -> Self:
+    def _consistent(self) -> Self:
         kind_of(self.contact or "spring", self.direction or "across")
         check_std(self.std, self.include, self.direction or "across")
         return self

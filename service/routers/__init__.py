@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse
 from starlette.types import Message, Receive, Scope, Send
 
-from ..problems import Kind
+from ..problems import ProblemKind
 
 
 def router_of(tag: str, route_class: type[APIRoute], prefix: str = "/v1") -> APIRouter:
@@ -40,7 +40,7 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """The descriptions of problems with these statuses, for ``responses``."""
     return {
         status: {
-            "description": "; ".join(kind.title for kind in Kind if kind.status == status),
+            "description": "; ".join(kind.title for kind in ProblemKind if kind.status == status),
             "content": _PROBLEM,
             "headers": _ID | (_RETRY if status == 503 else {}),
         }

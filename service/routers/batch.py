@@ -21,7 +21,7 @@ from ..batch_forms import ALL, FORMS
 from ..included import Plan, answer_case
 from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body, within
 from ..models.options import BatchOptions, CaseRequest
-from ..problems import FieldFault, Kind, RequestError, document_of, meaning, refuse
+from ..problems import FieldFault, ProblemKind, RequestError, document_of, meaning, refuse
 from ..reading import DirectRoute, decode, dump, of_members, validated
 from . import POSTED, router_of
 
@@ -77,7 +77,7 @@ class _Answer(Response):
     async def _whole(self, form: Form, receive: Receive, send: Send) -> None:
         text = await self._work.client(read_body(self._fields, receive, self._limit, self._place))
         if not text:
-            raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
+            raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
         # Reading costs by the byte, computing by the case: a small body can request much
         # computation.
         cost = len(text) / _BYTES_PER_UNIT
@@ -85,7 +85,7 @@ class _Answer(Response):
             lambda: self._batch(form.read(text, self._most, self._options)), cost
         )
         text = bytearray()  # freed, unless the columns are views of it
-        cost += batch.cost
+        cost += batch.size * batch.plan.cost
         pieces = _gathered(form.write(batch))
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [
@@ -142,7 +142,7 @@ class _Answer(Response):
                 self._place()
             if len(text) > self._limit:
                 raise RequestError(
-                    Kind.BODY_TOO_LARGE, f"a line may have up to {self._limit} bytes"
+                    ProblemKind.BODY_TOO_LARGE, f"a line may have up to {self._limit} bytes"
                 )
             more = await self._work.client(_next_line(receive, text))
         await self._work.client(

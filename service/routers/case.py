@@ -1,16 +1,16 @@
 """One case: ``GET`` and ``POST /v1/mu-macro``, and ``GET /v1/mu-macro.txt`` for spreadsheets."""
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import Query, Request, Response
 from starlette.responses import PlainTextResponse
 
-from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 
 from ..included import Plan, answer_case
 from ..models.answers import CaseAnswer
-from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
+from ..models.options import CaseQuery, CaseRequest, TextQuery
 from ..reading import DirectRoute, Json, dump
 from . import ASKED, POSTED, router_of
 
@@ -31,17 +31,8 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     """The answer to a case."""
     state, inputs = request.app.state, case.inputs
     table, plan = state.tables.pick(case.tolerance), Plan.of(case, inputs)
-    surrogate, with_model = table.surrogate, MODEL in (case.include or ())
-
-    def work() -> tuple[dict[str, Any], int]:
-        values, source = answer_case(surrogate, inputs, plan)
-        if with_model:  # rows of docs/validity.md, and the digits that k supports
-            words = plan.kind.names
-            values["model"] = model_rows(surrogate, inputs, **words)
-            values["digits"] = digits(k_effect(surrogate, inputs, **words))
-        return values, source
-
-    large = with_model or plan.cost > _LARGE
+    work = partial(answer_case, table.surrogate, inputs, plan)
+    large = plan.model or plan.cost > _LARGE
     values, source = await state.work.question(work) if large else work()
     state.metrics.case(table, source)
     return {**values, **table.signature}

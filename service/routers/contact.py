@@ -21,7 +21,7 @@ from .. import API_VERSION
 from ..limits import Working
 from ..models.answers import FitAnswer, StiffnessAnswer
 from ..models.questions import FitRequest, StiffnessRequest
-from ..problems import Kind, RequestError
+from ..problems import ProblemKind, RequestError
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
 from . import POSTED, problems, router_of
@@ -62,7 +62,7 @@ def _fitted(table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]
             warnings.simplefilter("ignore")
             fit = mumacro.fit(columns, measured.unknowns, surrogate=table.surrogate, **words)
     except ModuleNotFoundError as error:
-        raise RequestError(Kind.NOT_INSTALLED, missing("fit", error)) from None
+        raise RequestError(ProblemKind.NOT_INSTALLED, missing("fit", error)) from None
     members = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
     return {
         **members,

@@ -191,6 +191,8 @@ def test_a_line_is_answered_like_a_batch_or_a_case(client: Any, case: Case) -> N
     assert first == client.post(BATCH, json=columns).json()
     assert second == client.post(BATCH, json=rows).json()
     assert third == one(client, case)
+    more: Case = {**case, "include": ["model"]}
+    assert read("ndjson", posted(client, "ndjson", as_ndjson([more]))) == [one(client, more)]
 
 
 def test_options_of_a_stream_come_with_its_query_or_its_lines(

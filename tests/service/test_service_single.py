@@ -1,8 +1,11 @@
 """One case over HTTP: its answer, and all that ``include`` adds to it; the other forms are those of
 test_formats.py."""
 
+import asyncio
 import json
 import math
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,6 +14,7 @@ from hypothesis import strategies as st
 
 from mumacro import Surrogate
 from mumacro.analysis.settling import settling
+from service import reading
 from tests.support.cases import Case
 from tests.support.comparing import close
 
@@ -176,3 +180,48 @@ def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate)
                 getattr(expected, name) if math.isfinite(getattr(expected, name)) else None
             ), name
         assert (answer["settling"]["time"] is None) == (at["v0"] == 0)  # it never slips
+
+
+def test_an_endpoint_answers_a_case_by_seven_functions(client: Any, case: Case) -> None:
+    """What a reader follows from the endpoint to its answer, beside the library's own functions."""
+    text = json.dumps(case).encode()
+    scope = {
+        "type": "http",
+        "http_version": "1.1",
+        "method": "POST",
+        "scheme": "http",
+        "path": PATH,
+        "query_string": b"",
+        "headers": [(b"host", b"here"), (b"content-type", b"application/json")],
+    }
+    statuses, called, depth = list[int](), set[str](), 0
+    service = str(Path(reading.__file__).parent)
+
+    async def receive() -> Any:
+        return {"type": "http.request", "body": text}
+
+    async def send(message: Any) -> None:
+        statuses.append(message.get("status", 0))
+
+    def note(frame: Any, event: str, _: Any) -> None:
+        nonlocal depth
+        code = frame.f_code
+        if not code.co_filename.startswith(service) or code.co_name.startswith("<"):
+            return
+        begins = code.co_name == "post_mu_macro" or depth
+        if event == "call" and begins:
+            called.add(code.co_qualname)
+            depth += 1
+        elif event == "return" and depth:
+            depth -= 1
+
+    async def answered() -> None:
+        sys.setprofile(note)
+        try:
+            await client.app(scope, receive, send)
+        finally:
+            sys.setprofile(None)
+
+    asyncio.run(answered())
+    assert statuses[0] == 200
+    assert len(called - {"post_mu_macro"}) == 7, sorted(called)
