@@ -16,10 +16,27 @@ html_title = f"mumacro {__version__}"
 highlight_language = "none"
 smartquotes = False  # --help is no dash
 html_theme = "furo"
-# the accent of the service's page
+# the fonts and colours of the service's page (service/static/page/page.css)
+_FONTS = {
+    "font-stack": 'system-ui, "DejaVu Sans", sans-serif',
+    "font-stack--monospace": 'ui-monospace, "DejaVu Sans Mono", monospace',
+}
 _LIGHT, _DARK = (
-    {"color-brand-primary": accent, "color-brand-content": accent}
-    for accent in ("#0b5cad", "#7db7f5")
+    {
+        **_FONTS,
+        "color-background-primary": card,
+        "color-background-secondary": back,
+        "color-background-border": line,
+        "color-foreground-primary": text,
+        "color-foreground-secondary": soft,
+        "color-foreground-muted": soft,
+        "color-brand-primary": accent,
+        "color-brand-content": accent,
+    }
+    for back, card, text, soft, line, accent in (
+        ("#f3f5f8", "#ffffff", "#16202c", "#55616f", "#d4dae1", "#0b5cad"),
+        ("#11151b", "#1a2029", "#e7ecf2", "#a3afbd", "#36414e", "#7db7f5"),
+    )
 )
 html_theme_options = {"light_css_variables": _LIGHT, "dark_css_variables": _DARK}
 html_copy_source = False

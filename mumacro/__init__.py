@@ -2,6 +2,7 @@
 stick-slip model."""
 
 import sys as _sys
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.errors import missing as _missing
@@ -57,6 +58,19 @@ __all__ = [
 # the modules of the face can be imported by its names, wherever they stand
 _sys.modules |= {f"{__name__}.stiffness": stiffness, f"{__name__}.validity": validity}
 _sys.meta_path.append(_moved.Signposts)
+
+
+if not _TYPE_CHECKING:  # with it a type checker would accept any name
+
+    def __getattr__(name: str) -> object:
+        """AttributeError; for a method of a surrogate it says how to call it."""
+        public = not name.startswith("_") and callable(getattr(Surrogate, name, None))
+        advice = f": use mumacro.open().{name}(...)" if public else ""
+        raise AttributeError(
+            f"module 'mumacro' has no attribute {name!r}{advice}",
+            name=name,
+            obj=_sys.modules[__name__],
+        )
 
 
 def __dir__() -> list[str]:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from difflib import get_close_matches
 from enum import Enum
 from typing import Any, NoReturn
 
@@ -288,12 +289,24 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
         return RequestError(ProblemKind.METHOD_NOT_ALLOWED, detail, headers={"Allow": allowed})
     kinds = (ProblemKind.MALFORMED_BODY, ProblemKind.NOT_FOUND, ProblemKind.RANGE_NOT_SATISFIABLE)
     kind = next((one for one in kinds if one.status == error.status_code), ProblemKind.UNEXPECTED)
-    detail = (
-        "no such path: /docs describes all of them"
-        if kind is ProblemKind.NOT_FOUND
-        else error.detail
-    )
+    detail = _nearest_path(scope) if kind is ProblemKind.NOT_FOUND else error.detail
     return RequestError(kind, detail, headers=error.headers)
+
+
+def _nearest_path(scope: Scope) -> str:
+    """What to do about a path that is not there; its case, and "_" for "-", do not matter."""
+    path = path_in(scope)[:_MAX_TEXT].lower().replace("_", "-").rstrip("/")
+    paths = [one for one in scope["app"].state.methods if "{" not in one]
+    # a path without its version, such as /mu-macro, is nearer to /v1/mu-macro than it looks
+    near = next(
+        (
+            found[0]
+            for tried in (path, f"/v1{path}")
+            if (found := get_close_matches(tried, paths, n=1, cutoff=0.8))
+        ),
+        None,
+    )
+    return f"no such path; {f'did you mean {near}? ' if near else ''}/docs describes all of them"
 
 
 def _of_input(error: InputError, _: Scope) -> RequestError:

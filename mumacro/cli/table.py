@@ -56,5 +56,8 @@ def _errors(surrogate: Surrogate) -> Iterator[str]:
         rows = [
             (name, *(f"{value:.2g}" for value in part.values())) for name, part in spread.items()
         ]
-        text = "errors that a share of the verified points does not exceed; bound over error"
+        text = (
+            "Errors that a share of the verified points does not exceed; then how many\n"
+            "times the error its bound is: 1 or more is a bound that holds."
+        )
         yield f"{text}\n{in_columns([('', *heads), *rows])}"

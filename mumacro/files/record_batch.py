@@ -4,7 +4,7 @@ Columns that are named like a missing input are refused.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -17,7 +17,14 @@ from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import GAP, LIKE, SI, refusal
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
-from mumacro.inputs.text_tables import TOO_LARGE, absent, find_heads, meant_by, read_cell
+from mumacro.inputs.text_tables import (
+    TOO_LARGE,
+    absent,
+    absent_together,
+    find_heads,
+    meant_by,
+    read_cell,
+)
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.surrogate import Surrogate
@@ -137,13 +144,10 @@ def find_columns(
         faults.append(f"there are both k and {end[0]}; leave one out")
     ends = ENDS if heads.keys() & {*ENDS} else () if rigid else ("k",)
     required = [name for field in kind.fields for name in (ends if field == "k" else (field,))]
-    for name in required:
-        if name not in heads and (name != "omega" or "f" not in heads):
-            fault = absent(name, names)
-            if name == "y0" and AMPLITUDE in (split_unit(column)[0] for column in names):
-                fault = f"there is no column y0, but {AMPLITUDE}: give --direction normal"
-            or_rigid = "; rename the one that holds it, or give --rigid if all contacts are rigid"
-            faults.append(fault + or_rigid if name == "k" and "similar" not in fault else fault)
+    faults += _absent(
+        [name for name in required if name not in heads and (name != "omega" or "f" not in heads)],
+        names,
+    )
     slopes = [f"d_mu_macro_d_{name}" for name in kind.fields] if "gradient" in include else []
     added = [ANSWERS[0], *(BAND if ends == ENDS else ()), *ANSWERS[1:], *slopes]
     faults += [
@@ -154,6 +158,18 @@ def find_columns(
     return {
         name: (names[heads[name][0]], heads[name][1]) for name in (*required, "f") if name in heads
     }, added
+
+
+def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
+    """The faults of columns that are missing."""
+    if "y0" in inputs and AMPLITUDE in (split_unit(column)[0] for column in names):
+        yield f"there is no column y0, but {AMPLITUDE}: give --direction normal"
+        inputs = [name for name in inputs if name != "y0"]
+    if inputs:
+        one = len(inputs) == 1
+        yield absent(inputs[0], names) if one else absent_together(inputs, names)
+    if "k" in inputs and not any(meant_by(column) == "k" for column in names):
+        yield "rename the one that holds k, or give --rigid if all contacts are rigid"
 
 
 def answer_columns(

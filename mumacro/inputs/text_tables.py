@@ -153,17 +153,41 @@ def absent(name: str, heads: Sequence[str]) -> str:
     "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
     brackets)"
     """
+    if alike := _similar(name, heads):
+        remedy = f"rename that column to {alike[1]} (or another unit in brackets)"
+        return f"there is no column {name}; {alike[0]!r} is similar: {remedy}"
+    meaning = ": the mean friction force over Fz" if name == "mu_macro" else ""
+    columns = ", ".join(map(repr, heads))
+    return f"there is no column {_heading(name)}{meaning}; there are {columns}"
+
+
+def absent_together(names: Sequence[str], heads: Sequence[str]) -> str:
+    """What to do about several columns that are missing; what they share is told once.
+
+    >>> absent_together(["Fz", "v0"], ["speed", "note"])
+    "there are no columns Fz [N], v0 [m/s]; there are 'speed', 'note'; similar: rename 'speed' to
+    v0 [m/s]"
+    """
+    headings = ", ".join(map(_heading, names))
+    renames = [f"{one[0]!r} to {one[1]}" for name in names if (one := _similar(name, heads))]
+    remedy = f"; similar: rename {', '.join(renames)}" if renames else ""
+    columns = ", ".join(map(repr, heads))
+    return f"there are no columns {headings}; there are {columns}{remedy}"
+
+
+def _heading(name: str) -> str:
+    """The heading that a column of an input has, in SI units."""
+    heading = f"{name} [{unit_of(name) if name in (*UNITS_OF, *LIKE) else '-'}]"
+    return f"{heading} or f [Hz]" if name == "omega" else heading
+
+
+def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
+    """The head that probably stands for an input, and the heading that it should have."""
     for head in heads:
         field = meant_by(head)
         if field and field in (name, {"omega": "f"}.get(name)):
-            remedy = (
-                f"rename that column to {field} [{unit_of(field)}] (or another unit in brackets)"
-            )
-            return f"there is no column {name}; {head!r} is similar: {remedy}"
-    unit = f"{name} [{unit_of(name) if name in (*UNITS_OF, *LIKE) else '-'}]"
-    heading = f"{unit} or f [Hz]" if name == "omega" else unit
-    meaning = ": the mean friction force over Fz" if name == "mu_macro" else ""
-    return f"there is no column {heading}{meaning}; there are {', '.join(map(repr, heads))}"
+            return head, f"{field} [{unit_of(field)}]"
+    return None
 
 
 def read_cell(name: str, cell: str, decimal: str = ".") -> float:

@@ -45,6 +45,16 @@ def test_the_face_is_what_users_need() -> None:
     assert [name for name in mumacro.__all__ if not hasattr(mumacro, name)] == []
 
 
+def test_a_method_of_a_surrogate_is_not_one_of_the_module_and_says_so() -> None:
+    with pytest.raises(
+        AttributeError, match=r"'evaluate': use mumacro\.open\(\)\.evaluate\("
+    ) as caught:
+        getattr(mumacro, "evaluate")  # noqa: B009 (a type checker refuses the name itself)
+    assert caught.value.name == "evaluate"
+    with pytest.raises(AttributeError, match=r"no attribute 'nothing'$"):
+        getattr(mumacro, "nothing")  # noqa: B009
+
+
 def test_importing_the_library_loads_no_optional_package() -> None:
     heavy = "matplotlib", "pandas", "scipy", "xarray", "dask", "pyarrow", "netCDF4"
     code = f"import sys, mumacro; print([name for name in {heavy} if name in sys.modules])"

@@ -34,8 +34,8 @@ def test_it_loads_and_shows_the_known_value(
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
     assert page.text("#regime") == "stick slip"
     assert page.text("#model") == (
-        "One model: one spring of stiffness k, oscillation across the sliding direction; compared "
-        "with one published set of measured points, along."
+        "One model: one spring of stiffness k, oscillation across the sliding direction. It was "
+        "compared with one published set of measured points, shaken along."
     )
     assert page.text("#known").startswith("10\xa0% more or less of k changes µ by")
     assert page.find("#known").is_displayed()
@@ -47,7 +47,7 @@ def test_it_loads_and_shows_the_known_value(
         "µ/µ₀": f"{answer.mu_ratio:.4g}",
         "ṽ = v₀/(l₀ω)": f"{answer.v_tilde:.4g}",
         "ỹ = y₀/l₀": f"{answer.y_tilde:.4g}",
-        "peak vibration y₀ω": "251.3 mm/s",
+        "peak speed y₀ω": "251.3 mm/s",
         "stick fraction": f"{100 * stick:.4g} %",
         "shaker power": f"{1e3 * power:.4g} mW",
         "power saved": f"{1e3 * (0.3 - answer.mu_macro) * 0.1:.4g} mW",

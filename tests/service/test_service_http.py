@@ -75,6 +75,25 @@ def test_an_unknown_path_is_not_found(client: Any, problem: Any, path: Any) -> N
     problem(client.get(path), 404)
 
 
+@pytest.mark.parametrize(
+    ("path", "near"),
+    [
+        ("/v1/mu_macro", "/v1/mu-macro"),
+        ("/mu-macro", "/v1/mu-macro"),
+        ("/v1/mu-macro/", "/v1/mu-macro"),
+        ("/V1/Law", "/v1/law"),
+        ("/v1/solvefor", "/v1/solve-for"),
+        ("/readyz/", "/readyz"),
+        ("/nowhere", None),
+    ],
+)
+def test_an_unknown_path_names_the_nearest(client: Any, problem: Any, path: str, near: Any) -> None:
+    detail = problem(client.get(path), 404)["detail"]
+    assert detail == (
+        f"no such path; {f'did you mean {near}? ' if near else ''}/docs describes all of them"
+    )
+
+
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
 def test_a_wrong_method_is_answered_with_the_right_ones(

@@ -183,6 +183,7 @@ export function fit(use, load) {
   $("example").title = about.example.label;
   $("example").addEventListener("click", () => {
     $("points").value = about.example.points;
+    $("unknowns").value = "k"; // mu0 is one of its columns
     load(about.example.case);
   });
   $("fit-image").addEventListener("click", () => plot.save(told, "friction-fit.svg"));

@@ -86,7 +86,7 @@ function showAnswer({ asked, ...found }) {
   $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
-  $("model").textContent = `One model: ${kind}, ${about.choices.direction[direction]}; compared with one published set of measured points, along.`;
+  $("model").textContent = `One model: ${kind}, ${about.choices.direction[direction]}. It was compared with one published set of measured points, shaken along.`;
   const rows = found.model ?? [];
   const [units, known] = ["units", "k is known"].map((name) => rows.find(({ row }) => row === name)); // beside the number
   $("units").textContent = units ? `Check the units: ${prose(units.text)}` : "";
@@ -97,7 +97,7 @@ function showAnswer({ asked, ...found }) {
     "µ/µ₀": all ? friction(found.mu_ratio, bound / valueOf(asked, "mu0"), 15) : show(found.mu_ratio, 4),
     "static µ (v₀ → 0)": show(limits.mu_static, 4),
     "border at v₀": inUnit("v0", limits.v0_crit),
-    "peak vibration y₀ω": normal ? "–" : inUnit("v0", valueOf(asked, "y0") * valueOf(asked, "omega")),
+    "peak speed y₀ω": normal ? "–" : inUnit("v0", valueOf(asked, "y0") * valueOf(asked, "omega")),
     "stick fraction": found.stick_fraction === null ? "–" : `${show(100 * found.stick_fraction, 4)} %`,
     "shaker power": k.low === Infinity ? "– (rigid)" : inUnit("power", power?.oscillation ?? null),
     "power saved": inUnit("power", power?.saved ?? null),

@@ -3,6 +3,13 @@ import { withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
 
+/** All faults of a question, where it has several; names that share a reason stand together: "E, nu: is required". */
+function faults(errors = []) {
+  if (errors.length < 2) return null;
+  const names = Map.groupBy(errors, ({ reason }) => reason);
+  return [...names].map(([reason, all]) => `${all.map(({ field }) => field).join(", ")}: ${reason}`).join("; ");
+}
+
 async function ask(path, options) {
   let response, body;
   try {
@@ -15,7 +22,7 @@ async function ask(path, options) {
   if (response.ok) return { found: body };
   const { status, headers } = response;
   if (status === 401) return { key: true };
-  const why = body.detail ?? `status ${status}`;
+  const why = faults(body.errors) ?? body.detail ?? `status ${status}`;
   if (status < 500 && ![408, 429].includes(status)) return { refused: `The service refuses this: ${why}.` };
   return { later: `The service cannot answer now: ${why}.`, seconds: Number(headers.get("Retry-After")) || null };
 }

@@ -35,6 +35,7 @@ function show(spec) {
     spec,
     dom_id: "#swagger-ui",
     deepLinking: true,
+    defaultModelsExpandDepth: 0, // fifty models are folded until somebody opens them
     validatorUrl: null,
     presets: [window.SwaggerUIBundle.presets.apis],
     plugins: [accessible],

@@ -710,6 +710,7 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
     assert found["error_distribution"] == surrogate.error_distribution
     text = said(capsys, 0, "table")
     assert text.count(".nc") > len(found["bundled"])
+    assert "times the error its bound is: 1 or more is a bound that holds." in text
     assert f"{surrogate.error_distribution['border']['0.95']:.2g}" in text
 
 

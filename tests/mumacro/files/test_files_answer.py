@@ -233,6 +233,14 @@ SIMILAR = "{!r} is similar: rename that column to {}"
         ),
         ("mu0,Fz,y0,omega,v0,c", {}, ["no column k [N/m]", "'omega', 'v0', 'c'", "--rigid"]),
         ("mu0,Fz,k,y0,v0", {}, ["omega [rad/s] or f [Hz]"]),
+        (
+            "mu,F,stuff,y0,f",
+            {},
+            [
+                "no columns mu0 [-], Fz [N], k [N/m], v0 [m/s]; there are 'mu', 'F', 'stuff', ",
+                "; similar: rename 'mu' to mu0 [-], 'F' to Fz [N]; rename the one that holds k",
+            ],
+        ),
         *(
             (f"mu0,Fz,{more},y0,omega,v0", {}, [said])
             for more, said in (
