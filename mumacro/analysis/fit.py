@@ -118,7 +118,7 @@ class Fit:
             curves.append(
                 plotting.Curve(label, x[in_set], mu_measured, bars, x_curve, mu, width * deviation)
             )
-        return plotting.plot_fit(along, curves, ", ".join(self._value_texts()), ax)
+        return plotting.plot_fit(along, curves, self._title(), ax)
 
     def _plot_each(self, along: str, ax: Any) -> Any:
         """The same where each point has its own other inputs, such as mu0: one line."""
@@ -129,7 +129,10 @@ class Fit:
         width = quantile(None if std is not None else x.size - len(self.values))
         bars, label = None if std is None else std[order], "fit, at the inputs of each point"
         curve = plotting.Curve(label, x, mu_measured, bars, x, mu, width * deviation)
-        return plotting.plot_fit(along, [curve], ", ".join(self._value_texts()), ax)
+        return plotting.plot_fit(along, [curve], self._title(), ax)
+
+    def _title(self) -> str:
+        return f"{', '.join(self._value_texts())}; {self.contact}, {self.direction}"
 
     def _value_texts(self) -> list[str]:
         units = {"k": " N/m", "mu0": ""}

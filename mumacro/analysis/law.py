@@ -16,6 +16,7 @@ from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import FIELDS, POSITIVE
+from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
@@ -39,6 +40,7 @@ class Law:
     kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
     #: how k grows along Fz; None where k is constant
     stiffening: Stiffening | None = None
+    k_range: tuple[float, float] | None = None  #: the interval of k [N/m]; None for one number
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -76,7 +78,10 @@ class Law:
             borders=[(crossing.value, crossing.name) for crossing in self.border],
             roots=roots,
             target=target,
-            title=plotting.in_words(self.case, self.kind.names),
+            title=plotting.in_words(
+                self.case if self.k_range is None else {**self.case, "k": self.k_range},
+                self.kind.names,
+            ),
         )
 
 
@@ -208,4 +213,5 @@ def law(
         answer = band_curve.answer(x, groups=True, strict=True)
     at_rest = curve.answer(x, v0=0.0) if along != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
-    return Law(along, x, answer, mu_static, border, fixed, kind, curve.stiffening)
+    k_range = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
+    return Law(along, x, answer, mu_static, border, fixed, kind, curve.stiffening, k_range)

@@ -62,9 +62,20 @@ def test_every_example_is_listed_and_tested(repository: Path) -> None:
     }
     readme = (repository / "examples" / "README.md").read_text("utf-8")
     tests = "".join(path.read_text("utf-8") for path in (repository / "tests").rglob("*.py"))
-    untested = {"README.md", "demo.py"}  # to be read, or run by a person
     assert [name for name in there - {"README.md"} if f"`{name}" not in readme] == []
-    assert [name for name in there - untested if Path(name).stem not in tests] == []
+    assert [name for name in there - {"README.md"} if Path(name).stem not in tests] == []
+
+
+def test_the_demo_prints_the_answer_of_the_readme(repository: Path) -> None:
+    text = run(repository, sys.executable, "dev.py", "demo")  # examples/demo.py
+    readme = (repository / "README.md").read_text("utf-8")
+    stated = number(r'^\{"mu_macro":([0-9.]+)', readme[readme.index('{"mu_macro":') :])
+    assert number(r'"mu_macro": ([0-9.]+)', text) == stated
+    assert number(r"Answer: +mu_macro = ([0-9.]+) ", text) == close(stated, rel=1e-11)
+    # what comes next is what the README says
+    for step in ("python3 dev.py serve", "open http://127.0.0.1:8000"):
+        assert step in text
+        assert step in readme.replace("<", "").replace(">", "")
 
 
 def test_curl(repository: Path, live_server: Any, surrogate: Surrogate) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mumacro import InputError, Surrogate, closed_forms
+from mumacro import InputError, Surrogate, closed_forms, plotting
 from mumacro.analysis.approximations import (
     APPROXIMATIONS,
     BORDERS,
@@ -217,6 +217,8 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
     pytest.importorskip("matplotlib").use("Agg")
     law, _, _ = law_of(surrogate, pair, INTERVAL, refine=True)
     axes = law.plot()
+    k_title = plotting.in_words({"k": law.k_range})
+    assert (" to " in k_title, k_title in axes.get_title(loc="left")) == (True, True)
     (band,) = axes.collections
     corners = band.get_paths()[0].vertices
     for x, *ends in zip(law.values, *law.band, strict=True):

@@ -89,6 +89,7 @@ def test_the_normal_force_obeys_the_published_form(surrogate: Surrogate, alpha: 
 def test_the_plot_of_points_with_their_own_mu0_is_one_line_through_the_fit() -> None:
     result = measured.fitted("ball")
     axes = result.plot()
+    assert axes.get_title(loc="left").endswith(" N/m; ball, along")
     fit_line = axes.get_lines()[-1]
     assert fit_line.get_xdata() == close(measured.points().v0, rel=1e-15)
     assert fit_line.get_ydata() == close(result.predict()[0], rel=1e-15)
