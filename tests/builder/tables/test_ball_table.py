@@ -173,6 +173,8 @@ CORNERS: dict[str, Any] = {
     "gross slip at rest": lambda n: (10.0 ** np.linspace(-20, -1, n), beside(1.0, n, 3)),
     "corner at creep": lambda n: (beside(1e-9, n, 4), 1.0 + beside(1e-6, n, 5)),
     "steepest ray": lambda n: (beside(STEEPEST * 0.3, n, 6), np.full(n, 0.3)),
+    "border at y~ 1.5": lambda n: (beside(STEEPEST, n, 7), beside(1.0, n, 8)),
+    "creep below the ridge": lambda n: (beside(0.0202, n, 9), beside(1.879 / MIDDLE, n, 10)),
     "small": lambda n: (10.0 ** np.linspace(-14, -3, n), 10.0 ** np.linspace(-7, -2, n)),
 }
 
@@ -193,7 +195,10 @@ def test_no_error_is_beyond_its_bound(
         assert np.abs(value - solved[name]).max() <= tolerance
 
 
-@pytest.mark.parametrize("corner", ["ridge", "corner at creep", "steepest ray"])
+@pytest.mark.parametrize(
+    "corner",
+    ["ridge", "corner at creep", "steepest ray", "border at y~ 1.5", "creep below the ridge"],
+)
 def test_no_slope_is_beyond_its_bound(of: Contact, corner: str) -> None:
     table = opened(COARSE)
     v, y = of.as_asked(*CORNERS[corner](40))
