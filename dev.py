@@ -182,7 +182,8 @@ def test(*arguments: str) -> int:
         for word in (*(() if "--quick" in arguments else ("-m", "not peer")), *arguments)
         if word != "--quick"
     ]
-    return run(PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *chosen) or failed
+    spread = ("-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder")  # see tests/conftest.py
+    return run(PYTHON, "-m", "pytest", *spread, *chosen) or failed
 
 
 def demo() -> int:

@@ -76,7 +76,7 @@ def _build(chosen: Namespace) -> str:
             "tolerance": tolerance,
             "verified_max_abs_error": surrogate.max_abs_error,
             "verified_max_rel_error": surrogate.max_rel_error,
-            "n_solves": sweep.n_solves,
+            "n_solves": surrogate.attributes["n_solves"],
             "bytes": out.stat().st_size,
             "content_sha256": surrogate.checksum,
         }
@@ -123,7 +123,7 @@ def _solve(chosen: Namespace) -> int:
 
 def _verify(chosen: Namespace) -> int:
     from .solver.sweep import Sweep
-    from .tables.build import solved_springs, write_verified
+    from .tables.build import springs_for, write_verified
     from .tables.contacts import ball
     from .tables.verify import holds, verify, verify_ball
 
@@ -133,7 +133,8 @@ def _verify(chosen: Namespace) -> int:
         report = verify(surrogate, sweep, chosen.points, chosen.seed)
         whole = holds(report, tolerance)
         if surrogate.table.ball:
-            of = ball(solved_springs(sweep), surrogate.ball_tolerance, chosen.workers)
+            springs = springs_for(surrogate.table, sweep)
+            of = ball(springs, surrogate.ball_tolerance, chosen.workers)
             report["ball"] = verify_ball(surrogate, of, chosen.points, chosen.seed)
             whole = whole and holds(report["ball"], surrogate.ball_tolerance)
     report |= {"tolerance": tolerance, "holds": whole}

@@ -22,7 +22,7 @@ from mumacro.version import __version__
 from ..solver.ball import Springs
 from ..solver.sweep import Sweep
 from .blocks import build_block, build_border
-from .contacts import FINE, Contact, ball, fine_springs, spring
+from .contacts import FINE, Contact, ball, spring
 from .measure import block_errors, border_errors
 from .quantities import ABS_TO_REL, SOLVED
 from .verify import QUANTILES, holds, uncovered, verify, verify_ball
@@ -35,6 +35,7 @@ SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the
 CELL_SAFETY = 1.5
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
+SPRING_POINTS = 2000  # fresh solves that the springs of a ball are compared with
 ATTEMPTS = 4
 #: the least tolerance of a ball, whatever that of its table: beside the ridge the ring misses 1e-11
 BALL_TOLERANCE = 1e-10
@@ -99,7 +100,7 @@ def stages() -> int:
 
 def ball_stages() -> int:
     """The same of :func:`add_ball`."""
-    return 1 + len(CHARTS) + len(BALL_CHARTS) + 2
+    return 1 + len(BALL_CHARTS) + 2
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
@@ -176,8 +177,8 @@ def add_ball(
     """The table with a ball of its tolerance, but not below :data:`BALL_TOLERANCE`, verified; its
     springs are the same.
 
-    A ball is integrated over springs of the tolerance :data:`.contacts.FINE`, which are solved for
-    that first.
+    A ball is integrated over springs of the tolerance :data:`.contacts.FINE`, see
+    :func:`springs_for`.
 
     Raises
     ------
@@ -185,7 +186,8 @@ def add_ball(
         When the verified error does not come below the tolerance.
     """
     tolerance = max(float(table.attributes["tolerance"]), BALL_TOLERANCE)
-    of = ball(solved_springs(sweep, progress), tolerance, sweep.workers)
+    of = ball(springs_for(table, sweep), tolerance, sweep.workers)
+    progress("springs of the ball", True)
     border, targets = Border(table.border), [tolerance] * len(BALL_CHARTS)
 
     def build(i: int) -> Block:
@@ -214,23 +216,30 @@ def add_ball(
     return table
 
 
-def solved_springs(
-    sweep: Sweep, progress: Callable[[str, bool], None] = lambda _text, _done: None
-) -> Springs:
-    """Springs of the tolerance :data:`.contacts.FINE`, solved anew or from a checkpoint."""
-    border = Border(pieces := build_border(sweep, FINE))
-    for piece in pieces:
-        piece.max_rel_error = 1e-14
-    progress("fine border", True)
-    blocks = []
-    for i, chart in enumerate(CHARTS):
-        blocks.append(
-            build_block(
-                spring(sweep), i, border, FINE, lambda text: progress(f"fine {text}", False)
-            )
-        )
-        progress(f"fine {chart.name}", True)
-    return fine_springs(pieces, blocks)
+def springs_for(table: Table, sweep: Sweep) -> Springs:
+    """The springs that a ball is integrated over: those of ``table`` where its tolerance is
+    :data:`.contacts.FINE`, else those of the bundled table of that tolerance.
+
+    That table is compared with fresh solves first: the solver may have changed since it was built.
+
+    Raises
+    ------
+    BuildError
+        No such table is bundled, or it cannot be read, or it is not what the solver gives.
+    """
+    if float(table.attributes["tolerance"]) <= FINE:
+        return Springs(Surrogate(table, "springs"))
+    remedy = (
+        f"a ball is integrated over the springs of the bundled table of {FINE:g}; build that "
+        f"first: python -m builder build --tolerance {FINE:g} --out tables/mumacro-{FINE:g}.nc"
+    )
+    try:
+        fine = Surrogate.open(FINE)
+    except MumacroError as error:
+        raise BuildError(f"{error}; {remedy}") from error
+    if not holds(verify(fine, sweep, SPRING_POINTS), FINE):
+        raise BuildError(f"{fine.path} is not what the solver gives now; {remedy}")
+    return Springs(fine)
 
 
 def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
@@ -354,7 +363,6 @@ def _finish(
         "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),
     }
     table = add_ball(table, out, sweep, progress)
-    table.attributes["n_solves"] = np.int32(sweep.n_solves)
     write_table(table, out)
     if sweep.checkpoint is not None:
         shutil.rmtree(sweep.checkpoint, ignore_errors=True)

@@ -17,7 +17,7 @@ from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import MIDDLE, Chart
-from mumacro.table.blocks import Block, BorderPiece, Table
+from mumacro.table.blocks import Block, Table
 from mumacro.table.polynomials import Border
 
 from ..solver.ball import Ball, Springs, points_for
@@ -153,11 +153,3 @@ def _no_noise(name: str, v: Array, y: Array, solved: dict[str, Array], sliding: 
     """A quadrature's own error is a part of the errors that a table of a ball states."""
     del y, solved, sliding, name
     return np.zeros_like(v)
-
-
-def fine_springs(pieces: list[BorderPiece], blocks: list[Block]) -> Springs:
-    """What a ball is integrated over, from a border and blocks of the tolerance :data:`FINE`."""
-    none = np.empty(0)
-    table = Table(pieces, blocks, none, none, none, none, none, none)
-    table.attributes = {"tolerance": FINE, "quantities": " ".join(atlas.QUANTITY_NAMES)}
-    return Springs(Surrogate(table, "fine springs"))

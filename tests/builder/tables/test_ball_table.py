@@ -12,16 +12,18 @@ from scipy.special import ellipe, ellipk
 
 from builder.solver.ball import NAMES, Ball, Springs
 from builder.solver.sweep import Sweep
+from builder.tables.build import BuildError, springs_for
 from builder.tables.contacts import BALL_NOISE, Contact, ball, ratio_of
 from builder.tables.measure import block_errors
 from builder.tables.verify import BALL_CASES, Neighbours, seam_jumps
-from mumacro import InputError, Surrogate, closed_forms
+from mumacro import InputError, Surrogate, closed_forms, surrogate
 from mumacro.inputs.kind import BALL
 from mumacro.kernel.binding import kernels
 from mumacro.table.atlas import BALL_CHARTS, MIDDLE, QUANTITY_NAMES, SLOW, STEEPEST, STEEPEST_Y
 from mumacro.table.netcdf import FORMAT_VERSION, WITHOUT_BALL, read_table, write_table
 from tests.support.cases import Array, opened
 from tests.support.comparing import close
+from tests.support.places import TABLES
 
 COARSE = 1e-7
 
@@ -39,6 +41,36 @@ def of(springs: Springs) -> Contact:
 def wide(n: int, seed: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     return 10.0 ** rng.uniform(-8, 4, n), 10.0 ** rng.uniform(-5, 5, n)
+
+
+# --- its springs ----------------------------------------------------------------------------------
+
+
+def test_the_springs_of_a_ball_are_those_of_the_finest_table(sweep: Sweep) -> None:
+    own = springs_for(opened(1e-12).table, sweep).fine.table
+    bundled = springs_for(opened(1e-4).table, sweep).fine.table
+    for one, other in zip(own.blocks, bundled.blocks, strict=True):
+        for name in one.nodes:
+            assert np.array_equal(one.nodes[name], other.nodes[name]), name
+
+
+def test_springs_that_the_solver_does_not_give_are_refused(
+    sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fine = opened(1e-12)
+    block = fine.table.blocks[0]
+    nodes = {name: x + 1e-9 for name, x in block.nodes.items()}
+    changed = [dataclasses.replace(block, nodes=nodes), *fine.table.blocks[1:]]
+    path = tmp_path / "mumacro-1e-12.nc"
+    write_table(dataclasses.replace(fine.table, blocks=changed), path)
+    monkeypatch.setattr(surrogate, "bundled_tables", lambda: [path])
+    coarse = opened(1e-4).table
+    with pytest.raises(BuildError, match=r"not what the solver gives now; .* --tolerance 1e-12"):
+        springs_for(coarse, sweep)
+    for left in ([], [TABLES / "mumacro-1e-7.nc"]):
+        monkeypatch.setattr(surrogate, "bundled_tables", lambda left=left: left)
+        with pytest.raises(BuildError, match=r"table.*; a ball .* first: .* --tolerance 1e-12"):
+            springs_for(coarse, sweep)
 
 
 # --- the solver -----------------------------------------------------------------------------------
