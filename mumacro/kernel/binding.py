@@ -62,7 +62,8 @@ def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
         if isinstance(column, float):
             constants[i] = column
         else:
-            arrays[i] = _from_buffer(_NUMBERS, column) + start
+            at = _from_buffer(_NUMBERS, column)
+            arrays[i] = at + start if start else at
     return of_kernel
 
 
