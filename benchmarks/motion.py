@@ -24,7 +24,7 @@ CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5}
 L0 = 3e-6  # m, mu0 Fz / k
 #: contact, tolerance, motions, and the tolerance of what they are compared with
 SEARCHES = (
-    ("spring", 1e-4, 5_000, 1e-8),
+    ("spring", 1e-4, 10_000, 1e-8),
     ("spring", 1e-6, 10_000, 1e-9),
     ("spring", 1e-7, 5_000, 1e-9),
     ("ball", 1e-6, 300, 1e-7),

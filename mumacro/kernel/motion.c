@@ -742,10 +742,14 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
 }
 
 /* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only one; of those that stick
- * there are many, and only its way decides between them. */
+ * there are many, and only its way decides between them.
+ *
+ * The steps that are left to be halved are then those of the period that slips most: the last one hardly slips, and
+ * halves of its steps may be those that the periods before have taken already. */
 static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance,
                                        double goal, double *f) {
     double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance, curved = 0.0;
+    double most = 0.0, step = 0.0, from[2] = {0.0, 0.0};
     mu_march march;
     mu_steady out;
     f[0] = f[1] = 0.0;
@@ -756,7 +760,14 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
     march.steps = steps;
     for (int period = 1;; ++period) {
         double moved[2], rate, leap;
+        const double before = march.step;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
+        if (march.mean[MU_MEAN_PATH] > most) {
+            most = march.mean[MU_MEAN_PATH];
+            step = before;
+            from[0] = f[0];
+            from[1] = f[1];
+        }
         moved[0] = march.f[0] - f[0];
         moved[1] = march.f[1] - f[1];
         size[2] = size[1];
@@ -773,8 +784,14 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
             distance = mu_min(2.0 * size[0] / (1.0 - rate), 2.0);
         }
         if (march.failed) distance = 2.0;
-        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed)
-            return mu_steady_of(&march, mu_min(distance + curved, 2.0));
+        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) {
+            out = mu_steady_of(&march, mu_min(distance + curved, 2.0));
+            if (march.mean[MU_MEAN_PATH] < most) {
+                march.step = step;
+                mu_take_period(m, grid, from, tolerance, &march, NULL);
+            }
+            return out;
+        }
         f[0] = march.f[0];
         f[1] = march.f[1];
         /* many equal periods at once: half of what is left, and no more than a straight way that errs little */

@@ -268,8 +268,13 @@ AT_REST_LONG = in_tau(
 )
 
 
+#: it slips in the first period only
+AT_REST_ONCE = [*random_motions(3151)][-1]
+
+
 @pytest.mark.parametrize(
-    ("case", "tolerance"), [(AT_REST, 1e-6), (AT_REST_LONG, 1e-4), (AT_REST_LONG, 1e-3)]
+    ("case", "tolerance"),
+    [(AT_REST, 1e-6), (AT_REST_LONG, 1e-4), (AT_REST_LONG, 1e-3), (AT_REST_ONCE, 1e-4)],
 )
 def test_the_way_to_a_cycle_that_sticks_counts_in_the_estimate(
     case: dict[str, Any], tolerance: float
