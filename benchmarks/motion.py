@@ -12,7 +12,7 @@ import functools
 import math
 import time
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,12 @@ from mumacro import Surrogate, motion
 Array = NDArray[np.float64]
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5}
 L0 = 3e-6  # m, mu0 Fz / k
-#: contact, tolerance, motions, and the tolerance of what they are compared with
+#: motions, tolerance, how many, and the tolerance of what they are compared with
 SEARCHES = (
-    ("spring", 1e-4, 5_000, 1e-8),
+    ("spring", 1e-4, 10_000, 1e-8),
     ("spring", 1e-6, 10_000, 1e-9),
     ("spring", 1e-7, 5_000, 1e-9),
+    ("ball, one harmonic", 1e-4, 10_000, 1e-6),
     ("ball", 1e-6, 300, 1e-7),
 )
 AGAINST_TABLES = (
@@ -62,34 +63,64 @@ def random_motions(n: int, ball: bool = False, seed: int = 1) -> Iterator[dict[s
         yield {**CASE, "v0": v0, "x": x or 0.0, "y": y or 0.0, "normal": normal or 0.0}
 
 
-def ratios(contact: str, tolerance: float, finer: float, n: int, seed: int = 1) -> Array:
-    """Error, estimate and tolerance mu0 of random motions, (n, 3); the error from finer cycles."""
+def single_harmonics(n: int, seed: int = 1) -> Iterator[dict[str, Any]]:
+    """Keywords of ``motion`` with one harmonic along or across, log-uniform, dragged."""
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        drag, size = 10.0 ** rng.uniform(-4.0, 1.5), 10.0 ** rng.uniform(-2.0, 2.0)
+        name = "x" if rng.random() < 0.5 else "y"
+        yield {**CASE, "v0": drag * L0 * CASE["omega"], name: size * L0}
+
+
+class Deviations(NamedTuple):
+    """Of random motions from finer cycles, each (n,)."""
+
+    error: Array  #: of the mean force over Fz
+    estimate: Array
+    most: Array  #: what the tolerance allows the estimate
+    stick: Array  #: of the stick fraction
+    path: Array  #: of the slip path, over itself plus mu0 Fz / k
+
+
+def deviations(kind: str, tolerance: float, finer: float, n: int, seed: int = 1) -> Deviations:
+    """``kind`` is "spring", "ball" or "ball, one harmonic"."""
+    contact = kind.partition(",")[0]
+    single = kind != contact
+    cases = single_harmonics(n, seed) if single else random_motions(n, contact == "ball", seed)
     rows = []
-    for case in random_motions(n, contact == "ball", seed):
+    for case in cases:
         a, b = (motion(**case, contact=contact, tolerance=t) for t in (tolerance, finer))
-        error = math.hypot(a.mu_macro - b.mu_macro, a.mu_lateral - b.mu_lateral)
-        rows.append((error, a.error_estimate, tolerance * CASE["mu0"]))
-    return np.array(rows)
+        rows.append(
+            (
+                math.hypot(a.mu_macro - b.mu_macro, a.mu_lateral - b.mu_lateral),
+                a.error_estimate,
+                tolerance * CASE["mu0"],
+                abs(a.stick_fraction - b.stick_fraction),
+                abs(a.slip_path - b.slip_path) / (L0 + b.slip_path),
+            )
+        )
+    return Deviations(*np.array(rows).T)
 
 
 def errors(share: float = 1.0) -> str:
     """Error over estimate of random motions beside cycles of a finer tolerance."""
     rows = []
-    for contact, tolerance, n, finer in SEARCHES:
-        error, estimate, most = ratios(contact, tolerance, finer, max(1, round(share * n))).T
-        ratio = error / estimate
+    for kind, tolerance, n, finer in SEARCHES:
+        off = deviations(kind, tolerance, finer, max(1, round(share * n)))
+        ratio, found = off.error / off.estimate, off.estimate <= off.most
         rows.append(
             [
-                f"{contact}, {tolerance:g}",
-                f"{error.size:,}",
+                f"{kind}, {tolerance:g}",
+                f"{ratio.size:,}",
                 *(quantity(float(x)) for x in np.quantile(ratio, (0.5, 0.99, 1.0))),
                 f"{np.count_nonzero(ratio > 1.0)}",
-                quantity(float(error.max() / CASE["mu0"])),
-                f"{np.count_nonzero(estimate > most)}",
+                quantity(float(off.error.max() / CASE["mu0"])),
+                f"{np.count_nonzero(~found)}",
+                *(quantity(float(x[found].max())) for x in (off.stick, off.path)),
             ]
         )
     header = (
-        "contact, tolerance",
+        "motion, tolerance",
         "motions",
         "error/estimate: median",
         "99 %",
@@ -97,6 +128,8 @@ def errors(share: float = 1.0) -> str:
         "above 1",
         "largest error/mu0",
         "given up",
+        "stick fraction off",
+        "slip path off",
     )
     return markdown(header, rows)
 
@@ -136,13 +169,14 @@ def beside_tables(share: float = 1.0) -> str:
 
 
 def times(share: float = 1.0) -> str:
-    """Processor time of one motion at 1e-6, and 1,000 cases of one motion on all processors."""
+    """Processor time of one motion at 1e-6, and 1,000 cases of one motion, dragged, on all
+    processors."""
     rows = []
     for contact, n in (("spring", 1000), ("ball", 300)):
-        each = []
+        each: dict[bool, list[float]] = {False: [], True: []}  # by whether it is at rest
         for case in random_motions(max(3, round(share * n)), contact == "ball", seed=5):
             call = functools.partial(motion, **case, contact=contact, threads=1)
-            each.append(1e3 * best_of(1, {"": call})[""])
+            each[case["v0"] == 0.0].append(1e3 * best_of(1, {"": call})[""])
         rng = np.random.default_rng(3)
         many = max(10, round(1000 * share))
         case = {
@@ -154,10 +188,11 @@ def times(share: float = 1.0) -> str:
         start, used = time.perf_counter(), time.process_time()
         motion(**case, contact=contact)
         wall, used = time.perf_counter() - start, time.process_time() - used
-        quantiles = np.quantile(each, (0.5, 0.9, 0.99, 1.0))
-        rows.append(
-            [contact, *(f"{x:.2f}" for x in quantiles), f"{many:,}", f"{wall:.2f}", f"{used:.2f}"]
-        )
+        at_once = [f"{many:,}", f"{wall:.2f}", f"{used:.2f}"]
+        for rest, cells in ((False, at_once), (True, ["", "", ""])):
+            quantiles = np.quantile(each[rest] or [math.nan], (0.5, 0.9, 0.99, 1.0))
+            name = f"{contact}, v0 = 0" if rest else f"{contact}, dragged"
+            rows.append([name, *(f"{x:.2f}" for x in quantiles), *cells])
     header = (
         "",
         "one, median [ms]",

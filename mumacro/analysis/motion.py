@@ -220,7 +220,8 @@ def motion(
     -------
     Motion
         ``error_estimate`` is below ``tolerance mu0``, unless the search gives up; then it says what
-        is left.
+        is left.  ``stick_fraction`` and ``slip_path`` have no estimate and are less accurate: a
+        brief stick or a slow approach to the cycle hardly changes a mean force.
 
     Raises
     ------

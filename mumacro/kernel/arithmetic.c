@@ -81,7 +81,9 @@ MU_INLINE mu_lanes mu_cube_root(mu_lanes x) {
     mu_lanes root = MU_NUMBER(third), cube = root * root * root, off;
     root = root * ((cube + 2.0 * x) / (2.0 * cube + x));
     off = (x - root * root * root) / x;
-    return mu_fma(root * off, mu_fma(off, mu_fma(off, mu_all(14.0 / 81.0), mu_all(2.0 / 9.0)), mu_all(1.0 / 3.0)), root);
+    return mu_fma(
+        root * off,
+        mu_fma(off, mu_fma(off, mu_all(14.0 / 81.0), mu_all(2.0 / 9.0)), mu_all(1.0 / 3.0)), root);
 }
 
 /* x = m 2^e with 1/2 <= m < 1, of finite x > 0: returns m. */

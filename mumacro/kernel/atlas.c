@@ -1,15 +1,16 @@
-/* The atlas of one spring: how the quadrant v~, y~ >= 0 is divided into blocks, and the chart of each.  This file is the
- * only list of its blocks and of pieces of the border, ball_atlas.c that of a ball's blocks, records.c that of
- * quantities; Python reads them through the shared object.
+/* The atlas of one spring: how the quadrant v~, y~ >= 0 is divided into blocks, and the chart of
+ * each.  This file is the only list of its blocks and of pieces of the border, ball_atlas.c that of
+ * a ball's blocks, records.c that of quantities; Python reads them through the shared object.
  *
- * A chart maps (v~, y~) to two coordinates (a, b) in which what the block tabulates is a smooth function q(a, b); each
- * quantity is value = base + factor q.
+ * A chart maps (v~, y~) to two coordinates (a, b) in which what the block tabulates is a smooth
+ * function q(a, b); each quantity is value = base + factor q.
  *
- * Continuous sliding needs no fitted border: its orbit is analytic in (v~^2, y~^2), beyond the border too.  Stick-slip
- * is between the static limit and the border, both of them square-root edges; with v~ = v~crit sin^2(pi s/2) it is
- * analytic in s on [0, 1].  Around y~ = 1, v~ = 0 only polar coordinates of the normal form
- * mu~^3 + 2 (y~ - 1) mu~ = pi v~ are analytic.  In the tails what is left beyond the outer solution
- * outer = (2/pi) K(i y~/v~), eq. (35), is linear in 1/y~ to 1e-12. */
+ * Continuous sliding needs no fitted border: its orbit is analytic in (v~^2, y~^2), beyond the
+ * border too.  Stick-slip is between the static limit and the border, both of them square-root
+ * edges; with v~ = v~crit sin^2(pi s/2) it is analytic in s on [0, 1].  Around y~ = 1, v~ = 0 only
+ * polar coordinates of the normal form mu~^3 + 2 (y~ - 1) mu~ = pi v~ are analytic.  In the tails
+ * what is left beyond the outer solution outer = (2/pi) K(i y~/v~), eq. (35), is linear in 1/y~ to
+ * 1e-12. */
 
 #define MU_Y_STICK_LO 0.75
 #define MU_Y_CONT 1.5 /* continuous: rational coordinates below, logarithmic above */

@@ -145,7 +145,8 @@ static mu_turn mu_turn_of_ring(const mu_place *at) {
     const double root = at->a < MU_FOLD_KNOT ? sqrt(1.0 - t) : mu_max(left, 1e-9);
     double of_root;
     const double tilt = mu_entry_slope(t, root, &of_root), a = mu_fold_slope(at->a), b = mu_fold_slope(at->b);
-    const mu_turn out = {a, -a, -tilt * b, (1.0 + tilt) * b, 0.0, 0.0, -tilt, 1.0 + tilt, 2.0 * MU_FOLD_KNOT, MU_FOLD_SCALE};
+    const mu_turn out = {a, -a, -tilt * b, (1.0 + tilt) * b, 0.0, 0.0, -tilt, 1.0 + tilt,
+                         2.0 * MU_FOLD_KNOT, MU_FOLD_SCALE};
     return out;
 }
 

@@ -38,8 +38,8 @@ static mu_answer mu_ball_stick_limit(double v, double y) {
 #define MU_SQUARE 0.6857142857142857
 #define MU_FOURTH 0.5541125541125541
 
-/* Two terms as of one spring, (35) at y~ / sqrt(v~^2 + MU_SQUARE), which is exact to 1/v~^2; for small amplitudes what is
- * left of 1/v~^4 is known. */
+/* Two terms as of one spring, (35) at y~ / sqrt(v~^2 + MU_SQUARE), which is exact to 1/v~^2; for
+ * small amplitudes what is left of 1/v~^4 is known. */
 static mu_answer mu_ball_ratio_fast(const mumacro_data *data, double v, double y) {
     const int plain = mu_max(v, y) < 1e150;
     const double share = plain ? 1.0 / (v * v + MU_SQUARE) : 1.0 / v / v, ratio = y / v;

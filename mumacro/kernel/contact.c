@@ -18,8 +18,8 @@ MU_INLINE double mu_ball_border(const mumacro_data *data, double y) {
     return MU_MIDDLE * mu_border_at(data, y / MU_MIDDLE);
 }
 
-/* d mu~ / d v~ at v~ = 0: infinite from rest on for y~ <= 1.5, like a logarithm; else read off the table at a speed that
- * stands for the limit. */
+/* d mu~ / d v~ at v~ = 0: infinite from rest on for y~ <= 1.5, like a logarithm; else read off the
+ * table at a speed that stands for the limit. */
 static double mu_ball_speed_slope(const mumacro_data *data, double y, double *bound) {
     double v;
     mu_answer found;
@@ -236,8 +236,8 @@ static mu_driven mu_drive_inside(const mumacro_data *data, int contact, int dire
     return contact == MU_BALL && y < MU_HUGE ? mu_drive_ball(data, v, y) : mu_drive_spring(direction, v, y);
 }
 
-/* Any v~ and y~.  Where y~ - v~ has no digits it is not known whether the contact sticks: there a bound is that a little
- * inside, and the way from there. */
+/* Any v~ and y~.  Where y~ - v~ has no digits it is not known whether the contact sticks: there a
+ * bound is that a little inside, and the way from there. */
 static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v, double y) {
     const double inside = y * (1.0 - 2.0 * MU_LINE_ROUNDING);
     mu_driven out = {mu_line_of_sliding(direction, v, y), 0.0, 0.0, 0.0, 0.0, 0.0}, near;

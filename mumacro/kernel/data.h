@@ -47,8 +47,8 @@ typedef struct {
     mumacro_driven_rule driven;
 } mumacro_data;
 
-/* The six inputs of n cases, mu0, Fz, k, y0 (normal: Fz_amplitude), omega, v0: each an array (n,), or one constant where
- * its array is NULL. */
+/* The six inputs of n cases, mu0, Fz, k, y0 (normal: Fz_amplitude), omega, v0: each an array (n,),
+ * or one constant where its array is NULL. */
 typedef struct {
     const double *array[6];
     double constant[6];

@@ -117,9 +117,9 @@ static void mu_know(mu_answer found, mu_slopes at, double known[MU_KNOWN][MU_CHU
     known[MU_OF_BOUND_Y][i] = at.bound_y;
 }
 
-/* The same of any case; `slopes` is NULL where they are still to be found.  One-sided at the edges: d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0,
- * d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, infinite on y~ = 1 and for rigid contact.  Relative to k the slope is 0 for
- * rigid contact. */
+/* The same of any case; `slopes` is NULL where they are still to be found.  One-sided at the edges:
+ * d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0,
+ * infinite on y~ = 1 and for rigid contact.  Relative to k the slope is 0 for rigid contact. */
 static void mu_gradient(const mumacro_data *data, int contact, int direction, const mu_inputs *in,
                         mu_answer found, const mu_slopes *slopes, double v, double y, double *out, int64_t stride) {
     const double mu0 = in->mu0, six[6] = {in->mu0, in->Fz, in->k, in->y0, in->omega, in->v0};
@@ -275,7 +275,8 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
                 found.source < 0 ? NAN : mu_length_scale(six.mu0, six.Fz, six.k);
         }
         if (rows == MU_ROWS)
-            mu_gradient(data, contact, direction, &six, found, slopes, v, y, out + MU_ROW_GRADIENT * stride + i, stride);
+            mu_gradient(data, contact, direction, &six, found, slopes, v, y,
+                        out + MU_ROW_GRADIENT * stride + i, stride);
     }
 }
 

@@ -1,5 +1,5 @@
-/* What the shared object offers.  mumacro/kernel/binding.py reads this file, data.h and records.h too: declarations only, no
- * macros. */
+/* What the shared object offers.  mumacro/kernel/binding.py reads this file, data.h and records.h
+ * too: declarations only, no macros. */
 #ifndef MU_LIBRARY_H
 #define MU_LIBRARY_H
 #include <stdint.h>
@@ -33,9 +33,10 @@ typedef struct {
     void (*values)(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
                    const double *y, double *value, double *bound, int8_t *source);
     /* a quantity and its slopes: mumacro_slope_row, stride apart; of a ball mu~ alone has them, others are NaN */
-    void (*slopes)(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v, const double *y, double *out,
-                   int64_t stride);
-    /* dimensional cases; out has the first `rows` of mumacro_row, stride apart: those before v~, those before the gradient, or all */
+    void (*slopes)(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
+                   const double *y, double *out, int64_t stride);
+    /* dimensional cases; out has the first `rows` of mumacro_row, stride apart: those before v~,
+     * those before the gradient, or all */
     void (*cases)(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *columns,
                   int rows, double *out, int64_t stride, int8_t *source);
     /* cases whose k, the third column, reaches to high: mumacro_extreme_row, stride apart */
@@ -43,8 +44,8 @@ typedef struct {
                       const double *high, double *out, int64_t stride);
     /* across, alone, in a fraction of the time: mu~ of a spring; and one case, its gradient only where asked for */
     double (*ratio)(const mumacro_data *data, double v, double y);
-    void (*one)(const mumacro_data *data, int contact, double mu0, double Fz, double k, double y0, double omega, double v0,
-                int with_gradient, mumacro_case *out);
+    void (*one)(const mumacro_data *data, int contact, double mu0, double Fz, double k, double y0,
+                double omega, double v0, int with_gradient, mumacro_case *out);
     /* v~crit(y~) of a contact and direction: 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *y, double *crit);
     /* blocks of points with 0 < v~, y~ < infinity, of a ball those of its middle spring, and their coordinates as
@@ -68,18 +69,18 @@ typedef struct {
      * (n, springs, 2) are the state, sums (n, 2) the result */
     void (*element_steps)(int64_t n, int springs, const double *before, const double *after, const double *k,
                           const double *dx, const double *dy, double *forces, double *sums);
-    /* steady cycles of n periodic motions.  Units: mu0 Fz, l0 = mu0 Fz / k, tau = omega t.  counts: harmonics of x, y
-     * and the normal force, whose orders follow each other; a case: drag per tau, amplitude and phase of each.  A row of
-     * out: mean forces along and across, share of stick, path of the foot per period, work of the shaker per period,
-     * decay of a disturbance per period as a logarithm, estimate of the error of the mean force.  work: 2 room numbers
-     * for room steps */
+    /* steady cycles of n periodic motions.  Units: mu0 Fz, l0 = mu0 Fz / k, tau = omega t.  counts:
+     * harmonics of x, y and the normal force, whose orders follow each other; a case: drag per tau,
+     * amplitude and phase of each.  A row of out: mean forces along and across, share of stick, path
+     * of the foot per period, work of the shaker per period, decay of a disturbance per period as a
+     * logarithm, estimate of the error of the mean force.  work: 2 room numbers for room steps */
     void (*motions)(int contact, int64_t n, const int32_t *counts, const double *orders, const double *cases,
                     double tolerance, int64_t room, double *work, double *out);
     /* one cycle of a case, summed over springs by weight, each with its share of the limit: forces (n + 1, 2) at equal
      * times of the period */
     void (*motion_cycle)(const int32_t *counts, const double *orders, const double *one, int springs,
-                         const double *shares, const double *weights, double tolerance, int64_t room, double *work, int64_t n,
-                         double *forces);
+                         const double *shares, const double *weights, double tolerance, int64_t room,
+                         double *work, int64_t n, double *forces);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this build has none of that number. */

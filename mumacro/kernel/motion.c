@@ -1,18 +1,20 @@
 /* The steady cycle of a contact under any periodic motion beside a drag.
  *
- * Units: the mean limit mu0 Fz for forces, l0 = mu0 Fz / k for lengths, the angle tau = omega t for time.  One spring
- * sticks, where its force follows the motion, or slips, where |f| is the limit L.  With the velocity w of the upper
- * point and the angle th of the force, slip is
+ * Units: the mean limit mu0 Fz for forces, l0 = mu0 Fz / k for lengths, the angle tau = omega t for
+ * time.  One spring sticks, where its force follows the motion, or slips, where |f| is the limit L.
+ * With the velocity w of the upper point and the angle th of the force, slip is
  *
  *     th' = w.t / L,   slip speed = w.n - L',   n = (cos th, sin th), t = (-sin th, cos th),
  *
- * a quadratic equation for u = tan((th - th0)/2), which the method of Radau of order 5 integrates.  Stick ends where
- * |f| reaches L, slip where its speed falls through 0.  Steps end there and at marks of the period, so that each step
- * is smooth.  The cycle is the fixed point of the map of a period, found by Newton's method: of a small disturbance d of
- * the force only the part along t survives where slip begins, and exp(-integral of slip speed / L) of that during slip.
+ * a quadratic equation for u = tan((th - th0)/2), which the method of Radau of order 5 integrates.
+ * Stick ends where |f| reaches L, slip where its speed falls through 0.  Steps end there and at
+ * marks of the period, so that each step is smooth.  The cycle is the fixed point of the map of a
+ * period, found by Newton's method: of a small disturbance d of the force only the part along t
+ * survives where slip begins, and exp(-integral of slip speed / L) of that during slip.
  *
- * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of the last two over
- * all marks, which cannot cancel.  A ball is many independent springs, see element.c. */
+ * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of
+ * the last two over all marks, which cannot cancel.  A ball is many independent springs, see
+ * element.c. */
 
 enum {
     MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6,
@@ -25,15 +27,16 @@ enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
 
-/* A motion of one spring: harmonics of x, y and the normal force one after another, whose terms are amplitude and phase.
- * Lengths are multiplied by scale, which is 1 over the spring's share of the limit. */
+/* A motion of one spring: harmonics of x, y and the normal force one after another, whose terms are
+ * amplitude and phase.  Lengths are multiplied by scale, which is 1 over the spring's share of the
+ * limit. */
 typedef struct {
     const int32_t *counts;
     const double *orders, *terms;
     double drag, scale, acceleration; /* the last is a bound */
     int marks, nodes; /* parts of a period whose sums are kept; steps at least */
-    /* where no order is above MU_MOTION_ORDERS, else 0: the highest, and of each what sin and cos in x, y and the normal
-     * force are multiplied by */
+    /* where no order is above MU_MOTION_ORDERS, else 0: the highest, and of each what sin and cos
+     * in x, y and the normal force are multiplied by */
     int highest;
     double parts[MU_MOTION_ORDERS][6];
 } mu_shaken;
@@ -54,9 +57,11 @@ typedef struct {
     mu_moment at;
     double f[2];
     int slips;
-    double step, began, slid; /* what the next slip may take; beginning of the last stick; slip since a stick was counted */
+    /* what the next slip may take; beginning of the last stick; slip since a stick was counted */
+    double step, began, slid;
     double mean[MU_MEANS], marked[2 * MU_MARKS];
-    /* of a small disturbance: the direction that survives first, the last one, what is left as a logarithm, as a factor */
+    /* of a small disturbance: the direction that survives first, the last one, what is left as a
+     * logarithm, as a factor */
     double first[2], last[2], decay, turned;
     int slipped, failed, sticks;
     mu_grid *steps; /* ends of all its steps */
@@ -85,7 +90,8 @@ static inline void mu_sine_cosine(double x, double *sine, double *cosine) {
                                    0.041666666666666664, -0.5};
     /* x = n pi/2 + r with |r| <= pi/4; pi/2 in three parts, of which n times the first two is exact */
     const int32_t n = mu_whole_of(x * MU_TWO_OVER_PI + (x < 0.0 ? -0.5 : 0.5));
-    const double r = ((x - n * 1.57079632673412561417) - n * 6.07710050630396597660e-11) - n * 2.02226624879595063154e-21;
+    const double r = ((x - n * 1.57079632673412561417) - n * 6.07710050630396597660e-11) -
+                     n * 2.02226624879595063154e-21;
     const double square = r * r;
     double s = odd[0], c = even[0];
     for (int i = 1; i < 8; ++i) {
@@ -175,7 +181,8 @@ static void mu_mean_way(const mu_shaken *m, double tau, double length, double *w
         double s = 0.0, c = 1.0;
         mu_sine_cosine(middle, &sine, &cosine);
         for (int i = 0; i < m->highest; ++i) {
-            const double *part = m->parts[i], damping = mu_damping(0.5 * (i + 1.0) * length), next = s * cosine + c * sine;
+            const double *part = m->parts[i], damping = mu_damping(0.5 * (i + 1.0) * length),
+                         next = s * cosine + c * sine;
             c = c * cosine - s * sine;
             s = next;
             way[0] += damping * (part[0] * s + part[1] * c);
@@ -194,7 +201,7 @@ static void mu_mean_way(const mu_shaken *m, double tau, double length, double *w
 /* Of what may be squared. */
 static double mu_length(double x, double y) { return sqrt(x * x + y * y); }
 
-/* --- slip ------------------------------------------------------------------------------------------------------------ */
+/* --- slip ------------------------------------------------------------------------------------- */
 
 static const double MU_RADAU_AT[3] = {(4.0 - MU_SQRT6) / 10.0, (4.0 + MU_SQRT6) / 10.0, 1.0};
 static const double MU_RADAU[3][3] = {
@@ -230,7 +237,8 @@ static int mu_slip_step(const mu_shaken *m, const mu_moment *start, double ex, d
                         mu_slip *slip) {
     const double a0 = (start->wx * ex + start->wy * ey) / start->limit;
     const double rate = 0.5 * (start->wy * ex - start->wx * ey) / start->limit;
-    const double tau[MU_MOMENTS] = {start->tau + MU_RADAU_AT[0] * length, start->tau + MU_RADAU_AT[1] * length, end, end};
+    const double tau[MU_MOMENTS] = {start->tau + MU_RADAU_AT[0] * length,
+                                    start->tau + MU_RADAU_AT[1] * length, end, end};
     double a[3], b[3], *u = slip->u, change = 1.0;
     slip->length = length;
     slip->ex = ex;
@@ -294,7 +302,7 @@ static double mu_slip_at(const mu_slip *slip, double share) {
     return share * (slip->u[0] * at_p + slip->u[1] * at_q + slip->u[2] * at_1);
 }
 
-/* --- events ---------------------------------------------------------------------------------------------------------- */
+/* --- events ----------------------------------------------------------------------------------- */
 
 /* A root between low and high, where the values have different signs, or that of low is 0. */
 typedef struct {
@@ -334,7 +342,7 @@ static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_sl
     const double x[4] = {0.0, MU_RADAU_AT[0], MU_RADAU_AT[1], 1.0};
     const double speed[4] = {mu_max(mu_slip_speed(slip, start, 0.0), 0.0), slip->speed[0], slip->speed[1],
                              slip->speed[2]};
-    double first, second, third, c, d, e, root, at[3], value[3];
+    double first, second, last, third, c, d, e, root, at[3], value[3];
     int left = 0;
     for (int i = 1; i < 4; ++i) {
         if (speed[i] < 0.0) {
@@ -346,7 +354,8 @@ static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_sl
     /* divided differences, and the slope c x^2 + 2 d x + e of the cubic */
     first = (speed[1] - speed[0]) / x[1];
     second = ((speed[2] - speed[1]) / (x[2] - x[1]) - first) / x[2];
-    third = (((speed[3] - speed[2]) / (x[3] - x[2]) - (speed[2] - speed[1]) / (x[2] - x[1])) / (x[3] - x[1]) - second) / x[3];
+    last = (speed[3] - speed[2]) / (x[3] - x[2]) - (speed[2] - speed[1]) / (x[2] - x[1]);
+    third = (last / (x[3] - x[1]) - second) / x[3];
     c = 3.0 * third;
     d = second - third * (x[1] + x[2]);
     e = first - second * x[1] + third * x[1] * x[2];
@@ -422,8 +431,8 @@ static double mu_excess_slope(const mu_moment *at, const double *f) {
     return f[0] * at->wx + f[1] * at->wy - at->limit * at->slope;
 }
 
-/* At which share of its step a stick ends; 1 where it lasts, whose moment and force are last and at_last.  fresh: it has just
- * begun, on the limit; then 0 says that it does not begin. */
+/* At which share of its step a stick ends; 1 where it lasts, whose moment and force are last and
+ * at_last.  fresh: it has just begun, on the limit; then 0 says that it does not begin. */
 static double mu_stick_end(const mu_stick *stick, int fresh, mu_moment *last, double *at_last) {
     double f[2];
     mu_moment at = mu_stuck_at(stick, 1.0, f);
@@ -471,7 +480,7 @@ static double mu_stick_end(const mu_stick *stick, int fresh, mu_moment *last, do
     return b.high;
 }
 
-/* --- a period ---------------------------------------------------------------------------------------------------------- */
+/* --- a period --------------------------------------------------------------------------------- */
 
 /* Adds a force, which has done a work beside the drag. */
 static void mu_add(mu_march *march, const mu_shaken *m, double middle, double time, double fx, double fy, double work) {
@@ -642,7 +651,9 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     march->f[0] = f[0];
     march->f[1] = f[1];
     fresh = mu_length(f[0], f[1]) >= march->at.limit * (1.0 - 1e-12);
-    if (fresh && f[0] * march->at.wx + f[1] * march->at.wy - march->at.limit * march->at.slope > 0.0) mu_begin_slip(march);
+    if (fresh &&
+        f[0] * march->at.wx + f[1] * march->at.wy - march->at.limit * march->at.slope > 0.0)
+        mu_begin_slip(march);
     for (int64_t i = 0; i < grid->n; ++i) {
         const double end = grid->nodes[i];
         if (end - march->at.tau < MU_MOTION_SHORT && i + 1 < grid->n) continue;
@@ -663,7 +674,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     for (int i = 0; i < 2 * m->marks; ++i) march->marked[i] /= 2.0 * MU_PI;
 }
 
-/* --- the steady cycle --------------------------------------------------------------------------------------------------- */
+/* --- the steady cycle ------------------------------------------------------------------------- */
 
 static void mu_keep_below(double limit, double *f) {
     const double size = mu_length(f[0], f[1]);
@@ -701,7 +712,9 @@ static mu_steady mu_steady_of(const mu_march *march, double distance) {
     mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks, 0};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
-    if (march->slipped) out.decay = march->turned != 0.0 ? march->decay - mu_log1(mu_min(fabs(march->turned), 1.0)) : HUGE_VAL;
+    if (march->slipped)
+        out.decay = march->turned != 0.0 ? march->decay - mu_log1(mu_min(fabs(march->turned), 1.0))
+                                         : HUGE_VAL;
     return out;
 }
 
@@ -741,11 +754,15 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
     }
 }
 
-/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only one; of those that stick
- * there are many, and only its way decides between them. */
+/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only
+ * one; of those that stick there are many, and only its way decides between them.
+ *
+ * The steps that are left to be halved are then those of the period that slips most: the last one
+ * hardly slips, and halves of its steps may be those that the periods before have taken already. */
 static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance,
                                        double goal, double *f) {
     double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance, curved = 0.0;
+    double most = 0.0, step = 0.0, from[2] = {0.0, 0.0};
     mu_march march;
     mu_steady out;
     f[0] = f[1] = 0.0;
@@ -756,7 +773,14 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
     march.steps = steps;
     for (int period = 1;; ++period) {
         double moved[2], rate, leap;
+        const double before = march.step;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
+        if (march.mean[MU_MEAN_PATH] > most) {
+            most = march.mean[MU_MEAN_PATH];
+            step = before;
+            from[0] = f[0];
+            from[1] = f[1];
+        }
         moved[0] = march.f[0] - f[0];
         moved[1] = march.f[1] - f[1];
         size[2] = size[1];
@@ -773,8 +797,14 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
             distance = mu_min(2.0 * size[0] / (1.0 - rate), 2.0);
         }
         if (march.failed) distance = 2.0;
-        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed)
-            return mu_steady_of(&march, mu_min(distance + curved, 2.0));
+        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) {
+            out = mu_steady_of(&march, mu_min(distance + curved, 2.0));
+            if (march.mean[MU_MEAN_PATH] < most) {
+                march.step = step;
+                mu_take_period(m, grid, from, tolerance, &march, NULL);
+            }
+            return out;
+        }
         f[0] = march.f[0];
         f[1] = march.f[1];
         /* many equal periods at once: half of what is left, and no more than a straight way that errs little */
@@ -832,7 +862,8 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         out.level = level;
         out.error = 2.0 * limit;
         if (level > 0)
-            out.error = (m->drag > 0.0 ? 2.0 : 6.0) * mu_difference(&out, &last, m->marks) + 3.0 * out.distance + rounding;
+            out.error = (m->drag > 0.0 ? 2.0 : 6.0) * mu_difference(&out, &last, m->marks) +
+                        3.0 * out.distance + rounding;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
         if (out.error <= tolerance || level == levels) return out;
         if (m->drag == 0.0 && (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error))) return out;
@@ -861,8 +892,8 @@ static double mu_kronrod(int i, double *weight) {
     return i < 7 ? -point[0] : point[0];
 }
 
-/* Springs of a ball from t = low to high, which may be kinks: the error of their sum, and their values at both ends by the
- * polynomial through the points. */
+/* Springs of a ball from t = low to high, which may be kinks: the error of their sum, and their
+ * values at both ends by the polynomial through the points. */
 typedef struct {
     double low, high, error, start[2], end[2];
     double mean[MU_MEANS], decay, of_springs;
@@ -871,8 +902,9 @@ typedef struct {
     int sticks[15];
 } mu_panel;
 
-/* How rough two functions are at the points of the rule: the size of their four highest coefficients by polynomials that
- * are orthogonal there.  They stay large at kinks, wherever these lie between the points. */
+/* How rough two functions are at the points of the rule: the size of their four highest
+ * coefficients by polynomials that are orthogonal there.  They stay large at kinks, wherever these
+ * lie between the points. */
 static double mu_roughness(double values[15][2], double *start, double *end) {
     double x[15], weight[15], last[15] = {0.0}, p[15], size = 0.0, square = 0.0;
     double at_end = 0.7071067811865476, before = 0.0, sign = 1.0;
@@ -969,7 +1001,9 @@ static void mu_predict(double points[15][3], double *f, int n, double u) {
     if (n < 3) return;
     for (int j = 0; j < 3; ++j)
         for (int i = 0; i < n; ++i)
-            if (i != near[0] && i != near[1] && (near[j] < 0 || fabs(points[i][0] - u) < fabs(points[near[j]][0] - u))) near[j] = i;
+            if (i != near[0] && i != near[1] &&
+                (near[j] < 0 || fabs(points[i][0] - u) < fabs(points[near[j]][0] - u)))
+                near[j] = i;
     f[0] = f[1] = 0.0;
     if (fabs(points[near[0]][0] - u) > fabs(points[near[1]][0] - points[near[0]][0])) { /* beyond them */
         f[0] = points[near[0]][1];
@@ -984,8 +1018,9 @@ static void mu_predict(double points[15][3], double *f, int n, double u) {
     }
 }
 
-static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int kink_low, int kink_high, double tolerance,
-                              mu_grid *grid, mu_grid *steps, double *f) {
+static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int kink_low,
+                              int kink_high, double tolerance, mu_grid *grid, mu_grid *steps,
+                              double *f) {
     mu_panel out;
     double values[15][2], sums[15][2], ends[2], at[15][3], errors[15];
     int halvings = 0;
@@ -1003,7 +1038,9 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int k
         mu_predict(at, f, k, u);
         spring = mu_spring_at(m, t, tolerance, single ? 0 : MU_MOTION_LEVELS, grid, steps, f);
         errors[i] = share * spring.error;
-        if (single) errors[i] = mu_max(errors[i ? i - 1 : 1], errors[i < 14 ? i + 1 : 13]) + 3.0 * share * spring.distance;
+        if (single)
+            errors[i] = mu_max(errors[i ? i - 1 : 1], errors[i < 14 ? i + 1 : 13]) +
+                        3.0 * share * spring.distance;
         if (!(errors[i] <= tolerance)) { /* from where the search for the cycle begins else */
             f[0] = m->drag > 0.0 ? 1.0 : 0.0;
             f[1] = 0.0;
@@ -1041,7 +1078,8 @@ static double mu_panel_error(const mu_panel *panels, int n, int i) {
     for (int j = 0; j < n; ++j) {
         const mu_panel *other = &panels[j];
         if (other->low == one->high)
-            error += (one->high - one->at[14]) * mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
+            error += (one->high - one->at[14]) *
+                     mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
         if (other->high == one->low)
             error += (one->at[0] - one->low) * mu_length(one->start[0] - other->end[0], one->start[1] - other->end[1]);
     }
@@ -1049,7 +1087,8 @@ static double mu_panel_error(const mu_panel *panels, int n, int i) {
 }
 
 /* Panels of a ball before any is divided: from one kink to the next. */
-static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps, double *f, mu_panel *panels) {
+static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps,
+                           double *f, mu_panel *panels) {
     double edges[MU_MOTION_SCAN + 2] = {0.0}, before = 0.0;
     int n = 0, last = -1;
     for (int i = 0; i < MU_MOTION_SCAN; ++i) {
@@ -1065,12 +1104,15 @@ static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, 
         return 2;
     }
     edges[n + 1] = 1.0;
-    for (int i = 0; i <= n; ++i) panels[i] = mu_ball_panel(m, edges[i], edges[i + 1], i > 0, i < n, tolerance, grid, steps, f);
+    for (int i = 0; i <= n; ++i)
+        panels[i] = mu_ball_panel(m, edges[i], edges[i + 1], i > 0, i < n, tolerance, grid, steps,
+                                  f);
     return n + 1;
 }
 
-/* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the middle.  A kink close
- * to an end is left to later divisions: coarse steps may see it where fine ones do not. */
+/* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the
+ * middle.  A kink close to an end is left to later divisions: coarse steps may see it where fine
+ * ones do not. */
 static double mu_division(const mu_shaken *m, const mu_panel *panel, double tolerance, mu_grid *grid, mu_grid *steps,
                           double *f, int *kink) {
     const double middle = 0.5 * (panel->low + panel->high), near = 0.02 * (panel->high - panel->low);
@@ -1082,7 +1124,8 @@ static double mu_division(const mu_shaken *m, const mu_panel *panel, double tole
         if (panel->sticks[i] != panel->sticks[i + 1] && distance < nearest) best = i, nearest = distance;
     }
     if (best >= 0) {
-        const double at = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best], tolerance, grid, steps, f);
+        const double at = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best],
+                                  tolerance, grid, steps, f);
         *kink = at - panel->low > near && panel->high - at > near;
         if (*kink) return at;
     }
@@ -1138,7 +1181,8 @@ static mu_shaken mu_shaken_as(const int32_t *counts, const double *orders, const
     if (largest <= MU_MOTION_ORDERS) {
         m.highest = (int)largest;
         for (int i = 0; i < counts[0] + counts[1] + counts[2]; ++i) {
-            double *part = m.parts[(int)orders[i] - 1] + (i < counts[0] ? 0 : i < counts[0] + counts[1] ? 2 : 4), sine, cosine;
+            const int place = i < counts[0] ? 0 : i < counts[0] + counts[1] ? 2 : 4;
+            double *part = m.parts[(int)orders[i] - 1] + place, sine, cosine;
             mu_sine_cosine(m.terms[2 * i + 1], &sine, &cosine);
             part[0] += m.terms[2 * i] * cosine;
             part[1] += m.terms[2 * i] * sine;
@@ -1167,8 +1211,9 @@ static void mu_motions(int contact, int64_t n, const int32_t *counts, const doub
 }
 
 /* One cycle of springs with shares of the limit and weights at n + 1 equal times, see library.h. */
-static void mu_motion_cycle(const int32_t *counts, const double *orders, const double *one, int springs,
-                            const double *shares, const double *weights, double tolerance, int64_t room, double *work, int64_t n,
+static void mu_motion_cycle(const int32_t *counts, const double *orders, const double *one,
+                            int springs, const double *shares, const double *weights,
+                            double tolerance, int64_t room, double *work, int64_t n,
                             double *forces) {
     mu_grid grid = {work, 0, room}, steps = {work + room, 0, room};
     const mu_shaken m = mu_shaken_as(counts, orders, one);

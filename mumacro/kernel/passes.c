@@ -165,7 +165,8 @@ MU_INLINE void mu_pass_slopes(const mumacro_data *data, int n, const mu_chunk *c
 }
 
 /* mu~, from q in its cells or from slopes that are known already. */
-MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c, const mu_slope *known, double *value) {
+MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c,
+                              const mu_slope *known, double *value) {
     const double *polynomials = data->quantities[MU_MU_RATIO].polynomials;
     for (int i = 0; i < n; ++i) {
         const double *cell = polynomials + 64 * (int64_t)c->cell[i];
@@ -270,7 +271,8 @@ MU_INLINE void mu_values_of(const mumacro_data *data, int contact, int quantity,
         double *error = bound ? bound + i : NULL;
         int8_t *from = source ? source + i : NULL;
         mu_chunk c;
-        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, contact, few, v + i, y + i, &c, NULL, value + i, error, from);
+        if (quantity == MU_MU_RATIO)
+            mu_chunk_of_ratios(data, contact, few, v + i, y + i, &c, NULL, value + i, error, from);
         else mu_chunk_of_others(data, contact, quantity, few, v + i, y + i, &c, value + i, error, from);
     }
 }
@@ -291,7 +293,8 @@ static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
 /* Slopes at a point of the chunk; slope: of mu_pass_slopes for mu~, NULL for other quantities. */
 MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quantity, const mu_chunk *c,
                                  const mu_slope *slope, int i, double v, double y) {
-    const int charted = contact == MU_BALL ? c->block[i] >= MU_B_LOW && c->block[i] < MU_B_END : c->block[i] < MU_CHARTS;
+    const int charted = contact == MU_BALL ? c->block[i] >= MU_B_LOW && c->block[i] < MU_B_END
+                                           : c->block[i] < MU_CHARTS;
     if (charted && mu_form_in((int)c->block[i], quantity).factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
         if (slope != NULL && !mu_is_corner(at.block)) {

@@ -156,7 +156,8 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     out.bound_y = more > 0.0 ? scale * (errors[0] * fabs(form.factor_y) + errors[2] * share_b * reach) + more + noise
                              : scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y,
                                                       share_b * turn.b_y * ratio) + noise;
-    if (at->block == MU_B_RING) { /* beside the ridge it is not T_8 that interpolation leaves out: shares are less sure */
+    if (at->block == MU_B_RING) {
+        /* beside the ridge it is not T_8 that interpolation leaves out: shares are less sure */
         const double unsure = mu_is_ridge(at) ? 8.0 : 2.0;
         out.bound_v *= unsure;
         out.bound_y *= unsure;

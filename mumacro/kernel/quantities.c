@@ -64,7 +64,8 @@ typedef struct {
 /* mu~ of a block as mu_place_common has it. */
 static double mu_ratio_factor(const mu_place *at) {
     const mu_mask yes = mu_all_whole(-1), no = mu_all_whole(0);
-    const int deep = at->block == MU_S_LOW || at->block == MU_B_S_LOW || at->block == MU_B_RING || at->block == MU_B_SLOW;
+    const int deep = at->block == MU_S_LOW || at->block == MU_B_S_LOW || at->block == MU_B_RING ||
+                     at->block == MU_B_SLOW;
     const int low = at->block == MU_C_LOW || at->block == MU_B_LOW || deep;
     const mu_mask sliding = mu_is_sliding_block(at->block) && !deep ? yes : no, small = low ? yes : no;
     const mu_mask lowest = deep ? yes : no;
@@ -171,8 +172,8 @@ static void mu_base_slopes(int base, const mu_place *at, mu_form_slopes *out) {
 MU_INLINE mu_form_slopes mu_slopes_of_form(mu_form form, const mu_place *at, const mu_turn *turn) {
     static const signed char powers[][2] = {
         /* twice the powers of v~ and y~ in each factor, in their order */
-        {0, 0}, {0, 0}, {0, 2}, {2, 4}, {2, -2}, {4, -2}, {0, -1}, {0, 4}, {0, 4}, {0, 0}, {2, 4}, {0, 2}, {0, 0}, {2, 0},
-        {0, 6}, {0, 0},
+        {0, 0}, {0, 0}, {0, 2}, {2, 4}, {2, -2}, {4, -2}, {0, -1}, {0, 4},
+        {0, 4}, {0, 0}, {2, 4}, {0, 2}, {0, 0}, {2, 0}, {0, 6}, {0, 0},
     };
     const signed char *power = powers[(int)form.factor];
     mu_form_slopes out = {0.0, 0.0, 0.5 * power[0], 0.5 * power[1]};

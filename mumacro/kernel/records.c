@@ -125,7 +125,8 @@ static double mu_ratio_slack(const mumacro_data *data, const mu_place *at, doubl
     if (!mu_is_tail(at->block)) return 0.0;
     /* the terms that are added up: the outer solution, and the layer's logarithm */
     terms = value + (factor > 0.0 ? factor * fabs(mu_log1(at->v) - 0.5 * mu_log1(at->y)) : 0.0);
-    return 8.0 * MU_ROUNDING * terms + (mu_is_sliding_block(at->block) ? 0.0 : 16.0 * MU_ROUNDING * factor) + MU_DENORMAL;
+    return 8.0 * MU_ROUNDING * terms +
+           (mu_is_sliding_block(at->block) ? 0.0 : 16.0 * MU_ROUNDING * factor) + MU_DENORMAL;
 }
 
 static double mu_power_slack(const mumacro_data *data, const mu_place *at, double value, double factor) {

@@ -179,8 +179,10 @@ class MotionAnswer(BaseModel):
 
     mu_macro: float = quantity("Mean force along the drag over the mean normal force", "-")
     mu_lateral: float = quantity("Mean force along y over the mean normal force", "-")
-    stick_fraction: float = quantity("Share of the period during which the contact sticks", "-")
-    slip_path: Number = quantity("Path of the foot in a period", "m")
+    stick_fraction: float = quantity(
+        "Share of the period during which the contact sticks; no error estimate", "-"
+    )
+    slip_path: Number = quantity("Path of the foot in a period; no error estimate", "m")
     power: Number = quantity("Mean power of the shaker in x and y", "W")
     power_drive: Number = quantity("Mean power of the drive, mu_macro Fz v0", "W")
     error_estimate: float = quantity("Estimated error of mu_macro and mu_lateral, no bound", "-")
