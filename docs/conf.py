@@ -1,6 +1,7 @@
 """The documentation as a site: ``python3 dev.py docs``; warnings are errors, links are checked by
 the build itself."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -16,27 +17,29 @@ html_title = f"mumacro {__version__}"
 highlight_language = "none"
 smartquotes = False  # --help is no dash
 html_theme = "furo"
-# the fonts and colours of the service's page (service/static/page/page.css)
+# the fonts and colours of the service's page
 _FONTS = {
     "font-stack": 'system-ui, "DejaVu Sans", sans-serif',
     "font-stack--monospace": 'ui-monospace, "DejaVu Sans Mono", monospace',
 }
+_COLOURS = {
+    "color-background-primary": "card",
+    "color-background-secondary": "back",
+    "color-background-border": "line",
+    "color-foreground-primary": "text",
+    "color-foreground-secondary": "soft",
+    "color-foreground-muted": "soft",
+    "color-brand-primary": "accent",
+    "color-brand-content": "accent",
+}
+_PAGE = (ROOT / "service" / "static" / "page" / "page.css").read_text("utf-8")
+_PAIRS = {
+    name: (light, dark)
+    for name, light, dark in re.findall(r"--(\w+): light-dark\((#\w+), (#\w+)\)", _PAGE)
+}
 _LIGHT, _DARK = (
-    {
-        **_FONTS,
-        "color-background-primary": card,
-        "color-background-secondary": back,
-        "color-background-border": line,
-        "color-foreground-primary": text,
-        "color-foreground-secondary": soft,
-        "color-foreground-muted": soft,
-        "color-brand-primary": accent,
-        "color-brand-content": accent,
-    }
-    for back, card, text, soft, line, accent in (
-        ("#f3f5f8", "#ffffff", "#16202c", "#55616f", "#d4dae1", "#0b5cad"),
-        ("#11151b", "#1a2029", "#e7ecf2", "#a3afbd", "#36414e", "#7db7f5"),
-    )
+    _FONTS | {variable: _PAIRS[name][scheme] for variable, name in _COLOURS.items()}
+    for scheme in (0, 1)
 )
 html_theme_options = {"light_css_variables": _LIGHT, "dark_css_variables": _DARK}
 html_copy_source = False

@@ -33,6 +33,8 @@ from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.units import number_hint, unknown_name
 
+from . import API_VERSION
+
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()
@@ -289,24 +291,19 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
         return RequestError(ProblemKind.METHOD_NOT_ALLOWED, detail, headers={"Allow": allowed})
     kinds = (ProblemKind.MALFORMED_BODY, ProblemKind.NOT_FOUND, ProblemKind.RANGE_NOT_SATISFIABLE)
     kind = next((one for one in kinds if one.status == error.status_code), ProblemKind.UNEXPECTED)
-    detail = _nearest_path(scope) if kind is ProblemKind.NOT_FOUND else error.detail
+    detail = _no_such_path(scope) if kind is ProblemKind.NOT_FOUND else error.detail
     return RequestError(kind, detail, headers=error.headers)
 
 
-def _nearest_path(scope: Scope) -> str:
+def _no_such_path(scope: Scope) -> str:
     """What to do about a path that is not there; its case, and "_" for "-", do not matter."""
     path = path_in(scope)[:_MAX_TEXT].lower().replace("_", "-").rstrip("/")
-    paths = [one for one in scope["app"].state.methods if "{" not in one]
+    paths = [each for each in scope["app"].state.methods if "{" not in each]
     # a path without its version, such as /mu-macro, is nearer to /v1/mu-macro than it looks
-    near = next(
-        (
-            found[0]
-            for tried in (path, f"/v1{path}")
-            if (found := get_close_matches(tried, paths, n=1, cutoff=0.8))
-        ),
-        None,
-    )
-    return f"no such path; {f'did you mean {near}? ' if near else ''}/docs describes all of them"
+    for candidate in (path, f"/v{API_VERSION}{path}"):
+        for near in get_close_matches(candidate, paths, n=1, cutoff=0.8):
+            return f"no such path; did you mean {near}? /docs describes all of them"
+    return "no such path; /docs describes all of them"
 
 
 def _of_input(error: InputError, _: Scope) -> RequestError:

@@ -10,7 +10,7 @@ solves nothing else: FastAPI's own reading of a case takes longer than its answe
 import json
 import string
 from collections.abc import Callable, Coroutine, Mapping
-from types import MappingProxyType
+from functools import partial
 from typing import Any
 from urllib.parse import parse_qsl
 
@@ -28,8 +28,6 @@ JSON = "application/json"
 # of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _LISTS = frozenset(("include",))
-_WITH_ARRAYS = orjson.OPT_SERIALIZE_NUMPY
-_NO_HEADERS: Mapping[str, str] = MappingProxyType({})
 
 
 # --- JSON -----------------------------------------------------------------------------------------
@@ -72,24 +70,21 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
         raise RequestError(ProblemKind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
 
 
-def dump(values: Any) -> bytes:
-    """Write JSON; numbers that are not finite become null."""
-    return orjson.dumps(values, option=_WITH_ARRAYS)
+#: Write JSON as bytes; numbers that are not finite become null.
+dump = partial(orjson.dumps, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 class Json(Response):
     """An answer as JSON; Starlette's own looks for what the headers may lack, which takes as long
     as a case."""
 
-    def __init__(self, content: Any, headers: Mapping[str, str] = _NO_HEADERS) -> None:
-        self.status_code, self.background = 200, None
-        self.body = orjson.dumps(content, option=_WITH_ARRAYS)
+    def __init__(self, content: Any, headers: Mapping[str, str] | None = None) -> None:
+        self.status_code, self.body, self.background = 200, dump(content), None
         self.raw_headers = [
             (b"content-length", b"%d" % len(self.body)),
             (b"content-type", b"application/json"),
+            *((name.lower().encode(), value.encode()) for name, value in (headers or {}).items()),
         ]
-        for name, value in headers.items():
-            self.raw_headers.append((name.lower().encode(), value.encode()))
 
 
 # --- requests -------------------------------------------------------------------------------------

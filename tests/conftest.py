@@ -178,11 +178,21 @@ PEERS = {"bridge", "fmpy", "open_page"}
 #: files of minutes, in the order of their time: they come first, so that none of them is left to
 #: one processor at the end (dev.py keeps this order)
 LONGEST = (
-    "test_guide.py", "test_kernel_safety.py", "test_c_header.py", "test_processors.py",
-    "test_builder_cli.py", "test_reliability.py", "test_packaging.py", "test_wheel.py",
-    "test_export.py", "test_committed_tables.py", "test_fitting.py", "test_verify.py",
-    "test_benchmarks.py", "test_files_run.py",
-)  # fmt: skip
+    "test_guide.py",
+    "test_kernel_safety.py",
+    "test_c_header.py",
+    "test_processors.py",
+    "test_builder_cli.py",
+    "test_reliability.py",
+    "test_packaging.py",
+    "test_wheel.py",
+    "test_export.py",
+    "test_committed_tables.py",
+    "test_fitting.py",
+    "test_verify.py",
+    "test_benchmarks.py",
+    "test_files_run.py",
+)
 
 
 @pytest.hookimpl(tryfirst=True)  # before the expression of -m is applied
