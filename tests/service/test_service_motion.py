@@ -204,14 +204,21 @@ def test_a_motion_beyond_the_time_limit_is_answered_and_keeps_its_slot_until_it_
 
 @pytest.mark.slow
 def test_probes_are_answered_beside_many_hard_motions(live_server: Any) -> None:
-    """Real ones, which compute without Python's lock: the longest wait of /livez is short."""
+    """Real ones, which compute without Python's lock: probes do not wait for their end."""
     body = json.dumps({**RIG, "contact": "ball", "tolerance": 1e-4, "x": HARD[:3], "y": HARD[:3]})
+    probes_before_an_answer = list[int]()
+
+    def motion() -> int:
+        status, *_ = live_server.ask("POST", PATH, body)
+        if status == 200:
+            probes_before_an_answer.append(len(waits))
+        return status
+
     with ThreadPoolExecutor(8) as clients, asking(live_server, 0.002) as waits:
-        answers = [clients.submit(live_server.ask, "POST", PATH, body) for _ in range(24)]
-        statuses = {answer.result()[0] for answer in answers}
+        statuses = {answer.result() for answer in [clients.submit(motion) for _ in range(24)]}
     assert statuses == {200, 503}
-    assert len(waits) > 50
-    assert max(waits) < 0.5
+    # one that waits for the first motion to end is the only one before its answer
+    assert probes_before_an_answer[0] > 10
 
 
 def test_all_faults_are_reported_at_once(client: Any) -> None:
