@@ -212,7 +212,7 @@ def test_probes_are_answered_beside_many_hard_motions(live_server: Any) -> None:
         status, *_ = live_server.ask("POST", PATH, body)
         if status == 200:
             probes_before_an_answer.append(len(waits))
-        return status
+        return int(status)
 
     with ThreadPoolExecutor(8) as clients, asking(live_server, 0.002) as waits:
         statuses = {answer.result() for answer in [clients.submit(motion) for _ in range(24)]}
