@@ -7,6 +7,7 @@ wrong arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, inte
 import difflib
 import importlib
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -58,6 +59,10 @@ def _part(name: str) -> Any:
 
 
 def _eval(words: Sequence[str]) -> int:
+    if any(word.partition("=")[0] in NAMES and not Path(word).exists() for word in words):
+        raise UsageError(
+            f"it evaluates files; one case is given without eval: mumacro {shlex.join(words)}"
+        )
     try:
         from mumacro.cli.eval import main as evaluate
     except ModuleNotFoundError as error:

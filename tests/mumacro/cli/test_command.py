@@ -153,6 +153,11 @@ def test_no_words_show_three_examples_that_run_and_a_misspelt_command_is_correct
     assert "did you mean solve-for?" in said(capsys, 2, "solve_for", "y0")
 
 
+def test_eval_of_a_case_in_place_of_a_file_names_the_command_for_one_case(capsys: Capture) -> None:
+    fault = said(capsys, 2, "eval", "mu0=0.4", "Fz=0.5N", "k=2e6")
+    assert "one case is given without eval: mumacro mu0=0.4 Fz=0.5N k=2e6" in fault
+
+
 def test_a_table_that_cannot_be_read_or_does_not_exist(capsys: Capture, tmp_path: Path) -> None:
     (tmp_path / "text.nc").write_text("no table")
     assert "text.nc" in said(capsys, 1, CASE, "--table", str(tmp_path / "text.nc"))
