@@ -99,6 +99,7 @@ def names(guide: bool) -> dict[str, Any]:
     return {
         "inputs": inputs,
         "choices": _CHOICES,
+        "exponents": {contact: springs.exponent for contact, springs in SPRINGS_OF.items()},
         "impossible": {
             f"{contact} {direction}": reason
             for contact in CONTACTS

@@ -1,6 +1,7 @@
 """The page in a browser: the numbers, the map, the friction law, the panels, downloads."""
 
 import csv
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import mumacro
 from benchmarks.support.browser import RECORDED, START
 from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import contact_of
@@ -223,9 +225,47 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(
     assert float(page.value("#field-omega").removesuffix(" kHz")) == close(at, rel=0.05)
 
 
+def test_k_grows_with_the_load_along_the_law_and_to_a_root(
+    open_page: Any, surrogate: Surrogate
+) -> None:
+    page = open_page()
+    assert not page.find("#exponent").is_displayed()
+    page.choose("#along", "Fz")
+    page.choose("#unknown", "Fz", "input")
+    assert page.find("#exponent").get_attribute("placeholder") == "0"
+    page.type("#exponent", "1/2")
+    assert page.value("#exponent-to-solve") == "1/2"
+    law = mumacro.law(
+        surrogate, "Fz", start=1e-1, stop=1e3, points=3, stiffness_exponent=0.5, **START
+    )
+    words = page.find("#law").get_attribute("aria-label")
+    ends = re.search(r"from (\S+) at Fz = 0.1 N to (\S+) at Fz = 1000 N", words)
+    assert ends
+    assert [float(end) for end in ends.groups()] == close(law.answer.mu_macro[[0, 2]], rel=1e-3)
+    # a place on the law, with the k of its load
+    page.touched("#law", 0.5, 0.5, click=True)
+    load, k = (float(page.value(f"#field-{name}").split()[0]) for name in ("Fz", "k"))
+    assert k * 1e6 == close(1e6 * math.sqrt(load / 10.0), rel=1e-3)
+    page.click("#solve-form button")
+    page.wait_for("#solve-result", r"Fz = \S+ N: µ = 0\.15, .*, k = \S+ N/µm")
+    page.click("#solve-result button")
+    assert page.shown()["µ/µ₀"] == "0.5"
+    for text, fault in (("2", "power: must be from 0 to 1"), ("a", "power: “a” is not a number")):
+        page.type("#exponent", text)
+        page.wait_for("#law-status", fault)
+    page.type("#exponent", "")
+    assert page.text("#law-status") == ""
+    page.click("#rigid")
+    assert not page.find("#exponent").is_displayed()
+
+
 ENDS = {
     "#along=mu0": "µ₀",
     "#along=Fz": "Fz [N]",
+    "#along=Fz&contact=ball&k=0.8..1.2": "Fz [N]",
+    "#along=Fz&exponent=1&scale=linear": "Fz [N]",
+    "#along=Fz&exponent=1/2&direction=normal": "Fz [N]",
+    "#along=Fz_amplitude&scale=linear&direction=normal": "ΔFz [N]",
     "#along=k&scale=linear": "k [N/µm]",
     "#along=omega": "f [kHz]",
     "#along=y0&scale=linear": "y₀ [µm]",

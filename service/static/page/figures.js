@@ -1,7 +1,8 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
 import {
-  RIGID, about, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
+  RIGID, about, caption, caseOf, fromSI, inUnit, inWords, loadOf, readInterval, readValue, show, stiffens, symbolOf,
+  toSI, valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
@@ -149,6 +150,14 @@ export function mapPanel(set, nudge, status) {
 const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 
+/** Between which values [SI] of an input an oscillating force, which stays as it is, does not lift the contact off. */
+function withoutLiftOff(along, state) {
+  if (state.direction !== "normal") return [0, Infinity];
+  const just = (name, share) => Number((share * valueOf(state, name)).toPrecision(4));
+  if (along === "Fz") return [just("Fz_amplitude", 1.001), Infinity];
+  return [0, along === "Fz_amplitude" ? just("Fz", 0.999) : Infinity];
+}
+
 /** The interval of the swept input: what was chosen, else whole decades around the point and its border. */
 function lawRange({ along, scale, range, ...state }, border) {
   if (range.text) return range;
@@ -159,11 +168,13 @@ function lawRange({ along, scale, range, ...state }, border) {
   const [least, most] = [Math.min(...shown), Math.max(...shown)];
   const linear = [about.inputs[along].positive ? (least / 100).toPrecision(1) : 0, (4 * most).toPrecision(1)];
   const decades = [`1e${Math.floor(Math.log10(least)) - 2}`, `1e${Math.ceil(Math.log10(most)) + 2}`];
-  return readInterval(along, (scale === "linear" ? linear : decades).join(".."), unit);
+  const [start, stop] = (scale === "linear" ? linear : decades).map(Number);
+  const [lift, load] = withoutLiftOff(along, state).map((end) => fromSI(along, end, unit));
+  return readInterval(along, `${Math.max(start, lift)}..${Math.min(stop, load)}`, unit);
 }
 
-/** The law: `set({ name: value [SI] })`, `nudge(name, steps)`. */
-export function lawPanel(set, nudge) {
+/** The law: `move(name, value [SI])`, `nudge(name, steps)`. */
+export function lawPanel(move, nudge) {
   let state, answer, asked, law, frame, along, unit;
   let cursor = null;
   const status = new Status("law-status", "law-section");
@@ -223,10 +234,11 @@ export function lawPanel(set, nudge) {
 
   /** All that is drawn, as CSV (RFC 4180), in the units that are shown. */
   function csv() {
-    const { values, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high } = law;
+    const { values, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high, k } = law;
     const columns = {
       [heading()]: values.map((value) => Number(shown(value).toPrecision(15))), "mu_macro [-]": mu_macro,
       "mu_static [-]": mu_static, regime, ...(low && { "mu_macro_low [-]": low, "mu_macro_high [-]": high }),
+      ...(k && { "k [N/m]": k }),
     };
     const rows = values.map((_, i) => Object.values(columns).map((column) => column[i]));
     return [Object.keys(columns), ...rows].map((cells) => `${cells.join(",")}\r\n`).join(""); // no cell holds a comma
@@ -234,7 +246,7 @@ export function lawPanel(set, nudge) {
 
   plot.follow({
     move: (x) => frame && read(frame.holds(x) ? Math.round((POINTS - 1) * frame.x.share(frame.x.value(x))) : null),
-    pick: (x) => frame && set({ [along]: toSI(along, frame.x.value(x), unit) }),
+    pick: (x) => frame && move(along, toSI(along, frame.x.value(x), unit)),
     step: (right) => right && nudge(along, right),
   });
   $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${along}.csv`));
@@ -246,9 +258,13 @@ export function lawPanel(set, nudge) {
     unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
     $("range").placeholder = chosen;
-    status.set("typed", state.range.fault && `range: ${state.range.fault}.`);
+    const grows = stiffens(state, along);
+    $("exponent-of-law").hidden = !grows;
+    const faults = [["range", state.range.fault], ["power", grows && state.exponent.fault]].filter(([, fault]) => fault);
+    status.set("typed", faults.map(([name, fault]) => `${name}: ${fault}.`).join(" ") || null);
     tell();
-    const request = { ...caseOf(state, [along], true), along, start, stop, points: POINTS, scale: state.scale };
+    const asking = { ...caseOf(state, [along], true), ...loadOf(state, along) };
+    const request = { ...asking, along, start, stop, points: POINTS, scale: state.scale };
     if (!answer || JSON.stringify(request) === asked) return;
     asked = JSON.stringify(request);
     channel.push(request);

@@ -1,8 +1,8 @@
 // The form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
 import { Status } from "./ask.js";
 import {
-  RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
-  readValue, refuse, show, symbolOf, valueOf, within,
+  RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, loadOf, namesOf, powerOf, readPoints, readQuantity,
+  readValue, refuse, show, stiffens, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
@@ -10,6 +10,9 @@ import { post } from "./service.js";
 const STEPS = 1000; // of a slider, a decade
 /** What a field of materials can hold, while it is empty: a ball of steel. */
 const SUCH_AS = { radius: "such as 5 mm", length: "such as 10 mm", E: "steel: 210 GPa", nu: "steel: 0.3" };
+
+/** The exponents of k over Fz that contacts have, as they are written. */
+const OWN_EXPONENTS = { spring: "0", ball: "1/3" };
 
 /** Shows a quantity in its field; what is typed and cannot be used stays, and is marked unless it is empty. */
 function fill(input, { text, fault, typed = text }) {
@@ -69,6 +72,10 @@ export function inputForm(set, setSI, status) {
     rigid.checked = state.k === RIGID;
     if (!rigid.checked) elastic = state.k.text;
     fill($("range"), state.range);
+    for (const id of ["exponent", "exponent-to-solve"]) {
+      fill($(id), state.exponent);
+      $(id).placeholder = OWN_EXPONENTS[state.contact];
+    }
     for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
     if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
     for (const { name, symbol, row, input, slider, fault } of rows) {
@@ -123,19 +130,25 @@ const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...g
   return make("li", {}, text, given.length > 0 && button);
 }));
 
-/** Which value of an input gives a wanted friction.  `use({ name: value [SI] }, digits, more)` takes it. */
+/** Which value of an input gives a wanted friction.  `use(name, value [SI], digits)` takes it. */
 export function solver(use) {
+  const offer = () => { $("exponent-of-solve").hidden = $("unknown").value !== "Fz"; };
+  $("solve-form").addEventListener("input", offer);
   return panel("solve", "v1/solve-for", (state) => {
     const { unknown, quantity, target: text } = Object.fromEntries(new FormData($("solve-form")));
     const { low: target } = within("target", () => readQuantity("mu0", text, "-"));
-    return { ...caseOf(state, [unknown]), unknown, quantity, target, include: powerOf(state) };
+    if (stiffens(state, unknown) && state.exponent.fault) refuse(`power: ${state.exponent.fault}`);
+    const asked = { ...caseOf(state, [unknown]), ...loadOf(state, unknown) };
+    return { ...asked, unknown, quantity, target, include: powerOf(state) };
   }, ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
     const { unit } = state[unknown];
     const none = min === max ? reason : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
     const lines = roots.map(({ value, mu_macro: mu, regime, power }) => {
       const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
+      const { k, Fz, stiffness_exponent: exponent } = asked;
+      const grown = exponent ? `, k = ${inUnit("k", k * (value / Fz) ** exponent, state.k.unit)}` : "";
       const shaker = power ? `, shaker ${inUnit("power", power.oscillation)}` : "";
-      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`, { [unknown]: value }, 15];
+      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${grown}${shaker}`, unknown, value, 15];
     });
     list("solve-result", lines.length ? lines : [[none]], use);
   });

@@ -193,16 +193,56 @@ export function readPoints(text) {
 /** The range of a law over which nobody chose one. */
 export const ANY = { text: "" };
 
-/** A quantity for each input and for the `range` of the one that the law goes along, and what is chosen. */
+/** The exponent of a contact's own stiffness, where nobody chose another. */
+export const ITS_OWN = { text: "" };
+
+/** A typed exponent of k over Fz: a number or a fraction, from 0 to 1. */
+export function readExponent(text) {
+  if (text.trim() === "") return ITS_OWN;
+  const parts = text.split("/");
+  if (parts.length > 2) refuse(`“${text.trim()}” is not a number`);
+  const [over, under] = [...parts, "1"].map((part) => readQuantity("mu0", part, "-").low);
+  const value = over / under;
+  if (!(value >= 0 && value <= 1)) refuse("must be from 0 to 1, such as 1/3");
+  return { text: text.trim(), value };
+}
+
+/** Whether k may grow where an input changes. */
+export const stiffens = (state, name) => name === "Fz" && state.k !== RIGID;
+
+/** The exponent with which it does; 0 where it does not. */
+const exponentAlong = (state, name) =>
+  (stiffens(state, name) ? state.exponent.value ?? about.exponents[state.contact] : 0);
+
+/** What a question along an input says of the load at which k holds: nothing where k is constant. */
+export function loadOf(state, name) {
+  const exponent = exponentAlong(state, name);
+  return exponent ? { Fz: valueOf(state, "Fz"), stiffness_exponent: exponent } : {};
+}
+
+/** k at another value [SI] of an input, as a part of the state: nothing where k is constant. */
+export function stiffened(state, name, value, digits) {
+  const exponent = exponentAlong(state, name);
+  if (!exponent) return {};
+  const { low, high, unit } = state.k;
+  const factor = (value / valueOf(state, "Fz")) ** exponent;
+  const text = (end) => Number(fromSI("k", end * factor, unit).toPrecision(digits));
+  return { k: readValue("k", low < high ? `${text(low)}..${text(high)}` : `${text(low)}`, unit) };
+}
+
+/** A quantity for each input, for the `range` of the one that the law goes along, the `exponent` of k over Fz, and what
+ *  is chosen. */
 export const startState = () => ({
   ...Object.fromEntries(Object.entries(about.inputs).map(([name, { start }]) => [name, readValue(name, start)])),
   contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: ANY,
+  exponent: ITS_OWN,
 });
 
-/** What is typed for an input or the range; if it cannot be used, what was there, with `typed` and its `fault`. */
+/** What is typed for an input, the range or the exponent; if it cannot be used, what was there, with `typed` and its `fault`. */
 export function readTyped(state, name, text) {
   const [input, read] = name === "range" ? [state.along, readRange] : [name, readValue];
-  const { found, fault } = attempt(() => read(input, text, state[input].unit));
+  const { found, fault } = attempt(() =>
+    (name === "exponent" ? readExponent(text) : read(input, text, state[input].unit)));
   return fault ? { ...state[name], typed: text, fault } : found;
 }
 
@@ -256,6 +296,7 @@ export function toAddress(state) {
   const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state[name])}`);
   parts.push(...Object.keys(WORDS).filter((key) => state[key] !== usual[key]).map((key) => `${key}=${state[key]}`));
   if (state.range.text) parts.push(`range=${inAddress(state.range)}`);
+  if (state.exponent.text) parts.push(`exponent=${inAddress(state.exponent)}`);
   return `#${parts.join("&")}`;
 }
 
@@ -280,6 +321,7 @@ export function fromAddress(hash) {
   if (texts.has("omega")) take("f", () => refuse("omega is given, too"));
   for (const name of namesOf(state)) take(name, (text) => readValue(name, text, about.inputs[name].unit));
   take("f", (text) => readValue("omega", text, "Hz"), "omega");
+  take("exponent", readExponent);
   take("range", (text) => readInterval(state.along, text, about.inputs[state.along].unit));
   for (const key of [...texts.keys()]) take(key, () => refuse("unknown"));
   return { state, faults };

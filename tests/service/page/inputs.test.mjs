@@ -3,8 +3,8 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import {
-  RIGID, about, attempt, caseOf, friction, fromAddress, inUnit, question, readInterval, readPoints, readQuantity, readValue,
-  show, startState, toAddress, valueOf,
+  RIGID, about, attempt, caseOf, friction, fromAddress, inUnit, loadOf, question, readInterval, readPoints, readQuantity,
+  readValue, show, startState, stiffened, toAddress, valueOf,
 } from "../../../service/static/page/inputs.js";
 
 const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
@@ -108,6 +108,7 @@ test("an address in the words of the command line gives the same state back", ()
   assert.equal(toAddress(startState()), "#mu0=0.3&Fz=10N&k=1N/um&y0=2um&f=20kHz&v0=10mm/s");
   for (const address of [
     "#mu0=0.3&Fz=10N&k=0.8..1.2N/um&y0=1e-7m&omega=130000rad/s&v0=1e-310m/s&contact=ball&digits=all&along=y0&scale=linear&range=1..2000nm",
+    "#mu0=0.3&Fz=10N&k=1N/um&y0=2um&f=20kHz&v0=10mm/s&along=Fz&exponent=2/3",
     "#mu0=0.3&Fz=10N&k=rigid&Fz_amplitude=5N&f=20kHz&v0=10mm/s&direction=normal",
   ]) {
     const { state, faults } = fromAddress(address);
@@ -123,6 +124,8 @@ for (const [address, said] of [
   ["v0=5 mm", "v0 = 5 mm (“mm” is not a unit of v₀"], ["along=constructor", "along = constructor (must be one of"],
   ["scale=<script>", "scale = <script> (must be one of log, linear)"], ["omega=1&f=1", "f = 1 (omega is given, too)"],
   ["std_mu0=1&range=z", "range = z (“z” is not an interval: write low..high); std_mu0 = 1 (unknown)"],
+  ["exponent=1.5", "exponent = 1.5 (must be from 0 to 1, such as 1/3)"], ["exponent=1/0", "must be from 0 to 1"],
+  ["exponent=1/2/3", "“1/2/3” is not a number"], ["exponent=0.5 N", "“N” is not a unit of"],
   ["along=k&range=1..rigid", "range = 1..rigid (must be an interval of two numbers)"], ["direction=normal&y0=1um", "y0 = 1um (unknown)"],
   ["contact=box", "contact = box (must be one of spring, ball)"],
   ["contact=ball&direction=normal", "direction = normal (not for a ball)"],
@@ -133,6 +136,18 @@ for (const [address, said] of [
     assert.ok(Number.isFinite(caseOf(state).mu0));
   });
 }
+
+test("k grows with the load as the contact does, or as it was typed", () => {
+  const exponent = (address, name = "Fz") => loadOf(fromAddress(`#${address}`).state, name).stiffness_exponent;
+  ["", "contact=ball&k=rigid", "contact=ball&exponent=0"].forEach((address) => assert.equal(exponent(address), undefined));
+  assert.equal(exponent("contact=ball", "v0"), undefined);
+  [["contact=ball", 1 / 3], ["exponent=1/3", 1 / 3], ["exponent=0,7", 0.7], ["exponent=50 %25", 0.5], ["exponent=1", 1]]
+    .forEach(([address, expected]) => near(exponent(address), expected));
+  const { state } = fromAddress("#contact=ball&Fz=8N&k=0.8..1.2N/um");
+  assert.deepEqual(loadOf(state, "Fz"), { Fz: 8, stiffness_exponent: 1 / 3 });
+  assert.equal(stiffened(state, "Fz", 1, 6).k.text, "0.4..0.6 N/µm");
+  assert.deepEqual(stiffened(state, "y0", 1e-6, 6), {});
+});
 
 test("the question says what was chosen, and nothing else", () => {
   const plain = question(startState());
