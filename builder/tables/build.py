@@ -220,21 +220,20 @@ def springs_for(table: Table, sweep: Sweep) -> Springs:
     """The springs that a ball is integrated over: those of ``table`` where its tolerance is
     :data:`.contacts.FINE`, else those of the bundled table of that tolerance.
 
-    That table is compared with fresh solves first: the solver may have changed since it was built.
+    They are compared with fresh solves first: the solver may have changed since they were built.
 
     Raises
     ------
     BuildError
         No such table is bundled, or it cannot be read, or it is not what the solver gives.
     """
-    if float(table.attributes["tolerance"]) <= FINE:
-        return Springs(Surrogate(table, "springs"))
     remedy = (
         f"a ball is integrated over the springs of the bundled table of {FINE:g}; build that "
         f"first: python -m builder build --tolerance {FINE:g} --out tables/mumacro-{FINE:g}.nc"
     )
     try:
-        fine = Surrogate.open(FINE)
+        own = float(table.attributes["tolerance"]) <= FINE
+        fine = Surrogate(table, "this table") if own else Surrogate.open(FINE)
     except MumacroError as error:
         raise BuildError(f"{error}; {remedy}") from error
     if not holds(verify(fine, sweep, SPRING_POINTS), FINE):
