@@ -9,8 +9,6 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 import mumacro
 from mumacro.contacts.quadrature import driven_rule
 from mumacro.errors import MumacroError

@@ -278,7 +278,12 @@ def _state_errors(table: Table, out: Path, of: Contact, seed: int, tolerance: fl
         for name, value in found.values.items():
             slopes = np.zeros(2)
             if name in found.cells:
-                errors = to_bits(CELL_SAFETY * found.cells[name], ERROR_BITS, up=True)
+                errors = CELL_SAFETY * found.cells[name]
+                if name not in of.sloped:
+                    # they bound values: a rough quadrature can make the finer interpolant worse
+                    # than the table
+                    errors[:, 0] = np.minimum(errors[:, 0], SAFETY * value)
+                errors = to_bits(errors, ERROR_BITS, up=True)
                 block.cell_errors[name], slopes = errors, errors.max(axis=0)[1:]
             block.errors[name] = np.array([SAFETY * value, *slopes])
         block.max_abs_error, block.max_rel_error = found.absolute, found.relative

@@ -130,8 +130,15 @@ def _stating(surrogate: Surrogate, of: Contact, error: float, of_border: float) 
     border = [
         replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border
     ]
-    stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
-    blocks = [replace(block, errors=stated) for block in of.blocks(table)]
+    one = np.array([error, 0.0, 0.0])
+    blocks = [
+        replace(
+            block,
+            errors=dict.fromkeys(table.quantities, one),
+            cell_errors=dict.fromkeys(block.nodes, np.tile(one, (math.prod(block.cells), 1))),
+        )
+        for block in of.blocks(table)
+    ]
     return Surrogate(
         of.with_blocks(replace(table, border=border), blocks), surrogate.path, surrogate.threads
     )

@@ -270,8 +270,8 @@ def test_the_errors_that_are_measured_are_those_that_the_table_states(of: Contac
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10, 1e-12])
 def test_half_of_the_bounds_are_below_150_errors(tolerance: float) -> None:
     """Of what verification met: one error a block was up to 440 times the error at most points."""
-    attributes = opened(tolerance).attributes
-    ratios = np.reshape(attributes["ball_verified_bound_over_error"], (-1, 3))
+    attributes = opened(tolerance).table.attributes
+    ratios = attributes["ball_verified_bound_over_error"].reshape(-1, 3)
     names = attributes["ball_verified_quantities"].split()
     assert names[:3] == ["mu_ratio", "power", "stick_fraction"]
     for name, (least, median, _) in zip(names, ratios, strict=True):
