@@ -281,7 +281,7 @@ def _state_errors(table: Table, out: Path, of: Contact, seed: int, tolerance: fl
                 errors = CELL_SAFETY * found.cells[name]
                 if name not in of.sloped:
                     # they bound values: a rough quadrature can make the finer interpolant worse
-                    # than the table
+                    # than the table, and some points of cells are in another block
                     errors[:, 0] = np.minimum(errors[:, 0], SAFETY * value)
                 errors = to_bits(errors, ERROR_BITS, up=True)
                 block.cell_errors[name], slopes = errors, errors.max(axis=0)[1:]

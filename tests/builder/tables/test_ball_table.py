@@ -260,7 +260,10 @@ def test_the_errors_that_are_measured_are_those_that_the_table_states(of: Contac
     ):
         assert found.cells.keys() == block.nodes.keys()
         for name in block.nodes:
-            assert np.all(found.cells[name] <= block.cell_errors[name]), (chart.name, name)
+            cells = found.cells[name]
+            if name != "mu_ratio":  # some points of cells are in another block
+                cells = np.minimum(cells, found.values[name])
+            assert np.all(cells <= block.cell_errors[name]), (chart.name, name)
             assert found.values[name] <= block.errors[name][0], (chart.name, name)
             # where a stick fraction's own noise is larger than what the cells err by, none is left
             assert found.values[name] > 0.0 or name == "stick_fraction", (chart.name, name)
