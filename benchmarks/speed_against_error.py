@@ -221,8 +221,11 @@ def plot(lines: list[Line], path: Path) -> None:
             color=color,
             lw=1.0 + 1.2 * (color == colors[0]),
         )
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_yticks([10, 20, 50, 100, 200, 500, 1000], minor=False)
+    axes.yaxis.set_major_formatter("{x:,.0f}")
+    slowest = max(ns for _, points in lines for _, ns in points)
+    decades, between = [10, 100, 1000, 10_000, 100_000], [20, 50, 200, 500]
+    ticks = decades if slowest > 2000.0 else sorted([*decades[:3], *between])
+    axes.set_yticks(ticks, minor=False)
     axes.minorticks_off()
     axes.grid(color="#e4e4e4")
     axes.legend(fontsize=9, loc="upper left")

@@ -262,7 +262,9 @@ class Surrogate:
     # --- dimensionless ----------------------------------------------------------------------------
 
     def mu_ratio(self, v_tilde: Any, y_tilde: Any) -> Any:
-        """mu~ = mu_macro/mu0 [-], eq. (15): the fast path.
+        """mu~ = mu_macro/mu0 [-] of one spring that is shaken across, eq. (15): the fast path.
+
+        Of a ball: ``quantity("mu_ratio", v_tilde, y_tilde, contact="ball")``, with its bound.
 
         Parameters
         ----------

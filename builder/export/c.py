@@ -9,8 +9,6 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 import mumacro
 from mumacro.contacts.quadrature import driven_rule
 from mumacro.errors import MumacroError
@@ -161,12 +159,14 @@ def _contact_text(
         if name not in table.quantities or not blocks:
             quantities.append("{0, 0, NULL, NULL, NULL}")
             continue
-        polynomials, errors, slope_errors = quantity_cells(blocks, code, charts)
+        polynomials, errors, cell_errors = quantity_cells(blocks, code, charts)
         # the stick fraction is zero in continuous sliding
         first = int(polynomials.any(axis=(1, 2)).argmax())
-        # no slope is asked of a ball's power and stick fraction
-        sloped = slope_errors[first:] if slope_errors.any() else np.zeros((1, 3))
-        parts = {"cells": polynomials[first:], "errors": errors, "slope_errors": sloped}
+        parts = {
+            "cells": polynomials[first:],
+            "errors": errors,
+            "cell_errors": cell_errors[first:],
+        }
         arrays |= {f"{prefix}{name}_{part}": array for part, array in parts.items()}
         names = _names(f"{prefix}{name}_", parts)
         quantities.append(f"{{{first}, {len(polynomials) - first}, {names}}}")

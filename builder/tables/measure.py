@@ -130,8 +130,15 @@ def _stating(surrogate: Surrogate, of: Contact, error: float, of_border: float) 
     border = [
         replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border
     ]
-    stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
-    blocks = [replace(block, errors=stated) for block in of.blocks(table)]
+    one = np.array([error, 0.0, 0.0])
+    blocks = [
+        replace(
+            block,
+            errors=dict.fromkeys(table.quantities, one),
+            cell_errors=dict.fromkeys(block.nodes, np.tile(one, (math.prod(block.cells), 1))),
+        )
+        for block in of.blocks(table)
+    ]
     return Surrogate(
         of.with_blocks(replace(table, border=border), blocks), surrogate.path, surrogate.threads
     )
@@ -150,9 +157,9 @@ def block_errors(surrogate: Surrogate, of: Contact, n: int, seed: int) -> list[B
         cells = cell_errors(of, index, block, *exact)
         chart = of.charts[index]
         if of.border is not None and chart.b.name in _FROM_BORDER and chart.a.name != "inverse_y":
-            for name, rows in cells.items():
+            for name in of.sloped:
                 bends = _bends(surrogate, of, of.border, index, name)
-                rows[:, 1] += bends.max(axis=(1, 3)).ravel()
+                cells[name][:, 1] += bends.max(axis=(1, 3)).ravel()
         found.append(BlockErrors(*errors, cells))
     return found
 
@@ -343,17 +350,19 @@ def cell_errors(
     of: Contact, index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
 ) -> dict[str, Array]:
     """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and
-    along b.
+    along b; of a quantity whose slopes a table does not give, 0 for the derivatives.
 
     ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`;
     ``noise`` their rounding.
     """
     found: dict[str, Array] = {}
     for name in QUANTITY_NAMES:
-        if name in block.nodes and name in of.sloped:
+        if name in block.nodes:
             for coefficients in _truths(of, exact[name], noise[name]):
                 largest = _largest(of, index, block, name, coefficients)
                 found[name] = np.maximum(found.get(name, 0.0), largest)
+            if name not in of.sloped:
+                found[name][:, 1:] = 0.0
     return found
 
 

@@ -199,14 +199,14 @@ class Data:
         )
         self.pointer.border_cells = self.border.shape[0]
 
-    def put(self, quantity: int, polynomials: Array, errors: Array, slope_errors: Array) -> None:
+    def put(self, quantity: int, polynomials: Array, errors: Array, cell_errors: Array) -> None:
         """Add the cells of a quantity, see :attr:`quantities`."""
         place = self.pointer.quantities[quantity]
         place.cells = polynomials.shape[0]
         self.quantities[quantity] = (
             self._keep(place, "polynomials", polynomials),
             self._keep(place, "errors", errors),
-            self._keep(place, "slope_errors", slope_errors),
+            self._keep(place, "cell_errors", cell_errors),
         )
 
     def put_driven(self, points: Array) -> None:

@@ -9,7 +9,7 @@
  * of q, of its derivatives along a and along b, the largest where these have their share of it. */
 typedef struct {
     int64_t first, cells;
-    const double *polynomials, *errors, *slope_errors;
+    const double *polynomials, *errors, *cell_errors;
 } mumacro_cells;
 
 /* Quadrature over the springs of a ball that slip backwards, under oscillation along the sliding direction: points

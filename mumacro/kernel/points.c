@@ -13,13 +13,16 @@ static mu_answer mu_in_block(const mumacro_data *data, int quantity, const mu_pl
     const mu_form form = mu_form_in(at->block, quantity);
     const double base = mu_base(form.base, at), factor = mu_factor(form.factor, at);
     const double *errors = cells->errors + 2 * MU_PLACE_OF(at->block);
+    double error = errors[0];
     mu_answer out = {0.0, 0.0, at->block};
     if (form.factor != MU_NOTHING) {
         const mu_spot spot = mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
         out.value = mu_fma1(factor, mu_cell_value(cells->polynomials + 64 * spot.cell, spot.u, spot.w), base);
         out.value = mu_min(mu_max(out.value, 0.0), about->most);
+        /* those of a ball err by orders more beside its border than in the rest of a block */
+        if (mu_is_ball(at->block) && quantity != MU_MU_RATIO) error = cells->cell_errors[3 * spot.cell];
     }
-    out.bound = fabs(factor) * errors[0] + errors[1] + about->slack(data, at, out.value, factor);
+    out.bound = fabs(factor) * error + errors[1] + about->slack(data, at, out.value, factor);
     return out;
 }
 
@@ -105,7 +108,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     const mu_form_slopes form = mu_slopes_of_form(mu_form_in(at->block, quantity), at, &turn);
     /* d b / d ln x where b is folded */
     const double fold = turn.edge_v == 1.0 ? fabs(turn.b_v) : fabs(turn.b_v / turn.edge_v);
-    const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 3 * spot.cell;
+    const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->cell_errors + 3 * spot.cell;
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
     const double q_b = slope.q_b * 2.0 * block[MU_STEP_B];
     double reach = fold, ratio, noise, along_a, along_a_y, more = 0.0;

@@ -42,7 +42,8 @@ class Block:
     errors: dict[str, Array] = field(
         default_factory=lambda: {name: np.zeros(3) for name in atlas.QUANTITY_NAMES}
     )
-    #: the same for every cell (cells, 3), in the order of the cells, for slopes
+    #: the same for every cell (cells, 3), in the order of the cells; derivatives of a ball's power
+    #: and stick fraction, whose slopes a table does not give, have 0
     cell_errors: dict[str, Array] = field(default_factory=dict)
     max_abs_error: float = 0.0  #: the largest errors of mu~ that verification met
     max_rel_error: float = 0.0

@@ -23,7 +23,7 @@ from mumacro.table.atomic import write_whole
 from mumacro.table.blocks import BY_NAME, Block, BorderPiece, Table, names_in
 from mumacro.table.polynomials import nodes
 
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 WITHOUT_BALL = 3  # the version of a file that has no ball
 # More is refused before memory is taken; of the largest table that the builder makes:
 MOST_BYTES = 16 * 2**20  # of a file: 425 kB
@@ -54,8 +54,6 @@ _PLAIN = {
 BALL = "ball_"  # before the names of attributes at the root that tell of a ball
 #: the statistics of bound over error in the attribute ``verified_bound_over_error``
 RATIOS = ("least", "median", "largest")
-#: quantities of a ball whose slopes a table gives
-BALL_SLOPES = ("mu_ratio",)
 CELL_AXES = ("quantity", "cell", "derivative")
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
 
@@ -173,9 +171,9 @@ def _fill(root: Any, table: Table) -> None:
         )
     # inside the border, which they are fitted to: with a second group at the root the CF checker
     # looks for "time"
-    _fill_blocks(border.createGroup("blocks"), table, atlas.CHARTS, table.blocks, table.quantities)
+    _fill_blocks(border.createGroup("blocks"), table, atlas.CHARTS, table.blocks)
     if table.ball:
-        _fill_blocks(border.createGroup("ball"), table, atlas.BALL_CHARTS, table.ball, BALL_SLOPES)
+        _fill_blocks(border.createGroup("ball"), table, atlas.BALL_CHARTS, table.ball)
 
 
 def _fill_blocks(
@@ -183,11 +181,10 @@ def _fill_blocks(
     table: Table,
     charts: Sequence[atlas.Chart],
     blocks: list[Block],
-    sloped: Sequence[str],
 ) -> None:
-    """The blocks of a contact, with errors in every cell of the quantities that are ``sloped``."""
+    """The blocks of a contact, with errors in every cell."""
     if any(block.cell_errors for block in blocks):
-        _put_cell_errors(group, blocks, sloped)
+        _put_cell_errors(group, blocks, table.quantities)
     for chart, block in zip(charts, blocks, strict=True):
         one = group.createGroup(chart.name)
         axes = (chart.a.name, chart.b.name)
@@ -403,7 +400,7 @@ def _read(root: hdf5.Group) -> Table:
     if np.array_equal(attributes["format_version"], FORMAT_VERSION):
         below_ball = below_border.group("ball")
         ball = [_block(below_ball.group(chart.name), chart, names) for chart in atlas.BALL_CHARTS]
-        _add_cell_errors(below_ball, ball, BALL_SLOPES)
+        _add_cell_errors(below_ball, ball, names)
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         shape = tuple(plain[axis].size for axis in axes) if axes else None

@@ -266,7 +266,7 @@ static void ask_nonsense(const mumacro_kernel *kernel) {
         cells->cells = 1 + (int)(drawn() * 20.0);
         cells->polynomials = held[n++] = nonsense(64 * (size_t)cells->cells);
         cells->errors = held[n++] = nonsense((MU_SOURCES + 1) * 2);
-        cells->slope_errors = held[n++] = nonsense(3 * (size_t)cells->cells);
+        cells->cell_errors = held[n++] = nonsense(3 * (size_t)cells->cells);
     }
     data.driven.nodes = (int)(drawn() * 40.0);
     data.driven.points = held[n++] = nonsense(5 * (size_t)data.driven.nodes + 1);
