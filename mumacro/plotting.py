@@ -53,6 +53,8 @@ _REGIMES = {"continuous": "continuous sliding", "stick_slip": "stick and slip"}
 _MARKS = "osD^vPX"  # of groups of cases: they differ without colour, too
 _MOST_LABELS = 8  # of curves in a legend
 _SIDE = 0.05  # of the map, where no label stands
+#: as many times nearer than it is counts the border, which is bold and dashed
+_FROM_BORDER = 0.5
 #: places where the map names the regime, in shares of its width and height
 AREAS = ((0.14, 0.735), (0.8, 0.12))
 
@@ -275,9 +277,12 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
         if not inside.any():
             continue
         x, y = across[inside], lines[level][inside]
-        others = [line for other, line in lines.items() if other != level] + [border]
+        others = [(line, 1.0) for other, line in lines.items() if other != level]
         apart = np.min(
-            [np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1) for line in others],
+            [
+                share * np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1)
+                for line, share in [*others, (border, _FROM_BORDER)]
+            ],
             axis=0,
         )
         for u, w in [*words, *(at[1:] for at in placed)]:
