@@ -79,8 +79,8 @@ class Springs:
             vs, ys = v[at], y[at]
             if index >= len(atlas.CHARTS):
                 values = [self.fine.quantity(name, vs, ys)[0] for name in atlas.QUANTITY_NAMES]
-                for found, value in zip(out, values, strict=True):
-                    found[at] = value
+                for column, value in zip(out, values, strict=True):
+                    column[at] = value
                 deficit[at] = _fast_deficit(vs, ys)
                 continue
             for code, quantity in enumerate(atlas.QUANTITIES):
@@ -132,14 +132,16 @@ def _fast_deficit(v: Array, y: Array) -> Array:
     for k in range(1, 24):  # (2/pi) K(i r) in powers of r^2
         terms = terms * -n * ((2 * k - 1) / (2 * k)) ** 2
         total = total - terms
-    found = kernels[-1].outer_expansion(r)
+    expansion = kernels[-1].outer_expansion(r)
     return np.where(
-        n < 0.1, total - (found[:, 1] + 0.5 * found[:, 2]) * share, 1.0 - _mu_fast(found, share)
+        n < 0.1,
+        total - (expansion[:, 1] + 0.5 * expansion[:, 2]) * share,
+        1.0 - _mu_fast(expansion, share),
     )
 
 
-def _mu_fast(found: Array, share: Array) -> Array:
-    return found[:, 0] + (found[:, 1] + 0.5 * found[:, 2]) * share
+def _mu_fast(expansion: Array, share: Array) -> Array:
+    return expansion[:, 0] + (expansion[:, 1] + 0.5 * expansion[:, 2]) * share
 
 
 class Ball:
@@ -234,10 +236,10 @@ class Ball:
             near = np.abs(excess) < 0.3 * s
             amplitude = np.where(near, 1.0 + excess / s, y[at, None] / s)
             off = np.where(near, excess / s, amplitude - 1.0)
-            found = self.springs((v[at, None] / s).ravel(), amplitude.ravel(), off.ravel())
+            integrands = self.springs((v[at, None] / s).ravel(), amplitude.ravel(), off.ravel())
             share = MIDDLE * s * length * self._weight
             weights = (share, share, share * MIDDLE * s, share)
-            for row, values, weight in zip(out, found, weights, strict=True):
+            for row, values, weight in zip(out, integrands, weights, strict=True):
                 row[at] += (values.reshape(s.shape) * weight).sum(axis=1)
         return out
 
