@@ -40,10 +40,10 @@ def shared_counters() -> Iterator[None]:
     place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108  (a folder of its own is made there)
     with ExitStack() as stack:
         with suppress(OSError):
-            made = tempfile.TemporaryDirectory(
+            folder = tempfile.TemporaryDirectory(
                 prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True
             )
-            os.environ[_SHARED] = stack.enter_context(made)
+            os.environ[_SHARED] = stack.enter_context(folder)
         yield
 
 

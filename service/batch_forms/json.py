@@ -88,15 +88,15 @@ def _count(text: bytes | bytearray, character: bytes) -> int:
 def _members(text: bytearray) -> Any:
     """What ``json`` reads, with long lists of numbers by orjson: a text stands in place of each
     while it reads."""
-    kept, lists, at = list[bytes | bytearray](), list[Any](), 0
+    pieces, lists, at = list[bytes | bytearray](), list[Any](), 0
     while (start := text.find(b"[", at)) >= 0 and (end := text.find(b"]", start) + 1) > 0:
         numbers = _list(text[start:end]) if end - start > _SHORT else None
-        kept.append(
+        pieces.append(
             text[at:end] if numbers is None else text[at:start] + b'"%b%d"' % (_TOKEN, len(lists))
         )
         lists += [] if numbers is None else [numbers]
         at = end
-    members = decode(b"".join([*kept, text[at:]]), large=True)
+    members = decode(b"".join([*pieces, text[at:]]), large=True)
     if isinstance(members, dict):
         token = _TOKEN.decode()
         for name, value in members.items():

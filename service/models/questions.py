@@ -255,7 +255,7 @@ class FitRequest(Choice):
     )
 
     @model_validator(mode="after")
-    def _what_is_left_out(self) -> Self:
+    def _refuse_unknowns_and_other_amplitude(self) -> Self:
         for name in self.unknowns:
             if getattr(self, name) is not None:
                 raise InputError(name, None, "left out: it is among the unknowns")
