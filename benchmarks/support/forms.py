@@ -60,7 +60,7 @@ def posted(client: Any, form: str, body: Any, **params: Any) -> Any:
     return client.post(BATCH, content=body, params=params, headers={"Content-Type": TYPES[form]})
 
 
-def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
+def answered_rows(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
     response = posted(client, form, WRITERS[form](rows), **params)
     assert (response.status_code, response.headers["content-type"]) == (200, TYPES[form]), (
         response.text

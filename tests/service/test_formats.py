@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.support.forms import BATCH, Row, asked, number
+from benchmarks.support.forms import BATCH, Row, answered_rows, number
 from benchmarks.support.serving import CASE
 from mumacro import Surrogate
 
@@ -104,9 +104,9 @@ WAYS: dict[str, Callable[[Any], list[Row]]] = {
     "GET": lambda client: [by_get(client, row) for row in ROWS],
     "rows": by_rows,
     "columns": by_columns,
-    "lines": lambda client: list(map(of_one, asked(client, "ndjson", ROWS))),
-    "CSV": lambda client: asked(client, "csv", ROWS),
-    "Arrow": lambda client: asked(client, "arrow", ROWS),
+    "lines": lambda client: list(map(of_one, answered_rows(client, "ndjson", ROWS))),
+    "CSV": lambda client: answered_rows(client, "csv", ROWS),
+    "Arrow": lambda client: answered_rows(client, "arrow", ROWS),
 }
 
 
@@ -162,6 +162,6 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     reply = client.post(BATCH, params=query, json=good).json()
     assert [{name: flat(row)[name] for name in names} for row in reply["results"]] == single
     for form in ("arrow", "csv", "ndjson"):
-        rows = asked(client, form, GOOD, **query)
+        rows = answered_rows(client, form, GOOD, **query)
         assert form == "ndjson" or list(rows[0]) == [*names, "error"]
         assert [{name: row[name] for name in names} for row in map(flat, rows)] == single

@@ -8,7 +8,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from benchmarks.support.forms import BATCH, as_csv, as_ndjson, asked, posted, read, stream_of
+from benchmarks.support.forms import (
+    BATCH,
+    answered_rows,
+    as_csv,
+    as_ndjson,
+    posted,
+    read,
+    stream_of,
+)
 from mumacro import Surrogate
 from tests.support.cases import Case
 
@@ -69,10 +77,10 @@ def test_a_gap_in_k_is_never_a_rigid_contact(client: Any, case: Case, gap: Any) 
         (fault,) = client.post(BATCH, content=json.dumps(body)).json()["errors"]
         assert (fault["index"], fault["field"], "rigid" in fault["reason"]) == (1, "k", True)
         assert gap is not None or fault["reason"] == GAP
-    first, second, third = asked(client, "ndjson", rows)
+    first, second, third = answered_rows(client, "ndjson", rows)
     assert (first["source"], second["status"], third["source"]) == ("stick_slip_low", 422, "rigid")
     assert second["errors"][0]["field"] == "k"
-    assert [row["error"] and row["error"][:2] for row in asked(client, "csv", rows)] == [
+    assert [row["error"] and row["error"][:2] for row in answered_rows(client, "csv", rows)] == [
         None,
         "k:",
         None,
@@ -229,7 +237,7 @@ def test_an_odd_line_among_plain_ones_affects_only_itself(
 ) -> None:
     good = json.dumps(case)
     answers = read("ndjson", posted(client, "ndjson", "\n".join([good, "", odd, good])))
-    (expected,) = asked(client, "ndjson", [case])
+    (expected,) = answered_rows(client, "ndjson", [case])
     assert answers[0] == answers[-1] == expected
     assert [answer.get("status") for answer in answers[1:-1]] == ([] if status is ... else [status])
     if status not in (..., None):

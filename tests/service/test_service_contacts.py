@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.support.forms import BATCH, as_csv, asked, posted, read
+from benchmarks.support.forms import BATCH, answered_rows, as_csv, posted, read
 from mumacro import Surrogate
 from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES
@@ -53,7 +53,7 @@ def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate,
         more = (
             {"table": answer["table"], "api_version": "1"} if form == "ndjson" else {"error": None}
         )
-        answers = asked(client, form, rows, **options)
+        answers = answered_rows(client, form, rows, **options)
         assert answers == [{**one, **more} for one in expected]
         assert list(answers[0]) == [*names, *more]
 
@@ -77,7 +77,7 @@ def test_columns_may_have_units_in_csv(client: Any) -> None:
     rows = [{**rig, "f": 20690.0, **ENDS, "y0": 2e-6, "v0": 0.02}]
     text = as_csv(rows).replace("k_low", "k_low [N/mm]").replace("800000.0", "800.0")
     text = text.replace("f,", "f [kHz],").replace("20690.0", "20.69")
-    assert read("csv", posted(client, "csv", text)) == asked(client, "csv", rows)
+    assert read("csv", posted(client, "csv", text)) == answered_rows(client, "csv", rows)
 
 
 def test_bad_rows_spoil_only_themselves(client: Any) -> None:

@@ -8,7 +8,15 @@ from urllib.parse import urlencode
 import pyarrow as pa
 import pytest
 
-from benchmarks.support.forms import BATCH, as_arrow, as_csv, as_table, asked, posted, stream_of
+from benchmarks.support.forms import (
+    BATCH,
+    answered_rows,
+    as_arrow,
+    as_csv,
+    as_table,
+    posted,
+    stream_of,
+)
 from benchmarks.support.serving import CASE
 
 SINGLE = "/v1/mu-macro"
@@ -392,8 +400,8 @@ def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_na
     for body in ([case, {**case, "f": 1.0}], {**case, "f": [1.7e308, 1.0]}):
         (fault,) = client.post(BATCH, json=body).json()["errors"]
         assert (fault["index"], fault["field"]) == (0, "f")
-    assert asked(client, "ndjson", [case])[0]["errors"][0]["field"] == "f"
-    assert asked(client, "csv", [case])[0]["error"].startswith("f: must be finite")
+    assert answered_rows(client, "ndjson", [case])[0]["errors"][0]["field"] == "f"
+    assert answered_rows(client, "csv", [case])[0]["error"].startswith("f: must be finite")
     held = {name: value for name, value in case.items() if name != "v0"}
     for path, more in (
         ("law", {"start": 0.1, "stop": 1.0}),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.contacts import NAMES as BALL_NAMES
-from benchmarks.contacts import asked, hard_points
+from benchmarks.contacts import hard_points, rows_of
 from builder.solver.sweep import Sweep
 from builder.tables.measure import fast_from
 from builder.tables.quantities import solver_noise
@@ -107,8 +107,8 @@ def test_a_ball_is_never_beyond_its_bounds(tolerance: float) -> None:
     """Over all of the legal range, beside the finest table.  Its ball is the one of 1e-10, which
     test_ball_table.py compares with fresh quadratures."""
     v, y = hard_points(3000, along=False, seed=11)
-    truths, found = asked(opened(1e-12), v, y, "across"), {}
-    rows = zip(BALL_NAMES, asked(opened(tolerance), v, y, "across"), truths, strict=True)
+    truths, found = rows_of(opened(1e-12), v, y, "across"), {}
+    rows = zip(BALL_NAMES, rows_of(opened(tolerance), v, y, "across"), truths, strict=True)
     for name, (value, bound), (truth, left) in rows:
         error, slope = np.abs(value - truth), name.startswith("slope")
         assert slope or not np.isnan(value).any()
@@ -121,7 +121,7 @@ def test_a_ball_is_never_beyond_its_bounds(tolerance: float) -> None:
         found[name] = float(np.nanmax(share))
     assert min(found[name] for name in BALL_NAMES) > 0.25
     plain = (v > 1e-3) & (v < 1e2) & (y > 1e-2) & (y < 1e2)
-    mu, bound = asked(opened(tolerance), v[plain], y[plain], "across")[0]
+    mu, bound = rows_of(opened(tolerance), v[plain], y[plain], "across")[0]
     error = np.abs(mu - truths[0][0][plain])
     assert np.median(bound[error > 0] / error[error > 0]) < 150.0
 
