@@ -95,15 +95,15 @@ def installed() -> dict[str, str]:
     """The parts that ``.venv`` holds and that are current; empty if it is absent, broken or
     incomplete."""
     try:
-        found = json.loads(MARKER.read_text(encoding="utf-8"))
+        parts = json.loads(MARKER.read_text(encoding="utf-8"))
         works = subprocess.run([PYTHON, "-c", ""], check=False).returncode == 0  # noqa: S603 (a link may be broken)
     except (OSError, ValueError):
         return {}
-    if not isinstance(found, dict) or not works:
+    if not isinstance(parts, dict) or not works:
         return {}
-    held = dict(found.items() & current().items())
-    old = found.keys() & SETS.keys() - held.keys()  # packages that newer locks dropped must go too
-    return {name: made for name, made in held.items() if not old or name not in SETS}
+    valid = dict(parts.items() & current().items())
+    old = parts.keys() & SETS.keys() - valid.keys()  # packages that newer locks dropped must go too
+    return {name: checksum for name, checksum in valid.items() if not old or name not in SETS}
 
 
 def pip(*arguments: str) -> None:
@@ -152,7 +152,7 @@ def ensure(set_name: str = "tools") -> None:
     pip("--no-deps", "--no-build-isolation", "-e", ".")
     names = {set_name, "kernel", *have}
     MARKER.write_text(
-        json.dumps({name: made for name, made in current().items() if name in names}),
+        json.dumps({name: checksum for name, checksum in current().items() if name in names}),
         encoding="utf-8",
     )
 
