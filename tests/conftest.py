@@ -56,8 +56,8 @@ def started(tables_dir: Path) -> "Callable[..., TestClient]":
 @pytest.fixture(scope="session")
 def client(started: "Callable[..., TestClient]") -> "Iterator[TestClient]":
     """A client of one with default settings, after its start."""
-    with started() as made:
-        yield made
+    with started() as one:
+        yield one
 
 
 @pytest.fixture(scope="session")

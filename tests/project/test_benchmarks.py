@@ -79,11 +79,11 @@ SECTIONS = [
 ]
 
 
-def check(found: list[list[Row]]) -> None:
-    assert found
-    assert all(found)
+def check(tables: list[list[Row]]) -> None:
+    assert tables
+    assert all(tables)
     assert not {"nan", "inf", "-inf"} & {
-        cell for table in found for row in table for cell in row.values()
+        cell for table in tables for row in table for cell in row.values()
     }
 
 
@@ -106,18 +106,18 @@ def test_a_script_prints_tables_of_finite_numbers(script: str) -> None:
 def test_tables_keep_their_tolerance_where_plain_grids_do_not() -> None:
     (comparison,) = run("speed_against_error", "--quick", "--rounds", "1")
     check([comparison])
-    seen = []
+    names = []
     for row in comparison:
         if row["max abs error"] == "-":
             continue
         name, error = row["method"].strip("*"), float(row["max abs error"])
         if name.startswith("mumacro-"):
             assert 0.0 < error <= float(name.removeprefix("mumacro-"))
-            seen.append(name)
+            names.append(name)
         assert " x " not in row["data"] or error > 1e-3, (
             "24 and 48 nodes a side cannot follow the border"
         )
-    assert sorted(seen) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
+    assert sorted(names) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
 
 
 @pytest.mark.slow

@@ -49,7 +49,7 @@ class Installed:
         self.run("python", *pip, "-c", str(pins), str(wheel))
 
     def run(self, *words: Any, code: int = 0) -> Any:
-        kept = {
+        variables = {
             name: value
             for name, value in os.environ.items()
             if not name.startswith(("PYTHON", "MUMACRO_"))
@@ -60,7 +60,7 @@ class Installed:
             capture_output=True,
             text=True,
             timeout=600,
-            env={**kept, "PATH": str(self.bin)},
+            env={**variables, "PATH": str(self.bin)},
             check=False,
         )
         assert done.returncode == code, done.stdout + done.stderr
@@ -104,17 +104,17 @@ def build(folder: Path, platform: str | None = None) -> Path:
     newest = max(
         path.stat().st_mtime for path in (*files, ROOT / "hatch_build.py", ROOT / "pyproject.toml")
     )
-    made = [
+    wheels = [
         path
         for path in ROOT.glob(f"dist/*-{platform}.whl")
         if platform and path.stat().st_mtime > newest
     ]
-    if not made:
+    if not wheels:
         env = {**os.environ, "MUMACRO_BUILD_PLATFORM": platform}
         command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
         subprocess.run(command, cwd=ROOT, env=env, check=True)
-        made = [*folder.glob("*.whl")]
-    (result,) = made
+        wheels = [*folder.glob("*.whl")]
+    (result,) = wheels
     return result
 
 

@@ -285,8 +285,8 @@ def test_a_wrong_line_of_csv_keeps_its_place_beside_blank_lines(client: Any, cas
 
 def test_a_number_of_csv_beyond_double_range_is_no_rigid_contact(client: Any, case: Case) -> None:
     rows = [{**case, "k": k} for k in ("1e999", "inf", "rigid", 1e6)]
-    found = read("csv", posted(client, "csv", as_csv(rows)))
-    assert [row["error"] and row["error"][:2] for row in found] == ["k:", "k:", None, None]
+    answers = read("csv", posted(client, "csv", as_csv(rows)))
+    assert [row["error"] and row["error"][:2] for row in answers] == ["k:", "k:", None, None]
 
 
 def test_arrow_keeps_order_over_batches_and_names_its_table(
@@ -318,17 +318,17 @@ def test_a_bad_arrow_case_affects_only_itself(client: Any, case: Case) -> None:
 
 
 def test_arrow_numbers_of_other_types_are_numbers(client: Any, case: Case) -> None:
-    given = pa.record_batch(
+    record_batch = pa.record_batch(
         {name: pa.array([value], type=pa.float32()) for name, value in case.items()}
     )
-    given = given.set_column(1, "Fz", pa.array([10], type=pa.int16()))
-    (row,) = read("arrow", posted(client, "arrow", stream_of(given)))
+    record_batch = record_batch.set_column(1, "Fz", pa.array([10], type=pa.int16()))
+    (row,) = read("arrow", posted(client, "arrow", stream_of(record_batch)))
     assert (
         row["mu_macro"]
         == one(client, {name: float(np.float32(x)) for name, x in case.items()})["mu_macro"]
     )
     answer = pa.ipc.open_stream(
-        posted(client, "arrow", stream_of(given.slice(1))).content
+        posted(client, "arrow", stream_of(record_batch.slice(1))).content
     ).read_all()
     assert (answer.num_rows, answer.schema.names[:5]) == (0, list(VALUES))
 

@@ -18,11 +18,11 @@ def test_an_attack_takes_little_memory_and_keeps_nobody_waiting(name: str) -> No
 
 
 def test_a_strange_request_is_answered_or_refused_and_never_an_error(live_server: Server) -> None:
-    found = strange.Tally()
-    found.ask(live_server, 1, 1000)
-    assert found.bad == []
-    assert set(found.counts) == set(strange.KINDS)
-    assert {200, 400, 404, 422} <= set(found.statuses)
+    tally = strange.Tally()
+    tally.ask(live_server, 1, 1000)
+    assert tally.bad == []
+    assert set(tally.counts) == set(strange.KINDS)
+    assert {200, 400, 404, 422} <= set(tally.statuses)
     assert live_server.errors() == []
 
 

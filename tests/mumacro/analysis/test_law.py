@@ -184,7 +184,7 @@ def test_the_articles_formulas_are_refused_for_another_contact(
 
 
 @pytest.mark.parametrize(
-    ("along", "case", "direction", "said"),
+    ("along", "case", "direction", "message"),
     [
         ("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
         ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
@@ -206,9 +206,9 @@ def test_the_articles_formulas_are_refused_for_another_contact(
     ],
 )
 def test_a_bad_interval_is_named(
-    surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any
+    surrogate: Surrogate, along: Any, case: Case, direction: Any, message: Any
 ) -> None:
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         friction_law(surrogate, along, values=[1.0, 10.0], **case, direction=direction)
 
 
