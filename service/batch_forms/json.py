@@ -22,7 +22,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import by_name, columns_of
 from mumacro.inputs.fields import is_rigid
 from mumacro.inputs.k_range import ENDS
-from mumacro.inputs.kind import Kind, kind_of
+from mumacro.inputs.kind import Kind
 
 from ..batch import Batch, Body, Form, Reason, too_large
 from ..included import REGIME_OF, SOURCES, Outputs, names_of, nested
@@ -43,14 +43,13 @@ _BETWEEN = re.compile(rb"\}\s*,")
 def read(text: bytearray, max_batch: int, options: BatchOptions) -> Body:
     """The cases and the options of a body: columns or one case, or a list of rows."""
     if opening := _OPENS_LIST.match(text):
-        kind = kind_of(options.contact or "spring", options.direction or "across")
-        if body := _quick_rows(text, opening.end(), max_batch, kind):
+        if body := _quick_rows(text, opening.end(), max_batch, options.kind):
             return body
         _limit_values(text, max_batch)
         rows = decode(text, large=True)
         if len(rows) > max_batch:
             raise too_large(max_batch)
-        return _one_by_one(rows, kind)
+        return _one_by_one(rows, options.kind)
     _limit_values(text, max_batch)
     members = _members(text)
     if not isinstance(members, dict):
