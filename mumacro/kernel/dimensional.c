@@ -1,12 +1,13 @@
-/* Cases in SI units: the groups y~ = y0 k / (mu0 Fz) and v~ = v0 k / (mu0 Fz omega), eqs. (6), (8), unusual inputs, and
- * the chain rule to the six inputs.  An infinite k is rigid contact, eq. (37). */
+/* Cases in SI units: the groups y~ = y0 k / (mu0 Fz) and v~ = v0 k / (mu0 Fz omega), eqs. (6), (8),
+ * unusual inputs, and the chain rule to the six inputs.  An infinite k is rigid contact, eq.
+ * (37). */
 
 typedef struct {
     double mu0, Fz, k, y0, omega, v0;
 } mu_inputs;
 
-/* 0 for a legal case, else 1 + the place of its first bad input.  Where the normal force oscillates y0 stands for its
- * amplitude, which is below Fz: else the contact lifts off. */
+/* 0 for a legal case, else 1 + the place of its first bad input.  Where the normal force oscillates
+ * y0 stands for its amplitude, which is below Fz: else the contact lifts off. */
 static int mu_first_bad(int direction, const mu_inputs *in) {
     if (!(in->mu0 > 0.0 && in->mu0 < HUGE_VAL)) return 1;
     if (!(in->Fz > 0.0 && in->Fz < HUGE_VAL)) return 2;
@@ -19,11 +20,12 @@ static int mu_first_bad(int direction, const mu_inputs *in) {
 /* r = y~/v~ = y0 omega/v0, which needs no stiffness. */
 static double mu_amplitude_ratio(const mu_inputs *in) {
     const double product = in->y0 * in->omega;
-    return product > 1e-290 && product < 1e290 ? product / in->v0 : mu_quotient(in->y0, in->omega, in->v0, 1.0, 1.0);
+    return product > 1e-290 && product < 1e290 ? product / in->v0
+                                               : mu_quotient(in->y0, in->omega, in->v0, 1.0, 1.0);
 }
 
-/* The groups of any legal case: v~ is infinite where nothing oscillates, both are for rigid contact; z for y~ where the
- * normal force oscillates. */
+/* The groups of any legal case: v~ is infinite where nothing oscillates, both are for rigid
+ * contact; z for y~ where the normal force oscillates. */
 static void mu_groups(int direction, const mu_inputs *in, double *v, double *y) {
     const int rigid = in->k == HUGE_VAL;
     *v = in->v0 > 0.0 ? HUGE_VAL : 0.0;
@@ -45,10 +47,11 @@ static double mu_rigid_slope(int direction, double r) {
     return r > 1.0 ? -MU_TWO_OVER_PI / sqrt((r - 1.0) * (r + 1.0)) : 0.0;
 }
 
-/* mu~ of any case of any contact, and the groups: zero inputs, rigid contact, groups beyond double precision.  `at`,
- * unless NULL, gets the slopes of a case along or normal with finite groups, which cost nothing more. */
-static mu_answer mu_any_case(const mumacro_data *data, int contact, int direction, const mu_inputs *in, double *v,
-                             double *y, mu_slopes *at) {
+/* mu~ of any case of any contact, and the groups: zero inputs, rigid contact, groups beyond
+ * double precision.  `at`, unless NULL, gets the slopes of a case along or normal with finite
+ * groups, which cost nothing more. */
+static mu_answer mu_any_case(const mumacro_data *data, int contact, int direction,
+                             const mu_inputs *in, double *v, double *y, mu_slopes *at) {
     double r, mu;
     *v = *y = NAN;
     if (mu_first_bad(direction, in)) return mu_limit(NAN, NAN, -1);
@@ -71,28 +74,34 @@ static mu_answer mu_any_case(const mumacro_data *data, int contact, int directio
     }
     r = mu_amplitude_ratio(in);
     if (r == 0.0) return mu_limit(1.0, MU_RIGID_ROUNDING, MU_RIGID);
-    if (r == HUGE_VAL) return mu_limit(0.0, 3.0 * MU_DENORMAL, MU_RIGID); /* eq. (35) is 2.5e-306 there */
+    /* eq. (35) is 2.5e-306 there */
+    if (r == HUGE_VAL) return mu_limit(0.0, 3.0 * MU_DENORMAL, MU_RIGID);
     mu = mu_rigid_ratio(direction, r);
-    /* y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large */
-    return mu_limit(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || *v > 1e150 ? 0.0 : mu), MU_RIGID);
+    /* y~ beyond double range: only the outer solution is left, corrected by
+     * the layers when v~ is not large */
+    return mu_limit(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || *v > 1e150 ? 0.0 : mu),
+                    MU_RIGID);
 }
 
-/* What the chain rule takes of each case: mu~ and its slopes along ln v~ and ln y~, and the bounds of all three. */
+/* What the chain rule takes of each case: mu~ and its slopes along ln v~ and
+ * ln y~, and the bounds of all three. */
 enum { MU_OF_MU, MU_OF_V, MU_OF_Y, MU_OF_BOUND, MU_OF_BOUND_V, MU_OF_BOUND_Y, MU_KNOWN };
 
 /* sign mu0 slope / input. */
-static void mu_chain_row(int n, double sign, const double *mu0, const double *slope, const double *input,
-                         double *out) {
+static void mu_chain_row(int n, double sign, const double *mu0, const double *slope,
+                         const double *input, double *out) {
     for (int i = 0; i < n; ++i) out[i] = sign * mu0[i] * slope[i] / input[i];
 }
 
-/* d mu_macro / d input of cases without zeros and infinities, and the bounds: 12 rows, stride apart. */
-static void mu_chain_rule(int direction, int n, double in[6][MU_CHUNK], double known[MU_KNOWN][MU_CHUNK], double *out,
-                          int64_t stride) {
+/* d mu_macro / d input of cases without zeros and infinities, and the
+ * bounds: 12 rows, stride apart. */
+static void mu_chain_rule(int direction, int n, double in[6][MU_CHUNK],
+                          double known[MU_KNOWN][MU_CHUNK], double *out, int64_t stride) {
     for (int bounds = 0; bounds < 2; ++bounds, out += 6 * stride) {
         double(*of)[MU_CHUNK] = known + (bounds ? MU_OF_BOUND : MU_OF_MU), both[MU_CHUNK];
         /* z = Fz_amplitude / Fz has neither mu0 nor k */
-        const double *stiff = direction == MU_NORMAL ? of[MU_OF_V] : both, sign = bounds ? 1.0 : -1.0;
+        const double *stiff = direction == MU_NORMAL ? of[MU_OF_V] : both,
+                     sign = bounds ? 1.0 : -1.0;
         for (int i = 0; i < n; ++i) both[i] = of[MU_OF_V][i] + of[MU_OF_Y][i];
         for (int i = 0; i < n; ++i) out[i] = of[MU_OF_MU][i] + sign * stiff[i];
         mu_chain_row(n, sign, in[0], both, in[1], out + stride);
@@ -112,7 +121,8 @@ static void mu_know(mu_answer found, mu_slopes at, double known[MU_KNOWN][MU_CHU
     known[MU_OF_MU][i] = found.value;
     known[MU_OF_V][i] = at.along_v;
     known[MU_OF_Y][i] = at.along_y;
-    known[MU_OF_BOUND][i] = mu_has_cells(found.source) ? mu_min(found.bound, at.bound) : found.bound;
+    known[MU_OF_BOUND][i] =
+        mu_has_cells(found.source) ? mu_min(found.bound, at.bound) : found.bound;
     known[MU_OF_BOUND_V][i] = at.bound_v;
     known[MU_OF_BOUND_Y][i] = at.bound_y;
 }
@@ -121,7 +131,8 @@ static void mu_know(mu_answer found, mu_slopes at, double known[MU_KNOWN][MU_CHU
  * d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0,
  * infinite on y~ = 1 and for rigid contact.  Relative to k the slope is 0 for rigid contact. */
 static void mu_gradient(const mumacro_data *data, int contact, int direction, const mu_inputs *in,
-                        mu_answer found, const mu_slopes *slopes, double v, double y, double *out, int64_t stride) {
+                        mu_answer found, const mu_slopes *slopes, double v, double y, double *out,
+                        int64_t stride) {
     const double mu0 = in->mu0, six[6] = {in->mu0, in->Fz, in->k, in->y0, in->omega, in->v0};
     double *error = out + 6 * stride;
     if (found.source != -1 && found.source != MU_RIGID && found.source != MU_NO_OSCILLATION &&
@@ -156,22 +167,23 @@ static void mu_gradient(const mumacro_data *data, int contact, int direction, co
     }
 }
 
-/* --- many cases ------------------------------------------------------------------------------------- */
+/* --- many cases ------------------------------------------------------------------------------- */
 
-/* v~ and y~ where inputs are legal and no product is near the ends of the range, else -1: with mu0 and k positive,
- * positive products leave no negative factor, and NaN fails the comparisons. */
+/* v~ and y~ where inputs are legal and no product is near the ends of the range, else -1: with mu0
+ * and k positive, positive products leave no negative factor, and NaN fails the comparisons. */
 MU_INLINE void mu_pass_groups(int n, double in[6][MU_CHUNK], double *v, double *y) {
     for (int i = 0; i < n; i += MU_LANES) {
         const mu_lanes mu0 = mu_load(in[0] + i), k = mu_load(in[2] + i), omega = mu_load(in[4] + i);
         const mu_lanes force = mu0 * mu_load(in[1] + i), stretch = mu_load(in[3] + i) * k;
         const mu_lanes speed = mu_load(in[5] + i) * k, rate = force * omega;
         const mu_lanes slow = speed / rate, small = stretch / force;
-        const mu_mask low = MU_WHERE(force > 1e-290) & MU_WHERE(stretch > 1e-290) & MU_WHERE(speed > 1e-290) &
-                            MU_WHERE(rate > 1e-290);
-        const mu_mask high = MU_WHERE(force < 1e290) & MU_WHERE(stretch < 1e290) & MU_WHERE(speed < 1e290) &
-                             MU_WHERE(rate < 1e290);
-        const mu_mask plain = low & high & MU_WHERE(mu0 > 0.0) & MU_WHERE(k > 0.0) & MU_WHERE(slow > 0.0) &
-                              MU_WHERE(slow < HUGE_VAL) & MU_WHERE(small > 0.0) & MU_WHERE(small < HUGE_VAL);
+        const mu_mask low = MU_WHERE(force > 1e-290) & MU_WHERE(stretch > 1e-290) &
+                            MU_WHERE(speed > 1e-290) & MU_WHERE(rate > 1e-290);
+        const mu_mask high = MU_WHERE(force < 1e290) & MU_WHERE(stretch < 1e290) &
+                             MU_WHERE(speed < 1e290) & MU_WHERE(rate < 1e290);
+        const mu_mask plain = low & high & MU_WHERE(mu0 > 0.0) & MU_WHERE(k > 0.0) &
+                              MU_WHERE(slow > 0.0) & MU_WHERE(slow < HUGE_VAL) &
+                              MU_WHERE(small > 0.0) & MU_WHERE(small < HUGE_VAL);
         mu_store(v + i, mu_select(plain, slow, mu_all(-1.0)));
         mu_store(y + i, mu_select(plain, small, mu_all(-1.0)));
     }
@@ -181,15 +193,18 @@ MU_INLINE void mu_pass_groups(int n, double in[6][MU_CHUNK], double *v, double *
 static double mu_length_scale(double mu0, double Fz, double k) {
     const double quotient = Fz / k, length = mu0 * quotient;
     int64_t i, j, l;
-    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290)) return length;
+    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290))
+        return length;
     const double mantissa = mu_split(mu0, &i) * (mu_split(Fz, &j) / mu_split(k, &l));
     return mu_scale(mantissa, i + j - l);
 }
 
 /* Up to MU_CHUNK cases; in: the six inputs, filled up to whole lanes. */
-MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n, double in[6][MU_CHUNK], int rows,
-                                 double *out, int64_t stride, int8_t *source) {
-    double v[MU_CHUNK], y[MU_CHUNK], *mu = out + MU_ROW_MU_RATIO * stride, *bound = out + MU_ROW_ERROR_BOUND * stride;
+MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n,
+                                 double in[6][MU_CHUNK], int rows, double *out, int64_t stride,
+                                 int8_t *source) {
+    double v[MU_CHUNK], y[MU_CHUNK], *mu = out + MU_ROW_MU_RATIO * stride,
+                                     *bound = out + MU_ROW_ERROR_BOUND * stride;
     double *slopes = rows == MU_ROWS ? out + MU_ROW_GRADIENT * stride : NULL;
     mu_chunk c;
     mu_slope slope[MU_CHUNK];
@@ -201,7 +216,8 @@ MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n, d
         const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
         for (int i = 0; i < n; ++i) {
             const int later = mu_is_left(c.block[i]);
-            const mu_slopes at = later ? none : mu_slopes_of(data, contact, MU_MU_RATIO, &c, slope, i, v[i], y[i]);
+            const mu_slopes at =
+                later ? none : mu_slopes_of(data, contact, MU_MU_RATIO, &c, slope, i, v[i], y[i]);
             mu_know(mu_limit(at.value, bound[i], source[i]), at, known, i);
         }
         mu_chain_rule(MU_ACROSS, n, in, known, slopes, stride);
@@ -214,7 +230,9 @@ MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n, d
         mu[i] = found.value;
         bound[i] = found.bound;
         source[i] = (int8_t)found.source;
-        if (slopes) mu_gradient(data, contact, MU_ACROSS, &six, found, NULL, v[i], y[i], slopes + i, stride);
+        if (slopes)
+            mu_gradient(data, contact, MU_ACROSS, &six, found, NULL, v[i], y[i], slopes + i,
+                        stride);
     }
     for (int i = 0; i < n; ++i) {
         out[i] = mu[i] * in[0][i];
@@ -229,29 +247,35 @@ MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n, d
     }
 }
 
-MU_INLINE void mu_cases_of(const mumacro_data *data, int contact, int64_t n, const double *const *columns,
-                           const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
+MU_INLINE void mu_cases_of(const mumacro_data *data, int contact, int64_t n,
+                           const double *const *columns, const int64_t *strides, int rows,
+                           double *out, int64_t stride, int8_t *source) {
     for (int64_t start = 0; start < n; start += MU_CHUNK) {
         const int few = mu_few(n - start);
         const int whole = (few + MU_LANES - 1) / MU_LANES * MU_LANES;
         double in[6][MU_CHUNK];
         for (int i = 0; i < 6; ++i) {
             if (strides[i]) memcpy(in[i], columns[i] + start, (size_t)few * sizeof **in);
-            for (int j = strides[i] ? few : 0; j < whole; ++j) in[i][j] = strides[i] ? 1.0 : columns[i][0];
+            for (int j = strides[i] ? few : 0; j < whole; ++j)
+                in[i][j] = strides[i] ? 1.0 : columns[i][0];
         }
         mu_chunk_of_cases(data, contact, few, in, rows, out + start, stride, source + start);
     }
 }
 
 static void mu_cases(const mumacro_data *data, int contact, int64_t n, const double *const *columns,
-                     const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
-    if (contact == MU_BALL) mu_cases_of(data, MU_BALL, n, columns, strides, rows, out, stride, source);
+                     const int64_t *strides, int rows, double *out, int64_t stride,
+                     int8_t *source) {
+    if (contact == MU_BALL)
+        mu_cases_of(data, MU_BALL, n, columns, strides, rows, out, stride, source);
     else mu_cases_of(data, MU_SPRING, n, columns, strides, rows, out, stride, source);
 }
 
-/* As mu_cases, of any contact and direction; where the normal force oscillates, y0's column holds its amplitude. */
-static void mu_cases_as(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
-                        const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
+/* As mu_cases, of any contact and direction; where the normal force oscillates,
+ * y0's column holds its amplitude. */
+static void mu_cases_as(const mumacro_data *data, int contact, int direction, int64_t n,
+                        const double *const *columns, const int64_t *strides, int rows, double *out,
+                        int64_t stride, int8_t *source) {
     if (direction == MU_ACROSS) {
         mu_cases(data, contact, n, columns, strides, rows, out, stride, source);
         return;
@@ -280,16 +304,19 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
     }
 }
 
-static void mu_one(const mumacro_data *data, int contact, double mu0, double Fz, double k, double y0, double omega,
-                   double v0, int with_gradient, mumacro_case *out) {
+static void mu_one(const mumacro_data *data, int contact, double mu0, double Fz, double k,
+                   double y0, double omega, double v0, int with_gradient, mumacro_case *out) {
     double in[6][MU_CHUNK], rows[MU_ROWS];
     const double six[6] = {mu0, Fz, k, y0, omega, v0};
     int8_t source;
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
     if (contact == MU_BALL)
-        mu_chunk_of_cases(data, MU_BALL, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
-    else mu_chunk_of_cases(data, MU_SPRING, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1, &source);
+        mu_chunk_of_cases(data, MU_BALL, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows, 1,
+                          &source);
+    else
+        mu_chunk_of_cases(data, MU_SPRING, 1, in, with_gradient ? MU_ROWS : MU_ROW_GRADIENT, rows,
+                          1, &source);
     out->mu_macro = rows[MU_ROW_MU_MACRO];
     out->mu_ratio = rows[MU_ROW_MU_RATIO];
     out->error_bound = rows[MU_ROW_ERROR_BOUND];
