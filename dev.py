@@ -68,7 +68,9 @@ def run(*command: str | Path, quiet: bool = False) -> int:
     env = environment()
     words = [shutil.which(command[0], path=env["PATH"]) or command[0], *map(str, command[1:])]
     out, err = (subprocess.PIPE, subprocess.STDOUT) if quiet else (None, None)
-    done = subprocess.run(words, cwd=ROOT, env=env, stdout=out, stderr=err, text=True, check=False)  # noqa: S603
+    done = subprocess.run(  # noqa: S603
+        words, cwd=ROOT, env=env, stdout=out, stderr=err, text=True, check=False
+    )
     if quiet and done.returncode:
         print(done.stdout, file=sys.stderr, flush=True)
     return done.returncode
@@ -96,7 +98,8 @@ def installed() -> dict[str, str]:
     incomplete."""
     try:
         parts = json.loads(MARKER.read_text(encoding="utf-8"))
-        works = subprocess.run([PYTHON, "-c", ""], check=False).returncode == 0  # noqa: S603 (a link may be broken)
+        # a link may be broken
+        works = subprocess.run([PYTHON, "-c", ""], check=False).returncode == 0  # noqa: S603
     except (OSError, ValueError):
         return {}
     if not isinstance(parts, dict) or not works:
@@ -219,8 +222,9 @@ def wheels() -> int:
 
 COMMANDS: dict[str, Callable[..., int]] = {
     **{command.__name__: command for command in (demo, test, check, docs, serve, wheels)},
-    "exec": execute, "lock": partial(run, sys.executable, "requirements/lock.py"),
-}  # fmt: skip
+    "exec": execute,
+    "lock": partial(run, sys.executable, "requirements/lock.py"),
+}
 
 
 def main(word: str = "", *rest: str) -> int:

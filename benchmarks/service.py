@@ -56,10 +56,14 @@ def get(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
 
 
 FORMS = {
-    "POST": post(CASE), "GET": get(CASE), "POST, rigid": post({**CASE, "k": "rigid"}),
-    "GET, rigid": get({**CASE, "k": "rigid"}), "POST, power": post({**CASE, "include": ["power"]}),
-    "GET, power": get({**CASE, "include": "power"}), ".txt": get(CASE, "/v1/mu-macro.txt"),
-}  # fmt: skip
+    "POST": post(CASE),
+    "GET": get(CASE),
+    "POST, rigid": post({**CASE, "k": "rigid"}),
+    "GET, rigid": get({**CASE, "k": "rigid"}),
+    "POST, power": post({**CASE, "include": ["power"]}),
+    "GET, power": get({**CASE, "include": "power"}),
+    ".txt": get(CASE, "/v1/mu-macro.txt"),
+}
 
 
 def ask(server: Server, request: bytes, number: int, clients: int) -> None:

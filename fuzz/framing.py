@@ -27,10 +27,11 @@ POST, SECOND = (
     b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n",
 )
 TEXTS = [
-    POST + LENGTH + b"\r\n" + BODY, POST + LENGTH + CHUNKED + b"\r\n" + chunk(BODY) + chunk(b""),
+    POST + LENGTH + b"\r\n" + BODY,
+    POST + LENGTH + CHUNKED + b"\r\n" + chunk(BODY) + chunk(b""),
     POST + CHUNKED + b"\r\n" + chunk(BODY[:20]) + chunk(BODY[20:]) + chunk(b""),
     b"GET /v1/mu-macro?mu0=0.3&Fz=10&k=1e6&y0=2e-6&omega=1e5&v0=0.01 HTTP/1.1\r\nHost: x\r\n\r\n",
-]  # fmt: skip
+]
 PIECES = [
     *(bytes([byte]) for byte in b" \t\r\n\0:;,x05-+/\x0b\x7f\xff"),
     b"",

@@ -358,14 +358,18 @@ HOSTILE: dict[str, Make] = {
 }
 #: a table with other numbers and a matching checksum is a different table; any answer is allowed
 ANOTHER = {
-    "numbers of 1.7e308, checksum right", "random numbers of 1e100, checksum right",
-    "amplitudes of 1e300, checksum right", "errors of 1e308, checksum right",
-}  # fmt: skip
+    "numbers of 1.7e308, checksum right",
+    "random numbers of 1e100, checksum right",
+    "amplitudes of 1e300, checksum right",
+    "errors of 1e308, checksum right",
+}
 #: what lies beside the parts that are read, is not read
 HARMLESS = {
-    "a group that contains itself", "a group that contains the root", "3,000 nested groups",
+    "a group that contains itself",
+    "a group that contains the root",
+    "3,000 nested groups",
     "3,000 groups among the blocks",
-}  # fmt: skip
+}
 
 
 def opened(folder: Path) -> list[Outcome]:

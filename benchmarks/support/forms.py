@@ -12,9 +12,11 @@ import pyarrow as pa
 Row = dict[str, Any]
 BATCH = "/v1/mu-macro/batch"
 TYPES = {
-    "json": "application/json", "csv": "text/csv", "ndjson": "application/x-ndjson",
+    "json": "application/json",
+    "csv": "text/csv",
+    "ndjson": "application/x-ndjson",
     "arrow": "application/vnd.apache.arrow.stream",
-}  # fmt: skip
+}
 
 
 def number(value: Any) -> Any:

@@ -200,8 +200,11 @@ def _of_points(value: Any, info: ValidationInfo) -> Any:
 
 
 _LISTED = {
-    "type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": MAX_POINTS,
-}  # fmt: skip
+    "type": "array",
+    "items": {"type": "number"},
+    "minItems": 1,
+    "maxItems": MAX_POINTS,
+}
 
 
 _POINTS = PlainValidator(_of_points)

@@ -154,9 +154,11 @@ def test_only_the_two_groups_matter(
 # --- illegal values and their messages ------------------------------------------------------------
 
 BAD = [
-    (field, bad) for field in FIELDS for bad in (-1.0, -5e-324, math.nan, math.inf, -math.inf)
+    (field, bad)
+    for field in FIELDS
+    for bad in (-1.0, -5e-324, math.nan, math.inf, -math.inf)
     if (field, bad) != ("k", math.inf)
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("field", "bad"), BAD)

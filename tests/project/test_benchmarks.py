@@ -48,7 +48,10 @@ def test_a_result_is_put_between_its_markers(
     monkeypatch.setattr(measuring, "PAGES", (page,))
     monkeypatch.setattr(measuring, "RESULTS", tmp_path / "results")
     monkeypatch.setattr(sys, "argv", ["benchmarks/trial.py", "--write", "--points", "7"])
-    sections = {"times": lambda points: f"{points} points", "other": lambda points: "elsewhere"}  # noqa: ARG005
+    sections = {
+        "times": lambda points: f"{points} points",
+        "other": lambda points: "elsewhere",  # noqa: ARG005
+    }
     measuring.main(None, sections, points=5)
     stored = (tmp_path / "results" / "trial-times.md").read_text("utf-8")
     assert stored.startswith("7 points\n\nTook 0.0 min. Machine: ")

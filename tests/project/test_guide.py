@@ -115,7 +115,7 @@ ELSEWHERE = {
         "tests/builder/export/test_c_languages.py",
         "test_octave_has_the_same_answers",
     ),
-}  # fmt: skip
+}
 #: pages whose Python programs another file runs
 PROGRAMS_ELSEWHERE = {"docs/how-to/scale.md": "tests/project/test_recipes.py"}
 SHELL = ("bash", "console")

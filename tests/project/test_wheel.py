@@ -218,10 +218,13 @@ def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(inst
 
 @pytest.mark.parametrize(
     ("words", "extra"),
-    [("mumacro serve", "service"), ("mumacro eval cases.csv -o out.csv", "files"),
-     ("python -m mumacro.service", "service"),
-     ("python -m mumacro.builder solve --v 0.1 --y 0.5", "builder")],
-)  # fmt: skip
+    [
+        ("mumacro serve", "service"),
+        ("mumacro eval cases.csv -o out.csv", "files"),
+        ("python -m mumacro.service", "service"),
+        ("python -m mumacro.builder solve --v 0.1 --y 0.5", "builder"),
+    ],
+)
 def test_without_an_extra_one_line_says_what_to_install(
     installed: Any, words: Any, extra: Any
 ) -> None:

@@ -21,7 +21,12 @@ schemathesis = pytest.importorskip(
 )
 
 from hypothesis import HealthCheck, settings  # noqa: E402
-from schemathesis.config import GenerationConfig, ProjectConfig, ProjectsConfig, SchemathesisConfig  # noqa: E402
+from schemathesis.config import (  # noqa: E402
+    GenerationConfig,
+    ProjectConfig,
+    ProjectsConfig,
+    SchemathesisConfig,
+)
 
 from service.app import create_app  # noqa: E402
 from service.settings import Settings  # noqa: E402

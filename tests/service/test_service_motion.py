@@ -20,9 +20,15 @@ from tests.support.cases import Case
 PATH = "/v1/motion"
 RIG: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
 NUMBERS = (
-    "mu_macro", "mu_lateral", "stick_fraction", "slip_path", "power", "power_drive",
-    "error_estimate", "periods",
-)  # fmt: skip
+    "mu_macro",
+    "mu_lateral",
+    "stick_fraction",
+    "slip_path",
+    "power",
+    "power_drive",
+    "error_estimate",
+    "periods",
+)
 SCENES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "across": ({"y": 2e-6}, {"y": 2e-6}),
     "ellipse": ({"x": [1e-6, 90], "y": 2e-6}, {"x": (1e-6, 90.0), "y": 2e-6}),
@@ -34,10 +40,12 @@ SCENES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"x": 2e-6, "normal": [3, 45], "tolerance": 1e-4},
         {"x": 2e-6, "normal": (3.0, 45.0), "tolerance": 1e-4},
     ),
-    "ball": ({"x": [1e-6, 90], "y": 2e-6, "contact": "ball", "tolerance": 1e-4},
-             {"x": (1e-6, 90.0), "y": 2e-6, "contact": "ball", "tolerance": 1e-4}),
+    "ball": (
+        {"x": [1e-6, 90], "y": 2e-6, "contact": "ball", "tolerance": 1e-4},
+        {"x": (1e-6, 90.0), "y": 2e-6, "contact": "ball", "tolerance": 1e-4},
+    ),
     "drag alone": ({"y": []}, {}),
-}  # fmt: skip
+}
 WHOLE = "whole number"
 
 

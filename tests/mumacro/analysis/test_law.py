@@ -50,12 +50,17 @@ def test_a_range_has_its_ends_exactly(scale: Any) -> None:
 
 @pytest.mark.parametrize(
     ("field", "arguments"),
-    [("along", ("x", 1.0, 2.0, 5, "log")), ("scale", ("v0", 1.0, 2.0, 5, "cubic")),
-     ("points", ("v0", 1.0, 2.0, 1, "log")),
-     ("start", ("v0", 0.0, 2.0, 5, "log")), ("start", ("k", 0.0, 2.0, 5, "linear")),
-     ("stop", ("v0", 2.0, 2.0, 5, "log")),
-     ("stop", ("v0", 1.0, math.inf, 5, "log")), ("start", ("v0", math.nan, 1.0, 5, "log"))],
-)  # fmt: skip
+    [
+        ("along", ("x", 1.0, 2.0, 5, "log")),
+        ("scale", ("v0", 1.0, 2.0, 5, "cubic")),
+        ("points", ("v0", 1.0, 2.0, 1, "log")),
+        ("start", ("v0", 0.0, 2.0, 5, "log")),
+        ("start", ("k", 0.0, 2.0, 5, "linear")),
+        ("stop", ("v0", 2.0, 2.0, 5, "log")),
+        ("stop", ("v0", 1.0, math.inf, 5, "log")),
+        ("start", ("v0", math.nan, 1.0, 5, "log")),
+    ],
+)
 def test_a_bad_range_names_its_field(field: str, arguments: Any) -> None:
     with pytest.raises(InputError) as caught:
         sweep_values(*arguments)
