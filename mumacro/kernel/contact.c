@@ -291,11 +291,11 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
     if (direction != MU_ACROSS) {
         const mu_driven found = mu_drive(data, contact, direction, v, y);
         const mu_line *line = &found.line;
-        if (quantity == MU_POWER)
-            return direction == MU_NORMAL ? mu_limit(NAN, NAN, -1)
-                                          : mu_limit(line->power, found.power_bound, line->source);
+        if (quantity == MU_MU_RATIO) return mu_limit(line->mu, found.bound, line->source);
         if (quantity == MU_STICK) return mu_limit(line->stick, found.stick_bound, line->source);
-        return mu_limit(line->mu, found.bound, line->source);
+        if (quantity == MU_POWER && direction == MU_ALONG)
+            return mu_limit(line->power, found.power_bound, line->source);
+        return mu_limit(NAN, NAN, -1);
     }
     { /* the same bits as in any array */
         int8_t source;

@@ -1,5 +1,6 @@
 """What is asked beside the inputs: which contact and table, what else is computed."""
 
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, WithJsonSchema, WrapValidator, model_validator
@@ -51,7 +52,7 @@ class Choice(Strict):
         _ = self.kind
         return self
 
-    @property
+    @cached_property
     def kind(self) -> Kind:
         """Contact and direction; InputError where they do not go together."""
         return kind_of(self.contact, self.direction)
@@ -176,7 +177,7 @@ class BatchOptions(Deviations):
 
     _std_has_an_effect = model_validator(mode="after")(_check_std)
 
-    @property
+    @cached_property
     def kind(self) -> Kind:
         """Contact and direction; InputError where they do not go together."""
         return kind_of(self.contact or "spring", self.direction or "across")
