@@ -84,11 +84,11 @@ static double mu_border(const mumacro_data *data, double y, double *slope, doubl
         scale = mu_border_scale(MU_BORDER_HIGH, y);
         if (ln_y) *ln_y = mu_log1(y);
     } else {
-        const mu_border_cells found = mu_border_cell(data, mu_all(y));
-        cell = data->border + 8 * mu_first_cell(found.cell);
-        u = mu_first(found.u);
-        scale = mu_first(found.scale);
-        if (ln_y) *ln_y = mu_first(found.ln_y);
+        const mu_border_cells cells = mu_border_cell(data, mu_all(y));
+        cell = data->border + 8 * mu_first_cell(cells.cell);
+        u = mu_first(cells.u);
+        scale = mu_first(cells.scale);
+        if (ln_y) *ln_y = mu_first(cells.ln_y);
     }
     if (slope) *slope = mu_border_slope(data->pieces, cell, u, y);
     return scale * mu_border_value(cell, u);

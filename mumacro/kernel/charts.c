@@ -123,11 +123,11 @@ static mu_place mu_locate(const mumacro_data *data, double v, double y) {
                : rho < 0.5  ? sqrt(rho)
                             : MU_SQRT2 - sqrt(1.0 - rho);
     } else {
-        const mu_places found =
+        const mu_places places =
             mu_place_common(mu_all(v), mu_all(y), mu_all(at.crit), mu_all(ln_y));
-        at.block = (int)mu_first_whole(found.block);
-        at.a = mu_first(found.a);
-        at.b = mu_first(found.b);
+        at.block = (int)mu_first_whole(places.block);
+        at.a = mu_first(places.a);
+        at.b = mu_first(places.b);
         if (at.block == MU_CORNER) mu_place_corner(&at);
     }
     return at;

@@ -25,15 +25,15 @@ MU_INLINE double mu_ball_border(const mumacro_data *data, double y) {
  * table at a speed that stands for the limit. */
 static double mu_ball_speed_slope(const mumacro_data *data, double y, double *bound) {
     double v;
-    mu_answer found;
+    mu_answer answer;
     *bound = HUGE_VAL;
     if (!(y > MU_MIDDLE)) return HUGE_VAL;
     *bound = 0.0;
     if (y == HUGE_VAL) return 0.0;
     v = MU_CREEP * mu_min(1.0, y / MU_MIDDLE - 1.0);
-    found = mu_answer_at(data, MU_BALL, MU_MU_RATIO, v, y / MU_MIDDLE);
-    *bound = found.bound / (MU_MIDDLE * v);
-    return found.value / (MU_MIDDLE * v);
+    answer = mu_answer_at(data, MU_BALL, MU_MU_RATIO, v, y / MU_MIDDLE);
+    *bound = answer.bound / (MU_MIDDLE * v);
+    return answer.value / (MU_MIDDLE * v);
 }
 
 /* --- along and normal ------------------------------------------------------------------------- */
@@ -76,13 +76,13 @@ typedef struct {
  * slope, or a root where the slope vanishes.  mu~ is stationary in m; its slopes and
  * the duration of stick are not. */
 MU_INLINE mu_bounds mu_bound_reverse(const mu_turning *at, mu_lanes v, mu_lanes y,
-                                     const mu_reverse *found, const mu_lines *line) {
-    const mu_lanes m = found->m, p = found->p, ill = at->x * y / (y - v);
+                                     const mu_reverse *reverse, const mu_lines *line) {
+    const mu_lanes m = reverse->m, p = reverse->p, ill = at->x * y / (y - v);
     const mu_lanes off = MU_LINE_ROUNDING * (2.0 / y + 2.0 * p * at->x) * (1.0 + ill);
-    const mu_lanes flat = 4.0 * mu_sqrt(off / at->travel), steep = 2.0 * off / found->slope;
-    const mu_lanes of_m = mu_select(MU_WHERE(found->slope > 0.0), mu_lower(steep, flat), flat);
+    const mu_lanes flat = 4.0 * mu_sqrt(off / at->travel), steep = 2.0 * off / reverse->slope;
+    const mu_lanes of_m = mu_select(MU_WHERE(reverse->slope > 0.0), mu_lower(steep, flat), flat);
     const mu_lanes of_p =
-        mu_lower(found->of_p, mu_all(1.0)) * of_m + MU_LINE_ROUNDING * p * (1.0 + ill);
+        mu_lower(reverse->of_p, mu_all(1.0)) * of_m + MU_LINE_ROUNDING * p * (1.0 + ill);
     const mu_lanes inputs = mu_size(line->along_v) + mu_size(line->along_y);
     mu_bounds out;
     out.stick = of_m / MU_PI + MU_LINE_ROUNDING * line->stick;
@@ -99,9 +99,9 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
     const double turn = at.travel - 2.0 / y, nearest = mu_turn_rounding(&at, y);
     if (mu_is_reversing(direction, &at, y)) {
         const mu_lanes slow = mu_all(v), wide = mu_all(y);
-        const mu_reverse found = mu_reverse_of(&at, wide);
-        const mu_lines line = mu_lines_of_reverse(&at, slow, wide, &found);
-        const mu_bounds bounds = mu_bound_reverse(&at, slow, wide, &found, &line);
+        const mu_reverse reverse = mu_reverse_of(&at, wide);
+        const mu_lines line = mu_lines_of_reverse(&at, slow, wide, &reverse);
+        const mu_bounds bounds = mu_bound_reverse(&at, slow, wide, &reverse, &line);
         out.line = mu_line_of_reverse(&at, v, y, &line);
         out.bound = mu_first(bounds.mu);
         out.bound_v = mu_first(bounds.along_v);
@@ -162,9 +162,9 @@ MU_INLINE void mu_drive_lanes(const mu_turning *at, double nodes[MU_NODE_ROWS][M
                               double out[2 * MU_SUMS][MU_LANES]) {
     const mu_lanes v = mu_load(nodes[MU_NODE_V]), y = mu_load(nodes[MU_NODE_Y]);
     const mu_lanes share = mu_load(nodes[MU_NODE_SHARE]);
-    const mu_reverse found = mu_reverse_of(at, y);
-    const mu_lines line = mu_lines_of_reverse(at, v, y, &found);
-    const mu_bounds bounds = mu_bound_reverse(at, v, y, &found, &line);
+    const mu_reverse reverse = mu_reverse_of(at, y);
+    const mu_lines line = mu_lines_of_reverse(at, v, y, &reverse);
+    const mu_bounds bounds = mu_bound_reverse(at, v, y, &reverse, &line);
     mu_store(out[MU_SUM_MU], share * line.mu);
     mu_store(out[MU_SUM_V], share * line.along_v);
     mu_store(out[MU_SUM_Y], share * line.along_y);
@@ -289,12 +289,12 @@ static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, 
 static mu_answer mu_answer_as(const mumacro_data *data, int contact, int direction, int quantity,
                               double v, double y) {
     if (direction != MU_ACROSS) {
-        const mu_driven found = mu_drive(data, contact, direction, v, y);
-        const mu_line *line = &found.line;
-        if (quantity == MU_MU_RATIO) return mu_limit(line->mu, found.bound, line->source);
-        if (quantity == MU_STICK) return mu_limit(line->stick, found.stick_bound, line->source);
+        const mu_driven driven = mu_drive(data, contact, direction, v, y);
+        const mu_line *line = &driven.line;
+        if (quantity == MU_MU_RATIO) return mu_limit(line->mu, driven.bound, line->source);
+        if (quantity == MU_STICK) return mu_limit(line->stick, driven.stick_bound, line->source);
         if (quantity == MU_POWER && direction == MU_ALONG)
-            return mu_limit(line->power, found.power_bound, line->source);
+            return mu_limit(line->power, driven.power_bound, line->source);
         return mu_limit(NAN, NAN, -1);
     }
     { /* the same bits as in any array */
@@ -305,18 +305,18 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
     }
 }
 
-static mu_slopes mu_slopes_of_driven(const mu_driven *found) {
-    const mu_line *line = &found->line;
+static mu_slopes mu_slopes_of_driven(const mu_driven *driven) {
+    const mu_line *line = &driven->line;
     const mu_slopes out = {line->mu,       line->along_v,  line->along_y,
-                           found->bound_v, found->bound_y, found->bound};
+                           driven->bound_v, driven->bound_y, driven->bound};
     return out;
 }
 
 static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int direction, double v,
                               double y) {
     if (direction != MU_ACROSS) {
-        const mu_driven found = mu_drive(data, contact, direction, v, y);
-        return mu_slopes_of_driven(&found);
+        const mu_driven driven = mu_drive(data, contact, direction, v, y);
+        return mu_slopes_of_driven(&driven);
     }
     return contact == MU_BALL
                ? mu_slopes_at(data, MU_BALL, MU_MU_RATIO, v / MU_MIDDLE, y / MU_MIDDLE)
@@ -333,8 +333,8 @@ static double mu_speed_slope_as(const mumacro_data *data, int contact, int direc
                                   : mu_speed_slope_at_zero(data, y, bound);
     {
         const double v = MU_CREEP * mu_min(y, 1.0);
-        const mu_driven found = mu_drive(data, contact, direction, v, y);
-        *bound = found.bound_v / v;
-        return found.line.along_v / v;
+        const mu_driven driven = mu_drive(data, contact, direction, v, y);
+        *bound = driven.bound_v / v;
+        return driven.line.along_v / v;
     }
 }

@@ -60,17 +60,17 @@ static mu_answer mu_any_case(const mumacro_data *data, int contact, int directio
     if (in->v0 == 0.0 && *y == HUGE_VAL) return mu_limit(0.0, 0.0, MU_STATIC_LIMIT);
     if (*y == 0.0 && in->v0 > 0.0) return mu_limit(1.0, MU_ROUNDING, MU_NO_OSCILLATION);
     if ((*v < HUGE_VAL && *y < HUGE_VAL) || direction == MU_NORMAL) {
-        mu_answer found;
+        mu_answer answer;
         if (at && direction != MU_ACROSS) {
             const mu_driven driven = mu_drive(data, contact, direction, *v, *y);
             *at = mu_slopes_of_driven(&driven);
-            found = mu_limit(at->value, at->bound, driven.line.source);
+            answer = mu_limit(at->value, at->bound, driven.line.source);
         } else {
-            found = mu_answer_as(data, contact, direction, MU_MU_RATIO, *v, *y);
+            answer = mu_answer_as(data, contact, direction, MU_MU_RATIO, *v, *y);
         }
         /* v~ below 5e-324: the static limit holds to rounding, mu~ itself underflows for y~ > 1 */
-        if (*v == 0.0 && in->v0 > 0.0) found.bound += MU_DENORMAL;
-        return found;
+        if (*v == 0.0 && in->v0 > 0.0) answer.bound += MU_DENORMAL;
+        return answer;
     }
     r = mu_amplitude_ratio(in);
     if (r == 0.0) return mu_limit(1.0, MU_RIGID_ROUNDING, MU_RIGID);
@@ -85,7 +85,7 @@ static mu_answer mu_any_case(const mumacro_data *data, int contact, int directio
 
 /* What the chain rule takes of each case: mu~ and its slopes along ln v~ and
  * ln y~, and the bounds of all three. */
-enum { MU_OF_MU, MU_OF_V, MU_OF_Y, MU_OF_BOUND, MU_OF_BOUND_V, MU_OF_BOUND_Y, MU_KNOWN };
+enum { MU_OF_MU, MU_OF_V, MU_OF_Y, MU_OF_BOUND, MU_OF_BOUND_V, MU_OF_BOUND_Y, MU_TERMS };
 
 /* sign mu0 slope / input. */
 static void mu_chain_row(int n, double sign, const double *mu0, const double *slope,
@@ -96,9 +96,9 @@ static void mu_chain_row(int n, double sign, const double *mu0, const double *sl
 /* d mu_macro / d input of cases without zeros and infinities, and the
  * bounds: 12 rows, stride apart. */
 static void mu_chain_rule(int direction, int n, double in[6][MU_CHUNK],
-                          double known[MU_KNOWN][MU_CHUNK], double *out, int64_t stride) {
+                          double terms[MU_TERMS][MU_CHUNK], double *out, int64_t stride) {
     for (int bounds = 0; bounds < 2; ++bounds, out += 6 * stride) {
-        double(*of)[MU_CHUNK] = known + (bounds ? MU_OF_BOUND : MU_OF_MU), both[MU_CHUNK];
+        double(*of)[MU_CHUNK] = terms + (bounds ? MU_OF_BOUND : MU_OF_MU), both[MU_CHUNK];
         /* z = Fz_amplitude / Fz has neither mu0 nor k */
         const double *stiff = direction == MU_NORMAL ? of[MU_OF_V] : both,
                      sign = bounds ? 1.0 : -1.0;
@@ -117,31 +117,31 @@ MU_INLINE int mu_has_cells(int source) {
     return source < MU_CHARTS || source == MU_BALL_SLIDES || source == MU_BALL_PARTLY;
 }
 
-static void mu_know(mu_answer found, mu_slopes at, double known[MU_KNOWN][MU_CHUNK], int i) {
-    known[MU_OF_MU][i] = found.value;
-    known[MU_OF_V][i] = at.along_v;
-    known[MU_OF_Y][i] = at.along_y;
-    known[MU_OF_BOUND][i] =
-        mu_has_cells(found.source) ? mu_min(found.bound, at.bound) : found.bound;
-    known[MU_OF_BOUND_V][i] = at.bound_v;
-    known[MU_OF_BOUND_Y][i] = at.bound_y;
+static void mu_set_terms(mu_answer answer, mu_slopes at, double terms[MU_TERMS][MU_CHUNK], int i) {
+    terms[MU_OF_MU][i] = answer.value;
+    terms[MU_OF_V][i] = at.along_v;
+    terms[MU_OF_Y][i] = at.along_y;
+    terms[MU_OF_BOUND][i] =
+        mu_has_cells(answer.source) ? mu_min(answer.bound, at.bound) : answer.bound;
+    terms[MU_OF_BOUND_V][i] = at.bound_v;
+    terms[MU_OF_BOUND_Y][i] = at.bound_y;
 }
 
 /* The same of any case; `slopes` is NULL where they are still to be found.  One-sided at the edges:
  * d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0,
  * infinite on y~ = 1 and for rigid contact.  Relative to k the slope is 0 for rigid contact. */
 static void mu_gradient(const mumacro_data *data, int contact, int direction, const mu_inputs *in,
-                        mu_answer found, const mu_slopes *slopes, double v, double y, double *out,
+                        mu_answer answer, const mu_slopes *slopes, double v, double y, double *out,
                         int64_t stride) {
     const double mu0 = in->mu0, six[6] = {in->mu0, in->Fz, in->k, in->y0, in->omega, in->v0};
     double *error = out + 6 * stride;
-    if (found.source != -1 && found.source != MU_RIGID && found.source != MU_NO_OSCILLATION &&
-        !(found.source == MU_STATIC_LIMIT && y == HUGE_VAL)) {
+    if (answer.source != -1 && answer.source != MU_RIGID && answer.source != MU_NO_OSCILLATION &&
+        !(answer.source == MU_STATIC_LIMIT && y == HUGE_VAL)) {
         const mu_slopes at = slopes ? *slopes : mu_slopes_as(data, contact, direction, v, y);
-        double inputs[6][MU_CHUNK], known[MU_KNOWN][MU_CHUNK];
+        double inputs[6][MU_CHUNK], terms[MU_TERMS][MU_CHUNK];
         for (int i = 0; i < 6; ++i) inputs[i][0] = six[i];
-        mu_know(found, at, known, 0);
-        mu_chain_rule(direction, 1, inputs, known, out, stride);
+        mu_set_terms(answer, at, terms, 0);
+        mu_chain_rule(direction, 1, inputs, terms, out, stride);
         if (!(v > 0.0)) {
             const double unit = (in->k / in->Fz) / in->omega;
             double bound;
@@ -150,15 +150,15 @@ static void mu_gradient(const mumacro_data *data, int contact, int direction, co
         }
         return;
     }
-    for (int i = 0; i < 12; ++i) out[i * stride] = found.source == -1 ? NAN : 0.0;
-    if (found.source == -1) return;
-    out[0] = found.value;
-    error[0] = found.bound;
-    if (found.source == MU_STATIC_LIMIT) out[5 * stride] = error[5 * stride] = HUGE_VAL;
-    if (found.source == MU_RIGID) {
-        const double rounding = 8.0 * MU_ROUNDING * found.value;
-        const double all = rounding + (found.bound > rounding ? found.bound : 0.0);
-        const int oscillates = found.value < 1.0 || in->y0 * in->omega > 0.0;
+    for (int i = 0; i < 12; ++i) out[i * stride] = answer.source == -1 ? NAN : 0.0;
+    if (answer.source == -1) return;
+    out[0] = answer.value;
+    error[0] = answer.bound;
+    if (answer.source == MU_STATIC_LIMIT) out[5 * stride] = error[5 * stride] = HUGE_VAL;
+    if (answer.source == MU_RIGID) {
+        const double rounding = 8.0 * MU_ROUNDING * answer.value;
+        const double all = rounding + (answer.bound > rounding ? answer.bound : 0.0);
+        const int oscillates = answer.value < 1.0 || in->y0 * in->omega > 0.0;
         const double along = oscillates ? mu_rigid_slope(direction, mu_amplitude_ratio(in)) : 0.0;
         for (int i = 3; i < 6; ++i) {
             out[i * stride] = (i < 5 ? mu0 : -mu0) * along / six[i];
@@ -212,26 +212,26 @@ MU_INLINE void mu_chunk_of_cases(const mumacro_data *data, int contact, int n,
     mu_pass_groups(n, in, v, y);
     left = mu_chunk_of_ratios(data, contact, n, v, y, &c, slopes ? slope : NULL, mu, bound, source);
     if (slopes) {
-        double known[MU_KNOWN][MU_CHUNK];
+        double terms[MU_TERMS][MU_CHUNK];
         const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
         for (int i = 0; i < n; ++i) {
             const int later = mu_is_left(c.block[i]);
             const mu_slopes at =
                 later ? none : mu_slopes_of(data, contact, MU_MU_RATIO, &c, slope, i, v[i], y[i]);
-            mu_know(mu_limit(at.value, bound[i], source[i]), at, known, i);
+            mu_set_terms(mu_limit(at.value, bound[i], source[i]), at, terms, i);
         }
-        mu_chain_rule(MU_ACROSS, n, in, known, slopes, stride);
+        mu_chain_rule(MU_ACROSS, n, in, terms, slopes, stride);
     }
     for (int i = 0; left && i < n; ++i) {
         const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
-        mu_answer found = {mu[i], bound[i], source[i]};
+        mu_answer answer = {mu[i], bound[i], source[i]};
         if (!mu_is_left(c.block[i])) continue;
-        if (v[i] == -1.0) found = mu_any_case(data, contact, MU_ACROSS, &six, v + i, y + i, NULL);
-        mu[i] = found.value;
-        bound[i] = found.bound;
-        source[i] = (int8_t)found.source;
+        if (v[i] == -1.0) answer = mu_any_case(data, contact, MU_ACROSS, &six, v + i, y + i, NULL);
+        mu[i] = answer.value;
+        bound[i] = answer.bound;
+        source[i] = (int8_t)answer.source;
         if (slopes)
-            mu_gradient(data, contact, MU_ACROSS, &six, found, NULL, v[i], y[i], slopes + i,
+            mu_gradient(data, contact, MU_ACROSS, &six, answer, NULL, v[i], y[i], slopes + i,
                         stride);
     }
     for (int i = 0; i < n; ++i) {
@@ -283,23 +283,23 @@ static void mu_cases_as(const mumacro_data *data, int contact, int direction, in
     for (int64_t i = 0; i < n; ++i) {
         double in[6], v, y;
         mu_inputs six;
-        mu_answer found;
+        mu_answer answer;
         mu_slopes at, *slopes = rows == MU_ROWS ? &at : NULL;
         for (int j = 0; j < 6; ++j) in[j] = columns[j][strides[j] ? i : 0];
         memcpy(&six, in, sizeof six);
-        found = mu_any_case(data, contact, direction, &six, &v, &y, slopes);
-        out[MU_ROW_MU_MACRO * stride + i] = found.value * six.mu0;
-        out[MU_ROW_MU_RATIO * stride + i] = found.value;
-        out[MU_ROW_ERROR_BOUND * stride + i] = found.bound * six.mu0;
-        source[i] = (int8_t)found.source;
+        answer = mu_any_case(data, contact, direction, &six, &v, &y, slopes);
+        out[MU_ROW_MU_MACRO * stride + i] = answer.value * six.mu0;
+        out[MU_ROW_MU_RATIO * stride + i] = answer.value;
+        out[MU_ROW_ERROR_BOUND * stride + i] = answer.bound * six.mu0;
+        source[i] = (int8_t)answer.source;
         if (rows > MU_ROW_V_TILDE) {
             out[MU_ROW_V_TILDE * stride + i] = v;
             out[MU_ROW_Y_TILDE * stride + i] = y;
             out[MU_ROW_LENGTH_SCALE * stride + i] =
-                found.source < 0 ? NAN : mu_length_scale(six.mu0, six.Fz, six.k);
+                answer.source < 0 ? NAN : mu_length_scale(six.mu0, six.Fz, six.k);
         }
         if (rows == MU_ROWS)
-            mu_gradient(data, contact, direction, &six, found, slopes, v, y,
+            mu_gradient(data, contact, direction, &six, answer, slopes, v, y,
                         out + MU_ROW_GRADIENT * stride + i, stride);
     }
 }

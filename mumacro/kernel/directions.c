@@ -194,9 +194,9 @@ static mu_reverse mu_reverse_of(const mu_turning *at, mu_lanes a) {
     mu_lanes low = mu_all(0.0), high = mu_all(MU_PI), m = mu_reverse_start(a);
     mu_mask done = mu_all_whole(0);
     for (int i = 0; i < 100 && !mu_is_everywhere(done); ++i) {
-        const mu_reverse found = mu_reverse_at(at, m);
-        const mu_lanes off = found.left - 2.0 / a, newton = m - off / found.slope;
-        const mu_mask above = MU_WHERE(off > 0.0) | ~MU_WHERE(found.slope > 0.0);
+        const mu_reverse reverse = mu_reverse_at(at, m);
+        const mu_lanes off = reverse.left - 2.0 / a, newton = m - off / reverse.slope;
+        const mu_mask above = MU_WHERE(off > 0.0) | ~MU_WHERE(reverse.slope > 0.0);
         mu_lanes next;
         high = mu_select(above, m, high);
         low = mu_select(above, low, m);
@@ -232,14 +232,14 @@ typedef struct {
 } mu_lines;
 
 MU_INLINE mu_lines mu_lines_of_reverse(const mu_turning *at, mu_lanes v, mu_lanes a,
-                                       const mu_reverse *found) {
-    const mu_lanes m = found->m, p = found->p, both = m * m + p * p;
+                                       const mu_reverse *reverse) {
+    const mu_lanes m = reverse->m, p = reverse->p, both = m * m + p * p;
     const mu_lanes sweep = 2.0 / MU_PI * (at->b + p); /* of rigid contact, for p = 0 */
     const mu_mask rigid = MU_WHERE(a > 1e100); /* nothing to rounding, while m^3 underflows */
     mu_lanes layers, size; /* what stick adds, and the sum of its absolute terms */
     mu_lines out;
     if (at->x < 0.5) {
-        const mu_lanes first = at->x * both, second = 2.0 * at->x * found->bent;
+        const mu_lanes first = at->x * both, second = 2.0 * at->x * reverse->bent;
         const mu_lanes third = 2.0 * p * at->sine;
         layers = a * (first - second - third);
         size = a * (first + second + third);

@@ -12,10 +12,10 @@ static void mu_values_as(const mumacro_data *data, int contact, int direction, i
         return;
     }
     for (int64_t i = 0; i < n; ++i) {
-        const mu_answer found = mu_answer_as(data, contact, direction, quantity, v[i], y[i]);
-        value[i] = found.value;
-        bound[i] = found.bound;
-        source[i] = (int8_t)found.source;
+        const mu_answer answer = mu_answer_as(data, contact, direction, quantity, v[i], y[i]);
+        value[i] = answer.value;
+        bound[i] = answer.bound;
+        source[i] = (int8_t)answer.source;
     }
 }
 
@@ -118,8 +118,8 @@ static void mu_roots(int64_t n, const double *v, const double *eta, double *root
 
 static void mu_outers(int64_t n, const double *r, double *out) {
     for (int64_t i = 0; i < n; ++i) {
-        const mu_outer found = mu_outer_expansion(r[i]);
-        memcpy(out + 5 * i, &found, 5 * sizeof *out);
+        const mu_outer outer = mu_outer_expansion(r[i]);
+        memcpy(out + 5 * i, &outer, 5 * sizeof *out);
     }
 }
 

@@ -361,8 +361,8 @@ static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_sl
     int left = 0;
     for (int i = 1; i < 4; ++i) {
         if (speed[i] < 0.0) {
-            const mu_bracket found = {x[i - 1], x[i], speed[i - 1], speed[i], 0};
-            *b = found;
+            const mu_bracket bracket = {x[i - 1], x[i], speed[i - 1], speed[i], 0};
+            *b = bracket;
             return 1;
         }
     }
@@ -390,8 +390,8 @@ static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_sl
         double p, q, next;
         value[1] = mu_speed_at(m, start, slip, at[1]);
         if (value[1] < 0.0) {
-            const mu_bracket found = {at[0], at[1], value[0], value[1], 0};
-            *b = found;
+            const mu_bracket bracket = {at[0], at[1], value[0], value[1], 0};
+            *b = bracket;
             return 1;
         }
         /* the vertex of the parabola */
@@ -1262,13 +1262,13 @@ static void mu_motions(int contact, int64_t n, const int32_t *counts, const doub
     for (int64_t i = 0; i < n; ++i, cases += numbers, out += MU_MEANS + 2) {
         const mu_shaken m = mu_shaken_as(counts, orders, cases);
         double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
-        const mu_steady found =
+        const mu_steady cycle =
             contact == MU_BALL
                 ? mu_ball_motion(&m, tolerance, &grid, &steps)
                 : mu_spring_motion(&m, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
-        memcpy(out, found.mean, sizeof found.mean);
-        out[MU_MEANS] = found.decay;
-        out[MU_MEANS + 1] = found.error;
+        memcpy(out, cycle.mean, sizeof cycle.mean);
+        out[MU_MEANS] = cycle.decay;
+        out[MU_MEANS + 1] = cycle.error;
     }
 }
 

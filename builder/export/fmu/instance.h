@@ -62,7 +62,7 @@ typedef void (*Logger)(void *environment, Status status, String category, String
 typedef struct {
     double time, x[INPUTS], v_rest;
     int contact, direction;
-    int known; /* whether the answer and the force belong to x */
+    int valid; /* whether the answer and the force belong to x */
     mumacro_answer answer;
     double force, force_slopes[6];
 } State;
@@ -102,7 +102,7 @@ static Reference amplitude(const Instance *m) {
 /* OK when the inputs are legal; else DISCARD, and the log says which is not. */
 static Status answered(ME) {
     State *s = &m->state;
-    if (!s->known) {
+    if (!s->valid) {
         const double *x = s->x, moved = x[amplitude(m) - 1];
         const int error = mumacro_evaluate_as(s->contact, s->direction, x[0], x[1], x[2], moved,
                                               x[4], fabs(x[V0 - 1]), &s->answer);
@@ -110,9 +110,9 @@ static Status answered(ME) {
         else
             mumacro_evaluate_force(s->contact, s->direction, x[V0 - 1], s->v_rest, x[0], x[1], x[2],
                                    moved, x[4], &s->force, s->force_slopes);
-        s->known = error == 0;
+        s->valid = error == 0;
     }
-    return s->known ? OK : DISCARD;
+    return s->valid ? OK : DISCARD;
 }
 
 static Status get_number(ME, Reference variable, double *value) {
@@ -126,9 +126,9 @@ static Status get_number(ME, Reference variable, double *value) {
         *value = m->state.x[variable - 1];
     } else {
         const Status status = answered(m);
-        const double found[] = {a->mu_macro, a->mu_ratio, a->error_bound, a->v_tilde, a->y_tilde};
+        const double outputs[] = {a->mu_macro, a->mu_ratio, a->error_bound, a->v_tilde, a->y_tilde};
         if (status != OK) return status;
-        *value = variable == FORCE ? m->state.force : found[variable - MU_MACRO];
+        *value = variable == FORCE ? m->state.force : outputs[variable - MU_MACRO];
     }
     return OK;
 }
@@ -156,7 +156,7 @@ static Status set_choice(ME, Reference variable, Choice value) {
         return ERROR;
     }
     *(variable == CONTACT ? &m->state.contact : &m->state.direction) = (int)value;
-    return m->state.known = 0, OK;
+    return m->state.valid = 0, OK;
 }
 
 static Status set_number(ME, Reference variable, double value) {
@@ -170,7 +170,7 @@ static Status set_number(ME, Reference variable, double value) {
     } else {
         m->state.x[variable - 1] = value;
     }
-    return m->state.known = 0, OK;
+    return m->state.valid = 0, OK;
 }
 
 /* Adds seed times d output / d input. */
@@ -217,18 +217,18 @@ static Instance *instantiate(String name, String token, Logger logger, void *env
 
 EXPORT void FMI(FreeInstance)(ME) { free(m); }
 
-EXPORT Status STATE(Get, )(ME, void **kept) {
-    if (*kept == NULL) *kept = malloc(sizeof(State));
-    return *kept == NULL ? ERROR : (memcpy(*kept, &m->state, sizeof(State)), OK);
+EXPORT Status STATE(Get, )(ME, void **state) {
+    if (*state == NULL) *state = malloc(sizeof(State));
+    return *state == NULL ? ERROR : (memcpy(*state, &m->state, sizeof(State)), OK);
 }
-EXPORT Status STATE(Set, )(ME, const void *kept) {
-    return memcpy(&m->state, kept, sizeof(State)), OK;
+EXPORT Status STATE(Set, )(ME, const void *state) {
+    return memcpy(&m->state, state, sizeof(State)), OK;
 }
-EXPORT Status STATE(Free, )(ME, void **kept) { return free(*kept), *kept = NULL, OK; }
+EXPORT Status STATE(Free, )(ME, void **state) { return free(*state), *state = NULL, OK; }
 /* which modelDescription.xml does not promise */
-EXPORT Status STATE(Serialized, Size)(ME, void *kept, size_t *size) { return ERROR; }
-EXPORT Status STATE(Serialize, )(ME, const void *kept, void *bytes, size_t size) { return ERROR; }
-EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **kept) { return ERROR; }
+EXPORT Status STATE(Serialized, Size)(ME, void *state, size_t *size) { return ERROR; }
+EXPORT Status STATE(Serialize, )(ME, const void *state, void *bytes, size_t size) { return ERROR; }
+EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **state) { return ERROR; }
 
 /* --- values and time -------------------------------------------------------------------------- */
 
