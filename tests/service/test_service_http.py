@@ -400,7 +400,7 @@ def test_a_page_that_the_client_has_is_not_sent_again(client: Any, path: Any) ->
 
 
 @pytest.mark.parametrize(
-    ("request_id", "status"),
+    ("byte_range", "status"),
     [
         ("bytes=99999999-", 416),
         ("bytes=-0", 416),
@@ -415,9 +415,9 @@ def test_a_page_that_the_client_has_is_not_sent_again(client: Any, path: Any) ->
 )
 @pytest.mark.parametrize("path", ["/v1/table.nc", "/", "/static/page/main.js"])
 def test_a_range_beyond_the_file_is_a_problem(
-    client: Any, problem: Any, path: Any, request_id: Any, status: Any
+    client: Any, problem: Any, path: Any, byte_range: Any, status: Any
 ) -> None:
-    response = client.get(path, headers={"Range": request_id.encode("latin-1")})
+    response = client.get(path, headers={"Range": byte_range.encode("latin-1")})
     problem(response, status)
     size = client.get(path).headers["content-length"]
     assert response.headers.get("content-range") == (f"bytes */{size}" if status == 416 else None)
@@ -448,16 +448,16 @@ def test_every_answer_has_the_security_headers(client: Any, case: Case) -> None:
 
 
 def test_pages_of_other_hosts_are_answered_only_where_a_setting_allows_them(started: Any) -> None:
-    example = {"Origin": "https://tool.example", "Access-Control-Request-Method": "POST"}
+    preflight = {"Origin": "https://tool.example", "Access-Control-Request-Method": "POST"}
     with started(cors_origins=("https://tool.example",)) as client:
         allowed, answer = (
-            client.options("/v1/mu-macro", headers=example),
-            client.get("/livez", headers=example),
+            client.options("/v1/mu-macro", headers=preflight),
+            client.get("/livez", headers=preflight),
         )
         for response in (allowed, answer):
             assert response.headers["access-control-allow-origin"] == "https://tool.example"
         assert allowed.headers["access-control-allow-methods"] == "GET, HEAD, POST"
         refused = client.options(
-            "/v1/mu-macro", headers={**example, "Origin": "https://other.example"}
+            "/v1/mu-macro", headers={**preflight, "Origin": "https://other.example"}
         )
         assert "access-control-allow-origin" not in refused.headers

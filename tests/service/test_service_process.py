@@ -295,8 +295,8 @@ def test_a_log_reader_that_stalls_delays_no_request(
         # Some 250 bytes a line: a pipe holds 64 kB, and the service a megabyte.
         with ThreadPoolExecutor(4) as pool:
             answered = [
-                pool.submit(statuses, port, *requests)
-                for requests in 4 * [(query, many), ("/x", 500)]
+                pool.submit(statuses, port, *question)
+                for question in 4 * [(query, many), ("/x", 500)]
             ]
         assert [one.result() for one in answered] == 4 * [many * [200], 500 * [404]]
         if then != "reads":

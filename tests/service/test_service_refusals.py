@@ -433,9 +433,9 @@ def test_columns_that_do_not_fit_are_refused(
 ) -> None:
     body: Any = f"{columns}\r\n1\r\n"
     if form == "arrow":
-        question = {**{name: [value] for name, value in CASE.items()}, **columns}
+        lists = {**{name: [value] for name, value in CASE.items()}, **columns}
         body = stream_of(
-            pa.record_batch({name: pa.array(x) for name, x in question.items() if x is not ...})
+            pa.record_batch({name: pa.array(x) for name, x in lists.items() if x is not ...})
         )
     document = problem(posted(client, form, body), 422)
     assert any(words in f"{fault['field']}: {fault['reason']}" for fault in document["errors"]), (

@@ -103,16 +103,16 @@ def test_the_manual_and_the_settings_agree(repository: Path) -> None:
     # any text is allowed
     assert set(BAD) | {"MUMACRO_CORS_ORIGINS", "MUMACRO_TRUSTED_PROXIES"} == names
     text = (repository / "docs" / "operations.md").read_text()
-    warnings = dict(re.findall(r"^\| `(MUMACRO_\w+)` \| (.*?) \| ", text, re.MULTILINE))
-    assert warnings.keys() == names
+    defaults = dict(re.findall(r"^\| `(MUMACRO_\w+)` \| (.*?) \| ", text, re.MULTILINE))
+    assert defaults.keys() == names
     for name, field in Settings.model_fields.items():
         default = "none" if field.default in (None, "", ()) else f"`{field.default}`"
-        assert field.default_factory or warnings[f"MUMACRO_{name.upper()}"] == default
+        assert field.default_factory or defaults[f"MUMACRO_{name.upper()}"] == default
     assert load_settings().tables == (repository / "tables",)
 
 
 @pytest.mark.parametrize(
-    ("option", "warnings"),
+    ("option", "message"),
     [
         (["--port", "70000"], "MUMACRO_PORT must be"),
         (["--workers=0"], "MUMACRO_WORKERS must be"),
@@ -122,10 +122,10 @@ def test_the_manual_and_the_settings_agree(repository: Path) -> None:
     ],
 )
 def test_a_bad_argument_ends_the_process_without_a_traceback(
-    repository: Path, option: Any, warnings: Any
+    repository: Path, option: Any, message: Any
 ) -> None:
     words = [sys.executable, "-m", "service", *option]
     process = subprocess.run(words, cwd=repository, capture_output=True, text=True, check=False)
     assert (process.returncode, process.stdout) == (2, "")
-    assert process.stderr.startswith(warnings)
+    assert process.stderr.startswith(message)
     assert "Traceback" not in process.stderr
