@@ -224,8 +224,8 @@ MUMACRO_API const char *mumacro_error_text(int error) {
     static const char *const texts[14] = {
         "for a force v0 must be finite, and v_rest finite and > 0",
         "dx and dy must be finite, and there must be a spring",
-        "the normal force of a ball cannot oscillate: its contact radius would change, which is "
-        "not modelled",
+        ("the normal force of a ball cannot oscillate: its contact radius would change, which is "
+         "not modelled"),
         "there is no such contact or direction",
         "there is no such quantity",
         "there is no place for the answer",
