@@ -68,7 +68,9 @@ def run(*command: str | Path, quiet: bool = False) -> int:
     env = environment()
     words = [shutil.which(command[0], path=env["PATH"]) or command[0], *map(str, command[1:])]
     out, err = (subprocess.PIPE, subprocess.STDOUT) if quiet else (None, None)
-    done = subprocess.run(words, cwd=ROOT, env=env, stdout=out, stderr=err, text=True, check=False)  # noqa: S603
+    done = subprocess.run(  # noqa: S603
+        words, cwd=ROOT, env=env, stdout=out, stderr=err, text=True, check=False
+    )
     if quiet and done.returncode:
         print(done.stdout, file=sys.stderr, flush=True)
     return done.returncode
@@ -95,15 +97,16 @@ def installed() -> dict[str, str]:
     """The parts that ``.venv`` holds and that are current; empty if it is absent, broken or
     incomplete."""
     try:
-        found = json.loads(MARKER.read_text(encoding="utf-8"))
-        works = subprocess.run([PYTHON, "-c", ""], check=False).returncode == 0  # noqa: S603 (a link may be broken)
+        parts = json.loads(MARKER.read_text(encoding="utf-8"))
+        # a link may be broken
+        works = subprocess.run([PYTHON, "-c", ""], check=False).returncode == 0  # noqa: S603
     except (OSError, ValueError):
         return {}
-    if not isinstance(found, dict) or not works:
+    if not isinstance(parts, dict) or not works:
         return {}
-    held = dict(found.items() & current().items())
-    old = found.keys() & SETS.keys() - held.keys()  # packages that newer locks dropped must go too
-    return {name: made for name, made in held.items() if not old or name not in SETS}
+    valid = dict(parts.items() & current().items())
+    old = parts.keys() & SETS.keys() - valid.keys()  # packages that newer locks dropped must go too
+    return {name: checksum for name, checksum in valid.items() if not old or name not in SETS}
 
 
 def pip(*arguments: str) -> None:
@@ -152,7 +155,7 @@ def ensure(set_name: str = "tools") -> None:
     pip("--no-deps", "--no-build-isolation", "-e", ".")
     names = {set_name, "kernel", *have}
     MARKER.write_text(
-        json.dumps({name: made for name, made in current().items() if name in names}),
+        json.dumps({name: checksum for name, checksum in current().items() if name in names}),
         encoding="utf-8",
     )
 
@@ -219,8 +222,9 @@ def wheels() -> int:
 
 COMMANDS: dict[str, Callable[..., int]] = {
     **{command.__name__: command for command in (demo, test, check, docs, serve, wheels)},
-    "exec": execute, "lock": partial(run, sys.executable, "requirements/lock.py"),
-}  # fmt: skip
+    "exec": execute,
+    "lock": partial(run, sys.executable, "requirements/lock.py"),
+}
 
 
 def main(word: str = "", *rest: str) -> int:

@@ -79,7 +79,8 @@ def local_compiler() -> list[str]:
             (Path(folder) / "probe.c").write_text(PROBE, "utf-8")
             command = [*words, *FLAGS, *last, "-shared", "probe.c", "-o", "probe.so"]
             try:
-                subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - the user's compiler
+                # the user's compiler
+                subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603
                 return words
             except (OSError, subprocess.CalledProcessError):
                 continue
@@ -125,12 +126,15 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     }
     objects["dispatch.o"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in has)]
     compiling = [
-        [f"{sources / file}", *words, "-c", "-o", made] for made, (file, *words) in objects.items()
+        [f"{sources / file}", *words, "-c", "-o", name] for name, (file, *words) in objects.items()
     ]
     with tempfile.TemporaryDirectory(dir=folder) as place:
         # each list at the same time
         for words in (compiling, [["-shared", *objects, "-o", name, *libraries]]):
-            jobs = [subprocess.Popen([*command, *FLAGS, *one], cwd=place) for one in words]  # noqa: S603 - see above
+            jobs = [
+                subprocess.Popen([*command, *FLAGS, *one], cwd=place)  # noqa: S603 - see above
+                for one in words
+            ]
             if sum(job.wait() != 0 for job in jobs):  # waits for all
                 sys.exit("The C compiler failed: see above")
         # A running program keeps the old file: the new one takes its place and is not written into

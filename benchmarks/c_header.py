@@ -45,7 +45,7 @@ def c_header(quick: bool) -> str:
         for compiler in filter(shutil.which, ("gcc", "clang")):
             for options in OPTIONS[:1] if quick else OPTIONS:
                 progress(row := f"`{compiler} {options}`")
-                made = folder / f"driver{len(work)}.so"
+                shared_object = folder / f"driver{len(work)}.so"
                 words = [
                     compiler,
                     *options.split(),
@@ -53,11 +53,11 @@ def c_header(quick: bool) -> str:
                     "-fPIC",
                     *sources,
                     "-o",
-                    made,
+                    shared_object,
                     "-lm",
                 ]
                 subprocess.run(words, check=True)
-                library = ctypes.CDLL(str(made))
+                library = ctypes.CDLL(str(shared_object))
                 work[row] = partial(library.ratio_array, at, beside, n, out)
                 work[f"{row}, call by call"] = partial(library.ratios, at, beside, n, out)
         best = best_of(rounds, work)

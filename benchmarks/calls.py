@@ -108,8 +108,8 @@ def calls(points: int, quick: bool) -> str:
                 [[name, quantity(t / number * scale)] for name, t in best.items()],
             )
         )
-    said = f"Table 1e-10, kernel of the level {mumacro.kernel.binding.kernels[-1].level}."
-    return "\n\n".join([said, *tables, processes(quick)])
+    caption = f"Table 1e-10, kernel of the level {mumacro.kernel.binding.kernels[-1].level}."
+    return "\n\n".join([caption, *tables, processes(quick)])
 
 
 def small(points: int, quick: bool) -> str:  # noqa: ARG001

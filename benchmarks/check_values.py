@@ -63,11 +63,11 @@ def row(quantity: str, where: str, value: float, tolerance: float, **inputs: Any
 
 def chosen() -> list[dict[str, str]]:
     points = read("points.csv")
-    found = []
+    chosen_points = []
     for kind in dict.fromkeys(point["case"] for point in points):
         of_kind = [point for point in points if point["case"] == kind]
-        found += [of_kind[i * len(of_kind) // A_CLASS] for i in range(A_CLASS)]
-    return found
+        chosen_points += [of_kind[i * len(of_kind) // A_CLASS] for i in range(A_CLASS)]
+    return chosen_points
 
 
 def rows() -> Iterator[dict[str, Any]]:

@@ -87,17 +87,17 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
     return v, y
 
 
-def asked(s: Surrogate, v: Array, y: Array, direction: str) -> list[Array]:
+def rows_of(s: Surrogate, v: Array, y: Array, direction: str) -> list[Array]:
     """Rows (values, bounds) of :data:`NAMES` for a ball."""
     kind: Any = {"contact": "ball", "direction": direction}
-    found = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
+    values = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
     answer = s.evaluate(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y0=y, gradient=True, **kind)
     with np.errstate(all="ignore"):
         slopes = (
             (answer.gradient[name] * x, answer.gradient_bound[name] * x)
             for name, x in (("v0", v), ("y0", y))
         )
-        return found + list(map(np.array, slopes))
+        return values + list(map(np.array, slopes))
 
 
 if __name__ == "__main__":

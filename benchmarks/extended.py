@@ -112,11 +112,11 @@ def of_reverse(at: Turning, m: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
     root = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0))
     apart = at.x * more * (at.x + cosine) / (at.sine + root)
     p = np.arcsin(np.clip(at.x * (more * at.sine + apart), -1.0, 1.0))
-    left = apart + arc.versed * root - p * at.x
+    rest = apart + arc.versed * root - p * at.x
     turn = at.x * (arc.versed - arc.cosine * more)
     slope = arc.sine * root - turn * turn / (arc.sine * root)
     inside = m + p < 2.0 * at.c
-    return p, arc.bent / arc.sine, left, slope, legal, inside
+    return p, arc.bent / arc.sine, rest, slope, legal, inside
 
 
 def reverse_root(at: Turning, a: Any) -> Any:
@@ -124,8 +124,8 @@ def reverse_root(at: Turning, a: Any) -> Any:
     low, high = np.zeros_like(at.x), np.full(at.x.shape, PI)
     m = 2.0 * np.arcsin(np.minimum(1.0 / np.sqrt(a), 1.0))
     for _ in range(100):
-        _, _, left, slope, legal, inside = of_reverse(at, m)
-        off = np.where(legal, left - 2.0 / a, np.inf)
+        _, _, rest, slope, legal, inside = of_reverse(at, m)
+        off = np.where(legal, rest - 2.0 / a, np.inf)
         slope = np.where(legal & inside, slope, np.where(legal, 0.0, np.nan))
         upper = (off > 0.0) | ~(slope > 0.0)
         high, low = np.where(upper, m, high), np.where(upper, low, m)

@@ -58,7 +58,7 @@ def hinted(v: float, y: float, w: Array, out: Array, orbit: Array) -> None:
 def surplus() -> str:
     """The error from the poorly known end of slip if the surplus is not removed."""
     w, out, orbit, _ = workspace()
-    found = []
+    errors = []
     for v, y, mu in reference("border"):
         full = solve(v, y)
         if full.regime == "stick_slip":
@@ -66,21 +66,21 @@ def surplus() -> str:
             naive = (
                 orbit[DURATION] * (orbit[COS_0] + 0.5 * v * orbit[DURATION]) + out[SUM_UX]
             ) / math.pi
-            found.append(
+            errors.append(
                 (
                     abs(out[SIGMA] - orbit[SIGMA_0]),
                     abs(naive - mu) / mu,
                     abs(full.mu_ratio - mu) / mu,
                 )
             )
-    spread, lost, kept = map(max, zip(*found, strict=True))
+    spread, lost, solved = map(max, zip(*errors, strict=True))
     head = (
         "points below the border",
         "slip and stick miss half a period by",
         "mu~ off by",
         "surplus taken out",
     )
-    return markdown(head, [[str(len(found)), quantity(spread), quantity(lost), quantity(kept)]])
+    return markdown(head, [[str(len(errors)), quantity(spread), quantity(lost), quantity(solved)]])
 
 
 def double_root() -> str:

@@ -109,8 +109,8 @@ def stiffness() -> str:
     p, rows = points(), []
     mu0 = p.without / FZ
     for contact in CONTACTS:
-        found = fitted(contact)
-        k, (low, high) = found.values["k"], found.interval["k"]
+        solution = fitted(contact)
+        k, (low, high) = solution.values["k"], solution.interval["k"]
         case = {**RIG, "mu0": 0.0, "v0": 0.0}
         each = np.array(
             [
@@ -131,9 +131,9 @@ def stiffness() -> str:
         rows.append(
             [
                 contact,
-                f"{k / 1e6:.2f} ± {found.std['k'] / 1e6:.2f}",
+                f"{k / 1e6:.2f} ± {solution.std['k'] / 1e6:.2f}",
                 f"{low / 1e6:.2f} to {high / 1e6:.2f}",
-                f"{np.sqrt(found.reduced_chi2):.4f}",
+                f"{np.sqrt(solution.reduced_chi2):.4f}",
                 f"{each.min() / 1e6:.2f} to {each.max() / 1e6:.2f}",
                 f"{100.0 * np.abs(each / k - 1.0).max():.1f}",
                 f"{y.min():.2f} to {y.max():.2f}",
@@ -193,7 +193,7 @@ def trends() -> str:
         "ball",
     )
     text = markdown(header, rows)
-    asked = [
+    k_static = [
         solve_for(
             table(),
             "k",
@@ -208,15 +208,16 @@ def trends() -> str:
     ]
     more = [
         f"{100.0 * (a / fitted(c).values['k'] - 1.0):.0f}"
-        for a, c in zip(asked, CONTACTS, strict=True)
+        for a, c in zip(k_static, CONTACTS, strict=True)
     ]
+    spring, ball = k_static
     off = p.without - p.shaken
     free = [fitted(c, unknowns=("k", "mu0")) for c in CONTACTS]
     return " ".join(
         [
             f"{text}\n\nNot shaken less shaken is {off.min():.2f} to {off.max():.2f} N while it",
             f"slides, {p.static_without - p.static_shaken:.2f} N before. The force before sliding",
-            f"asks for k = {asked[0] / 1e6:.2f} N/µm (spring), {asked[1] / 1e6:.2f} N/µm (ball):",
+            f"asks for k = {spring / 1e6:.2f} N/µm (spring), {ball / 1e6:.2f} N/µm (ball):",
             f"{more[0]} % and {more[1]} % more. With k and mu0 both unknown the fit says:",
             f"{free[0].warnings[0]} (spring); {free[1].warnings[0]} (ball).",
         ]

@@ -64,19 +64,21 @@ def main(
             parser.add_argument(
                 f"--{name}", type=type(default), default=default, help=f"default: {default}"
             )
-    given, failed = parser.parse_args(), False
-    if given.write and (getattr(given, "quick", False) or getattr(given, "share", 1.0) < 1.0):
+    arguments, failed = parser.parse_args(), False
+    if arguments.write and (
+        getattr(arguments, "quick", False) or getattr(arguments, "share", 1.0) < 1.0
+    ):
         parser.error("--write stores full runs only")
     for name, section in sections.items():
-        if given.only in (None, name):
+        if arguments.only in (None, name):
             progress(f"{name} ...")
             started = perf_counter()
-            found = section(**{option: getattr(given, option) for option in options})
-            found += f"\n\nTook {(perf_counter() - started) / 60.0:.1f} min. {machine()}"
-            print(f"## {name}\n\n{found}\n", flush=True)
-            failed |= "FAILED" in found
-            if given.write:
-                write(Path(sys.argv[0]).stem, name, found)
+            report = section(**{option: getattr(arguments, option) for option in options})
+            report += f"\n\nTook {(perf_counter() - started) / 60.0:.1f} min. {machine()}"
+            print(f"## {name}\n\n{report}\n", flush=True)
+            failed |= "FAILED" in report
+            if arguments.write:
+                write(Path(sys.argv[0]).stem, name, report)
     if failed:
         raise SystemExit(1)
 
@@ -97,12 +99,12 @@ def processor() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor() or platform.machine()
-    found = {
+    properties = {
         key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)
     }
-    name = found.get("model name", platform.machine())
-    if "cpu family" in found:
-        name += f" (family {found['cpu family']}, model {found.get('model', '?')})"
+    name = properties.get("model name", platform.machine())
+    if "cpu family" in properties:
+        name += f" (family {properties['cpu family']}, model {properties.get('model', '?')})"
     return name
 
 

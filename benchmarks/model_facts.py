@@ -41,8 +41,8 @@ def _creep_factor(y: float) -> float:
     run = solve_ivp(
         rates, (stick, math.pi), [1.0, 0.0, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-14
     )
-    left, driven, of_start, of_drive = run.y[:, -1]
-    start = (left * stick + driven) / (1.0 - left)
+    memory, driven, of_start, of_drive = run.y[:, -1]
+    start = (memory * stick + driven) / (1.0 - memory)
     return float((stick * (start + 0.5 * stick) + (start + stick) * of_start + of_drive) / math.pi)
 
 

@@ -107,7 +107,7 @@ def errors(share: float = 1.0) -> str:
     rows = []
     for kind, tolerance, n, finer in SEARCHES:
         off = deviations(kind, tolerance, finer, max(1, round(share * n)))
-        ratio, found = off.error / off.estimate, off.estimate <= off.most
+        ratio, within = off.error / off.estimate, off.estimate <= off.most
         rows.append(
             [
                 f"{kind}, {tolerance:g}",
@@ -115,8 +115,8 @@ def errors(share: float = 1.0) -> str:
                 *(quantity(float(x)) for x in np.quantile(ratio, (0.5, 0.99, 1.0))),
                 f"{np.count_nonzero(ratio > 1.0)}",
                 quantity(float(off.error.max() / CASE["mu0"])),
-                f"{np.count_nonzero(~found)}",
-                *(quantity(float(x[found].max())) for x in (off.stick, off.path)),
+                f"{np.count_nonzero(~within)}",
+                *(quantity(float(x[within].max())) for x in (off.stick, off.path)),
             ]
         )
     header = (

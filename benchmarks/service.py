@@ -56,20 +56,24 @@ def get(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
 
 
 FORMS = {
-    "POST": post(CASE), "GET": get(CASE), "POST, rigid": post({**CASE, "k": "rigid"}),
-    "GET, rigid": get({**CASE, "k": "rigid"}), "POST, power": post({**CASE, "include": ["power"]}),
-    "GET, power": get({**CASE, "include": "power"}), ".txt": get(CASE, "/v1/mu-macro.txt"),
-}  # fmt: skip
+    "POST": post(CASE),
+    "GET": get(CASE),
+    "POST, rigid": post({**CASE, "k": "rigid"}),
+    "GET, rigid": get({**CASE, "k": "rigid"}),
+    "POST, power": post({**CASE, "include": ["power"]}),
+    "GET, power": get({**CASE, "include": "power"}),
+    ".txt": get(CASE, "/v1/mu-macro.txt"),
+}
 
 
 def ask(server: Server, request: bytes, number: int, clients: int) -> None:
     """Send a request so many times on so many connections; every answer must be 200."""
     with ExitStack() as stack:
-        made = [stack.enter_context(connect(server)) for _ in range(clients)]
+        connections = [stack.enter_context(connect(server)) for _ in range(clients)]
         for _ in range(number // clients):
-            for raw in made:
+            for raw in connections:
                 raw.sendall(request)
-            for raw in made:
+            for raw in connections:
                 read(raw)
 
 
@@ -97,30 +101,30 @@ def peer(name: str, folder: str) -> AbstractContextManager[Server]:
 
 def single() -> str:
     os.sched_setaffinity(0, CLIENT)  # else it interrupts the servers whenever they answer
-    found: dict[str, list[tuple[float, float]]] = {}
+    times_of: dict[str, list[tuple[float, float]]] = {}
     with (
         tempfile.TemporaryDirectory() as folder,
         serving(FINEST, before=FIRST) as own,
         peer("raw", folder) as raw,
         peer("fastapi", folder) as fast,
     ):
-        asked = [(f"this service, {name}", own, text) for name, text in FORMS.items()]
-        asked.append(("FastAPI, models in and out", fast, FORMS["POST"]))
+        requests = [(f"this service, {name}", own, text) for name, text in FORMS.items()]
+        requests.append(("FastAPI, models in and out", fast, FORMS["POST"]))
         for _ in range(1 + ROUNDS):
-            for name, server, text in asked:
+            for name, server, text in requests:
                 times = []
                 for one, request in ((raw, FORMS["POST"]), (server, text)):
                     before = one.busy()
                     ask(one, request, REQUESTS, CLIENTS)
                     times.append((one.busy() - before) / REQUESTS * 1e6)
-                found.setdefault(name, []).append((times[0], times[1]))
-    found = {name: pairs[1:] for name, pairs in found.items()}
+                times_of.setdefault(name, []).append((times[0], times[1]))
+    times_of = {name: pairs[1:] for name, pairs in times_of.items()}
     rows = []
-    for name, pairs in found.items():
+    for name, pairs in times_of.items():
         ratio = statistics.median(own / floor for floor, own in pairs)
         rows.append((name, f"{statistics.median(own for _, own in pairs):.0f}", f"{ratio:.2f}"))
     mean = math.exp(statistics.fmean(math.log(float(row[2])) for row in rows[: len(FORMS)]))
-    floor = statistics.median(floor for pairs in found.values() for floor, _ in pairs)
+    floor = statistics.median(floor for pairs in times_of.values() for floor, _ in pairs)
     rows.append(("raw ASGI, nothing checked", f"{floor:.0f}", "1.00"))
     return (
         f"{markdown(('one case', 'processor time [us]', 'times raw ASGI'), rows)}\n\nGeometric "

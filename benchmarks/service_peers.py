@@ -20,8 +20,8 @@ def raw() -> Any:
                 await send({"type": "lifespan.startup.complete"})
             await send({"type": "lifespan.shutdown.complete"})
             return
-        given = orjson.loads((await receive())["body"])
-        six = [float(given[name]) for name in FIELDS]
+        case = orjson.loads((await receive())["body"])
+        six = [float(case[name]) for name in FIELDS]
         body = orjson.dumps({"mu_macro": six[0]})
         headers = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(body))]
         await send({"type": "http.response.start", "status": 200, "headers": headers})
@@ -43,10 +43,10 @@ def fastapi() -> Any:
 
     @app.post("/v1/mu-macro", response_model=CaseAnswer)
     async def one(case: Case) -> Any:
-        found = surrogate.evaluate(**case.model_dump(exclude_none=True))
+        answer = surrogate.evaluate(**case.model_dump(exclude_none=True))
         names = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
         return {
-            **{name: getattr(found, name) for name in names},
+            **{name: getattr(answer, name) for name in names},
             "table": label,
             "api_version": "1",
         }

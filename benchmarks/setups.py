@@ -37,7 +37,7 @@ def parts() -> dict[str, str]:
     """The base of the sketch, and its groups by their names."""
     drawn = PAGE.read_text("utf-8").partition('<svg id="sketch"')[2].partition("</svg>")[0]
     inside = drawn.partition(">")[2].replace(" hidden", "")
-    starts = [found.start() for found in re.finditer(r'<g class="(?:body|motion)', inside)]
+    starts = [group.start() for group in re.finditer(r'<g class="(?:body|motion)', inside)]
     groups = [inside[i:j] for i, j in zip(starts, [*starts[1:], len(inside)], strict=True)]
     names = {group.split('"')[1].split()[1]: group.strip() for group in groups}
     return {"base": inside[: starts[0]].strip(), **names}
@@ -52,11 +52,11 @@ def picture() -> str:
         inside = [drawn["base"], drawn[body], drawn[motion], label]
         panels.append("\n".join([f'<g transform="translate({x} {y})">', *inside, "</g>"]))
     width, height = 3 * WIDTH + 2 * MARGIN, 2 * HEIGHT + 2 * MARGIN
-    told = "; ".join(SETUPS.values())
+    description = "; ".join(SETUPS.values())
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
-            f'width="{width}" height="{height}" role="img" aria-label="{told}">',
+            f'width="{width}" height="{height}" role="img" aria-label="{description}">',
             f"<style>{STYLE}</style>",
             f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
             *panels,

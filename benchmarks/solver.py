@@ -115,21 +115,21 @@ def against_marching(n: int) -> str:
     drawn = points(n, seed=2, low=PEER_LOW)
     mu = solve_chunk("full", drawn)[:, 0]
     direct = best_of(3, {"": partial(solve_chunk, "full", drawn)})[""] / n
-    found = []
+    cycles = []
     for (v, y, _), exact in zip(drawn, mu, strict=True):
         start = process_time()
         marched = march(v, y)
-        found.append((marched.agreed, process_time() - start, abs(marched.mu_ratio - exact)))
+        cycles.append((marched.agreed, process_time() - start, abs(marched.mu_ratio - exact)))
     rows = [["compiled solver", str(n), quantity(1e6 * direct), "reference"]]
     for agreed, name in (
         (True, "two cycles agree to 1e-9"),
         (False, "given up, beside the border"),
     ):
-        chosen = [(seconds, error) for ended, seconds, error in found if ended == agreed]
+        chosen = [(seconds, error) for ended, seconds, error in cycles if ended == agreed]
         if chosen:
             seconds, error = np.array(chosen).T
-            told = quantity(1e6 * seconds.mean()), quantity(float(error.max()))
-            rows.append([f"marched, {name}", str(len(chosen)), *told])
+            cells = quantity(1e6 * seconds.mean()), quantity(float(error.max()))
+            rows.append([f"marched, {name}", str(len(chosen)), *cells])
     return markdown(("method", "points", "mean, microseconds", "max abs error"), rows)
 
 

@@ -143,7 +143,7 @@ def draw(n: int, seed: int) -> Array:
 def contenders(sweep: Sweep, quick: bool) -> dict[str, list[Contender]]:
     """The tables, the peers and the formula, by what a line of the picture is called."""
     opened = [Surrogate.open(path, threads=1) for path in (ROOT / "tables").glob("*.nc")]
-    found = {
+    lines = {
         "our tables": [
             Contender(
                 f"**{s.id}**",
@@ -157,9 +157,9 @@ def contenders(sweep: Sweep, quick: bool) -> dict[str, list[Contender]]:
     for n in QUICK_GRIDS if quick else FULL_GRIDS:
         progress(f"grid {n} x {n}")
         for one in (*on_grid(solve_grid(sweep, n)), fitted_to_the_border(sweep, n // 2)):
-            found.setdefault(one.name, []).append(one)
+            lines.setdefault(one.name, []).append(one)
     rigid = Contender("eq. (35), rigid contact", "formula", lambda v, y: closed_forms.outer(y / v))
-    return {**found, rigid.name: [rigid]}
+    return {**lines, rigid.name: [rigid]}
 
 
 def speed_against_error(points: int, rounds: int, quick: bool) -> str:

@@ -71,12 +71,12 @@ def rebuilt(table: Surrogate, workers: int) -> list[str]:
     return [quantity(seconds, 2), quantity(own, 2), "yes" if same else "no"]
 
 
-def kept(page: str, checksum: str) -> list[str]:
+def cells_in(page: str, checksum: str) -> list[str]:
     """The measured columns of the row with that checksum, if there is one."""
-    found = re.search(
+    row = re.search(
         rf"^\|[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|\s*`{checksum}`\s*\|$", page, re.MULTILINE
     )
-    return [cell.strip() for cell in found.groups()] if found else ["-", "-", "-"]
+    return [cell.strip() for cell in row.groups()] if row else ["-", "-", "-"]
 
 
 def tables(build: bool, workers: int) -> str:
@@ -102,9 +102,9 @@ def tables(build: bool, workers: int) -> str:
             "max_rel_power_error",
             "max_slope_error",
         )
-        found = (f"{float(str(s.attributes[f'ball_verified_{name}'])):.2e}" for name in ball)
-        balls.append([f"`{s.path.name}`", f"{s.ball_tolerance:.0e}", *found])
-        cost = rebuilt(s, workers) if build else kept(old, s.checksum)
+        ball_errors = (f"{float(str(s.attributes[f'ball_verified_{name}'])):.2e}" for name in ball)
+        balls.append([f"`{s.path.name}`", f"{s.ball_tolerance:.0e}", *ball_errors])
+        cost = rebuilt(s, workers) if build else cells_in(old, s.checksum)
         builds.append([f"`{s.path.name}`", *cost, f"`{s.checksum}`"])
     builds_of_all = "\n".join(
         f"python {' '.join(command(s.tolerance, f'tables/{s.path.name}'))}" for s in opened
@@ -113,9 +113,9 @@ def tables(build: bool, workers: int) -> str:
         f"Not run by the checks, which build coarser tables:\n\n```bash\n{builds_of_all}\n```"
     )
     note = re.search(r"^Built anew .*\n.*$", old, re.MULTILINE)
-    said = note.group() if note else "Not built anew yet."
+    build_note = note.group() if note else "Not built anew yet."
     if build:
-        said = (
+        build_note = (
             f"Built anew on {workers} threads with the program that this page was written "
             f"with.\n{machine()}"
         )
@@ -131,7 +131,7 @@ def tables(build: bool, workers: int) -> str:
             markdown(HEADER, rows),
             "Of a ball that is shaken across, with as many fresh quadratures:",
             markdown(BALL_HEADER, balls),
-            said,
+            build_note,
             markdown(BUILD_HEADER, builds, 1),
         ]
     )

@@ -68,7 +68,7 @@ def rigs() -> str:
                 "omega": 4e4 * math.pi,
                 "v0": v0,
             }
-            answer, found = s.evaluate(**case), settling(s, **case)
+            answer, decay = s.evaluate(**case), settling(s, **case)
             places.append((answer.v_tilde, answer.y_tilde))
             cells = [
                 f"{contact.k:.2g}",
@@ -82,7 +82,7 @@ def rigs() -> str:
                 f"{answer.mu_ratio:.3f}",
                 answer.regime,
             ]
-            rows.append([name, *cells, *groups, f"{found.periods:.2g}"])
+            rows.append([name, *cells, *groups, f"{decay.periods:.2g}"])
         axes.plot(*zip(*places, strict=True), shape, color=INK, mec="white", ms=9, label=name)
     if (legend := axes.get_legend()) is not None:
         legend.remove()

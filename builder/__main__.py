@@ -96,15 +96,15 @@ def _ball(chosen: Namespace) -> str:
         table = add_ball(surrogate.table, out, sweep, _Bar(ball_stages()))
         write_table(table, out)
     shutil.rmtree(checkpoint, ignore_errors=True)
-    found = table.attributes
+    attributes = table.attributes
     return as_json(
         {
             "table": str(out),
-            "ball_tolerance": found["ball_tolerance"],
-            "ball_verified_max_abs_error": found["ball_verified_max_abs_error"],
-            "ball_verified_max_rel_error": found["ball_verified_max_rel_error"],
+            "ball_tolerance": attributes["ball_tolerance"],
+            "ball_verified_max_abs_error": attributes["ball_verified_max_abs_error"],
+            "ball_verified_max_rel_error": attributes["ball_verified_max_rel_error"],
             "bytes": out.stat().st_size,
-            "content_sha256": found["content_sha256"],
+            "content_sha256": attributes["content_sha256"],
         }
     )
 
@@ -155,7 +155,7 @@ def _export(chosen: Namespace) -> str:
 
         surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
         written = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
-        return _told(chosen, {"table": str(surrogate.path), "format": kind, "out": written})
+        return _report(chosen, {"table": str(surrogate.path), "format": kind, "out": written})
     from .export.c import ExportError
     from .export.grid import FORMATS, check_format, export_table
 
@@ -168,10 +168,10 @@ def _export(chosen: Namespace) -> str:
     if out.is_dir():
         raise UsageError(f"--out {out} is a folder")
     shape = export_table(path, kind, out).mu_ratio.shape
-    return _told(chosen, {"table": str(path), "format": kind, "out": str(out), "shape": shape})
+    return _report(chosen, {"table": str(path), "format": kind, "out": str(out), "shape": shape})
 
 
-def _told(chosen: Namespace, about: dict[str, Any]) -> str:
+def _report(chosen: Namespace, about: dict[str, Any]) -> str:
     """What was written, as JSON or in columns, as ``mumacro table``."""
     if chosen.json:
         return as_json(about)
@@ -209,9 +209,9 @@ def _parser(prog: str) -> OneLineParser:
 
     def command(run: Callable[[Namespace], int | str], text: str) -> OneLineParser:
         name = run.__name__.strip("_")
-        made = commands.add_parser(name, help=text, description=text)
-        made.set_defaults(run=run, title=made.prog)
-        return made
+        subparser = commands.add_parser(name, help=text, description=text)
+        subparser.set_defaults(run=run, title=subparser.prog)
+        return subparser
 
     workers: dict[str, Any] = {
         "default": processors(),

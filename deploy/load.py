@@ -45,13 +45,13 @@ def bodies() -> dict[str, tuple[str, bytes]]:
     )
     padding = (LARGEST - sum(map(len, whole)) - CASES - 2) // CASES  # spaces are read too
     padded = f",{' ' * padding}".join(whole)
-    made = {
+    forms = {
         "rows": ("application/json", f"[{padded}]"),
         "columns": ("application/json", "{" + columns + "}"),
         "lines": ("application/x-ndjson", "\n".join(whole) + "\n"),
         "csv": ("text/csv", "\n".join([",".join(NAMES), *map(",".join, rows)]) + "\n"),
     }
-    return {name: (kind, text.encode()) for name, (kind, text) in made.items()}
+    return {name: (kind, text.encode()) for name, (kind, text) in forms.items()}
 
 
 def ask(address: str, query: str, kind: str, body: bytes) -> tuple[int, int]:
@@ -76,7 +76,7 @@ def main() -> int:
     chosen = parser.parse_args()
     address, forms = urlsplit(chosen.url).netloc, bodies()
     counts, largest = Counter[str](), [0]
-    asked = itertools.cycle(
+    questions = itertools.cycle(
         itertools.product(forms, ("", "?include=gradient,power,stick_fraction"))
     )
     lock, stop = threading.Lock(), time.monotonic() + chosen.seconds
@@ -86,16 +86,16 @@ def main() -> int:
         while time.monotonic() < stop:
             if not refused:
                 with lock:
-                    name, query = next(asked)
+                    name, query = next(questions)
             try:
                 status, length = ask(address, query, *forms[name])
-                told = f"{name} {status}" if status != 503 else "503"
+                outcome = f"{name} {status}" if status != 503 else "503"
             except (OSError, HTTPException) as error:
-                told, length = f"{name} lost ({type(error).__name__})", 0
+                outcome, length = f"{name} lost ({type(error).__name__})", 0
             with lock:
-                counts[told] += 1
+                counts[outcome] += 1
                 largest[0] = max(largest[0], length)
-            if refused := told == "503":
+            if refused := outcome == "503":
                 time.sleep(0.2)
 
     clients = 3 * SLOTS * chosen.workers
@@ -104,10 +104,10 @@ def main() -> int:
             one.result()
     right = {"503", *(f"{name} 200" for name in forms)}
     sizes = ", ".join(f"{name} {len(body) / 1e6:.1f} MB" for name, (_, body) in forms.items())
-    told = ", ".join(f"{name}: {n}" for name, n in sorted(counts.items()))
+    totals = ", ".join(f"{name}: {n}" for name, n in sorted(counts.items()))
     print(
         f"{clients} clients; bodies: {sizes}; largest answer {largest[0] / 1e6:.1f} MB; answers: "
-        f"{told}"
+        f"{totals}"
     )
     return 0 if counts.keys() <= right and len(counts) > 1 else 1
 

@@ -36,7 +36,7 @@ batch = post("/v1/mu-macro/batch", {**CASE, "v0": speeds})
 for v0, mu in zip(speeds, batch["mu_macro"], strict=True):
     print(f"v0 = {v0:5g} m/s: mu_macro = {mu:.6f}")
 
-known = {name: value for name, value in CASE.items() if name != "y0"}
-for result in post("/v1/solve-for", {"unknown": "y0", "target": [0.2, 0.1], **known})["results"]:
+case = {name: value for name, value in CASE.items() if name != "y0"}
+for result in post("/v1/solve-for", {"unknown": "y0", "target": [0.2, 0.1], **case})["results"]:
     (root,) = result["roots"]
     print(f"mu_macro = {result['target']} needs y0 = {1e6 * root['value']:.4f} um")

@@ -23,10 +23,10 @@ def until_ready(server: subprocess.Popen[bytes], log: Path) -> str:
     """The service's address, once it is ready."""
     started = time.monotonic()
     while time.monotonic() < started + WAIT_S and server.poll() is None:
-        found = re.search(r"running on (http://[^ ]+:\d+) ", log.read_text("utf-8"))
+        address = re.search(r"running on (http://[^ ]+:\d+) ", log.read_text("utf-8"))
         try:
-            if found and urllib.request.urlopen(f"{found[1]}/readyz", timeout=10):
-                return found[1]
+            if address and urllib.request.urlopen(f"{address[1]}/readyz", timeout=10):
+                return address[1]
         except OSError:
             pass
         time.sleep(0.05)

@@ -38,27 +38,27 @@ class Friction(om.ExplicitComponent):
                 "the power of a rigid contact is not defined: give a finite k, or power=False"
             )
         try:
-            found = self.table.evaluate(case, gradient=gradient, groups=True, illegal="raise")
-            return found, case["mu0"] * case["Fz"], case["omega"]
+            friction = self.table.evaluate(case, gradient=gradient, groups=True, illegal="raise")
+            return friction, case["mu0"] * case["Fz"], case["omega"]
         except InputError as error:
             raise om.AnalysisError(str(error)) from error
 
     def compute(self, inputs: Any, outputs: Any) -> None:
-        found, force, omega = self.answer(inputs)
-        outputs["mu_macro"] = found.mu_macro
+        friction, force, omega = self.answer(inputs)
+        outputs["mu_macro"] = friction.mu_macro
         if self.options["power"]:
-            share = self.table.power(found.v_tilde, found.y_tilde)
-            outputs["oscillation_power"] = force * found.length_scale * omega * share
+            share = self.table.power(friction.v_tilde, friction.y_tilde)
+            outputs["oscillation_power"] = force * friction.length_scale * omega * share
 
     def compute_partials(self, inputs: Any, partials: Any) -> None:
-        found, force, omega = self.answer(inputs, gradient=True)
-        for name, slope in found.gradient.items():
+        friction, force, omega = self.answer(inputs, gradient=True)
+        for name, slope in friction.gradient.items():
             partials["mu_macro", name] = slope
         if self.options["power"]:
             # at rest the partials are those just beside it
-            v, y = np.maximum(found.v_tilde, 1e-9), np.maximum(found.y_tilde, 1e-9)
+            v, y = np.maximum(friction.v_tilde, 1e-9), np.maximum(friction.y_tilde, 1e-9)
             p, along_v, along_y = self.table.slopes(v, y, "power")
-            unit, by_force = force * found.length_scale, 2.0 * p - along_v - along_y
+            unit, by_force = force * friction.length_scale, 2.0 * p - along_v - along_y
             for name in ("mu0", "Fz"):
                 partials["oscillation_power", name] = omega * unit * by_force / inputs[name]
             partials["oscillation_power", "k"] = (

@@ -84,11 +84,11 @@ class Count:
     """Cases tried, cases without the property, and the largest of some measure."""
 
     def __init__(self) -> None:
-        self.tried = self.broken = 0
+        self.cases = self.broken = 0
         self.worst = 0.0
 
     def add(self, wrong: NDArray[np.bool_], measure: Array | float = 0.0) -> None:
-        self.tried += wrong.size
+        self.cases += wrong.size
         self.broken += int(np.count_nonzero(wrong))
         self.worst = max(self.worst, float(np.max(measure, initial=0.0)))
 
@@ -154,12 +154,14 @@ def scaled(table: Surrogate, share: float, by_twos: bool) -> Count:
             with np.errstate(all="ignore"):
                 moved = {name: cases[name] * factor for name in pair}
             # outside the normal range the scaled input itself is rounded
-            kept = np.ones(n, np.bool_)
+            in_range = np.ones(n, np.bool_)
             for name in pair:
                 normal = (moved[name] >= 1e-305) & (moved[name] < 1e305) & (cases[name] >= 1e-305)
-                kept &= normal | (cases[name] == 0.0) | np.isinf(cases[name])
+                in_range &= normal | (cases[name] == 0.0) | np.isinf(cases[name])
             one, other = (
-                table.evaluate({name: values[kept] for name, values in {**cases, **change}.items()})
+                table.evaluate(
+                    {name: values[in_range] for name, values in {**cases, **change}.items()}
+                )
                 for change in ({}, moved)
             )
             change = np.abs(one.mu_macro - other.mu_macro)
@@ -208,12 +210,12 @@ def on_any_processor(table: Surrogate, share: float) -> Count:
     """The best kernel of this processor and the basic one, without AVX and fused multiply-add."""
     count = Count()
     for n, _, cases in pieces(N // 5, share):
-        found = []
+        rows = []
         for kernel in (kernels[-1], kernels[0]):
             answers = CaseRows.empty((n,))
             kernel.cases(table._data, list(cases.values()), answers, slice(0, n))
-            found.append(answers)
-        here, there = found
+            rows.append(answers)
+        here, there = rows
         change = np.abs(here.mu_macro - there.mu_macro)
         allowed = here.error_bound + there.error_bound
         with np.errstate(all="ignore"):
@@ -240,13 +242,13 @@ def nearby(rng: np.random.Generator, v: Array, y: Array, size: float) -> tuple[A
     return np.where(slow < moved, slow, v), np.where(slow < moved, moved, y)
 
 
-Found = dict[str, tuple[Array, Array]]  # by row: error over bound, bound over error
+Ratios = dict[str, tuple[Array, Array]]  # by row: error over bound, bound over error
 
 
-def compared(table: Surrogate, of: Contact, v: Array, y: Array, slopes: bool) -> Found:
+def compared(table: Surrogate, of: Contact, v: Array, y: Array, slopes: bool) -> Ratios:
     """A ball across at v~ and y~ of its middle spring against fresh quadratures, beyond what those
     may be wrong by."""
-    found = {}
+    ratios = {}
     if slopes:
         true, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
         rows = of.slopes(table, "mu_ratio", v, y)
@@ -265,8 +267,8 @@ def compared(table: Surrogate, of: Contact, v: Array, y: Array, slopes: bool) ->
         error = np.abs(value - truth)
         with np.errstate(all="ignore"):
             beyond = np.where(error > unsure, (error - unsure) / bound, 0.0)
-            found[name] = beyond, bound_over_error(bound, unsure, error)
-    return found
+            ratios[name] = beyond, bound_over_error(bound, unsure, error)
+    return ratios
 
 
 def across(share: float) -> list[list[str]]:
@@ -282,9 +284,9 @@ def across(share: float) -> list[list[str]]:
             drawn = [how(rng, math.ceil(part * n), table) for part, how in BALL_CASES.values()]
             v, y = (np.concatenate(x) for x in zip(*drawn, strict=True))
             v, y = of.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
-            found = compared(table, of, v, y, slopes)
-            medians = {name: np.nanmedian(over) for name, (_, over) in found.items()}
-            worst = {name: beyond for name, (beyond, _) in found.items()}
+            ratios = compared(table, of, v, y, slopes)
+            medians = {name: np.nanmedian(over) for name, (_, over) in ratios.items()}
+            worst = {name: beyond for name, (beyond, _) in ratios.items()}
             for size in (0.3, 0.03, 0.003):
                 best = np.unique(
                     [np.argsort(x)[-max(20, int(200 * share)) :] for x in worst.values()]
@@ -331,14 +333,14 @@ def driven(share: float) -> str:
             exact: Any = exact,
         ) -> Any:
             parts = [slice(low, low + 20_000) for low in range(0, v.size, 20_000)]
-            found = [
+            pairs = [
                 (answered(table, v[part], y[part], contact, direction), exact(v[part], y[part]))
                 for part in parts
             ]
             error = np.concatenate(
-                [np.abs(rows[:, 0].astype(np.longdouble) - true) for rows, true in found], axis=1
+                [np.abs(rows[:, 0].astype(np.longdouble) - true) for rows, true in pairs], axis=1
             )
-            bound = np.concatenate([rows[:, 1] for rows, _ in found], axis=1)
+            bound = np.concatenate([rows[:, 1] for rows, _ in pairs], axis=1)
             return np.nan_to_num((error / np.maximum(bound, 1e-300)).astype(float))
 
         v, y = ordinary(count, 22, normal)
@@ -395,9 +397,9 @@ def promises(share: float) -> str:
     rows = []
     for tolerance in (1e-4, 1e-12):
         for name, check in PROMISES.items():
-            found = check(Surrogate.open(tolerance), share)
-            worst = quantity(found.worst) if found.worst else ""
-            rows.append([name, f"{tolerance:g}", f"{found.tried:,}", f"{found.broken:,}", worst])
+            count = check(Surrogate.open(tolerance), share)
+            worst = quantity(count.worst) if count.worst else ""
+            rows.append([name, f"{tolerance:g}", f"{count.cases:,}", f"{count.broken:,}", worst])
     return markdown(
         ("property", "table", "tried", "broken", "largest change or error, bound = 1"), rows
     )

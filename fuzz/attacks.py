@@ -23,7 +23,7 @@ CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20
 EVERYTHING = ["groups", "limits", "gradient", "stick_fraction", "power", "settling"]
 
 
-def held(
+def hold_connections(
     server: Server, share: float, text: bytes, then: Callable[[], object] = lambda: time.sleep(3.0)
 ) -> None:
     """Send the same bytes on as many connections as are allowed, and hold these."""
@@ -63,13 +63,13 @@ def strange_words(server: Server, share: float) -> None:
 
 def idle_streams(server: Server, share: float) -> None:
     def law() -> None:
-        given = {name: value for name, value in CASE.items() if name != "v0"}
+        case = {name: value for name, value in CASE.items() if name != "v0"}
         status, _, _ = server.ask(
-            "POST", "/v1/law", json.dumps({**given, "start": 1e-4, "stop": 1.0})
+            "POST", "/v1/law", json.dumps({**case, "start": 1e-4, "stop": 1.0})
         )
         assert status == 200, f"/v1/law: {status}"
 
-    held(server, share, head("/v1/mu-macro/batch", None, "application/x-ndjson"), law)
+    hold_connections(server, share, head("/v1/mu-macro/batch", None, "application/x-ndjson"), law)
 
 
 def motions(server: Server, share: float) -> None:
@@ -114,7 +114,7 @@ Attack = Callable[[Server, float], None]
 
 
 def holding(text: bytes, factor: float = 1.0) -> Attack:
-    return lambda server, share: held(server, factor * share, text)
+    return lambda server, share: hold_connections(server, factor * share, text)
 
 
 def csv_of(start: bytes, line: bytes) -> Attack:
@@ -147,7 +147,7 @@ ATTACKS: dict[str, Attack] = {
 }
 
 
-def tried(attack: Attack, share: float) -> tuple[float, float]:
+def cost_of(attack: Attack, share: float) -> tuple[float, float]:
     """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve
     afterwards."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -161,8 +161,8 @@ def tried(attack: Attack, share: float) -> tuple[float, float]:
 
 
 def attacks(share: float) -> str:
-    found = {name: tried(attack, share) for name, attack in ATTACKS.items()}
-    rows = [(name, f"{memory:.0f}", f"{1e3 * wait:.0f}") for name, (memory, wait) in found.items()]
+    costs = {name: cost_of(attack, share) for name, attack in ATTACKS.items()}
+    rows = [(name, f"{memory:.0f}", f"{1e3 * wait:.0f}") for name, (memory, wait) in costs.items()]
     return markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
 
 

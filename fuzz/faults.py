@@ -83,31 +83,31 @@ def closed(folder: Path) -> Path:
         subprocess.run(words, cwd=folder, check=True, capture_output=True)
     except (OSError, subprocess.CalledProcessError):
         raise NotTriedError("another user cannot run this Python") from None
-    made = folder / "closed"
-    made.mkdir(mode=0o755)
-    return made
+    subfolder = folder / "closed"
+    subfolder.mkdir(mode=0o755)
+    return subfolder
 
 
-def left(folder: Path) -> list[str]:
+def files_in(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
 def full_disk_in_a_build(folder: Path) -> str:
     with small_disk(folder, "96k") as disk:
-        said = run(*build(disk / "rough.nc"), code=1)
+        line = run(*build(disk / "rough.nc"), code=1)
         assert (
             "No space left on device; repair that and give the same command again: it resumes"
-            in said
-        ), said
-        assert not [name for name in left(disk) if name.endswith(".growing")], left(disk)
-        kept = len(left(disk))
+            in line
+        ), line
+        assert not [name for name in files_in(disk) if name.endswith(".growing")], files_in(disk)
+        parts = len(files_in(disk))
         subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
         run(*build(disk / "rough.nc"))
-        assert left(disk) == ["rough.nc"]
+        assert files_in(disk) == ["rough.nc"]
         run(*build(folder / "whole.nc"))
         assert checksum(disk / "rough.nc") == checksum(folder / "whole.nc")
     return (
-        f"one line; {kept} finished parts kept; with more space the same command gives the "
+        f"one line; {parts} finished parts kept; with more space the same command gives the "
         "same table"
     )
 
@@ -127,19 +127,19 @@ def lost_permission(folder: Path) -> str:
         ("-c", program, SMALLEST, shut / "new.nc"),
         ("-m", "mumacro", "eval", source, "-o", shut / "out.csv"),
     ):
-        found = run(*words, nobody=True, code=1)
-        assert "Permission denied" in found, found
-        assert left(shut) == []
+        line = run(*words, nobody=True, code=1)
+        assert "Permission denied" in line, line
+        assert files_in(shut) == []
     return "one line; no file left"
 
 
 def two_builds_to_one_output(folder: Path) -> str:
     with alone_in(folder / "rough.nc.checkpoint"):
-        said = run(*build(folder / "rough.nc"), code=1)
+        line = run(*build(folder / "rough.nc"), code=1)
     assert (
-        "rough.nc.checkpoint: another process is at work here; wait for it, or stop it" in said
-    ), said
-    assert left(folder) == []
+        "rough.nc.checkpoint: another process is at work here; wait for it, or stop it" in line
+    ), line
+    assert files_in(folder) == []
     return "the second is refused with one line"
 
 
@@ -168,7 +168,7 @@ def killed_builds(folder: Path, kills: int = 20) -> str:
         resumed += parts() > 0
     run(*build(out))
     assert checksum(out) == checksum(folder / "whole.nc")
-    assert left(folder) == ["rough.nc", "whole.nc"], left(folder)
+    assert files_in(folder) == ["rough.nc", "whole.nc"], files_in(folder)
     return (
         f"{kills} kills, {resumed} starts from finished parts, {done} after an end: the same "
         "data, no file left"
@@ -184,7 +184,7 @@ FAULTS: dict[str, Callable[[Path], str]] = {
 QUICK = [*FAULTS][2:]
 
 
-def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
+def outcome_of(fault: Callable[[Path], str]) -> tuple[str, str]:
     """Result of the trial ("held" if it passed), and what was seen."""
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -196,7 +196,7 @@ def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
 
 
 def faults() -> str:
-    rows = [[name, *tried(fault)] for name, fault in FAULTS.items()]
+    rows = [[name, *outcome_of(fault)] for name, fault in FAULTS.items()]
     return markdown(("fault", "result", "what was seen"), rows, 3)
 
 

@@ -27,10 +27,11 @@ POST, SECOND = (
     b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n",
 )
 TEXTS = [
-    POST + LENGTH + b"\r\n" + BODY, POST + LENGTH + CHUNKED + b"\r\n" + chunk(BODY) + chunk(b""),
+    POST + LENGTH + b"\r\n" + BODY,
+    POST + LENGTH + CHUNKED + b"\r\n" + chunk(BODY) + chunk(b""),
     POST + CHUNKED + b"\r\n" + chunk(BODY[:20]) + chunk(BODY[20:]) + chunk(b""),
     b"GET /v1/mu-macro?mu0=0.3&Fz=10&k=1e6&y0=2e-6&omega=1e5&v0=0.01 HTTP/1.1\r\nHost: x\r\n\r\n",
-]  # fmt: skip
+]
 PIECES = [
     *(bytes([byte]) for byte in b" \t\r\n\0:;,x05-+/\x0b\x7f\xff"),
     b"",
@@ -63,7 +64,7 @@ def by_h11(text: bytes) -> list[Request]:
     Without what RFC 9112 (2.2, 3) and RFC 9110 (5.6.1) let a server ignore: empty lines, spaces,
     elements of a list.
     """
-    found: list[Request] = []
+    requests: list[Request] = []
     with suppress(h11.RemoteProtocolError):
         while text:
             line, end, rest = text.lstrip(b"\r\n").partition(b"\n")
@@ -74,14 +75,14 @@ def by_h11(text: bytes) -> list[Request]:
             request = connection.next_event()
             if not isinstance(request, h11.Request):
                 break
-            found.append((request.method, request.target, None))
+            requests.append((request.method, request.target, None))
             while isinstance(event := connection.next_event(), h11.Data):
                 body += event.data
             if not isinstance(event, h11.EndOfMessage):
                 break
-            found[-1] = request.method, request.target, body
+            requests[-1] = request.method, request.target, body
             text = b"" if connection.their_state is h11.MUST_CLOSE else connection.trailing_data[0]
-    return found
+    return requests
 
 
 def answers(server: Server, text: bytes, chance: random.Random) -> list[tuple[int, bytes]]:
@@ -92,8 +93,8 @@ def answers(server: Server, text: bytes, chance: random.Random) -> list[tuple[in
             for start, end in zip([0, *cuts], [*cuts, len(text)], strict=True):
                 raw.sendall(text[start:end])
             raw.shutdown(socket.SHUT_WR)
-        found = re.split(rb"(?=HTTP/1\.1 \d{3} )", to_end(raw))[1:]
-    return [(int(answer[9:12]), answer.partition(b"\r\n\r\n")[2]) for answer in found]
+        replies = re.split(rb"(?=HTTP/1\.1 \d{3} )", to_end(raw))[1:]
+    return [(int(answer[9:12]), answer.partition(b"\r\n\r\n")[2]) for answer in replies]
 
 
 @cache
@@ -110,9 +111,9 @@ def compared(server: Server, seed: int) -> str:
     for status, body in answers(server, text, chance):
         if status in (408, 431) or b":malformed-http" in body:
             break
-        known = expected[count] if count < len(expected) else (b"", b"", None)
-        plain = answer_to(server, known) if known[0] else (0, b"")
-        early = known[0] == b"POST" and known[2] is None and status < 400
+        request = expected[count] if count < len(expected) else (b"", b"", None)
+        plain = answer_to(server, request) if request[0] else (0, b"")
+        early = request[0] == b"POST" and request[2] is None and status < 400
         # a problem has the id of its request
         if early or status != plain[0] or (status < 400 and body != plain[1]):
             return (
@@ -126,10 +127,10 @@ def compared(server: Server, seed: int) -> str:
 def framing(share: float) -> str:
     """Requests with changes in their framing, often a second one behind them."""
     with serving(TABLE) as server:
-        found = Counter(compared(server, seed) for seed in range(round(TOTAL * share)))
+        counts = Counter(compared(server, seed) for seed in range(round(TOTAL * share)))
         errors, code = server.errors(), server.stop()
-    rows = [(name[:1000], f"{count:,}") for name, count in found.most_common(5)]
-    failed = " FAILED" if errors or code or found.keys() - {"the same", "fewer here"} else ""
+    rows = [(name[:1000], f"{count:,}") for name, count in counts.most_common(5)]
+    failed = " FAILED" if errors or code or counts.keys() - {"the same", "fewer here"} else ""
     return (
         f"{markdown(('requests', 'texts'), rows)}\n\n{len(errors)} errors in the log, exit "
         f"code {code}.{failed}"

@@ -91,9 +91,9 @@ def connected(server: Server) -> HTTPConnection:
 
 def expected(server: Server) -> dict[str, bytes]:
     """What an idle service answers."""
-    found = {name: ask(connected(server), question) for name, question in QUESTIONS.items()}
-    assert {status for status, _ in found.values()} == {200}, found
-    return {name: body for name, (_, body) in found.items()}
+    replies = {name: ask(connected(server), question) for name, question in QUESTIONS.items()}
+    assert {status for status, _ in replies.values()} == {200}, replies
+    return {name: body for name, (_, body) in replies.items()}
 
 
 @contextmanager
@@ -101,12 +101,12 @@ def clients(loop: Callable[[int, threading.Event], None], number: int = CLIENTS)
     """Many clients in loops of their own, until the context ends."""
     stop = threading.Event()
     with ThreadPoolExecutor(number) as pool:
-        asked = [pool.submit(loop, i, stop) for i in range(number)]
+        loops = [pool.submit(loop, i, stop) for i in range(number)]
         try:
             yield
         finally:
             stop.set()
-        for one in asked:
+        for one in loops:
             one.result()
 
 
@@ -172,9 +172,9 @@ def overload(minutes: float) -> str:
         with clients(loop, 17):
             time.sleep(60.0 * minutes)
         most, code = server.memory("VmHWM"), server.stop()
-    told = "; ".join(f"{name}, {what}: {n:,}" for (name, what), n in sorted(counts.items()))
+    totals = "; ".join(f"{name}, {what}: {n:,}" for (name, what), n in sorted(counts.items()))
     return (
-        f"{told}. Longest wait of one case {1e3 * max(waits):.0f} ms, most memory {most:.0f} "
+        f"{totals}. Longest wait of one case {1e3 * max(waits):.0f} ms, most memory {most:.0f} "
         f"MB, exit code {code}."
     )
 

@@ -149,11 +149,11 @@ def arrow(chance: random.Random) -> bytes:
     rng = np.random.default_rng(chance.randrange(1 << 30))
     kinds = [pa.float64()] * 8 + [pa.float32(), pa.int64(), pa.uint8(), pa.float16()]
     columns = {name: 10.0 ** rng.uniform(-1, 1, n) for name in CASE}
-    made = {
+    arrays = {
         name: pa.array(x, mask=x > 8.0).cast(chance.choice(kinds), safe=False)
         for name, x in columns.items()
     }
-    table, sink = pa.table(made), pa.BufferOutputStream()
+    table, sink = pa.table(arrays), pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, table.schema) as writer:
         for _ in range(chance.choice([1, 1, 2])):
             writer.write_table(table)
@@ -502,7 +502,7 @@ def wire(request: Request) -> bytes:
     )
 
 
-def asked(raw: socket.socket, request: Request) -> tuple[int, bool, str]:
+def exchange(raw: socket.socket, request: Request) -> tuple[int, bool, str]:
     """Status, whether the connection stays open, and what is wrong with the response, empty if
     nothing is."""
     try:
@@ -523,7 +523,7 @@ def asked(raw: socket.socket, request: Request) -> tuple[int, bool, str]:
     )
 
 
-class Found:
+class Tally:
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.statuses: Counter[int] = Counter()
@@ -541,7 +541,7 @@ class Found:
                     while batch and keeps:
                         name, request = batch.pop()
                         started, busy = time.perf_counter(), server.busy()
-                        status, keeps, fault = asked(raw, request)
+                        status, keeps, fault = exchange(raw, request)
                         # what a first request of its kind imports takes long, too
                         if time.perf_counter() - started > HANG_S and self.counts.total() >= PART:
                             self.slowest = max(self.slowest, server.busy() - busy)
@@ -556,25 +556,25 @@ class Found:
 
 def strange_requests(share: float, again: int = 0) -> str:
     """All kinds over sockets to one service; or one share ``again``."""
-    total, found, before = max(200, round(TOTAL * share)), Found(), 0.0
+    total, tally, before = max(200, round(TOTAL * share)), Tally(), 0.0
     with serving(TABLE) as server:
         for seed in [again] if again else range(1, 1 + -(-total // PART)):
-            found.ask(server, seed, min(PART, total))
+            tally.ask(server, seed, min(PART, total))
             before = before or server.memory()
         grown = server.memory() - before
         assert server.ask("GET", "/readyz")[0] == 200
         errors, code = server.errors(), server.stop()
-    for fault, text in found.bad[:50]:
+    for fault, text in tally.bad[:50]:
         progress(f"{fault}: {text}")
-    told = ", ".join(f"{status}: {count:,}" for status, count in sorted(found.statuses.items()))
+    statuses = ", ".join(f"{status}: {count:,}" for status, count in sorted(tally.statuses.items()))
     text = (
-        f"Statuses: {told}. Wrong responses, crashes and responses that took more than "
-        f"{HANG_S:.0f} s: {len(found.bad)}. The service took {grown:.0f} MB more than after its "
+        f"Statuses: {statuses}. Wrong responses, crashes and responses that took more than "
+        f"{HANG_S:.0f} s: {len(tally.bad)}. The service took {grown:.0f} MB more than after its "
         f"first thousand; {len(errors)} unexpected errors in its log, exit code {code}."
     )
-    if found.bad or errors or code:
-        text += f" FAILED: {Counter(fault for fault, _ in found.bad)} {errors[:3]}"
-    rows = [[name, f"{found.counts[name]:,}"] for name in KINDS]
+    if tally.bad or errors or code:
+        text += f" FAILED: {Counter(fault for fault, _ in tally.bad)} {errors[:3]}"
+    rows = [[name, f"{tally.counts[name]:,}"] for name in KINDS]
     return f"{markdown(('what is changed', 'requests'), rows)}\n\n{text}"
 
 

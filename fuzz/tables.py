@@ -68,7 +68,7 @@ class Outcome(NamedTuple):
     """
 
     what: str
-    said: str
+    reason: str
     seconds: float
     megabytes: float
 
@@ -93,8 +93,10 @@ def in_other_process(*arguments: object) -> list[Outcome]:
     done = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False
     )
-    found = [Outcome(*json.loads(line)) for line in done.stdout.splitlines()]
-    return found if done.returncode == 0 else [*found, Outcome(DIED, done.stderr[-300:], 0.0, 0.0)]
+    outcomes = [Outcome(*json.loads(line)) for line in done.stdout.splitlines()]
+    if done.returncode != 0:
+        outcomes.append(Outcome(DIED, done.stderr[-300:], 0.0, 0.0))
+    return outcomes
 
 
 def ask(table: Surrogate) -> None:
@@ -123,7 +125,7 @@ def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
     started = time.process_time()
     try:
         table = parse_table(image, path)
-        what, said = SAME, ""
+        what, reason = SAME, ""
         if table.attributes["content_sha256"] != expected.checksum:
             ask(Surrogate(table, path))
             what = DIFFERS
@@ -132,13 +134,13 @@ def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
             for name, value in expected.table.attributes.items()
             if not np.array_equal(np.asarray(table.attributes.get(name)), np.asarray(value))
         ]:
-            what, said = TEXTS, ", ".join(names)
+            what, reason = TEXTS, ", ".join(names)
     except TableError as error:
-        what, said = REFUSED, error.reason
+        what, reason = REFUSED, error.reason
     except BaseException as error:  # any other exception is a failure
-        what, said = ESCAPED, f"{type(error).__name__}: {error}"
+        what, reason = ESCAPED, f"{type(error).__name__}: {error}"
     more = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    return Outcome(what, said[:300], time.process_time() - started, more / 1024.0)
+    return Outcome(what, reason[:300], time.process_time() - started, more / 1024.0)
 
 
 def open_all(arguments: Sequence[str]) -> None:
@@ -165,22 +167,25 @@ def damaged(share: float, change: str) -> list[Outcome]:
         return [one for outcomes in parts for one in outcomes]
 
 
-def row(name: str, found: Sequence[Outcome]) -> list[str]:
-    count = Counter(outcome.what for outcome in found)
-    numbers = [len(found), *(count[what] for what in (REFUSED, SAME, TEXTS))]
+def row(name: str, outcomes: Sequence[Outcome]) -> list[str]:
+    count = Counter(outcome.what for outcome in outcomes)
+    numbers = [len(outcomes), *(count[what] for what in (REFUSED, SAME, TEXTS))]
     numbers.append(sum(count[what] for what in (DIFFERS, ESCAPED, DIED)))
-    worst = max(outcome.seconds for outcome in found), max(outcome.megabytes for outcome in found)
+    worst = (
+        max(outcome.seconds for outcome in outcomes),
+        max(outcome.megabytes for outcome in outcomes),
+    )
     return [name, *(f"{n:,}" for n in numbers), f"{worst[0]:.2f}", f"{worst[1]:.0f}"]
 
 
 def damaged_tables(share: float) -> str:
     rows = [row(name, damaged(share, change)) for change, name in CHANGES.items()]
-    left_out = (
+    note = (
         ""
         if share == 1.0
         else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
     )
-    return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time."
+    return f"{markdown(HEAD, rows)}\n\n{note}Seconds are processor time."
 
 
 # --- files made to harm the program that opens them: memory, time, stack, other files, wrong types
@@ -228,9 +233,9 @@ def replaced(file: h5py.File, name: str, packed: bytes, **options: Any) -> None:
     """Replace the variable of this name; its only chunk is written as the given bytes, if there are
     any."""
     del file[name]
-    made = file.create_dataset(name, dtype="f8", **options)
+    variable = file.create_dataset(name, dtype="f8", **options)
     if packed:
-        made.id.write_direct_chunk((0,) * made.ndim, packed)
+        variable.id.write_direct_chunk((0,) * variable.ndim, packed)
 
 
 def many_nodes(table: Table) -> None:
@@ -353,25 +358,29 @@ HOSTILE: dict[str, Make] = {
 }
 #: a table with other numbers and a matching checksum is a different table; any answer is allowed
 ANOTHER = {
-    "numbers of 1.7e308, checksum right", "random numbers of 1e100, checksum right",
-    "amplitudes of 1e300, checksum right", "errors of 1e308, checksum right",
-}  # fmt: skip
+    "numbers of 1.7e308, checksum right",
+    "random numbers of 1e100, checksum right",
+    "amplitudes of 1e300, checksum right",
+    "errors of 1e308, checksum right",
+}
 #: what lies beside the parts that are read, is not read
 HARMLESS = {
-    "a group that contains itself", "a group that contains the root", "3,000 nested groups",
+    "a group that contains itself",
+    "a group that contains the root",
+    "3,000 nested groups",
     "3,000 groups among the blocks",
-}  # fmt: skip
+}
 
 
 def opened(folder: Path) -> list[Outcome]:
     """Of all crafted files; after a crash, a new process continues with the next file."""
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     paths = [folder / f"{i}.nc" for i in range(len(HOSTILE))]
     for path, make in zip(paths, HOSTILE.values(), strict=True):
         make(path)
-    while len(found) < len(paths):
-        found += in_other_process(*paths[len(found) :])
-    return found
+    while len(outcomes) < len(paths):
+        outcomes += in_other_process(*paths[len(outcomes) :])
+    return outcomes
 
 
 def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
@@ -381,7 +390,7 @@ def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
             [
                 name,
                 one.what,
-                one.said.replace("|", "/")[:90],
+                one.reason.replace("|", "/")[:90],
                 f"{one.seconds:.2f}",
                 f"{one.megabytes:.0f}",
             ]

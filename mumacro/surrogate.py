@@ -830,14 +830,14 @@ class Surrogate:
                 f"spring: the table {self.path.name} has no ball, which a table of this program's "
                 "builder has; python -m builder ball adds it to a table",
             )
-        found = self._ball
-        if found is None:
+        data = self._ball
+        if data is None:
             rows = block_rows(self.table.ball, atlas.BALL_CHARTS)
-            found = self._ball = Data(*self.border.arrays, rows, outer_cells())
-        if quantity not in found.quantities:
+            data = self._ball = Data(*self.border.arrays, rows, outer_cells())
+        if quantity not in data.quantities:
             cells = quantity_cells(self.table.ball, quantity, atlas.BALL_CHARTS)
-            found.put(quantity, *cells)
-        return found
+            data.put(quantity, *cells)
+        return data
 
     def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
         """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~

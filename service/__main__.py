@@ -70,7 +70,8 @@ def main(arguments: Sequence[str] | None = None, prog: str = "python -m service"
 
 def _address(settings: Settings) -> str:
     """Where this machine reaches the service."""
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)  # noqa: S104  (compared, never bound)
+    any_address = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104  (compared, never bound)
+    host = any_address.get(settings.host, settings.host)
     return f"http://{f'[{host}]' if ':' in host else host}:{settings.port}"
 
 

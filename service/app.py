@@ -35,9 +35,14 @@ from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 
 ROUTERS = (
-    case.router, batch.router, questions.router, motion.router, contact.router, table.router,
+    case.router,
+    batch.router,
+    questions.router,
+    motion.router,
+    contact.router,
+    table.router,
     health.router,
-)  # fmt: skip
+)
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and "
     "oscillates across or along the sliding direction, or its normal force does; the contact is "
@@ -131,10 +136,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     }
     state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
     state.metrics = Metrics({*methods, *page.OPEN})
-    app.openapi = lambda: _described(app, closed=bool(settings.keys()))  # type: ignore[method-assign]
+    keys = settings.keys()
+    app.openapi = lambda: _described(app, closed=bool(keys))  # type: ignore[method-assign]
     # the last one is the outermost
     app.add_middleware(HeadAsGet)
-    if keys := settings.keys():
+    if keys:
         app.add_middleware(Keys, keys=keys, open_paths=opened)
     app.add_middleware(Heads)
     app.add_middleware(Room)
@@ -146,10 +152,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             allow_origins=list(settings.cors_origins),
             allow_methods=["GET", "HEAD", "POST"],
             allow_headers=[
-                "Content-Type", "X-API-Key", "Authorization", "If-None-Match", "X-Request-ID",
+                "Content-Type",
+                "X-API-Key",
+                "Authorization",
+                "If-None-Match",
+                "X-Request-ID",
             ],
             expose_headers=["ETag", "X-Request-ID", "Retry-After"],
-        )  # fmt: skip
+        )
     return app
 
 

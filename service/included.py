@@ -20,7 +20,7 @@ from mumacro.analysis.settling import settling as decay
 from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
-from mumacro.inputs.kind import SPRING, Kind, kind_of
+from mumacro.inputs.kind import SPRING, Kind
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, ROUNDING
 from mumacro.table.atlas import SOURCES as _SOURCES
@@ -230,8 +230,7 @@ class Plan(NamedTuple):
     @classmethod
     def of(cls, options: Any, inputs: Mapping[str, Any]) -> "Plan":
         """What options ask of such inputs; InputError where the cases do not have it."""
-        kind = kind_of(options.contact, options.direction)
-        interval = not _INTERVAL.isdisjoint(inputs)
+        kind, interval = options.kind, not _INTERVAL.isdisjoint(inputs)
         if kind == SPRING and not interval and not options.include:
             return _PLAIN
         names = options.include or ()

@@ -37,13 +37,14 @@ def shared_counters() -> Iterator[None]:
 
     Without a writable folder every worker reports its own counters.
     """
-    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108  (a folder of its own is made there)
+    memory = "/dev/shm"  # noqa: S108  (a folder of its own is made there)
+    place = memory if os.access(memory, os.W_OK) else None
     with ExitStack() as stack:
         with suppress(OSError):
-            made = tempfile.TemporaryDirectory(
+            folder = tempfile.TemporaryDirectory(
                 prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True
             )
-            os.environ[_SHARED] = stack.enter_context(made)
+            os.environ[_SHARED] = stack.enter_context(folder)
         yield
 
 

@@ -173,9 +173,9 @@ def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
         return "must be an object"
     if kind in ("too_short", "too_long"):
         least, most = (error["ctx"].get(end) for end in ("min_length", "max_length"))
-        return f"must have at least {least} entries" if most is None else (
-            f"may have up to {most} entries"
-        )  # fmt: skip
+        if most is None:
+            return f"must have at least {least} entries"
+        return f"may have up to {most} entries"
     if kind == "list_type":
         return "must be a list"
     message: str = error["msg"]

@@ -29,22 +29,22 @@ class _Transport:
     not two."""
 
     def __init__(self, transport: Any, loop: Any) -> None:
-        self._transport, self._loop, self._kept = transport, loop, b""
+        self._transport, self._loop, self._pending = transport, loop, b""
         self.is_closing = transport.is_closing
 
     def write(self, data: bytes) -> None:
         """Keep the first piece until the next one, or until the loop goes on."""
-        if not self._kept:
+        if not self._pending:
             self._loop.call_soon(self.flush)
-            self._kept = data
+            self._pending = data
         else:
             self.flush(data)
 
     def flush(self, data: bytes = b"") -> None:
-        """Send what is kept, and this, unless the client has left meanwhile."""
-        kept, self._kept = self._kept, b""
-        if kept and not self.is_closing():
-            self._transport.write(kept + data)
+        """Send what is pending, and this, unless the client has left meanwhile."""
+        head, self._pending = self._pending, b""
+        if head and not self.is_closing():
+            self._transport.write(head + data)
 
     def close(self) -> None:
         """Close when all is sent."""

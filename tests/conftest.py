@@ -56,8 +56,8 @@ def started(tables_dir: Path) -> "Callable[..., TestClient]":
 @pytest.fixture(scope="session")
 def client(started: "Callable[..., TestClient]") -> "Iterator[TestClient]":
     """A client of one with default settings, after its start."""
-    with started() as made:
-        yield made
+    with started() as one:
+        yield one
 
 
 @pytest.fixture(scope="session")
@@ -210,11 +210,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 #: reasons of skips that a run with CI=true may have: what no package index offers there, other
 #: users, other systems
 EXPECTED_SKIPS = (
-    r"soffice is not installed", r"curl [\d.]+ has no --json",
-    r"mounting a small file system", r"only root may run", r"another user cannot run",
-    r"this user may write everywhere", r"Python 3\.\d+ is neither on the PATH nor in pyenv",
-    r"the amplitude is not small compared with the speed", r"no x86 processor",
-)  # fmt: skip
+    r"soffice is not installed",
+    r"curl [\d.]+ has no --json",
+    r"mounting a small file system",
+    r"only root may run",
+    r"another user cannot run",
+    r"this user may write everywhere",
+    r"Python 3\.\d+ is neither on the PATH nor in pyenv",
+    r"the amplitude is not small compared with the speed",
+    r"no x86 processor",
+)
 
 
 def unexpected_skips(config: pytest.Config) -> list[str]:

@@ -89,9 +89,9 @@ class Opened:
         new: bool = False,
         wait: bool = True,
     ) -> Any:
-        wanted = (width, height, url or self.url, path)
+        view = (width, height, url or self.url, path)
         page = Page(self.browser, url or self.url)
-        if new or wanted != self.shown or path:
+        if new or view != self.shown or path:
             self.browser.get("about:blank")
             metrics = {
                 "width": width,
@@ -103,7 +103,7 @@ class Opened:
             page.scheme("light")
             page.complaints()
             self.browser.get(f"{url or self.url}/{path}{address}")
-            self.shown = wanted
+            self.shown = view
         else:
             page.run(
                 "history.replaceState(null, '', location.pathname); scrollTo(0, 0);"
@@ -156,15 +156,17 @@ class Page:
             "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"
         )
         assert [
-            told for told in self.complaints() if not re.search(r"status of (401|422|50\d)", told)
+            complaint
+            for complaint in self.complaints()
+            if not re.search(r"status of (401|422|50\d)", complaint)
         ] == []
         return self
 
-    def until(self, found: Any, told: Any) -> Any:
-        """What ``found()`` is as soon as it is true."""
+    def until(self, condition: Any, message: Any) -> Any:
+        """What ``condition()`` is as soon as it is true."""
         deadline = time.monotonic() + PATIENCE_S
-        while not (value := found()):
-            assert time.monotonic() < deadline, told()
+        while not (value := condition()):
+            assert time.monotonic() < deadline, message()
             time.sleep(0.03)
         return value
 

@@ -12,9 +12,11 @@ import pyarrow as pa
 Row = dict[str, Any]
 BATCH = "/v1/mu-macro/batch"
 TYPES = {
-    "json": "application/json", "csv": "text/csv", "ndjson": "application/x-ndjson",
+    "json": "application/json",
+    "csv": "text/csv",
+    "ndjson": "application/x-ndjson",
     "arrow": "application/vnd.apache.arrow.stream",
-}  # fmt: skip
+}
 
 
 def number(value: Any) -> Any:
@@ -60,7 +62,7 @@ def posted(client: Any, form: str, body: Any, **params: Any) -> Any:
     return client.post(BATCH, content=body, params=params, headers={"Content-Type": TYPES[form]})
 
 
-def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
+def answered_rows(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
     response = posted(client, form, WRITERS[form](rows), **params)
     assert (response.status_code, response.headers["content-type"]) == (200, TYPES[form]), (
         response.text

@@ -42,11 +42,11 @@ class Server:
                 start_new_session=True,
             )
         while (
-            found := re.search(r"(?i)running on http://[^ ]+:(\d+)[ /]", log.read_text("utf-8"))
+            address := re.search(r"(?i)running on http://[^ ]+:(\d+)[ /]", log.read_text("utf-8"))
         ) is None:
             assert self.process.poll() is None, log.read_text("utf-8")
             self.in_time()
-        self.port = int(found[1])
+        self.port = int(address[1])
         self.url = f"http://127.0.0.1:{self.port}"
 
     def in_time(self, pause: float = 0.02) -> None:
@@ -174,12 +174,12 @@ def asking(server: Server, pause: float = 0.02) -> Iterator[list[float]]:
             waits.append(time.perf_counter() - started)
 
     with ThreadPoolExecutor(1) as pool:
-        asked = pool.submit(ask)
+        loop = pool.submit(ask)
         try:
             yield waits
         finally:
             stop.set()
-        asked.result()
+        loop.result()
 
 
 def connect(server: Server, receive_buffer: int | None = None) -> socket.socket:

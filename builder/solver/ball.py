@@ -18,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from mumacro import Surrogate
+from mumacro import Surrogate, TableError
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
@@ -28,6 +28,10 @@ from mumacro.table.polynomials import quantity_cells
 from .compiled import solver_kernel
 
 CORNER = atlas.BLOCK_NAMES.index("corner")
+#: what a ball is solved for: every tabulated quantity, and 1 - mu~ with its own digits
+NAMES = (*atlas.QUANTITY_NAMES, "deficit")
+#: what a spring adds in proportion to its length scale, too: s once more
+_WITH_LENGTH = ("power",)
 POINTS = 73  # on either side of the middle of a piece
 #: tolerance from which as many are enough
 FEWER_POINTS = {1e-5: 34, 1e-8: 46}
@@ -53,9 +57,19 @@ def points_for(tolerance: float) -> int:
 
 
 class Springs:
-    """One spring at many points from the table of ``fine``: mu~, 1 - mu~, power, stick fraction."""
+    """One spring at many points from the table of ``fine``: :data:`NAMES`.
+
+    Raises
+    ------
+    TableError
+        The table is older than one of the quantities.
+    """
 
     def __init__(self, fine: Surrogate) -> None:
+        lacking = [name for name in atlas.QUANTITY_NAMES if name not in fine.table.quantities]
+        if lacking:
+            reason = f"has no {', '.join(lacking)}: build this table anew, before any coarser one"
+            raise TableError(fine.path, reason)
         self.fine, self._data = fine, fine._data
         self._cells = [
             np.ascontiguousarray(quantity_cells(fine.table.blocks, code)[0])
@@ -66,22 +80,20 @@ class Springs:
         """v~crit of one spring."""
         return self.fine.border(y)
 
-    def __call__(self, v: Array, y: Array, eta: Array) -> tuple[Array, Array, Array, Array]:
+    def __call__(self, v: Array, y: Array, eta: Array) -> dict[str, Array]:
         """At points (n,) with v~, y~ > 0, finite; eta = y~ - 1 counts in the corner."""
         block, a, b = kernels[-1].places(self._data, v, y)
         at = np.flatnonzero(block == CORNER)
         a[at], b[at] = _corner(v[at], eta[at])
-        out = [np.zeros(v.size) for _ in range(3)]
-        deficit = np.empty(v.size)
+        out = {name: np.zeros(v.size) for name in NAMES}
         rows = self._data.blocks
         for index in np.unique(block):
             at = np.flatnonzero(block == index)
             vs, ys = v[at], y[at]
             if index >= len(atlas.CHARTS):
-                values = [self.fine.quantity(name, vs, ys)[0] for name in atlas.QUANTITY_NAMES]
-                for found, value in zip(out, values, strict=True):
-                    found[at] = value
-                deficit[at] = _fast_deficit(vs, ys)
+                for name in atlas.QUANTITY_NAMES:
+                    out[name][at] = self.fine.quantity(name, vs, ys)[0]
+                out["deficit"][at] = _fast_deficit(vs, ys)
                 continue
             for code, quantity in enumerate(atlas.QUANTITIES):
                 if not atlas.CHARTS[index].holds(quantity):
@@ -89,11 +101,11 @@ class Springs:
                 base, factor = kernels[-1].forms(code, int(index), vs, ys, eta[at])
                 q = np.empty(at.size)
                 _cell_values(self._cells[code], rows[index], a[at], b[at], q)
-                out[code][at] = base + factor * q
+                out[quantity.name][at] = base + factor * q
                 if code == atlas.MU:
                     plain = 1.0 - base - factor * q
-                    deficit[at] = np.where(base == 1.0, -factor * q, plain)
-        return out[0], deficit, out[1], out[2]
+                    out["deficit"][at] = np.where(base == 1.0, -factor * q, plain)
+        return out
 
 
 def _corner(v: Array, eta: Array) -> tuple[Array, Array]:
@@ -132,14 +144,16 @@ def _fast_deficit(v: Array, y: Array) -> Array:
     for k in range(1, 24):  # (2/pi) K(i r) in powers of r^2
         terms = terms * -n * ((2 * k - 1) / (2 * k)) ** 2
         total = total - terms
-    found = kernels[-1].outer_expansion(r)
+    expansion = kernels[-1].outer_expansion(r)
     return np.where(
-        n < 0.1, total - (found[:, 1] + 0.5 * found[:, 2]) * share, 1.0 - _mu_fast(found, share)
+        n < 0.1,
+        total - (expansion[:, 1] + 0.5 * expansion[:, 2]) * share,
+        1.0 - _mu_fast(expansion, share),
     )
 
 
-def _mu_fast(found: Array, share: Array) -> Array:
-    return found[:, 0] + (found[:, 1] + 0.5 * found[:, 2]) * share
+def _mu_fast(expansion: Array, share: Array) -> Array:
+    return expansion[:, 0] + (expansion[:, 1] + 0.5 * expansion[:, 2]) * share
 
 
 class Ball:
@@ -191,8 +205,7 @@ class Ball:
         return np.stack([*decades, np.zeros(v.shape)], axis=1)
 
     def solve(self, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
-        """mu_ratio, deficit, power, stick_fraction at V = ``v``, Y = ``y``, of one shape; eta = Y -
-        1."""
+        """:data:`NAMES` at V = ``v``, Y = ``y``, of one shape; eta = Y - 1."""
         v, y = np.broadcast_arrays(v, y)
         shape = v.shape
         eta = y - 1.0 if eta is None else np.broadcast_to(eta, shape)
@@ -206,7 +219,7 @@ class Ball:
         return {name: row.reshape(shape) for name, row in zip(NAMES, rows, strict=True)}
 
     def _solve(self, v: Array, y: Array, eta: Array) -> Array:
-        edges, out = self._edges(v, y), np.zeros((4, v.size))
+        edges, out = self._edges(v, y), np.zeros((len(NAMES), v.size))
         # xi and 1 - xi of the edges, each with its own digits; eta = y - 1 has those of s = y
         at_corner = edges == y[:, None]
         lacking = np.where(at_corner, -eta[:, None], 1.0 - edges)
@@ -234,12 +247,9 @@ class Ball:
             near = np.abs(excess) < 0.3 * s
             amplitude = np.where(near, 1.0 + excess / s, y[at, None] / s)
             off = np.where(near, excess / s, amplitude - 1.0)
-            found = self.springs((v[at, None] / s).ravel(), amplitude.ravel(), off.ravel())
+            integrands = self.springs((v[at, None] / s).ravel(), amplitude.ravel(), off.ravel())
             share = MIDDLE * s * length * self._weight
-            weights = (share, share, share * MIDDLE * s, share)
-            for row, values, weight in zip(out, found, weights, strict=True):
-                row[at] += (values.reshape(s.shape) * weight).sum(axis=1)
+            for row, name in zip(out, NAMES, strict=True):
+                weight = share * MIDDLE * s if name in _WITH_LENGTH else share
+                row[at] += (integrands[name].reshape(s.shape) * weight).sum(axis=1)
         return out
-
-
-NAMES = ("mu_ratio", "deficit", "power", "stick_fraction")

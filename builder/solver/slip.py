@@ -106,14 +106,14 @@ def _add_integrals(
 
 
 @solver_kernel
-def _stiff_length(sigma: float, ratio: float, left: float) -> float:
+def _stiff_length(sigma: float, ratio: float, remaining: float) -> float:
     """Length of a collocation step [rad] from ``sigma``: the turn's layer is ``ratio`` = v~/y~
     [rad] wide."""
     gap = math.hypot(sigma, ratio) if ratio < 1.0 else 1.0
     # away from the turn behind a step may be as long as the way back to it; towards the next one
     # half the way to it
     ahead = 0.5 * (math.pi - sigma) if sigma > 0.0 else 0.5 * gap
-    return min(gap, max(ahead, 0.5 * gap) if sigma > 0.0 else ahead, left, 0.8)
+    return min(gap, max(ahead, 0.5 * gap) if sigma > 0.0 else ahead, remaining, 0.8)
 
 
 @solver_kernel
@@ -151,18 +151,18 @@ def slip(
         series.series(v, y, sign * math.sin(sigma), sign * math.cos(sigma), x, chart, w)
         lam = w[series.SPEED, 0]
         h = series.step_length(w, layer, lam)
-        left = end - (sigma + turn * math.pi)
-        jump, stop = _stiff_length(sigma, ratio, left), -1.0
+        remaining = end - (sigma + turn * math.pi)
+        jump, stop = _stiff_length(sigma, ratio, remaining), -1.0
         if lam * jump > STIFF and out[PATH] > FORGOTTEN:
-            last, h = jump == left, jump
+            last, h = jump == remaining, jump
             x_end, least = collocate(v, y, sign, sigma, x, chart, jump, out[SUM_UX : WORK + 1])
             if math.isnan(x_end):
                 return DIVERGED
             out[MIN_SPEED] = min(out[MIN_SPEED], least)
             turned, x = x_end - x, x_end
         else:
-            last = h >= left
-            h = left if last else h
+            last = h >= remaining
+            h = remaining if last else h
             stop = _standstill(w, h, out)
             if stop >= 0.0 and not to_stick:
                 if math.isnan(out[FALL]):

@@ -113,7 +113,7 @@ class Sweep:
         out = (
             self._run(kind, points)
             if self.checkpoint is None
-            else self._kept(self.checkpoint, kind, points)
+            else self._from_checkpoint(self.checkpoint, kind, points)
         )
         self.n_solves += points.shape[0]
         failed = np.flatnonzero(out[:, _STATUS] != OK)
@@ -131,7 +131,7 @@ class Sweep:
         done = self._pool.map(lambda c: solve_chunk(kind, c), chunks)
         return np.concatenate([np.empty((0, len(COLUMNS))), *done])
 
-    def _kept(self, folder: Path, kind: str, points: Array) -> Array:
+    def _from_checkpoint(self, folder: Path, kind: str, points: Array) -> Array:
         """What the checkpoint holds of these points; else they are solved and stored."""
         # the digest of the sources: results of another version of the solver are not reused
         text = (source_digest() + kind).encode() + np.ascontiguousarray(

@@ -40,7 +40,7 @@ def solve_nodes(
     keep their digits, but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to
     0.
     """
-    chart, found, cancelled = of.charts[index], {}, {}
+    chart, tabulated, cancelled = of.charts[index], {}, {}
     a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
     v, y, eta = chart.point(a[:, None], b[None, :], border)
     solved = of.solve(v, y, eta, continuous=chart.regime == CONTINUOUS)
@@ -53,10 +53,10 @@ def solve_nodes(
             exact = (base == 0.0) | (base == 1.0)
             if chart.a.name in _LOGARITHMIC and quantity.name == "mu_ratio":
                 rest, exact = _small_rest(chart, v, y, solved), np.full(v.shape, True)
-            found[quantity.name] = rest / factor
+            tabulated[quantity.name] = rest / factor
             noise = of.noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
             cancelled[quantity.name] = np.where(exact, 0.0, noise / np.abs(factor))
-    return a, b, found, cancelled
+    return a, b, tabulated, cancelled
 
 
 #: coordinates of blocks whose base is 1 and a logarithm
@@ -85,11 +85,11 @@ _FOLLOW = interpolation_matrix(WIDTH, _CHECK) @ np.linalg.inv(interpolation_matr
 LINES = 33  # across an axis, along which cells are tried
 
 
-def _fewest(axis: Axis, exact: Callable[[Array], Array], wanted: float, relative: bool) -> int:
+def _fewest(axis: Axis, exact: Callable[[Array], Array], bound: float, relative: bool) -> int:
     """Fewest cells along an axis for which polynomials of a cell's degree follow ``exact``.
 
     ``exact`` (points) -> (points, lines) takes evaluation's coordinate; errors are compared with
-    ``wanted``.
+    ``bound``.
     """
     low, high = axis.span
     step = 2 if axis.knotted else 1  # the knot of sigma is an edge of cells
@@ -104,7 +104,7 @@ def _fewest(axis: Axis, exact: Callable[[Array], Array], wanted: float, relative
         if relative:
             off /= np.abs(truth)
         inside = axis.to_file(check.ravel()).reshape(check.shape) >= axis.low - 1e-12
-        if off[inside].max() <= wanted:
+        if off[inside].max() <= bound:
             return cells
     return MAX_CELLS
 
@@ -114,17 +114,17 @@ def _position(axis: Axis, x: Array) -> Array:
     return (2.0 * axis.to_file(x) - axis.low - axis.high) / (axis.high - axis.low)
 
 
-def _block_cells(chart: Chart, values: Array, axis: int, wanted: float) -> int:
+def _block_cells(chart: Chart, values: Array, axis: int, bound: float) -> int:
     """:func:`_fewest` along one axis of a block, on lines that cover the other."""
     own, lines = (chart.a, chart.b)[axis], np.cos(np.linspace(0.0, np.pi, LINES))
     c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
     across = c @ interpolation_matrix(values.shape[1 - axis], lines).T
     return _fewest(
-        own, lambda x: interpolation_matrix(len(c), _position(own, x)) @ across, wanted, False
+        own, lambda x: interpolation_matrix(len(c), _position(own, x)) @ across, bound, False
     )
 
 
-def _border_cells(piece: int, values: Array, wanted: float) -> int:
+def _border_cells(piece: int, values: Array, bound: float) -> int:
     axis, c = BORDER_PIECES[piece][1], chebyshev_coefficients(values)
 
     def exact(x: Array) -> Array:
@@ -132,13 +132,13 @@ def _border_cells(piece: int, values: Array, wanted: float) -> int:
             :, None
         ]
 
-    return _fewest(axis, exact, wanted, True)
+    return _fewest(axis, exact, bound, True)
 
 
 def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
     """The stored border; its own tolerance is tighter than the table's, since every stick-slip node
     is built on it."""
-    wanted = max(1e-3 * tolerance, 4e-15)
+    bound = max(1e-3 * tolerance, 4e-15)
     pieces = []
     for piece, (_, axis, _) in enumerate(BORDER_PIECES):
         to_infinity = axis.name == "inverse_y"
@@ -150,10 +150,10 @@ def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
                 sweep.solve("border", np.ones_like(y), y)["deficit"]
                 / kernels[-1].border_scales(piece, y)[0]
             )
-            if _tail(chebyshev_coefficients(values), 0) <= wanted or n >= MAX_NODES or to_infinity:
+            if _tail(chebyshev_coefficients(values), 0) <= bound or n >= MAX_NODES or to_infinity:
                 break
             n = _next(n)
-        pieces.append(BorderPiece(x, values, _border_cells(piece, values, wanted)))
+        pieces.append(BorderPiece(x, values, _border_cells(piece, values, bound)))
     return pieces
 
 
@@ -167,22 +167,22 @@ def build_block(
     """Solve nodes until the Chebyshev tail in both directions is below SHARE * tolerance, then cut
     the cells."""
     chart = of.charts[index]
-    wanted = max(SHARE * tolerance, NODE_FLOOR)
+    bound = max(SHARE * tolerance, NODE_FLOOR)
     tail_block = chart.a.name == "inverse_y"
     na, nb = 3 if tail_block else 8, 8
     best, stuck = [math.inf, math.inf], [0, 0]
     while True:
         progress(f"{chart.name} {na} x {nb}")
-        a, b, found, _ = solve_nodes(of, index, (na, nb), border)
-        values = found["mu_ratio"]
-        left = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
+        a, b, tabulated, _ = solve_nodes(of, index, (na, nb), border)
+        values = tabulated["mu_ratio"]
+        tails = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):
             # twice no better by a third: what is left is the solver's rounding, to which more nodes
             # only add
-            stuck[axis] = 0 if left[axis] < 0.67 * best[axis] else stuck[axis] + 1
-            best[axis] = min(best[axis], left[axis])
+            stuck[axis] = 0 if tails[axis] < 0.67 * best[axis] else stuck[axis] + 1
+            best[axis] = min(best[axis], tails[axis])
         grow = [
-            left[axis] > wanted and (na, nb)[axis] < MAX_NODES and stuck[axis] < 3
+            tails[axis] > bound and (na, nb)[axis] < MAX_NODES and stuck[axis] < 3
             for axis in (0, 1)
         ]
         if tail_block:
@@ -192,6 +192,6 @@ def build_block(
         na, nb = (_next(n) if more else n for n, more in zip((na, nb), grow, strict=True))
     follow = [max(CELL_SHARE * tolerance, NODE_FLOOR, min(best[axis], 1.0)) for axis in (0, 1)]
     if tail_block:
-        follow[0] = wanted
+        follow[0] = bound
     cells = (_block_cells(chart, values, 0, follow[0]), _block_cells(chart, values, 1, follow[1]))
-    return Block(a, b, cells, found)
+    return Block(a, b, cells, tabulated)

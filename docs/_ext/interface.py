@@ -100,19 +100,19 @@ def _resolved(schema: dict[str, Any], schemas: dict[str, Any]) -> list[dict[str,
     if "$ref" in schema:
         return _resolved(schemas[schema["$ref"].rsplit("/", 1)[1]], schemas)
     options = [*schema.get("oneOf", []), *schema.get("anyOf", [])]
-    return [found for option in options for found in _resolved(option, schemas)] or [schema]
+    return [resolved for option in options for resolved in _resolved(option, schemas)] or [schema]
 
 
 def _fields(schema: dict[str, Any], schemas: dict[str, Any], what: str) -> Iterator[str]:
-    for found in _resolved(schema, schemas):
-        title = f"{what} {found['title']}" if "title" in found else what
-        yield from _table(title, _entries(found), schemas)
+    for one in _resolved(schema, schemas):
+        title = f"{what} {one['title']}" if "title" in one else what
+        yield from _table(title, _entries(one), schemas)
 
 
-def _entries(found: dict[str, Any]) -> list[tuple[str, dict[str, Any], bool]]:
+def _entries(schema: dict[str, Any]) -> list[tuple[str, dict[str, Any], bool]]:
     """Name, schema and whether it is required, of each field of an object."""
-    required = found.get("required", [])
-    return [(name, entry, name in required) for name, entry in found.get("properties", {}).items()]
+    required = schema.get("required", [])
+    return [(name, entry, name in required) for name, entry in schema.get("properties", {}).items()]
 
 
 def _table(
@@ -129,13 +129,13 @@ def _rows(
 ) -> Iterator[str]:
     """One field, then the fields within it: ``power.saved``, ``results[].target``."""
     options = _resolved(schema, schemas)
-    kinds = " or ".join(dict.fromkeys(_kind(found, schemas) for found in options))
+    kinds = " or ".join(dict.fromkeys(_kind(one, schemas) for one in options))
     text = schema.get("description", "").replace("|", "\\|").replace("\n", " ")
     yield f"| `{name}`{', required' if required else ''} | {kinds} | {text} |"
-    for found in options:
-        inner = [(f"{name}.", found)]
-        if "items" in found:
-            inner = [(f"{name}[].", one) for one in _resolved(found["items"], schemas)]
+    for option in options:
+        inner = [(f"{name}.", option)]
+        if "items" in option:
+            inner = [(f"{name}[].", one) for one in _resolved(option["items"], schemas)]
         for prefix, one in inner:
             for part, entry, _ in _entries(one):
                 yield from _rows(prefix + part, entry, False, schemas)
@@ -155,9 +155,7 @@ def _kind(schema: dict[str, Any], schemas: dict[str, Any]) -> str:
     kind = str(schema.get("type", "any"))
     inner = schema.get("items") or schema.get("additionalProperties")
     if kind in ("array", "object") and isinstance(inner, dict):
-        kind = (
-            f"{kind} of {' or '.join(_kind(found, schemas) for found in _resolved(inner, schemas))}"
-        )
+        kind = f"{kind} of {' or '.join(_kind(one, schemas) for one in _resolved(inner, schemas))}"
     return " ".join([kind, *bounds])
 
 

@@ -1,10 +1,12 @@
-/* A mass on a belt, held by a spring: friction that falls with speed makes it stick and slip; the shaker stops that.
+/* A mass on a belt, held by a spring: friction that falls with speed makes it stick
+ * and slip; the shaker stops that.
  *
  *     mumacro export --format c --out friction
  *     cc -O2 -Ifriction mass_on_belt.c friction/mumacro.c friction/mumacro_table.c -lm -o mass_on_belt
  *     ./mass_on_belt
  *
- * Prints, without and with the shaker, how far the mass swings from peak to peak and the mean force of friction. */
+ * Prints, without and with the shaker, how far the mass swings from peak to peak
+ * and the mean force of friction. */
 #include <math.h>
 #include <stdio.h>
 
@@ -39,7 +41,8 @@ static void simulate(double y0) {
         sum += friction(v, y0);
         n += 1;
     }
-    printf("y0 = %.1f um: swings by %.4f mm, mean friction %.3f N\n", 1e6 * y0, 1e3 * (high - low), sum / (double)n);
+    printf("y0 = %.1f um: swings by %.4f mm, mean friction %.3f N\n", 1e6 * y0, 1e3 * (high - low),
+           sum / (double)n);
 }
 
 int main(void) {

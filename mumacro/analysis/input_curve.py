@@ -59,10 +59,11 @@ class InputCurve:
         at an edge."""
         answer = self.answer(x, gradient=True)
         with np.errstate(over="ignore", invalid="ignore"):
-            slope = x * answer.gradient[self.unknown]  # type: ignore[index]
+            gradient: Any = answer.gradient
+            slope = x * gradient[self.unknown]
             if self.stiffening is not None:
                 k = self.stiffening.stiffness(self.case["k"], x)
-                slope = slope + self.stiffening.exponent * k * answer.gradient["k"]  # type: ignore[index]
+                slope = slope + self.stiffening.exponent * k * gradient["k"]
             return answer, slope
 
     def refined(self, values: Array) -> Array:

@@ -271,13 +271,13 @@ def _faults_of_names(
     case: Mapping[str, Any], kind: Kind, without: Sequence[str], whole: bool
 ) -> list[str]:
     frequencies = {"f", "omega"}
-    left_out = {*without} | (frequencies if frequencies & {*without} else set())
+    excluded = {*without} | (frequencies if frequencies & {*without} else set())
     faults = [
-        f"leave {name} out: it varies here or is computed" for name in case if name in left_out
+        f"leave {name} out: it varies here or is computed" for name in case if name in excluded
     ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
-    complete = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
+    complete = case.keys() | excluded | (frequencies if frequencies & case.keys() else set())
     hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
     absent = [
         hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in complete

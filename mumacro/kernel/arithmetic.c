@@ -1,4 +1,5 @@
-/* Elementary functions that give the same bits everywhere, alone and in arrays: no call of a mathematical library. */
+/* Elementary functions that give the same bits everywhere, alone and in arrays: no
+ * call of a mathematical library. */
 
 #define MU_PI 3.141592653589793
 #define MU_TWO_OVER_PI 0.6366197723675814
@@ -13,7 +14,8 @@ MU_INLINE int32_t mu_whole_of(double x) { return (int32_t)mu_min(mu_max(-1e9, x)
 
 /* ln x of normal x > 0; off by at most 4e-16 of the larger of 1 and |ln x|.
  *
- * The exponent times ln 2, plus the interpolant of ln m at 22 Chebyshev points of 1 <= m < 2, in powers of 2 m - 3. */
+ * The exponent times ln 2, plus the interpolant of ln m at 22 Chebyshev points of
+ * 1 <= m < 2, in powers of 2 m - 3. */
 MU_INLINE mu_lanes mu_log(mu_lanes x) {
     /* by the remainder of the power by 4: four short sums instead of one long chain */
     static const double c[4][6] = {
@@ -47,10 +49,14 @@ static double mu_log1(double x) {
     return subnormal ? log - 54.0 * MU_LN2 : log;
 }
 
-/* sqrt(x^2 + y^2) of what may not be squared, to the last digit: the root's own error is taken out of it. */
+/* sqrt(x^2 + y^2) of what may not be squared, to the last digit: the
+ * root's own error is taken out of it. */
 static double mu_hypot(double x, double y) {
     const double larger = mu_max(fabs(x), fabs(y)), smaller = mu_min(fabs(x), fabs(y));
-    const double scale = larger > 1e150 ? 1e-160 : larger < 1e-280 ? 1e300 : smaller < 1e-140 ? 1e140 : 1.0;
+    const double scale = larger > 1e150     ? 1e-160
+                         : larger < 1e-280  ? 1e300
+                         : smaller < 1e-140 ? 1e140
+                                            : 1.0;
     const double a = larger * scale, b = smaller * scale;
     double h, d, excess;
     if (larger == HUGE_VAL || smaller <= larger * 1e-17) return larger;
@@ -65,7 +71,8 @@ static double mu_hypot(double x, double y) {
     return (h - excess / (2.0 * h)) / scale;
 }
 
-/* The cube root of finite x > 0, to about 1e-5 for a start: a third of the exponent, then Halley's method once. */
+/* The cube root of finite x > 0, to about 1e-5 for a start: a third of the
+ * exponent, then Halley's method once. */
 static double mu_cube_root_near(double x) {
     const int subnormal = x < 2.2250738585072014e-308;
     const double m = subnormal ? x * 18014398509481984.0 : x; /* 2^54 */
@@ -75,9 +82,11 @@ static double mu_cube_root_near(double x) {
     return subnormal ? root / 262144.0 : root; /* 2^18 */
 }
 
-/* The cube root of normal x > 0 in lanes, off by at most 4e-16 of itself: as above, and then to the fourth order. */
+/* The cube root of normal x > 0 in lanes, off by at most 4e-16 of itself: as
+ * above, and then to the fourth order. */
 MU_INLINE mu_lanes mu_cube_root(mu_lanes x) {
-    const mu_mask third = (((MU_BITS(x) >> 32) * 0x55555556) & ~(int64_t)0xffffffff) + 0x2a9f7893782da1ce;
+    const mu_mask third =
+        (((MU_BITS(x) >> 32) * 0x55555556) & ~(int64_t)0xffffffff) + 0x2a9f7893782da1ce;
     mu_lanes root = MU_NUMBER(third), cube = root * root * root, off;
     root = root * ((cube + 2.0 * x) / (2.0 * cube + x));
     off = (x - root * root * root) / x;
@@ -110,7 +119,8 @@ static double mu_decay(double x) {
     const double r = x - n * 0.693147180369123816490 - n * 1.90821492927058770002e-10;
     double sum = 1.0;
     if (!(x < 800.0)) return 0.0;
-    for (int i = 13; i > 0; --i) sum = 1.0 - sum * r / i; /* the terms that are left out: below 5e-18 */
+    /* the terms that are left out: below 5e-18 */
+    for (int i = 13; i > 0; --i) sum = 1.0 - sum * r / i;
     return mu_scale(sum, -n);
 }
 

@@ -184,7 +184,7 @@ class Data:
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _FFI.new("mumacro_data *")
-        self._kept: list[Any] = []
+        self._pointers: list[Any] = []
         #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by
         #: code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
@@ -219,7 +219,7 @@ class Data:
         array = np.require(array, np.float64, ["C", "A"])
         pointer = _numbers(array)
         setattr(place, name, pointer)
-        self._kept.append(pointer)
+        self._pointers.append(pointer)
         return array
 
 
@@ -230,12 +230,12 @@ class Kernel:
     Illegal points and cases give NaN and the source -1.  See ``kernel/library.h``.
     """
 
-    def __init__(self, found: Any) -> None:
-        self._found = found
-        self.level: str = _FFI.string(found.level).decode()
-        self.atlas = found.atlas
-        self.ratio = found.ratio  # (data.pointer, v~, y~) -> mu~
-        self._values, self._one, self._cases = found.values, found.one, found.cases
+    def __init__(self, functions: Any) -> None:
+        self._functions = functions
+        self.level: str = _FFI.string(functions.level).decode()
+        self.atlas = functions.atlas
+        self.ratio = functions.ratio  # (data.pointer, v~, y~) -> mu~
+        self._values, self._one, self._cases = functions.values, functions.one, functions.cases
 
     def text(self, pointer: Any) -> str:
         """A text of the kernel."""
@@ -243,7 +243,7 @@ class Kernel:
 
     def quantity(self, code: int) -> Any:
         """The record of a quantity."""
-        return self._found.quantity(code)
+        return self._functions.quantity(code)
 
     def values(
         self,
@@ -286,7 +286,7 @@ class Kernel:
     ) -> None:
         """A quantity and its slopes at points (n,): fill ``rows`` from ``start`` on."""
         points = _numbers(v), _numbers(y)
-        self._found.slopes(data.pointer, contact, quantity, v.size, *points, *_out(rows, start))
+        self._functions.slopes(data.pointer, contact, quantity, v.size, *points, *_out(rows, start))
 
     def cases(
         self,
@@ -319,7 +319,7 @@ class Kernel:
         """As :meth:`cases`, with k from its column to ``high`` (n,)."""
         start, n = part.start, part.stop - part.start
         six, ends = _columns_of(columns, start), _numbers(high) + start
-        self._found.intervals(data.pointer, *kind, n, six, ends, *_out(rows, start))
+        self._functions.intervals(data.pointer, *kind, n, six, ends, *_out(rows, start))
 
     def one(self, pointer: Any, six: Sequence[float], with_gradient: bool, contact: int = 0) -> Any:
         """One case in plain numbers: a ``mumacro_case``, its gradient only where asked for."""
@@ -331,7 +331,7 @@ class Kernel:
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
         """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
         out = np.empty(y.size)
-        self._found.border_as(data.pointer, *kind, y.size, _numbers(y), _numbers(out))
+        self._functions.border_as(data.pointer, *kind, y.size, _numbers(y), _numbers(out))
         return out
 
     def places(
@@ -342,7 +342,7 @@ class Kernel:
         block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
         codes = _from_buffer(_CODES, block)
         arrays = _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
-        self._found.places(data.pointer, contact, v.size, *arrays)
+        self._functions.places(data.pointer, contact, v.size, *arrays)
         return block, a, b
 
     def element_steps(
@@ -358,7 +358,7 @@ class Kernel:
         """Move contacts (n,) by (dx, dy), while their limits go from ``before`` to ``after``:
         ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
         arrays = map(_numbers, (before, after, k, dx, dy, forces, sums))
-        self._found.element_steps(before.size, forces.shape[1], *arrays)
+        self._functions.element_steps(before.size, forces.shape[1], *arrays)
 
     def motions(
         self,
@@ -371,7 +371,7 @@ class Kernel:
         """Steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms), see
         ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force."""
         counts, joined = _harmonics(orders)
-        self._found.motions(
+        self._functions.motions(
             contact,
             cases.shape[0],
             counts,
@@ -394,7 +394,7 @@ class Kernel:
     ) -> Array:
         """Forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
         forces, (counts, joined) = np.empty((n + 1, 2)), _harmonics(orders)
-        self._found.motion_cycle(
+        self._functions.motion_cycle(
             counts,
             joined,
             _numbers(case),
@@ -418,14 +418,14 @@ class Kernel:
         base, factor = np.empty(v.shape), np.empty(v.shape)
         v, y, eta = (np.ascontiguousarray(x, np.float64) for x in (v, y, eta))
         numbers = map(_numbers, (v, y, eta, base, factor))
-        self._found.forms(contact, quantity, block, v.size, *numbers)
+        self._functions.forms(contact, quantity, block, v.size, *numbers)
         return base, factor
 
     def border_scales(self, piece: int, y: Array) -> tuple[Array, Array]:
         """What node values of a piece of the border, and what its cells, are multiplied by to give
         v~crit, (n,)."""
         of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
-        self._found.border_scales(
+        self._functions.border_scales(
             piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells))
         )
         return of_nodes, of_cells
@@ -434,7 +434,7 @@ class Kernel:
         """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below
         the border, (n,)."""
         inside, at_border = np.empty(w.size), np.empty(w.size)
-        self._found.cell_shares(
+        self._functions.cell_shares(
             w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border))
         )
         return inside, at_border
@@ -444,20 +444,20 @@ class Kernel:
         1."""
         t = np.ascontiguousarray(t, np.float64)
         out = np.empty(t.shape)
-        self._found.entries(t.size, _numbers(t), _numbers(out))
+        self._functions.entries(t.size, _numbers(t), _numbers(out))
         return out
 
     def normal_form_root(self, v: Array, eta: Array) -> Array:
         """Positive root of phi^3 + 2 eta phi = pi v~, (n,)."""
         out = np.empty(v.size)
-        self._found.normal_form_root(v.size, *map(_numbers, (v, eta, out)))
+        self._functions.normal_form_root(v.size, *map(_numbers, (v, eta, out)))
         return out
 
     def outer_expansion(self, r: Array) -> Array:
         """f, g, r f', r g', r (r f')' of mu~ = f(r) + g(r)/v~^2 + ... at r = y~/v~, shape (n,
         5)."""
         out = np.empty((r.size, 5))
-        self._found.outer_expansion(r.size, _numbers(r), _numbers(out))
+        self._functions.outer_expansion(r.size, _numbers(r), _numbers(out))
         return out
 
 

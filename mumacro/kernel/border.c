@@ -1,14 +1,19 @@
-/* The border of continuous sliding, v~crit(y~), in three pieces; this file alone knows how they are scaled.
+/* The border of continuous sliding, v~crit(y~), in three pieces; this file
+ * alone knows how they are scaled.
  *
  * low   y~ <= 1.5            coordinate y~^2, nodes hold 2 v~crit / y~^2
  * mid   1.5 < y~ <= 2^17     coordinate ln y~, nodes hold v~crit / sqrt(y~), cells v~crit itself
  * high  y~ > 2^17            coordinate 1/y~, nodes hold v~crit / sqrt(y~) */
 
 /* How far v~crit may be off, relative, with the last digits of v~ and y~. */
-MU_INLINE double mu_border_error(const mumacro_data *data) { return data->pieces[MU_PIECE_ERROR] + MU_ROUNDING; }
+MU_INLINE double mu_border_error(const mumacro_data *data) {
+    return data->pieces[MU_PIECE_ERROR] + MU_ROUNDING;
+}
 
 /* What a node's value is multiplied by to give v~crit. */
-static double mu_border_scale(int piece, double y) { return piece == MU_BORDER_LOW ? 0.5 * y * y : sqrt(y); }
+static double mu_border_scale(int piece, double y) {
+    return piece == MU_BORDER_LOW ? 0.5 * y * y : sqrt(y);
+}
 
 typedef struct {
     mu_whole cell;
@@ -20,9 +25,11 @@ MU_INLINE mu_border_cells mu_border_cell(const mumacro_data *data, mu_lanes y) {
     const double *low = data->pieces, *mid = low + MU_PIECE_COLUMNS;
     const mu_lanes ln_y = mu_log(y), squared = y * y;
     const mu_mask small = MU_WHERE(y <= MU_Y_CONT);
-    mu_lanes x = mu_select(small, mu_fma(squared, mu_all(low[MU_PIECE_STEP]), mu_all(low[MU_PIECE_OFFSET])),
-                     mu_fma(ln_y, mu_all(mid[MU_PIECE_STEP]), mu_all(mid[MU_PIECE_OFFSET])));
-    const mu_lanes first = mu_select(small, mu_all(low[MU_PIECE_FIRST]), mu_all(mid[MU_PIECE_FIRST]));
+    mu_lanes x =
+        mu_select(small, mu_fma(squared, mu_all(low[MU_PIECE_STEP]), mu_all(low[MU_PIECE_OFFSET])),
+                  mu_fma(ln_y, mu_all(mid[MU_PIECE_STEP]), mu_all(mid[MU_PIECE_OFFSET])));
+    const mu_lanes first =
+        mu_select(small, mu_all(low[MU_PIECE_FIRST]), mu_all(mid[MU_PIECE_FIRST]));
     const mu_lanes last = mu_all((double)(data->border_cells - 1));
     mu_lanes whole, cell;
     mu_border_cells out;
@@ -47,14 +54,21 @@ MU_INLINE double mu_border_value(const double *c, double u) {
 /* d ln v~crit / d ln y~ from the same cell: 2 for y~ -> 0, 1/2 for y~ -> infinity. */
 MU_INLINE double mu_border_slope(const double *pieces, const double *cell, double u, double y) {
     double value = cell[0], slope = 0.0;
-    const int piece = y <= MU_Y_CONT ? MU_BORDER_LOW : y <= MU_Y_TAIL ? MU_BORDER_MID : MU_BORDER_HIGH;
+    const int piece = y <= MU_Y_CONT   ? MU_BORDER_LOW
+                      : y <= MU_Y_TAIL ? MU_BORDER_MID
+                                       : MU_BORDER_HIGH;
     const double step = 2.0 * pieces[piece * MU_PIECE_COLUMNS + MU_PIECE_STEP];
-    const double weight = piece == MU_BORDER_LOW ? 2.0 * y * y : piece == MU_BORDER_MID ? 1.0 : -1.0 / y;
+    const double weight = piece == MU_BORDER_LOW   ? 2.0 * y * y
+                          : piece == MU_BORDER_MID ? 1.0
+                                                   : -1.0 / y;
     for (int i = 1; i < 8; ++i) {
         slope = mu_fma1(slope, u, value);
         value = mu_fma1(value, u, cell[i]);
     }
-    return (piece == MU_BORDER_LOW ? 2.0 : piece == MU_BORDER_MID ? 0.0 : 0.5) + weight * step * slope / value;
+    return (piece == MU_BORDER_LOW   ? 2.0
+            : piece == MU_BORDER_MID ? 0.0
+                                     : 0.5) +
+           weight * step * slope / value;
 }
 
 /* v~crit at 0 < y < infinity, with its slope and ln y~ where they are wanted. */
@@ -70,11 +84,11 @@ static double mu_border(const mumacro_data *data, double y, double *slope, doubl
         scale = mu_border_scale(MU_BORDER_HIGH, y);
         if (ln_y) *ln_y = mu_log1(y);
     } else {
-        const mu_border_cells found = mu_border_cell(data, mu_all(y));
-        cell = data->border + 8 * mu_first_cell(found.cell);
-        u = mu_first(found.u);
-        scale = mu_first(found.scale);
-        if (ln_y) *ln_y = mu_first(found.ln_y);
+        const mu_border_cells cells = mu_border_cell(data, mu_all(y));
+        cell = data->border + 8 * mu_first_cell(cells.cell);
+        u = mu_first(cells.u);
+        scale = mu_first(cells.scale);
+        if (ln_y) *ln_y = mu_first(cells.ln_y);
     }
     if (slope) *slope = mu_border_slope(data->pieces, cell, u, y);
     return scale * mu_border_value(cell, u);

@@ -9,9 +9,11 @@ typedef struct {
 MU_INLINE mu_spot mu_find(const double *block, int64_t first, int64_t cells, double a, double b) {
     const double x = mu_fma1(a, block[MU_STEP_A], block[MU_OFFSET_A]);
     const double z = mu_fma1(b, block[MU_STEP_B], block[MU_OFFSET_B]);
-    /* an offset's rounding may leave a coordinate at the near end below zero: truncation keeps it in the first cell */
+    /* an offset's rounding may leave a coordinate at the near end below zero:
+     * truncation keeps it in the first cell */
     const double i = (double)mu_whole_of(x), j = (double)mu_whole_of(z);
-    const double cell = block[MU_FIRST] + i * block[MU_CELLS_B] + j - (double)first, last = (double)(cells - 1);
+    const double cell = block[MU_FIRST] + i * block[MU_CELLS_B] + j - (double)first;
+    const double last = (double)(cells - 1);
     mu_spot out;
     /* no table and no input makes it read elsewhere */
     out.cell = (int32_t)mu_min(mu_max(0.0, cell), last);
@@ -22,8 +24,8 @@ MU_INLINE mu_spot mu_find(const double *block, int64_t first, int64_t cells, dou
 
 enum { MU_PARTS = 8 / MU_LANES };
 
-/* Rows hold falling powers of w, columns falling powers of u: Horner in w for all columns at once, and where rising is
- * not NULL the derivative along w. */
+/* Rows hold falling powers of w, columns falling powers of u: Horner in w for all columns at once,
+ * and where rising is not NULL the derivative along w. */
 MU_INLINE void mu_rows(const double *cell, double w, double *row, double *rising) {
     mu_lanes sum[MU_PARTS], slope[MU_PARTS];
     for (int p = 0; p < MU_PARTS; ++p) {
@@ -78,7 +80,8 @@ MU_INLINE mu_slope mu_cell_slopes(const double *cell, double u, double w) {
     return out;
 }
 
-/* (d/dw at w - d/dw at 1) / (w - 1) of the polynomial at u: a polynomial again, so nothing cancels next to w = 1. */
+/* (d/dw at w - d/dw at 1) / (w - 1) of the polynomial at u: a polynomial again, so
+ * nothing cancels next to w = 1. */
 static double mu_cell_bend(const double *cell, double u, double w) {
     double sum = 0.0, quotient = 0.0;
     for (int k = 0; k < 6; ++k) { /* the power 7 - k of w */

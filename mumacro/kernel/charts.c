@@ -1,6 +1,7 @@
 /* The charts: which block a point belongs to, and its coordinates there. */
 
-/* A point in its block: coordinates (a, b), v~crit and d ln v~crit / d ln y~; phi in the corner only. */
+/* A point in its block: coordinates (a, b), v~crit and d ln v~crit / d
+ * ln y~; phi in the corner only. */
 typedef struct {
     int block;
     double v, y, a, b, phi, crit, tilt;
@@ -9,12 +10,13 @@ typedef struct {
 /* The corner, where a and b are polar. */
 MU_INLINE int mu_is_corner(int64_t block) { return block == MU_CORNER || block == MU_B_CORNER; }
 
-/* Whether springs slide all the time in a block: in all of a ball's, but for those of partial slip. */
+/* Whether springs slide all the time in a block: in all of a ball's, but for those of partial
+ * slip. */
 MU_INLINE int mu_is_sliding_block(int block) {
     return mu_is_ball(block) ? block < MU_B_RING : block < MU_S_LOW;
 }
 
-/* --- many points: selections, no branches ----------------------------------------------------------- */
+/* --- many points: selections, no branches ----------------------------------------------------- */
 
 /* The one quotient of all common charts: 1/(1 + v~^2), 1/(v~^2 + y~^2) or, in stick-slip, 1/y~. */
 MU_INLINE mu_lanes mu_share(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask small) {
@@ -24,10 +26,13 @@ MU_INLINE mu_lanes mu_share(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask sma
 
 /* base and factor of mu~ in a common chart; in continuous sliding root = v~ sqrt(share).
  *
- * continuous, y~ <= 1.5: mu~ = 1 - q y~^2 / (4 (1 + v~^2)), eq. (31)   continuous above: mu~ = q / sqrt(1 + y~^2/v~^2)
- * stick-slip, y~ <= 0.75: mu~ = 1 - q y~^2    to 1.5: mu~ = q            stick-slip above: mu~ = q v~/y~ */
-MU_INLINE void mu_ratio_form(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask small, mu_mask lowest, mu_lanes share,
-                             mu_lanes root, mu_lanes *base, mu_lanes *factor) {
+ * continuous, y~ <= 1.5:   mu~ = 1 - q y~^2 / (4 (1 + v~^2)), eq. (31)
+ * continuous, above:       mu~ = q / sqrt(1 + y~^2/v~^2)
+ * stick-slip, y~ <= 0.75:  mu~ = 1 - q y~^2
+ * stick-slip, y~ <= 1.5:   mu~ = q
+ * stick-slip, above:       mu~ = q v~/y~ */
+MU_INLINE void mu_ratio_form(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask small, mu_mask lowest,
+                             mu_lanes share, mu_lanes root, mu_lanes *base, mu_lanes *factor) {
     const mu_mask deficit = lowest | (small & sliding);
     const mu_lanes of_deficit = y * y * mu_select(sliding, -0.25 * share, mu_all(-1.0));
     const mu_lanes of_value = mu_select(sliding, root, mu_select(small, mu_all(1.0), v * share));
@@ -40,20 +45,24 @@ typedef struct {
     mu_mask block;
 } mu_places;
 
-/* The blocks of points with 0 < y~ <= MU_Y_TAIL, v~ > 0.  MU_CORNER and MU_FAST come without coordinates. */
+/* The blocks of points with 0 < y~ <= MU_Y_TAIL, v~ > 0.  MU_CORNER and
+ * MU_FAST come without coordinates. */
 MU_INLINE mu_places mu_place_common(mu_lanes v, mu_lanes y, mu_lanes crit, mu_lanes ln_y) {
     const mu_lanes rho = v / crit, squared = y * y;
     const mu_mask sliding = MU_WHERE(rho >= 1.0), half = MU_WHERE(rho < 0.5);
     const mu_mask small = MU_WHERE(y <= MU_Y_CONT), lowest = MU_WHERE(y <= MU_Y_STICK_LO);
     /* one division and one root do for all blocks */
     const mu_lanes share = mu_share(v, y, sliding, small);
-    const mu_lanes root = mu_sqrt(mu_select(sliding, v * v * share, mu_select(half, rho, 1.0 - rho)));
-    /* sigma stands for s: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2 on; both square-root edges become
-     * smooth for one root, and the knot between the halves is an edge of cells */
+    const mu_lanes root =
+        mu_sqrt(mu_select(sliding, v * v * share, mu_select(half, rho, 1.0 - rho)));
+    /* sigma stands for s: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2
+     * on; both square-root edges become smooth for one root, and the knot between
+     * the halves is an edge of cells */
     const mu_lanes sigma = mu_select(half, root, MU_SQRT2 - root);
     const mu_lanes beyond = mu_select(small, 1.0 - share, mu_log(rho));
     /* -1 where true: what is counted is subtracted */
-    const mu_mask of_regime = mu_select_whole(sliding, mu_all_whole(0), mu_all_whole(MU_S_LOW) - ~lowest - ~small);
+    const mu_mask of_regime =
+        mu_select_whole(sliding, mu_all_whole(0), mu_all_whole(MU_S_LOW) - ~lowest - ~small);
     const mu_mask block = of_regime - ~small - MU_WHERE(y > MU_Y_MID) - MU_WHERE(y > MU_Y_HIGH);
     const mu_mask near = small | MU_WHERE(rho <= MU_RHO_MAX);
     const mu_mask off_corner = ~small | lowest | MU_WHERE(sigma >= MU_SIGMA_CUT) | sliding;
@@ -61,20 +70,23 @@ MU_INLINE mu_places mu_place_common(mu_lanes v, mu_lanes y, mu_lanes crit, mu_la
     mu_ratio_form(v, y, sliding, small, lowest, share, root, &out.base, &out.factor);
     out.a = mu_select(small & ~lowest & ~sliding, y, mu_select(small, squared, ln_y));
     out.b = mu_select(sliding, beyond, sigma);
-    out.block = mu_select_whole(near & off_corner, block,
-                                mu_select_whole(small, mu_all_whole(MU_CORNER), mu_all_whole(MU_FAST)));
+    out.block =
+        mu_select_whole(near & off_corner, block,
+                        mu_select_whole(small, mu_all_whole(MU_CORNER), mu_all_whole(MU_FAST)));
     return out;
 }
 
-/* Whether mu_place_common handles the points: legal, above zero, neither extreme nor beyond MU_Y_TAIL. */
+/* Whether mu_place_common handles the points: legal, above zero,
+ * neither extreme nor beyond MU_Y_TAIL. */
 MU_INLINE mu_mask mu_is_common(mu_lanes v, mu_lanes y) {
-    return MU_WHERE(v > 1e-290) & MU_WHERE(v < 1e150) & MU_WHERE(y > 1e-150) & MU_WHERE(y <= MU_Y_TAIL);
+    return MU_WHERE(v > 1e-290) & MU_WHERE(v < 1e150) & MU_WHERE(y > 1e-150) &
+           MU_WHERE(y <= MU_Y_TAIL);
 }
 
-/* --- one point -------------------------------------------------------------------------------------- */
+/* --- one point -------------------------------------------------------------------------------- */
 
-/* Positive root phi of phi^3 + 2 eta phi = pi v~, v~ > 0: a guess right in every limit, off by 28 % at most, then
- * Halley's method; three steps of third order take that to rounding. */
+/* Positive root phi of phi^3 + 2 eta phi = pi v~, v~ > 0: a guess right in every limit, off by 28 %
+ * at most, then Halley's method; three steps of third order take that to rounding. */
 static double mu_normal_form_root(double v, double eta) {
     const double c = MU_PI * v, p = 2.0 * eta, root = mu_cube_root_near(c);
     double phi = eta >= 0.0 ? c / (p + root * root) : sqrt(root * root - p);
@@ -85,8 +97,9 @@ static double mu_normal_form_root(double v, double eta) {
     return phi;
 }
 
-/* Corner coordinates (R, tan(psi/2)): R sin psi = sqrt 2 phi, R cos psi = s0/sqrt 2, s0^2 = 2 pi v~/phi.  The tangent
- * of half the angle is analytic in it, runs from 0 to 1 as well, and costs a division. */
+/* Corner coordinates (R, tan(psi/2)): R sin psi = sqrt 2 phi, R cos psi = s0/sqrt 2,
+ * s0^2 = 2 pi v~/phi.  The tangent of half the angle is analytic in it, runs from 0 to 1
+ * as well, and costs a division. */
 static void mu_place_corner(mu_place *at) {
     const double phi = mu_normal_form_root(at->v, at->y - 1.0), squared = 2.0 * MU_PI * at->v / phi;
     at->phi = phi;
@@ -106,12 +119,15 @@ static mu_place mu_locate(const mumacro_data *data, double v, double y) {
         if (v > MU_FAST_KAPPA * root) return at;
         at.a = 1.0 / y;
         at.block = v >= at.crit ? MU_C_TAIL : MU_S_TAIL;
-        at.b = v >= at.crit ? mu_log1(v / root) : rho < 0.5 ? sqrt(rho) : MU_SQRT2 - sqrt(1.0 - rho);
+        at.b = v >= at.crit ? mu_log1(v / root)
+               : rho < 0.5  ? sqrt(rho)
+                            : MU_SQRT2 - sqrt(1.0 - rho);
     } else {
-        const mu_places found = mu_place_common(mu_all(v), mu_all(y), mu_all(at.crit), mu_all(ln_y));
-        at.block = (int)mu_first_whole(found.block);
-        at.a = mu_first(found.a);
-        at.b = mu_first(found.b);
+        const mu_places places =
+            mu_place_common(mu_all(v), mu_all(y), mu_all(at.crit), mu_all(ln_y));
+        at.block = (int)mu_first_whole(places.block);
+        at.a = mu_first(places.a);
+        at.b = mu_first(places.b);
         if (at.block == MU_CORNER) mu_place_corner(&at);
     }
     return at;
@@ -130,7 +146,8 @@ static mu_turn mu_turn_corner(const mu_place *at) {
     const double stiff = 3.0 * phi * phi + 2.0 * (y - 1.0);
     const double phi_v = MU_PI * v / stiff, phi_y = -2.0 * phi * y / stiff;
     const double s_v = 0.5 * s0 * (1.0 - phi_v / phi), s_y = -0.5 * s0 * phi_y / phi;
-    const double turn = 0.5 * (1.0 + at->b * at->b) / (at->a * at->a); /* d tan(psi/2) / d psi, over R^2 */
+    /* d tan(psi/2) / d psi, over R^2 */
+    const double turn = 0.5 * (1.0 + at->b * at->b) / (at->a * at->a);
     mu_turn out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0};
     out.a_v = (0.5 * s0 * s_v + 2.0 * phi * phi_v) / at->a;
     out.a_y = (0.5 * s0 * s_y + 2.0 * phi * phi_y) / at->a;

@@ -1,21 +1,27 @@
-/* The limit of large speed: mu~ = f(r) + g(r)/v~^2 + ... with r = y~/v~, and the same of the power. */
+/* The limit of large speed: mu~ = f(r) + g(r)/v~^2 + ... with r = y~/v~, and the same of the
+ * power. */
 
-#define MU_ROUNDING 2e-15 /* of coordinates, Horner sums and the inputs' last digits, relative to the value's scale */
-#define MU_DENORMAL 1e-306 /* what a value may lose where it leaves the normal range of double precision */
+/* of coordinates, Horner sums and the inputs' last digits, relative to the value's scale */
+#define MU_ROUNDING 2e-15
+/* what a value may lose where it leaves the normal range of double precision */
+#define MU_DENORMAL 1e-306
 #define MU_FAST_ROUNDING 1.5e-15   /* of mu~ at large speed, relative */
 #define MU_RIGID_ROUNDING 1e-15    /* of mu~ of rigid contact, relative */
-#define MU_STATIC_ROUNDING 4.5e-16 /* of y~ = y0 k/(mu0 Fz) in the static limit: three roundings, relative */
+/* of y~ = y0 k/(mu0 Fz) in the static limit: three roundings, relative */
+#define MU_STATIC_ROUNDING 4.5e-16
 #define MU_POWER_ROUNDING (8.0 * MU_ROUNDING)
-/* Times max(1/v~, y~/v~^2)^4: what two terms of the power leave out, relative; 1.001 at most in 50,000 solves. */
+/* Times max(1/v~, y~/v~^2)^4: what two terms of the power leave out, relative;
+ * 1.001 at most in 50,000 solves. */
 #define MU_NEXT_ORDER 1.25
 
 typedef struct {
     double first, second, first_slope, second_slope, bend; /* f, g, r f', r g', r (r f')' */
-    double h, i3, i5, i7;                                  /* sqrt(1 + r^2); h J_p for p = 3, 5, 7, see below */
+    /* sqrt(1 + r^2); h J_p for p = 3, 5, 7, see below */
+    double h, i3, i5, i7;
 } mu_outer;
 
-/* f = (2/pi) K(i r), eq. (35), K the complete elliptic integral, by the arithmetic-geometric mean; and
- * g = r^2 <sin^2 (1/2 - r^2 cos^2) (1 + r^2 cos^2)^(-7/2)>; r >= 0. */
+/* f = (2/pi) K(i r), eq. (35), K the complete elliptic integral, by the arithmetic-geometric mean;
+ * and g = r^2 <sin^2 (1/2 - r^2 cos^2) (1 + r^2 cos^2)^(-7/2)>; r >= 0. */
 static mu_outer mu_outer_expansion(double r) {
     mu_outer out = {0.0, 0.0, 0.0, 0.0, 0.0, HUGE_VAL, 1.0, 0.0, 0.0};
     const double h = mu_hypot(1.0, r), q = 1.0 / h; /* q = sqrt(1 - m) with m = r^2 / (1 + r^2) */
@@ -38,8 +44,8 @@ static mu_outer mu_outer_expansion(double r) {
     i5 = (2.0 * (2.0 - m) * e - q2 * k) / 3.0;
     i7 = (4.0 * (2.0 - m) * i5 - 3.0 * q2 * e) / 5.0;
     i9 = (6.0 * (2.0 - m) * i7 - 5.0 * q2 * i5) / 7.0;
-    /* d J_p / d ln r = -p (J_p - J_(p+2)), J_p = <(1 + r^2 cos^2)^(-p/2)>: J3 = q e, J5 = q i5, J7 = q i7, J9 = q i9,
-     * with 1 + r^2 = h^2 taken into i7 and i9 */
+    /* d J_p / d ln r = -p (J_p - J_(p+2)), J_p = <(1 + r^2 cos^2)^(-p/2)>: J3 = q e, J5 = q i5,
+     * J7 = q i7, J9 = q i9, with 1 + r^2 = h^2 taken into i7 and i9 */
     out.first = k * q;
     out.second = (1.5 * i7 - m * i5) * h + q * (e - 2.5 * i5);
     out.first_slope = q * (e - k);
@@ -70,12 +76,14 @@ MU_INLINE void mu_outer_terms(const double *cells, double t, double *first, doub
     }
 }
 
-/* mu~ and its bound for large v~: two terms.  For 1 + r^2 below MU_OUTER_MAX f and g + r f'/2 are read from cells of
- * ln(1 + r^2), (MU_OUTER_CELLS, 2, 8), to rounding: its singularities are at +-i pi and beyond. */
+/* mu~ and its bound for large v~: two terms.  For 1 + r^2 below MU_OUTER_MAX f and g + r
+ * f'/2 are read from cells of ln(1 + r^2), (MU_OUTER_CELLS, 2, 8), to rounding: its
+ * singularities are at +-i pi and beyond. */
 static double mu_fast_ratio(const double *cells, double v, double y, double *bound) {
     const int plain = mu_max(v, y) < 1e150;
     const double share = 1.0 / (1.0 + v * v);
-    /* (35) at y~ / sqrt(1 + v~^2) is exact to O(y~^2) at every v~; what it takes from the second term is half r f' */
+    /* (35) at y~ / sqrt(1 + v~^2) is exact to O(y~^2) at every v~; what it takes
+     * from the second term is half r f' */
     const double t = 1.0 + (plain ? y * y * share : (y / v) * (y / v));
     double first, rest, correction;
     if (t < MU_OUTER_MAX) {
@@ -86,20 +94,23 @@ static double mu_fast_ratio(const double *cells, double v, double y, double *bou
         rest = outer.second + 0.5 * outer.first_slope;
     }
     correction = plain ? rest * share : rest / v / v;
-    /* rounding; what two terms leave out is at most 6.2e-16 of mu~, where large speeds begin, near y~ = 1e4 */
+    /* rounding; what two terms leave out is at most 6.2e-16 of mu~, where
+     * large speeds begin, near y~ = 1e4 */
     *bound = MU_FAST_ROUNDING * first;
     return mu_min(first + correction, 1.0);
 }
 
 typedef struct {
-    double first, first_v, first_y, both, both_v, both_y; /* orders, and their slopes along ln v~ and ln y~ */
+    /* orders, and their slopes along ln v~ and ln y~ */
+    double first, first_v, first_y, both, both_v, both_y;
 } mu_power_terms;
 
-/* Power for large v~, from the slow manifold of eq. (11); the relative error of both terms is O(v~^-4).  With
- * D = 1 + r^2 cos^2, r = y~/v~ and J_p = <D^(-p/2)>: the first order is v~ <r^2 cos^2 / sqrt D>, the second
- * -(((1 + r^2) J_5 - J_3)/2 + g)/v~. */
+/* Power for large v~, from the slow manifold of eq. (11); the relative error of both terms is
+ * O(v~^-4).  With D = 1 + r^2 cos^2, r = y~/v~ and J_p = <D^(-p/2)>: the first order is v~ <r^2
+ * cos^2 / sqrt D>, the second -(((1 + r^2) J_5 - J_3)/2 + g)/v~. */
 static mu_power_terms mu_power_expansion(double v, double y) {
-    /* <cos^2 / sqrt(1 + n cos^2)> = sum of (-1)^k c_k c_(k+1) n^k, c_k = (2k choose k) / 4^k; highest power first */
+    /* <cos^2 / sqrt(1 + n cos^2)> = sum of (-1)^k c_k c_(k+1) n^k, c_k = (2k
+     * choose k) / 4^k; highest power first */
     static const double series[11] = {
         0.02963424653717084, -0.032679369614925236, 0.03642282681539655, -0.04113636910915375,
         0.047254085540771484, -0.055515289306640625, 0.067291259765625, -0.08544921875,
@@ -110,8 +121,9 @@ static mu_power_terms mu_power_expansion(double v, double y) {
     /* <sqrt(1 + n cos^2)> = (1 + n) J3 = h i3; J1 is f */
     const double h = outer.h, j3 = outer.i3 / h, j5 = outer.i5 / h;
     const double next = (0.5 * (h * outer.i5 - j3) + outer.second) / v;
-    const double next_y =
-        (h * outer.i5 - j5 - 2.5 * h * (outer.i5 - outer.i7) + 1.5 * (j3 - j5) + outer.second_slope) / v;
+    const double next_y = (h * outer.i5 - j5 - 2.5 * h * (outer.i5 - outer.i7) + 1.5 * (j3 - j5) +
+                           outer.second_slope) /
+                          v;
     double lead = v * (h * outer.i3 - outer.first), lead_y = v * (h * outer.i3 - j3);
     mu_power_terms out;
     if (r < 0.2) { /* of the closed form, digits would cancel; eleven terms hold to rounding */

@@ -1,10 +1,12 @@
-/* A ball on a flat under a constant load, Hertz, as independent springs (method of dimensionality reduction): that
- * at the share xi of the contact radius carries 3/2 s d xi of the load, s = 1 - xi^2, and d xi of the stiffness.  So
+/* A ball on a flat under a constant load, Hertz, as independent springs (method of dimensionality
+ * reduction): that at the share xi of the contact radius carries 3/2 s d xi of the load,
+ * s = 1 - xi^2, and d xi of the stiffness.  So
  *
  *     mu~(v~, y~) = 3/2 int_0^1 s mu~_spring(v~ / (1.5 s), y~ / (1.5 s)) d xi:
  *
- * from the middle outwards the springs are the points of a ray, from (v~, y~)/1.5 to infinity.  Across, a table holds
- * that (ball_atlas.c).  Along, it is an integral over closed forms, taken here. */
+ * from the middle outwards the springs are the points of a ray, from (v~, y~)/1.5 to
+ * infinity.  Across, a table holds that (ball_atlas.c).  Along, it is an integral
+ * over closed forms, taken here. */
 
 #define MU_DRIVEN_COLUMNS 5 /* of a node of the rule of oscillation along */
 #define MU_HUGE 1e280 /* groups beyond which all springs are as the middle one to rounding */
@@ -12,7 +14,8 @@
 /* 1 - xi of the spring with the load s. */
 MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s)) : 1.0; }
 
-/* v~ from which all springs slide: the slowest for its amplitude is the middle one, or the one of the steepest ray. */
+/* v~ from which all springs slide: the slowest for its amplitude is the middle one,
+ * or the one of the steepest ray. */
 MU_INLINE double mu_ball_border(const mumacro_data *data, double y) {
     if (!(y > MU_MIDDLE * MU_STEEPEST_Y)) return y >= 0.0 ? MU_STEEPEST * y : NAN;
     return MU_MIDDLE * mu_border_at(data, y / MU_MIDDLE);
@@ -22,18 +25,18 @@ MU_INLINE double mu_ball_border(const mumacro_data *data, double y) {
  * table at a speed that stands for the limit. */
 static double mu_ball_speed_slope(const mumacro_data *data, double y, double *bound) {
     double v;
-    mu_answer found;
+    mu_answer answer;
     *bound = HUGE_VAL;
     if (!(y > MU_MIDDLE)) return HUGE_VAL;
     *bound = 0.0;
     if (y == HUGE_VAL) return 0.0;
     v = MU_CREEP * mu_min(1.0, y / MU_MIDDLE - 1.0);
-    found = mu_answer_at(data, MU_BALL, MU_MU_RATIO, v, y / MU_MIDDLE);
-    *bound = found.bound / (MU_MIDDLE * v);
-    return found.value / (MU_MIDDLE * v);
+    answer = mu_answer_at(data, MU_BALL, MU_MU_RATIO, v, y / MU_MIDDLE);
+    *bound = answer.bound / (MU_MIDDLE * v);
+    return answer.value / (MU_MIDDLE * v);
 }
 
-/* --- along and normal ----------------------------------------------------------------------------------- */
+/* --- along and normal ------------------------------------------------------------------------- */
 
 /* What a spring or a ball does under oscillation along or normal, with bounds. */
 typedef struct {
@@ -41,11 +44,12 @@ typedef struct {
     double bound, bound_v, bound_y, power_bound, stick_bound;
 } mu_driven;
 
-/* v~ and y~ may be off by four roundings each; a formula adds as many, relative to the sum of its terms. */
+/* v~ and y~ may be off by four roundings each; a formula adds as many,
+ * relative to the sum of its terms. */
 #define MU_LINE_ROUNDING 5e-16
 
-/* Without reverse slip.  The error of h is that of c = arccos x over the slope dc/dh.  c follows y~ - v~ like a root:
- * twice its differential bounds it where y~ - v~ has digits. */
+/* Without reverse slip.  The error of h is that of c = arccos x over the slope dc/dh.  c follows
+ * y~ - v~ like a root: twice its differential bounds it where y~ - v~ has digits. */
 static void mu_bound_stick(const mu_turning *at, const mu_stuck *stuck, double v, mu_driven *out) {
     const mu_line *line = &out->line;
     const double h = stuck->h, deficit = -(line->along_v + line->along_y);
@@ -68,15 +72,17 @@ typedef struct {
     mu_lanes mu, along_v, along_y, stick;
 } mu_bounds;
 
-/* With reverse slip.  m is the root of F(m) = 2/y~: its error is that of F over its slope, or a root where the slope
- * vanishes.  mu~ is stationary in m; its slopes and the duration of stick are not. */
-MU_INLINE mu_bounds mu_bound_reverse(const mu_turning *at, mu_lanes v, mu_lanes y, const mu_reverse *found,
-                                     const mu_lines *line) {
-    const mu_lanes m = found->m, p = found->p, ill = at->x * y / (y - v);
+/* With reverse slip.  m is the root of F(m) = 2/y~: its error is that of F over its
+ * slope, or a root where the slope vanishes.  mu~ is stationary in m; its slopes and
+ * the duration of stick are not. */
+MU_INLINE mu_bounds mu_bound_reverse(const mu_turning *at, mu_lanes v, mu_lanes y,
+                                     const mu_reverse *reverse, const mu_lines *line) {
+    const mu_lanes m = reverse->m, p = reverse->p, ill = at->x * y / (y - v);
     const mu_lanes off = MU_LINE_ROUNDING * (2.0 / y + 2.0 * p * at->x) * (1.0 + ill);
-    const mu_lanes flat = 4.0 * mu_sqrt(off / at->travel), steep = 2.0 * off / found->slope;
-    const mu_lanes of_m = mu_select(MU_WHERE(found->slope > 0.0), mu_lower(steep, flat), flat);
-    const mu_lanes of_p = mu_lower(found->of_p, mu_all(1.0)) * of_m + MU_LINE_ROUNDING * p * (1.0 + ill);
+    const mu_lanes flat = 4.0 * mu_sqrt(off / at->travel), steep = 2.0 * off / reverse->slope;
+    const mu_lanes of_m = mu_select(MU_WHERE(reverse->slope > 0.0), mu_lower(steep, flat), flat);
+    const mu_lanes of_p =
+        mu_lower(reverse->of_p, mu_all(1.0)) * of_m + MU_LINE_ROUNDING * p * (1.0 + ill);
     const mu_lanes inputs = mu_size(line->along_v) + mu_size(line->along_y);
     mu_bounds out;
     out.stick = of_m / MU_PI + MU_LINE_ROUNDING * line->stick;
@@ -93,23 +99,26 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
     const double turn = at.travel - 2.0 / y, nearest = mu_turn_rounding(&at, y);
     if (mu_is_reversing(direction, &at, y)) {
         const mu_lanes slow = mu_all(v), wide = mu_all(y);
-        const mu_reverse found = mu_reverse_of(&at, wide);
-        const mu_lines line = mu_lines_of_reverse(&at, slow, wide, &found);
-        const mu_bounds bounds = mu_bound_reverse(&at, slow, wide, &found, &line);
+        const mu_reverse reverse = mu_reverse_of(&at, wide);
+        const mu_lines line = mu_lines_of_reverse(&at, slow, wide, &reverse);
+        const mu_bounds bounds = mu_bound_reverse(&at, slow, wide, &reverse, &line);
         out.line = mu_line_of_reverse(&at, v, y, &line);
         out.bound = mu_first(bounds.mu);
         out.bound_v = mu_first(bounds.along_v);
         out.bound_y = mu_first(bounds.along_y);
         out.stick_bound = mu_first(bounds.stick);
-        out.power_bound = v * (out.bound + MU_LINE_ROUNDING) +
-                          MU_LINE_ROUNDING * (y * at.travel + 2.0 + 2.0 * at.c * v + 2.0 * y * at.sine) / MU_PI;
+        out.power_bound =
+            v * (out.bound + MU_LINE_ROUNDING) +
+            MU_LINE_ROUNDING * (y * at.travel + 2.0 + 2.0 * at.c * v + 2.0 * y * at.sine) / MU_PI;
     } else {
         const mu_stuck stuck = mu_half_stick(&at);
-        out.line = mu_line_of_stick(v, y, stuck.h, direction == MU_NORMAL ? MU_NORMAL_STICKS : MU_ALONG_STICKS);
+        out.line = mu_line_of_stick(v, y, stuck.h,
+                                    direction == MU_NORMAL ? MU_NORMAL_STICKS : MU_ALONG_STICKS);
         mu_bound_stick(&at, &stuck, v, &out);
     }
     if (v == 0.0) out.line.source = MU_STATIC_LIMIT;
-    if (direction == MU_ALONG && fabs(turn) < nearest) { /* where reverse slip begins slopes jump, and m has a root */
+    /* where reverse slip begins slopes jump, and m has a root */
+    if (direction == MU_ALONG && fabs(turn) < nearest) {
         const double root = 2.0 * MU_PI * out.line.stick / at.c * sqrt(nearest / at.travel);
         out.stick_bound += root;
         out.power_bound += y * nearest;
@@ -121,21 +130,26 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
 
 /* The rows that a ball sums over its springs. */
 enum { MU_SUM_MU, MU_SUM_V, MU_SUM_Y, MU_SUM_STICK, MU_SUMS };
-/* A rule of n nodes misses what Legendre polynomials of degree 2n and more carry.  The three highest that it can tell
- * apart, of degree n - 3 to n - 1, carry more: the largest of them, times this, is the bound. */
+/* A rule of n nodes misses what Legendre polynomials of degree 2n and more carry.  The
+ * three highest that it can tell apart, of degree n - 3 to n - 1, carry more: the largest
+ * of them, times this, is the bound. */
 #define MU_NULL_SAFETY 16.0
 
 /* What a ball's springs are driven by. */
 enum { MU_NODE_V, MU_NODE_Y, MU_NODE_SHARE, MU_NODE_ROWS };
 
-/* v~, y~ and share of the load of springs from node i of the rule on.  A spring that the rounding of the edge puts
- * among those without reverse slip, and a lane behind the last node, has no share. */
-MU_INLINE void mu_springs_in_lanes(const mu_turning *at, const mumacro_driven_rule *rule, int64_t i, double v, double y,
-                                   double reversed, double out[MU_NODE_ROWS][MU_LANES]) {
+/* v~, y~ and share of the load of springs from node i of the rule on.  A spring that the rounding
+ * of the edge puts among those without reverse slip, and a lane behind the last node, has no
+ * share. */
+MU_INLINE void mu_springs_in_lanes(const mu_turning *at, const mumacro_driven_rule *rule, int64_t i,
+                                   double v, double y, double reversed,
+                                   double out[MU_NODE_ROWS][MU_LANES]) {
     const double least = mu_max(y, 1.0) / 1e300;
     for (int lane = 0; lane < MU_LANES; ++lane) {
-        const double *point = rule->points + MU_DRIVEN_COLUMNS * (i + lane < rule->nodes ? i + lane : i);
-        const double rest = reversed * point[0], s = mu_max(rest * (2.0 - rest), least), load = MU_MIDDLE * s;
+        const double *point =
+            rule->points + MU_DRIVEN_COLUMNS * (i + lane < rule->nodes ? i + lane : i);
+        const double rest = reversed * point[0], s = mu_max(rest * (2.0 - rest), least);
+        const double load = MU_MIDDLE * s;
         const int counts = y / load * at->travel > 2.0 && i + lane < rule->nodes;
         out[MU_NODE_V][lane] = counts ? v / load : at->x * 4.0 / at->travel;
         out[MU_NODE_Y][lane] = counts ? y / load : 4.0 / at->travel;
@@ -146,10 +160,11 @@ MU_INLINE void mu_springs_in_lanes(const mu_turning *at, const mumacro_driven_ru
 /* Their shares of mu~, of its slopes and of the stick fraction, then of the bounds of these. */
 MU_INLINE void mu_drive_lanes(const mu_turning *at, double nodes[MU_NODE_ROWS][MU_LANES],
                               double out[2 * MU_SUMS][MU_LANES]) {
-    const mu_lanes v = mu_load(nodes[MU_NODE_V]), y = mu_load(nodes[MU_NODE_Y]), share = mu_load(nodes[MU_NODE_SHARE]);
-    const mu_reverse found = mu_reverse_of(at, y);
-    const mu_lines line = mu_lines_of_reverse(at, v, y, &found);
-    const mu_bounds bounds = mu_bound_reverse(at, v, y, &found, &line);
+    const mu_lanes v = mu_load(nodes[MU_NODE_V]), y = mu_load(nodes[MU_NODE_Y]);
+    const mu_lanes share = mu_load(nodes[MU_NODE_SHARE]);
+    const mu_reverse reverse = mu_reverse_of(at, y);
+    const mu_lines line = mu_lines_of_reverse(at, v, y, &reverse);
+    const mu_bounds bounds = mu_bound_reverse(at, v, y, &reverse, &line);
     mu_store(out[MU_SUM_MU], share * line.mu);
     mu_store(out[MU_SUM_V], share * line.along_v);
     mu_store(out[MU_SUM_Y], share * line.along_y);
@@ -160,13 +175,14 @@ MU_INLINE void mu_drive_lanes(const mu_turning *at, double nodes[MU_NODE_ROWS][M
     mu_store(out[MU_SUMS + MU_SUM_STICK], share * bounds.stick);
 }
 
-/* A ball with v~ < y~.  Its springs all turn at the same phase: those further out than 1 - xi = `reversed` slip
- * backwards, too. */
+/* A ball with v~ < y~.  Its springs all turn at the same phase: those further out than
+ * 1 - xi = `reversed` slip backwards, too. */
 static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     const mumacro_driven_rule *rule = &data->driven;
     const mu_turning at = mu_turning_of(v, y);
     const double last = 0.5 * at.travel * y / MU_MIDDLE, reversed = mu_outside(last);
-    const double still = 1.0 - reversed; /* xi of the last spring without reverse slip; next the load of these */
+    /* xi of the last spring without reverse slip; next the load of these */
+    const double still = 1.0 - reversed;
     const double load = MU_MIDDLE * still * (1.0 - still * still / 3.0);
     const double ill = 1.0 + 2.0 * at.x * y / (y - v);
     double nulls[MU_SUMS][3] = {{0.0}}, sums[2 * MU_SUMS] = {0.0};
@@ -217,7 +233,8 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
         out.bound_y += missed[MU_SUM_Y];
         out.stick_bound += missed[MU_SUM_STICK];
     }
-    if (last < 1.0 + 4.0 * MU_LINE_ROUNDING * ill) { /* a spring at the edge may belong to the others: slopes jump */
+    /* a spring at the edge may belong to the others: slopes jump */
+    if (last < 1.0 + 4.0 * MU_LINE_ROUNDING * ill) {
         const double room = mu_max(1.0 - last, MU_LINE_ROUNDING * ill);
         const double moved = mu_min(MU_LINE_ROUNDING * ill * last / sqrt(room), 1.0);
         out.bound_v += moved * (v + y) * at.c;
@@ -232,13 +249,16 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     return out;
 }
 
-static mu_driven mu_drive_inside(const mumacro_data *data, int contact, int direction, double v, double y) {
-    return contact == MU_BALL && y < MU_HUGE ? mu_drive_ball(data, v, y) : mu_drive_spring(direction, v, y);
+static mu_driven mu_drive_inside(const mumacro_data *data, int contact, int direction, double v,
+                                 double y) {
+    return contact == MU_BALL && y < MU_HUGE ? mu_drive_ball(data, v, y)
+                                             : mu_drive_spring(direction, v, y);
 }
 
 /* Any v~ and y~.  Where y~ - v~ has no digits it is not known whether the contact sticks: there a
  * bound is that a little inside, and the way from there. */
-static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v, double y) {
+static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v,
+                          double y) {
     const double inside = y * (1.0 - 2.0 * MU_LINE_ROUNDING);
     mu_driven out = {mu_line_of_sliding(direction, v, y), 0.0, 0.0, 0.0, 0.0, 0.0}, near;
     const mu_line *line = &out.line;
@@ -262,18 +282,20 @@ static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, 
     return out;
 }
 
-/* --- any contact and direction ---------------------------------------------------------------------------- */
+/* --- any contact and direction ---------------------------------------------------------------- */
 
-/* A quantity of a contact; the normal direction has z for y~ and no power: how far the load moves is not modelled. */
-static mu_answer mu_answer_as(const mumacro_data *data, int contact, int direction, int quantity, double v, double y) {
+/* A quantity of a contact; the normal direction has z for y~ and no power: how far
+ * the load moves is not modelled. */
+static mu_answer mu_answer_as(const mumacro_data *data, int contact, int direction, int quantity,
+                              double v, double y) {
     if (direction != MU_ACROSS) {
-        const mu_driven found = mu_drive(data, contact, direction, v, y);
-        const mu_line *line = &found.line;
-        if (quantity == MU_POWER)
-            return direction == MU_NORMAL ? mu_limit(NAN, NAN, -1)
-                                          : mu_limit(line->power, found.power_bound, line->source);
-        if (quantity == MU_STICK) return mu_limit(line->stick, found.stick_bound, line->source);
-        return mu_limit(line->mu, found.bound, line->source);
+        const mu_driven driven = mu_drive(data, contact, direction, v, y);
+        const mu_line *line = &driven.line;
+        if (quantity == MU_MU_RATIO) return mu_limit(line->mu, driven.bound, line->source);
+        if (quantity == MU_STICK) return mu_limit(line->stick, driven.stick_bound, line->source);
+        if (quantity == MU_POWER && direction == MU_ALONG)
+            return mu_limit(line->power, driven.power_bound, line->source);
+        return mu_limit(NAN, NAN, -1);
     }
     { /* the same bits as in any array */
         int8_t source;
@@ -283,30 +305,36 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
     }
 }
 
-static mu_slopes mu_slopes_of_driven(const mu_driven *found) {
-    const mu_line *line = &found->line;
-    const mu_slopes out = {line->mu, line->along_v, line->along_y, found->bound_v, found->bound_y, found->bound};
+static mu_slopes mu_slopes_of_driven(const mu_driven *driven) {
+    const mu_line *line = &driven->line;
+    const mu_slopes out = {line->mu,       line->along_v,  line->along_y,
+                           driven->bound_v, driven->bound_y, driven->bound};
     return out;
 }
 
-static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int direction, double v, double y) {
+static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int direction, double v,
+                              double y) {
     if (direction != MU_ACROSS) {
-        const mu_driven found = mu_drive(data, contact, direction, v, y);
-        return mu_slopes_of_driven(&found);
+        const mu_driven driven = mu_drive(data, contact, direction, v, y);
+        return mu_slopes_of_driven(&driven);
     }
-    return contact == MU_BALL ? mu_slopes_at(data, MU_BALL, MU_MU_RATIO, v / MU_MIDDLE, y / MU_MIDDLE)
-                              : mu_slopes_at(data, MU_SPRING, MU_MU_RATIO, v, y);
+    return contact == MU_BALL
+               ? mu_slopes_at(data, MU_BALL, MU_MU_RATIO, v / MU_MIDDLE, y / MU_MIDDLE)
+               : mu_slopes_at(data, MU_SPRING, MU_MU_RATIO, v, y);
 }
 
-/* d mu~ / d v~ at v~ = 0; along and normal it is h^2 / pi = pi for springs that have not begun to slip backwards. */
-static double mu_speed_slope_as(const mumacro_data *data, int contact, int direction, double y, double *bound) {
+/* d mu~ / d v~ at v~ = 0; along and normal it is h^2 / pi = pi for springs that
+ * have not begun to slip backwards. */
+static double mu_speed_slope_as(const mumacro_data *data, int contact, int direction, double y,
+                                double *bound) {
     *bound = 0.0;
     if (direction == MU_ACROSS)
-        return contact == MU_BALL ? mu_ball_speed_slope(data, y, bound) : mu_speed_slope_at_zero(data, y, bound);
+        return contact == MU_BALL ? mu_ball_speed_slope(data, y, bound)
+                                  : mu_speed_slope_at_zero(data, y, bound);
     {
         const double v = MU_CREEP * mu_min(y, 1.0);
-        const mu_driven found = mu_drive(data, contact, direction, v, y);
-        *bound = found.bound_v / v;
-        return found.line.along_v / v;
+        const mu_driven driven = mu_drive(data, contact, direction, v, y);
+        *bound = driven.bound_v / v;
+        return driven.line.along_v / v;
     }
 }

@@ -1,24 +1,28 @@
-/* Oscillation along the sliding direction and of the normal force: one spring, in closed form but for one root.
+/* Oscillation along the sliding direction and of the normal force: one spring,
+ * in closed form but for one root.
  *
- * along   the upper point moves with v~ + y~ cos tau, -1 <= u <= 1.  While it moves backwards, over 2 c with
- *         cos c = x = v~/y~, it travels D = 2 y~ (sin c - c cos c).  For D <= 2 the spring sticks over 2 h until it is
- *         where it turned, so mu~ = 1 - y~ (1 - N0(x)); for D > 2 it slips backwards, too.
- * normal  the upper point moves with v~ under the limit 1 + z cos tau, z = Fz_amplitude / Fz < 1: the same
- *         function, mu~ = 1 - z (1 - N0(v~/z)).
+ * along   the upper point moves with v~ + y~ cos tau, -1 <= u <= 1.  While it moves backwards,
+ *         over 2 c with cos c = x = v~/y~, it travels D = 2 y~ (sin c - c cos c).  For D <= 2 the
+ *         spring sticks over 2 h until it is where it turned, so mu~ = 1 - y~ (1 - N0(x)); for
+ *         D > 2 it slips backwards, too.
+ * normal  the upper point moves with v~ under the limit 1 + z cos tau, z = Fz_amplitude / Fz < 1:
+ *         the same function, mu~ = 1 - z (1 - N0(v~/z)).
  *
  * N0 is master_curve_limit in mumacro/closed_forms.py; with half the duration of stick, h,
- *     cos c = sin^2 h / R,   1 - N0 = (sin h - h cos h)^2 / (pi R),   R^2 = (h - sin h cos h)^2 + sin^4 h. */
+ *     cos c = sin^2 h / R,   1 - N0 = (sin h - h cos h)^2 / (pi R),
+ *     R^2 = (h - sin h cos h)^2 + sin^4 h. */
 
 enum { MU_ACROSS, MU_ALONG, MU_NORMAL, MU_DIRECTIONS };
 
-/* What one spring does; slopes are along ln v~ and ln y~ (normal: ln z); stick is a share of the period; terms is the
- * sum of the absolute values that mu is the sum of, for its rounding. */
+/* What one spring does; slopes are along ln v~ and ln y~ (normal: ln z); stick is a share of the
+ * period; terms is the sum of the absolute values that mu is the sum of, for its rounding. */
 typedef struct {
     double mu, along_v, along_y, stick, power, terms;
     int source;
 } mu_line;
 
-/* sin m, cos m, 1 - cos m, m - sin m, sin m - m cos m and m - sin m cos m for 0 <= m <= pi; no digits cancel. */
+/* sin m, cos m, 1 - cos m, m - sin m, sin m - m cos m and m - sin m cos m for
+ * 0 <= m <= pi; no digits cancel. */
 typedef struct {
     mu_lanes sine, cosine, versed, lag, bent, rest;
 } mu_arcs;
@@ -26,9 +30,10 @@ typedef struct {
 MU_INLINE mu_arcs mu_arcs_of(mu_lanes m) {
     /* (1 - sin m / m) / m^2; its terms times 2, 4, 6, ... are those of (sin m - m cos m) / m^3 */
     static const double series[11] = {
-        3.868170170630684e-23, -1.9572941063391263e-20, 8.22063524662433e-18, -2.8114572543455206e-15,
-        7.647163731819816e-13, -1.6059043836821613e-10, 2.505210838544172e-08, -2.7557319223985893e-06,
-        0.0001984126984126984, -0.008333333333333333, 0.16666666666666666,
+        3.868170170630684e-23,   -1.9572941063391263e-20, 8.22063524662433e-18,
+        -2.8114572543455206e-15, 7.647163731819816e-13,   -1.6059043836821613e-10,
+        2.505210838544172e-08,   -2.7557319223985893e-06, 0.0001984126984126984,
+        -0.008333333333333333,   0.16666666666666666,
     };
     const mu_mask far = MU_WHERE(m > 0.5 * MU_PI);
     const mu_lanes d = mu_select(far, (MU_PI - m) + 1.2246467991473532e-16, m), q = d * d;
@@ -45,7 +50,8 @@ MU_INLINE mu_arcs mu_arcs_of(mu_lanes m) {
     out.versed = mu_select(far, 1.0 + cosine, out.versed);
     out.lag = mu_select(far, m - out.sine, d * q * u);
     out.bent = mu_select(far, out.sine - m * out.cosine, d * q * t);
-    out.rest = mu_select(far, m - out.sine * out.cosine, d * q * (u * (2.0 - q * u) + (1.0 - q * u) * t));
+    out.rest =
+        mu_select(far, m - out.sine * out.cosine, d * q * (u * (2.0 - q * u) + (1.0 - q * u) * t));
     return out;
 }
 
@@ -56,7 +62,8 @@ typedef struct {
 
 static mu_arc mu_arc_of(double m) {
     const mu_arcs of = mu_arcs_of(mu_all(m));
-    const mu_arc out = {mu_first(of.sine), mu_first(of.cosine), mu_first(of.bent), mu_first(of.rest)};
+    const mu_arc out = {mu_first(of.sine), mu_first(of.cosine), mu_first(of.bent),
+                        mu_first(of.rest)};
     return out;
 }
 
@@ -78,7 +85,8 @@ MU_INLINE mu_lanes mu_arcsines(mu_lanes x) {
 
 static double mu_arcsine(double x) { return mu_first(mu_arcsines(mu_all(x))); }
 
-/* x = v~/a below 1, sin c, c = arccos x, b = arcsin x and D / a = 2 (sin c - c cos c), with the digits of a - v~. */
+/* x = v~/a below 1, sin c, c = arccos x, b = arcsin x and D / a = 2 (sin c - c
+ * cos c), with the digits of a - v~. */
 typedef struct {
     double x, sine, c, b, travel;
 } mu_turning;
@@ -110,12 +118,15 @@ static mu_stuck mu_half_stick(const mu_turning *at) {
     for (int i = 0; i < 20; ++i) {
         const mu_arc arc = mu_arc_of(h);
         const double square = arc.sine * arc.sine, norm = arc.rest * arc.rest + square * square;
-        const double off = arc.rest * at->x - square * at->sine; /* sin(c(h) - c) times the root of norm */
+        /* sin(c(h) - c) times the root of norm */
+        const double off = arc.rest * at->x - square * at->sine;
         const double tilt = 2.0 * arc.sine * (square * arc.sine - arc.cosine * arc.rest);
-        const double step = off * sqrt(norm) / tilt * (1.0 + off * off / (6.0 * norm)), next = h - step;
+        const double step = off * sqrt(norm) / tilt * (1.0 + off * off / (6.0 * norm));
+        const double next = h - step;
         h = next > MU_PI ? 0.5 * (h + MU_PI) : next < 0.5 * h ? 0.5 * h : next;
         out.slope = tilt / norm;
-        if (fabs(step) < 1e-9 * mu_min(h, MU_PI - h)) break; /* slow speeds: pi - h is what changes */
+        /* slow speeds: pi - h is what changes */
+        if (fabs(step) < 1e-9 * mu_min(h, MU_PI - h)) break;
     }
     out.h = h;
     return out;
@@ -125,7 +136,8 @@ static mu_stuck mu_half_stick(const mu_turning *at) {
 static double mu_master_deficit(double h) {
     const mu_arc arc = mu_arc_of(h);
     const double square = arc.sine * arc.sine;
-    return h > 0.0 ? arc.bent * arc.bent / (MU_PI * sqrt(arc.rest * arc.rest + square * square)) : 0.0;
+    return h > 0.0 ? arc.bent * arc.bent / (MU_PI * sqrt(arc.rest * arc.rest + square * square))
+                   : 0.0;
 }
 
 /* Both kinds of stick-slip without reverse slip; envelope theorem: d mu~/d v~ = h^2/pi. */
@@ -137,14 +149,15 @@ static mu_line mu_line_of_stick(double v, double a, double h, int source) {
     out.along_v = v * h * h / MU_PI;
     out.along_y = -(deficit + out.along_v);
     out.stick = h / MU_PI;
-    out.power = v * deficit; /* heat is what slip takes, v~ in all, less the work of the drive, v~ mu~ */
+    /* heat is what slip takes, v~ in all, less the work of the drive, v~ mu~ */
+    out.power = v * deficit;
     out.source = source;
     return out;
 }
 
-/* Reverse slip: the spring sticks over m + p after the first turn and over m - p after the second, on which both
- * follow from x = cos c: cos(c - p) = x m / sin m, and F(m) = sin c - cos m sin(c - p) - p cos c = 2/y~.  Springs of
- * the same turning, one in each lane. */
+/* Reverse slip: the spring sticks over m + p after the first turn and over m - p after the second,
+ * on which both follow from x = cos c: cos(c - p) = x m / sin m, and F(m) = sin c - cos m
+ * sin(c - p) - p cos c = 2/y~.  Springs of the same turning, one in each lane. */
 typedef struct {
     mu_lanes m, p, bent, of_p; /* bent = 1 - m cot m; of_p = dp/dm */
     mu_lanes left, slope;      /* F(m) and its slope, infinite and 0 beyond the end */
@@ -155,7 +168,8 @@ MU_INLINE mu_reverse mu_reverse_at(const mu_turning *at, mu_lanes m) {
     const mu_lanes more = arc.lag / arc.sine, cosine = at->x * (1.0 + more), zero = mu_all(0.0);
     const mu_mask legal = MU_WHERE(arc.sine > 0.0) & MU_WHERE(cosine <= 1.0);
     const mu_lanes root = mu_sqrt(mu_select(legal, (1.0 - cosine) * (1.0 + cosine), mu_all(1.0)));
-    const mu_lanes apart = at->x * more * (at->x + cosine) / (at->sine + root); /* sin c - sin(c - p) */
+    /* sin c - sin(c - p) */
+    const mu_lanes apart = at->x * more * (at->x + cosine) / (at->sine + root);
     const mu_lanes turn = at->x * (arc.versed - arc.cosine * more), steep = arc.sine * root;
     const mu_lanes lead = mu_lower(at->x * (more * at->sine + apart), mu_all(1.0));
     mu_reverse out;
@@ -164,7 +178,8 @@ MU_INLINE mu_reverse mu_reverse_at(const mu_turning *at, mu_lanes m) {
     out.bent = mu_select(legal, arc.bent / arc.sine, zero);
     out.of_p = mu_select(legal, at->x * out.bent / steep, mu_all(1.0));
     out.left = mu_select(legal, apart + arc.versed * root - out.p * at->x, mu_all(HUGE_VAL));
-    out.slope = mu_select(legal & MU_WHERE(m + out.p < 2.0 * at->c), steep - turn * turn / steep, zero);
+    out.slope =
+        mu_select(legal & MU_WHERE(m + out.p < 2.0 * at->c), steep - turn * turn / steep, zero);
     return out;
 }
 
@@ -173,19 +188,20 @@ MU_INLINE mu_lanes mu_reverse_start(mu_lanes a) {
     return 2.0 * mu_arcsines(mu_lower(1.0 / mu_sqrt(a), mu_all(1.0)));
 }
 
-/* m by Newton's method between bounds; where D is near 2 the root is double, but mu~ is stationary in m.  A lane that
- * has its root keeps it. */
+/* m by Newton's method between bounds; where D is near 2 the root is double, but mu~ is stationary
+ * in m.  A lane that has its root keeps it. */
 static mu_reverse mu_reverse_of(const mu_turning *at, mu_lanes a) {
     mu_lanes low = mu_all(0.0), high = mu_all(MU_PI), m = mu_reverse_start(a);
     mu_mask done = mu_all_whole(0);
     for (int i = 0; i < 100 && !mu_is_everywhere(done); ++i) {
-        const mu_reverse found = mu_reverse_at(at, m);
-        const mu_lanes off = found.left - 2.0 / a, newton = m - off / found.slope;
-        const mu_mask above = MU_WHERE(off > 0.0) | ~MU_WHERE(found.slope > 0.0);
+        const mu_reverse reverse = mu_reverse_at(at, m);
+        const mu_lanes off = reverse.left - 2.0 / a, newton = m - off / reverse.slope;
+        const mu_mask above = MU_WHERE(off > 0.0) | ~MU_WHERE(reverse.slope > 0.0);
         mu_lanes next;
         high = mu_select(above, m, high);
         low = mu_select(above, low, m);
-        next = mu_select(MU_WHERE(newton >= low) & MU_WHERE(newton <= high), newton, 0.5 * (low + high));
+        next = mu_select(MU_WHERE(newton >= low) & MU_WHERE(newton <= high), newton,
+                         0.5 * (low + high));
         next = mu_select(done, m, next);
         done |= MU_WHERE(mu_size(next - m) <= 1e-10 * next);
         m = next;
@@ -193,13 +209,14 @@ static mu_reverse mu_reverse_of(const mu_turning *at, mu_lanes a) {
     return mu_reverse_at(at, m);
 }
 
-/* a times the integral of the way back (way 1) or forth (-1) since the turn, over the stick s after it. */
+/* a times the integral of the way back (way 1) or forth (-1) since the
+ * turn, over the stick s after it. */
 MU_INLINE mu_lanes mu_way_in_stick(const mu_turning *at, mu_lanes a, mu_lanes s, double way) {
     /* of (s^2/2 - 1 + cos s) / s^4 */
     static const double series[9] = {
-        4.110317623312165e-19, -1.5619206968586225e-16, 4.779477332387385e-14, -1.1470745597729725e-11,
-        2.08767569878681e-09, -2.7557319223985894e-07, 2.48015873015873e-05, -0.001388888888888889,
-        0.041666666666666664,
+        4.110317623312165e-19,   -1.5619206968586225e-16, 4.779477332387385e-14,
+        -1.1470745597729725e-11, 2.08767569878681e-09,    -2.7557319223985894e-07,
+        2.48015873015873e-05,    -0.001388888888888889,   0.041666666666666664,
     };
     const mu_arcs arc = mu_arcs_of(s);
     const mu_lanes q = s * s;
@@ -214,18 +231,21 @@ typedef struct {
     mu_lanes mu, along_v, along_y, stick, terms;
 } mu_lines;
 
-MU_INLINE mu_lines mu_lines_of_reverse(const mu_turning *at, mu_lanes v, mu_lanes a, const mu_reverse *found) {
-    const mu_lanes m = found->m, p = found->p, both = m * m + p * p;
+MU_INLINE mu_lines mu_lines_of_reverse(const mu_turning *at, mu_lanes v, mu_lanes a,
+                                       const mu_reverse *reverse) {
+    const mu_lanes m = reverse->m, p = reverse->p, both = m * m + p * p;
     const mu_lanes sweep = 2.0 / MU_PI * (at->b + p); /* of rigid contact, for p = 0 */
     const mu_mask rigid = MU_WHERE(a > 1e100); /* nothing to rounding, while m^3 underflows */
     mu_lanes layers, size; /* what stick adds, and the sum of its absolute terms */
     mu_lines out;
     if (at->x < 0.5) {
-        const mu_lanes first = at->x * both, second = 2.0 * at->x * found->bent, third = 2.0 * p * at->sine;
+        const mu_lanes first = at->x * both, second = 2.0 * at->x * reverse->bent;
+        const mu_lanes third = 2.0 * p * at->sine;
         layers = a * (first - second - third);
         size = a * (first + second + third);
     } else {
-        const mu_lanes back = mu_way_in_stick(at, a, m - p, -1.0), forth = mu_way_in_stick(at, a, m + p, 1.0);
+        const mu_lanes back = mu_way_in_stick(at, a, m - p, -1.0);
+        const mu_lanes forth = mu_way_in_stick(at, a, m + p, 1.0);
         layers = back - forth;
         size = mu_size(back) + mu_size(forth);
     }
@@ -256,9 +276,11 @@ static int mu_is_reversing(int direction, const mu_turning *at, double y) {
     return direction == MU_ALONG && y * at->travel > 2.0;
 }
 
-/* One spring that slips all the time, or does not oscillate; NaN and -1 where illegal.  The others follow. */
+/* One spring that slips all the time, or does not oscillate; NaN and -1
+ * where illegal.  The others follow. */
 static mu_line mu_line_of_sliding(int direction, double v, double y) {
-    mu_line out = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, direction == MU_NORMAL ? MU_NORMAL_SLIDES : MU_ALONG_SLIDES};
+    mu_line out = {
+        1.0, 0.0, 0.0, 0.0, 0.0, 1.0, direction == MU_NORMAL ? MU_NORMAL_SLIDES : MU_ALONG_SLIDES};
     if (!(v >= 0.0 && y >= 0.0 && y < (direction == MU_NORMAL ? 1.0 : HUGE_VAL))) {
         out.mu = out.along_v = out.along_y = out.stick = out.power = NAN;
         out.source = -1;

@@ -1,4 +1,5 @@
-/* The one function of the shared object: the kernel of an instruction level, where this processor can run it. */
+/* The one function of the shared object: the kernel of an instruction level,
+ * where this processor can run it. */
 #include <stddef.h>
 
 #include "export.h"
@@ -15,8 +16,9 @@ extern const mumacro_kernel mumacro_kernel_avx512;
 #if defined MUMACRO_HAS_AVX2
 #include <cpuid.h>
 
-/* Whether the processor has the instructions of a level (1: AVX2, 2: AVX-512) and the system keeps their registers.
- * Not by __builtin_cpu_supports: what it reads is missing or empty in the run-time library of some compilers. */
+/* Whether the processor has the instructions of a level (1: AVX2, 2: AVX-512) and the system keeps
+ * their registers.  Not by __builtin_cpu_supports: what it reads is missing or empty in the
+ * run-time library of some compilers. */
 static int mu_runs(int level) {
     const unsigned first = bit_OSXSAVE | bit_FMA;
     const unsigned wide = bit_AVX512F | bit_AVX512DQ | bit_AVX512VL | bit_AVX512BW;

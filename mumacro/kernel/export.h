@@ -1,4 +1,5 @@
-/* What the functions of the shared object are marked with, where they are defined; library.h declares them without. */
+/* What the functions of the shared object are marked with, where they are defined;
+ * library.h declares them without. */
 #if defined _WIN32
 #pragma clang diagnostic ignored "-Wdll-attribute-on-redeclaration"
 #define MU_EXPORT __declspec(dllexport)

@@ -1,16 +1,19 @@
 /* A stiffness that is known as an interval only: the extremes of mu_macro over it.
  *
- * v~ and y~ are both proportional to k, and r = y~/v~ stays.  Across, mu~ falls from 1 and, where r > 9.72, rises again
- * between two turns, by up to 0.0087 per unit of ln k, before it falls to its limit of rigid contact.  Along, mu~ falls
- * all the way, normal it rises: the ends are the extremes.
+ * v~ and y~ are both proportional to k, and r = y~/v~ stays.  Across, mu~ falls from 1
+ * and, where r > 9.72, rises again between two turns, by up to 0.0087 per unit of ln k,
+ * before it falls to its limit of rigid contact.  Along, mu~ falls all the way, normal it
+ * rises: the ends are the extremes.
  *
- * Both turns begin in one point, y~ = 6.4 for one spring and 8.3 for a ball (there r = 10.4).  So for small r samples
- * stand close where they may be, and two turns between two samples are seen by the cubic through these.  For r > 12 the
- * lower one lies at 4.1 < y~ < 6.2, the upper one between r^2/16 and r^2/2: samples enclose each. */
+ * Both turns begin in one point, y~ = 6.4 for one spring and 8.3 for a ball (there r = 10.4).  So
+ * for small r samples stand close where they may be, and two turns between two samples are seen by
+ * the cubic through these.  For r > 12 the lower one lies at 4.1 < y~ < 6.2, the upper one between
+ * r^2/16 and r^2/2: samples enclose each. */
 
 #define MU_TURNING 9.7 /* r from which there are turns */
 #define MU_APART 12.0  /* r from which they are apart, with y~ = 9 between them */
-#define MU_CLOSE_LOW 4.5 /* y~ of the samples for less: the first, the step to the next, and how many */
+/* y~ of the samples for less: the first, the step to the next, and how many */
+#define MU_CLOSE_LOW 4.5
 #define MU_CLOSE_STEP 1.13
 #define MU_CLOSE_SAMPLES 11
 #define MU_TURN_WIDTH 1e-7 /* around an extreme, relative to k: mu_macro there is flat to 1e-14 */
@@ -35,7 +38,8 @@ static mu_sample mu_take_sample(mu_interval *of, double k) {
     double rows[MU_ROWS];
     int8_t source;
     mu_sample out;
-    mu_cases_as(of->data, of->contact, of->direction, 1, columns, strides, MU_ROWS, rows, 1, &source);
+    mu_cases_as(of->data, of->contact, of->direction, 1, columns, strides, MU_ROWS, rows, 1,
+                &source);
     out.k = k;
     out.mu = rows[MU_ROW_MU_MACRO];
     out.slope = rows[MU_ROW_GRADIENT + 2] * k;
@@ -45,7 +49,9 @@ static mu_sample mu_take_sample(mu_interval *of, double k) {
     return out;
 }
 
-static int mu_is_turn(double first, double last) { return (first < 0.0 && last > 0.0) || (first > 0.0 && last < 0.0); }
+static int mu_is_turn(double first, double last) {
+    return (first < 0.0 && last > 0.0) || (first > 0.0 && last < 0.0);
+}
 
 /* The slope alone: a ball takes less time for it. */
 static double mu_slope_alone(const mu_interval *of, double k) {
@@ -59,16 +65,19 @@ static double mu_slope_alone(const mu_interval *of, double k) {
     return in.mu0 * (at.along_v + at.along_y);
 }
 
-/* A sample at the turn between two, which come ever closer: by halves in ln k while they are far apart, then by the
- * secant of the slope, where an end that stays twice counts half (Illinois). */
+/* A sample at the turn between two, which come ever closer: by halves in ln k while they are far
+ * apart, then by the secant of the slope, where an end that stays twice counts half (Illinois). */
 static void mu_close_in(mu_interval *of, mu_sample left, mu_sample right) {
     double k = left.k;
     int side = 0;
     for (int i = 0; i < 60 && right.k > left.k * (1.0 + MU_TURN_WIDTH); ++i) {
-        const double low = left.k * (1.0 + 0.4 * MU_TURN_WIDTH), high = right.k * (1.0 - 0.4 * MU_TURN_WIDTH);
-        const double share = left.slope / (left.slope - right.slope), secant = left.k + share * (right.k - left.k);
+        const double low = left.k * (1.0 + 0.4 * MU_TURN_WIDTH);
+        const double high = right.k * (1.0 - 0.4 * MU_TURN_WIDTH);
+        const double share = left.slope / (left.slope - right.slope);
+        const double secant = left.k + share * (right.k - left.k);
         double slope;
-        k = right.k > 4.0 * left.k ? sqrt(left.k) * sqrt(right.k) : mu_min(mu_max(secant, low), high);
+        k = right.k > 4.0 * left.k ? sqrt(left.k) * sqrt(right.k)
+                                   : mu_min(mu_max(secant, low), high);
         if (!(k > left.k && k < right.k)) break; /* denormal numbers */
         slope = mu_slope_alone(of, k);
         if (mu_is_turn(slope, right.slope)) {
@@ -86,12 +95,13 @@ static void mu_close_in(mu_interval *of, mu_sample left, mu_sample right) {
     (void)mu_take_sample(of, k);
 }
 
-/* Where two turns may hide between close samples whose slopes have the same sign: k of the extreme slope of the cubic
- * with their values and slopes, where it has the other sign; else 0. */
+/* Where two turns may hide between close samples whose slopes have the same sign: k of the extreme
+ * slope of the cubic with their values and slopes, where it has the other sign; else 0. */
 static double mu_hidden_turns(const mu_sample *before, const mu_sample *here) {
     const double length = mu_log1(here->k) - mu_log1(before->k), rise = here->mu - before->mu;
     const double first = before->slope * length, last = here->slope * length;
-    const double bend = 3.0 * (first + last - 2.0 * rise), fall = 6.0 * rise - 4.0 * first - 2.0 * last;
+    const double bend = 3.0 * (first + last - 2.0 * rise);
+    const double fall = 6.0 * rise - 4.0 * first - 2.0 * last;
     const double place = -0.5 * fall / bend, on = place * length; /* of the way, and in ln k */
     if (!(place > 0.0 && place < 1.0 && mu_is_turn(first, first + 0.5 * fall * place))) return 0.0;
     return mu_min(before->k * (1.0 + on * (1.0 + 0.5 * on)), here->k); /* exp(on), nearly */
@@ -116,9 +126,10 @@ static void mu_go_on(mu_interval *of, double k) {
     }
 }
 
-/* The smallest and the largest mu_macro for low <= k <= high, and the largest bound met; NaN for what is no case. */
-static void mu_extremes_of(const mumacro_data *data, int contact, int direction, const mu_inputs *low, double high,
-                           double out[MU_EXTREME_ROWS]) {
+/* The smallest and the largest mu_macro for low <= k <= high, and the largest
+ * bound met; NaN for what is no case. */
+static void mu_extremes_of(const mumacro_data *data, int contact, int direction,
+                           const mu_inputs *low, double high, double out[MU_EXTREME_ROWS]) {
     const double end = low->k, ratio = mu_amplitude_ratio(low);
     mu_interval of = {data, contact, direction, *low, HUGE_VAL, -HUGE_VAL, 0.0, {0.0, 0.0, 0.0}};
     for (int i = 0; i < MU_EXTREME_ROWS; ++i) out[i] = NAN;
@@ -132,9 +143,11 @@ static void mu_extremes_of(const mumacro_data *data, int contact, int direction,
             for (int i = 0; i < 3; ++i) mu_go_on(&of, mu_min(around[i], high));
         } else {
             double k = MU_CLOSE_LOW * unit;
-            for (int i = 0; i < MU_CLOSE_SAMPLES; ++i, k *= MU_CLOSE_STEP) mu_go_on(&of, mu_min(k, high));
+            for (int i = 0; i < MU_CLOSE_SAMPLES; ++i, k *= MU_CLOSE_STEP)
+                mu_go_on(&of, mu_min(k, high));
         }
-        mu_go_on(&of, mu_min(square / 2.0, high)); /* beyond, mu~ falls, in the end by less than its last digit */
+        /* beyond, mu~ falls, in the end by less than its last digit */
+        mu_go_on(&of, mu_min(square / 2.0, high));
     }
     mu_go_on(&of, high);
     if (!(of.least <= of.most)) return;

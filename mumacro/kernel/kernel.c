@@ -1,14 +1,16 @@
 /* The evaluation of mumacro's tables: every program, in any language, computes with these files.
  *
- * C99; no memory is taken, nothing is stored between calls, any thread may call; no input and no table makes it read
- * out of bounds.  SPDX-License-Identifier: Apache-2.0 */
+ * C99; no memory is taken, nothing is stored between calls, any thread may call; no input and no
+ * table makes it read out of bounds.  SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
-#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || defined _M_FP_FAST
-#error "mumacro needs infinities and NaN: compile without -ffast-math, -ffinite-math-only and /fp:fast"
+#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) ||             \
+    defined _M_FP_FAST
+#error                                                                                             \
+    "mumacro needs infinities and NaN: compile without -ffast-math, -ffinite-math-only and /fp:fast"
 #endif
 
 #include "data.h"

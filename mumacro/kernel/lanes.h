@@ -1,8 +1,9 @@
 /* Several points at once: arithmetic on as many doubles as the processor holds in one register.
  *
- * One type, mu_lanes, and a few operations on it; MU_LANES is 8, 4, 2 or, for any other compiler, 1.  Every operation
- * is exact or rounded once, lane by lane, so the number of lanes never changes a result.  mu_fma is fused where the
- * processor can do that (AVX2 with FMA, AVX-512, NEON); elsewhere the last digits may differ. */
+ * One type, mu_lanes, and a few operations on it; MU_LANES is 8, 4, 2 or, for any other compiler,
+ * 1.  Every operation is exact or rounded once, lane by lane, so the number of lanes never changes
+ * a result.  mu_fma is fused where the processor can do that (AVX2 with FMA, AVX-512, NEON);
+ * elsewhere the last digits may differ. */
 #ifndef MU_LANES_H
 #define MU_LANES_H
 
@@ -61,7 +62,8 @@ MU_INLINE double mu_fma1(double a, double b, double c) {
 
 #if MU_LANES > 1
 typedef double mu_lanes __attribute__((vector_size(8 * MU_LANES)));
-typedef int64_t mu_mask __attribute__((vector_size(8 * MU_LANES))); /* -1 where true, 0 where false */
+/* -1 where true, 0 where false */
+typedef int64_t mu_mask __attribute__((vector_size(8 * MU_LANES)));
 typedef int32_t mu_whole __attribute__((vector_size(4 * MU_LANES)));
 #define MU_WHERE(condition) ((mu_mask)(condition))
 #define MU_BITS(x) ((mu_mask)(x))
@@ -82,7 +84,9 @@ MU_INLINE int32_t mu_first_cell(mu_whole x) { return x[0]; }
 MU_INLINE mu_lanes mu_select(mu_mask where, mu_lanes a, mu_lanes b) {
     return (mu_lanes)((where & (mu_mask)a) | (~where & (mu_mask)b));
 }
-MU_INLINE mu_mask mu_select_whole(mu_mask where, mu_mask a, mu_mask b) { return (where & a) | (~where & b); }
+MU_INLINE mu_mask mu_select_whole(mu_mask where, mu_mask a, mu_mask b) {
+    return (where & a) | (~where & b);
+}
 #if MU_LANES == 8
 MU_INLINE mu_lanes mu_sqrt(mu_lanes x) { return (mu_lanes)_mm512_maskz_sqrt_pd(255, (__m512d)x); }
 MU_INLINE mu_lanes mu_fma(mu_lanes a, mu_lanes b, mu_lanes c) {

@@ -4,17 +4,18 @@
 #include "library.h"
 #include "interval.c"
 
-static void mu_values_as(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
-                         const double *y, double *value, double *bound, int8_t *source) {
+static void mu_values_as(const mumacro_data *data, int contact, int direction, int quantity,
+                         int64_t n, const double *v, const double *y, double *value, double *bound,
+                         int8_t *source) {
     if (direction == MU_ACROSS) {
         mu_values(data, contact, quantity, n, v, y, value, bound, source);
         return;
     }
     for (int64_t i = 0; i < n; ++i) {
-        const mu_answer found = mu_answer_as(data, contact, direction, quantity, v[i], y[i]);
-        value[i] = found.value;
-        bound[i] = found.bound;
-        source[i] = (int8_t)found.source;
+        const mu_answer answer = mu_answer_as(data, contact, direction, quantity, v[i], y[i]);
+        value[i] = answer.value;
+        bound[i] = answer.bound;
+        source[i] = (int8_t)answer.source;
     }
 }
 
@@ -25,13 +26,14 @@ static double mu_border_as(const mumacro_data *data, int contact, int direction,
     return contact == MU_BALL ? mu_ball_border(data, y) : mu_border_at(data, y);
 }
 
-static void mu_borders_as(const mumacro_data *data, int contact, int direction, int64_t n, const double *y,
-                          double *crit) {
+static void mu_borders_as(const mumacro_data *data, int contact, int direction, int64_t n,
+                          const double *y, double *crit) {
     for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_as(data, contact, direction, y[i]);
 }
 
 /* Where the columns stand, and their strides. */
-static void mu_take_columns(const mumacro_columns *in, const double *columns[6], int64_t strides[6]) {
+static void mu_take_columns(const mumacro_columns *in, const double *columns[6],
+                            int64_t strides[6]) {
     for (int i = 0; i < 6; ++i) {
         columns[i] = in->array[i] ? in->array[i] : &in->constant[i];
         strides[i] = in->array[i] != NULL;
@@ -39,15 +41,17 @@ static void mu_take_columns(const mumacro_columns *in, const double *columns[6],
 }
 
 static void mu_cases_of_columns(const mumacro_data *data, int contact, int direction, int64_t n,
-                                const mumacro_columns *in, int rows, double *out, int64_t stride, int8_t *source) {
+                                const mumacro_columns *in, int rows, double *out, int64_t stride,
+                                int8_t *source) {
     const double *columns[6];
     int64_t strides[6];
     mu_take_columns(in, columns, strides);
     mu_cases_as(data, contact, direction, n, columns, strides, rows, out, stride, source);
 }
 
-static void mu_intervals(const mumacro_data *data, int contact, int direction, int64_t n, const mumacro_columns *in,
-                         const double *high, double *out, int64_t stride) {
+static void mu_intervals(const mumacro_data *data, int contact, int direction, int64_t n,
+                         const mumacro_columns *in, const double *high, double *out,
+                         int64_t stride) {
     const double *columns[6];
     int64_t strides[6];
     mu_take_columns(in, columns, strides);
@@ -61,8 +65,8 @@ static void mu_intervals(const mumacro_data *data, int contact, int direction, i
     }
 }
 
-static void mu_places_of(const mumacro_data *data, int contact, int64_t n, const double *v, const double *y,
-                         int8_t *block, double *a, double *b) {
+static void mu_places_of(const mumacro_data *data, int contact, int64_t n, const double *v,
+                         const double *y, int8_t *block, double *a, double *b) {
     for (int64_t i = 0; i < n; ++i) {
         const mu_place at = mu_locate_as(data, contact, v[i], y[i]);
         block[i] = (int8_t)MU_PLACE_OF(at.block);
@@ -71,15 +75,16 @@ static void mu_places_of(const mumacro_data *data, int contact, int64_t n, const
     }
 }
 
-static void mu_border_scales(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells) {
+static void mu_border_scales(int piece, int64_t n, const double *y, double *of_nodes,
+                             double *of_cells) {
     for (int64_t i = 0; i < n; ++i) {
         of_nodes[i] = mu_border_scale(piece, y[i]);
         of_cells[i] = piece == MU_BORDER_MID ? 1.0 : of_nodes[i];
     }
 }
 
-static void mu_forms(int contact, int quantity, int place, int64_t n, const double *v, const double *y,
-                     const double *eta, double *base, double *factor) {
+static void mu_forms(int contact, int quantity, int place, int64_t n, const double *v,
+                     const double *y, const double *eta, double *base, double *factor) {
     const int block = contact == MU_BALL ? MU_BALL_BLOCKS + place : place;
     const mu_form form = mu_form_in(block, quantity);
     for (int64_t i = 0; i < n; ++i) {
@@ -113,8 +118,8 @@ static void mu_roots(int64_t n, const double *v, const double *eta, double *root
 
 static void mu_outers(int64_t n, const double *r, double *out) {
     for (int64_t i = 0; i < n; ++i) {
-        const mu_outer found = mu_outer_expansion(r[i]);
-        memcpy(out + 5 * i, &found, 5 * sizeof *out);
+        const mu_outer outer = mu_outer_expansion(r[i]);
+        memcpy(out + 5 * i, &outer, 5 * sizeof *out);
     }
 }
 
@@ -123,10 +128,13 @@ static const mumacro_quantity *mu_about(int code) {
 }
 
 static const mumacro_atlas MU_ATLAS = {
-    MU_Y_STICK_LO, MU_Y_STICK_HI, MU_Y_CONT, MU_Y_MID, MU_Y_HIGH, MU_Y_TAIL, MU_S_CUT, MU_SIGMA_CUT, MU_RHO_MAX,
-    MU_FAST_KAPPA, MU_ROUNDING, MU_OUTER_LOG_MAX, MU_CHARTS, MU_SOURCES, MU_PIECES, MU_QUANTITIES, MU_REGIMES,
-    MU_OUTER_CELLS, MU_CHART, MU_PIECE, MU_SOURCE_NAME, MU_REGIME_NAME, MU_REGIME_OF_SOURCE,
-    MU_MIDDLE, MU_STEEPEST, MU_STEEPEST_Y, MU_SLOW, MU_FOLD_KNOT, MU_FOLD_SCALE, MU_BALL_CHARTS, MU_BALL_CHART,
+    MU_Y_STICK_LO,  MU_Y_STICK_HI,    MU_Y_CONT,           MU_Y_MID,      MU_Y_HIGH,
+    MU_Y_TAIL,      MU_S_CUT,         MU_SIGMA_CUT,        MU_RHO_MAX,    MU_FAST_KAPPA,
+    MU_ROUNDING,    MU_OUTER_LOG_MAX, MU_CHARTS,           MU_SOURCES,    MU_PIECES,
+    MU_QUANTITIES,  MU_REGIMES,       MU_OUTER_CELLS,      MU_CHART,      MU_PIECE,
+    MU_SOURCE_NAME, MU_REGIME_NAME,   MU_REGIME_OF_SOURCE, MU_MIDDLE,     MU_STEEPEST,
+    MU_STEEPEST_Y,  MU_SLOW,          MU_FOLD_KNOT,        MU_FOLD_SCALE, MU_BALL_CHARTS,
+    MU_BALL_CHART,
 };
 
 #define MU_TEXT(x) #x
@@ -136,8 +144,24 @@ static const mumacro_atlas MU_ATLAS = {
 
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
-    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points,
+    MU_NAME(MUMACRO_LEVEL),
+    &MU_ATLAS,
+    mu_about,
+    mu_values_as,
+    mu_slopes_of_points,
     mu_cases_of_columns,
-    mu_intervals, mu_ratio_alone, mu_one, mu_borders_as, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares,
-    mu_entries, mu_roots, mu_outers, mu_element_steps, mu_motions, mu_motion_cycle,
+    mu_intervals,
+    mu_ratio_alone,
+    mu_one,
+    mu_borders_as,
+    mu_places_of,
+    mu_forms,
+    mu_border_scales,
+    mu_cell_shares,
+    mu_entries,
+    mu_roots,
+    mu_outers,
+    mu_element_steps,
+    mu_motions,
+    mu_motion_cycle,
 };

@@ -67,8 +67,9 @@ typedef struct {
     mu_grid *steps; /* ends of all its steps */
 } mu_march;
 
-/* A steady cycle: means per period; decay of a disturbance per period as its logarithm; distance to the cycle; the
- * estimate of the error of the mean force; how many sticks it has, but for brief ones. */
+/* A steady cycle: means per period; decay of a disturbance per period as its
+ * logarithm; distance to the cycle; the estimate of the error of the mean force; how
+ * many sticks it has, but for brief ones. */
 typedef struct {
     double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error;
     int sticks, level;
@@ -82,13 +83,16 @@ typedef struct {
 
 /* sin x and cos x of |x| < 1e5, off by at most 1.2e-16. */
 static inline void mu_sine_cosine(double x, double *sine, double *cosine) {
-    static const double odd[8] = {2.8114572543455206e-15, -7.647163731819816e-13, 1.6059043836821613e-10,
-                                  -2.505210838544172e-08, 2.7557319223985893e-06, -0.0001984126984126984,
-                                  0.008333333333333333, -0.16666666666666666};
-    static const double even[8] = {4.779477332387385e-14, -1.1470745597729725e-11, 2.08767569878681e-09,
-                                   -2.755731922398589e-07, 2.48015873015873e-05, -0.001388888888888889,
-                                   0.041666666666666664, -0.5};
-    /* x = n pi/2 + r with |r| <= pi/4; pi/2 in three parts, of which n times the first two is exact */
+    static const double odd[8] = {2.8114572543455206e-15, -7.647163731819816e-13,
+                                  1.6059043836821613e-10, -2.505210838544172e-08,
+                                  2.7557319223985893e-06, -0.0001984126984126984,
+                                  0.008333333333333333,   -0.16666666666666666};
+    static const double even[8] = {4.779477332387385e-14, -1.1470745597729725e-11,
+                                   2.08767569878681e-09,  -2.755731922398589e-07,
+                                   2.48015873015873e-05,  -0.001388888888888889,
+                                   0.041666666666666664,  -0.5};
+    /* x = n pi/2 + r with |r| <= pi/4; pi/2 in three parts, of which n times the first two is
+     * exact */
     const int32_t n = mu_whole_of(x * MU_TWO_OVER_PI + (x < 0.0 ? -0.5 : 0.5));
     const double r = ((x - n * 1.57079632673412561417) - n * 6.07710050630396597660e-11) -
                      n * 2.02226624879595063154e-21;
@@ -109,7 +113,8 @@ static inline void mu_sine_cosine(double x, double *sine, double *cosine) {
 
 /* The motion at n <= MU_MOMENTS times; n is a constant where it is called. */
 MU_INLINE void mu_moments(const mu_shaken *m, int n, const double *tau, mu_moment *moments) {
-    double sum[6][MU_MOMENTS] = {{0.0}}, sine[MU_MOMENTS], cosine[MU_MOMENTS], s[MU_MOMENTS], c[MU_MOMENTS];
+    double sum[6][MU_MOMENTS] = {{0.0}}, sine[MU_MOMENTS], cosine[MU_MOMENTS], s[MU_MOMENTS],
+           c[MU_MOMENTS];
     if (m->highest) { /* sin and cos of n tau from those of (n - 1) tau */
         for (int j = 0; j < n; ++j) {
             mu_sine_cosine(tau[j], &sine[j], &cosine[j]);
@@ -168,7 +173,8 @@ static mu_moment mu_moment_at(const mu_shaken *m, double tau) {
 /* sin(half) / half of half <= 0.2, to 1e-17. */
 static double mu_damping(double half) {
     const double z = half * half;
-    return 1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0))));
+    return 1.0 -
+           z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0))));
 }
 
 /* The mean way over a time that no harmonic turns by more than 0.4. */
@@ -205,23 +211,29 @@ static double mu_length(double x, double y) { return sqrt(x * x + y * y); }
 
 static const double MU_RADAU_AT[3] = {(4.0 - MU_SQRT6) / 10.0, (4.0 + MU_SQRT6) / 10.0, 1.0};
 static const double MU_RADAU[3][3] = {
-    {(88.0 - 7.0 * MU_SQRT6) / 360.0, (296.0 - 169.0 * MU_SQRT6) / 1800.0, (-2.0 + 3.0 * MU_SQRT6) / 225.0},
-    {(296.0 + 169.0 * MU_SQRT6) / 1800.0, (88.0 + 7.0 * MU_SQRT6) / 360.0, (-2.0 - 3.0 * MU_SQRT6) / 225.0},
+    {(88.0 - 7.0 * MU_SQRT6) / 360.0, (296.0 - 169.0 * MU_SQRT6) / 1800.0,
+     (-2.0 + 3.0 * MU_SQRT6) / 225.0},
+    {(296.0 + 169.0 * MU_SQRT6) / 1800.0, (88.0 + 7.0 * MU_SQRT6) / 360.0,
+     (-2.0 - 3.0 * MU_SQRT6) / 225.0},
     {(16.0 - MU_SQRT6) / 36.0, (16.0 + MU_SQRT6) / 36.0, 1.0 / 9.0},
 };
-/* weights of the embedded estimate of order 3, and the real eigenvalue of the inverse of the matrix */
-static const double MU_RADAU_ERROR[3] = {-(13.0 + 7.0 * MU_SQRT6) / 3.0, (-13.0 + 7.0 * MU_SQRT6) / 3.0, -1.0 / 3.0};
+/* weights of the embedded estimate of order 3, and the real eigenvalue of the inverse of the
+ * matrix */
+static const double MU_RADAU_ERROR[3] = {-(13.0 + 7.0 * MU_SQRT6) / 3.0,
+                                         (-13.0 + 7.0 * MU_SQRT6) / 3.0, -1.0 / 3.0};
 static const double MU_RADAU_REAL = 3.6378342527444962;
 
 /* A step of slip: its stages, with u = tan((th - th0)/2) and the slip speed there. */
 typedef struct {
     mu_moment stage[MU_MOMENTS]; /* the last is no stage: four at once take no longer than three */
-    double length, u[3], speed[3], error, ex, ey; /* (ex, ey): direction of the force at the start */
+    /* (ex, ey): direction of the force at the start */
+    double length, u[3], speed[3], error, ex, ey;
 } mu_slip;
 
 /* Direction of the force at u. */
 static void mu_direction(const mu_slip *slip, double u, double *nx, double *ny) {
-    const double square = u * u, cosine = (1.0 - square) / (1.0 + square), sine = 2.0 * u / (1.0 + square);
+    const double square = u * u, cosine = (1.0 - square) / (1.0 + square);
+    const double sine = 2.0 * u / (1.0 + square);
     *nx = cosine * slip->ex - sine * slip->ey;
     *ny = cosine * slip->ey + sine * slip->ex;
 }
@@ -233,8 +245,8 @@ static double mu_slip_speed(const mu_slip *slip, const mu_moment *at, double u) 
 }
 
 /* The stages of a step of this length; returns 0 where none are found. */
-static int mu_slip_step(const mu_shaken *m, const mu_moment *start, double ex, double ey, double length, double end,
-                        mu_slip *slip) {
+static int mu_slip_step(const mu_shaken *m, const mu_moment *start, double ex, double ey,
+                        double length, double end, mu_slip *slip) {
     const double a0 = (start->wx * ex + start->wy * ey) / start->limit;
     const double rate = 0.5 * (start->wy * ex - start->wx * ey) / start->limit;
     const double tau[MU_MOMENTS] = {start->tau + MU_RADAU_AT[0] * length,
@@ -289,7 +301,8 @@ static int mu_slip_step(const mu_shaken *m, const mu_moment *start, double ex, d
         slip->speed[i] = mu_slip_speed(slip, &slip->stage[i], u[i]);
         slip->error += MU_RADAU_ERROR[i] * u[i];
     }
-    slip->error = fabs(2.0 * start->limit * slip->error / (MU_RADAU_REAL + mu_max(length * a0, 0.0)));
+    slip->error =
+        fabs(2.0 * start->limit * slip->error / (MU_RADAU_REAL + mu_max(length * a0, 0.0)));
     return 1;
 }
 
@@ -331,23 +344,25 @@ static void mu_narrow(mu_bracket *b, double x, double value) {
     }
 }
 
-static double mu_speed_at(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, double share) {
+static double mu_speed_at(const mu_shaken *m, const mu_moment *start, const mu_slip *slip,
+                          double share) {
     const mu_moment at = mu_moment_at(m, start->tau + share * slip->length);
     return mu_slip_speed(slip, &at, mu_slip_at(slip, share));
 }
 
-/* Whether the speed of a step falls below 0, and between which shares first.  Where all stages are above, the least of
- * the cubic through them is looked at. */
-static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, mu_bracket *b) {
+/* Whether the speed of a step falls below 0, and between which shares first.  Where all stages are
+ * above, the least of the cubic through them is looked at. */
+static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_slip *slip,
+                         mu_bracket *b) {
     const double x[4] = {0.0, MU_RADAU_AT[0], MU_RADAU_AT[1], 1.0};
-    const double speed[4] = {mu_max(mu_slip_speed(slip, start, 0.0), 0.0), slip->speed[0], slip->speed[1],
-                             slip->speed[2]};
+    const double speed[4] = {mu_max(mu_slip_speed(slip, start, 0.0), 0.0), slip->speed[0],
+                             slip->speed[1], slip->speed[2]};
     double first, second, last, third, c, d, e, root, at[3], value[3];
     int left = 0;
     for (int i = 1; i < 4; ++i) {
         if (speed[i] < 0.0) {
-            const mu_bracket found = {x[i - 1], x[i], speed[i - 1], speed[i], 0};
-            *b = found;
+            const mu_bracket bracket = {x[i - 1], x[i], speed[i - 1], speed[i], 0};
+            *b = bracket;
             return 1;
         }
     }
@@ -375,8 +390,8 @@ static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_sl
         double p, q, next;
         value[1] = mu_speed_at(m, start, slip, at[1]);
         if (value[1] < 0.0) {
-            const mu_bracket found = {at[0], at[1], value[0], value[1], 0};
-            *b = found;
+            const mu_bracket bracket = {at[0], at[1], value[0], value[1], 0};
+            *b = bracket;
             return 1;
         }
         /* the vertex of the parabola */
@@ -398,7 +413,8 @@ static int mu_slip_falls(const mu_shaken *m, const mu_moment *start, const mu_sl
 }
 
 /* At which share of a step its speed falls through 0. */
-static double mu_slip_end(const mu_shaken *m, const mu_moment *start, const mu_slip *slip, mu_bracket *b) {
+static double mu_slip_end(const mu_shaken *m, const mu_moment *start, const mu_slip *slip,
+                          mu_bracket *b) {
     const double fastest = mu_max(slip->speed[0], mu_max(slip->speed[1], slip->speed[2]));
     for (int count = 0; count < 60 && b->high - b->low > 1e-15; ++count) {
         const double share = mu_next_guess(b), speed = mu_speed_at(m, start, slip, share);
@@ -436,13 +452,15 @@ static double mu_excess_slope(const mu_moment *at, const double *f) {
 static double mu_stick_end(const mu_stick *stick, int fresh, mu_moment *last, double *at_last) {
     double f[2];
     mu_moment at = mu_stuck_at(stick, 1.0, f);
-    mu_bracket b = {0.0, 1.0, mu_min(mu_excess(&stick->start, stick->f), 0.0), mu_excess(&at, f), 0};
+    mu_bracket b = {0.0, 1.0, mu_min(mu_excess(&stick->start, stick->f), 0.0), mu_excess(&at, f),
+                    0};
     *last = at;
     at_last[0] = f[0];
     at_last[1] = f[1];
     if (b.at_high <= 0.0) {
         /* between the ends it may have been outside */
-        mu_bracket top = {0.0, 1.0, mu_excess_slope(&stick->start, stick->f), mu_excess_slope(&at, f), 0};
+        mu_bracket top = {0.0, 1.0, mu_excess_slope(&stick->start, stick->f),
+                          mu_excess_slope(&at, f), 0};
         if (fresh || top.at_low <= 0.0 || top.at_high >= 0.0) return 1.0;
         for (int count = 0; count < 12 && b.at_high <= 0.0; ++count) {
             const double share = mu_next_guess(&top);
@@ -483,7 +501,8 @@ static double mu_stick_end(const mu_stick *stick, int fresh, mu_moment *last, do
 /* --- a period --------------------------------------------------------------------------------- */
 
 /* Adds a force, which has done a work beside the drag. */
-static void mu_add(mu_march *march, const mu_shaken *m, double middle, double time, double fx, double fy, double work) {
+static void mu_add(mu_march *march, const mu_shaken *m, double middle, double time, double fx,
+                   double fy, double work) {
     const int place = 2 * (int)(middle * (0.5 / MU_PI) * m->marks);
     march->mean[MU_MEAN_X] += time * fx;
     march->mean[MU_MEAN_Y] += time * fy;
@@ -495,7 +514,8 @@ static void mu_add(mu_march *march, const mu_shaken *m, double middle, double ti
 /* The forces at the times to be drawn before tau. */
 static int mu_is_drawn(const mu_drawing *drawing, double tau, double *time) {
     if (!drawing || drawing->next > drawing->n) return 0;
-    *time = drawing->next < drawing->n ? 2.0 * MU_PI * (double)drawing->next / (double)drawing->n : 2.0 * MU_PI;
+    *time = drawing->next < drawing->n ? 2.0 * MU_PI * (double)drawing->next / (double)drawing->n
+                                       : 2.0 * MU_PI;
     return *time <= tau;
 }
 
@@ -520,17 +540,21 @@ static void mu_begin_slip(mu_march *march) {
     march->slipped = march->slips = 1;
 }
 
-static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, double end, int *ends,
-                         mu_drawing *drawing) {
+static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, double end,
+                         int *ends, mu_drawing *drawing) {
     static const double *weight = MU_RADAU[2];
     const mu_moment start = march->at;
-    const double size = mu_length(march->f[0], march->f[1]), ex = march->f[0] / size, ey = march->f[1] / size;
+    const double size = mu_length(march->f[0], march->f[1]), ex = march->f[0] / size;
+    const double ey = march->f[1] / size;
     const double rest = end - start.tau;
-    const double length = march->step >= rest ? rest : march->step > 0.5 * rest ? 0.5 * rest : march->step;
+    const double length = march->step >= rest        ? rest
+                          : march->step > 0.5 * rest ? 0.5 * rest
+                                                     : march->step;
     double factor, nx, ny, time;
     mu_bracket fall;
     mu_slip slip;
-    if (!mu_slip_step(m, &start, ex, ey, length, length == rest ? end : start.tau + length, &slip)) {
+    if (!mu_slip_step(m, &start, ex, ey, length, length == rest ? end : start.tau + length,
+                      &slip)) {
         march->step = 0.25 * length;
         return;
     }
@@ -556,7 +580,8 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
         const double share = slip.length * weight[i], limit = slip.stage[i].limit;
         mu_direction(&slip, slip.u[i], &nx, &ny);
         mu_add(march, m, start.tau + 0.5 * slip.length, share, limit * nx, limit * ny,
-               share * limit * (nx * (slip.stage[i].wx - m->scale * m->drag) + ny * slip.stage[i].wy));
+               share * limit *
+                   (nx * (slip.stage[i].wx - m->scale * m->drag) + ny * slip.stage[i].wy));
         march->mean[MU_MEAN_PATH] += share * slip.speed[i];
         march->decay += share * slip.speed[i] / limit;
     }
@@ -606,8 +631,10 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
         way[0] -= stick.start.x;
         way[1] -= stick.start.y;
         /* the integral of f (w - drag), exactly */
-        mu_add(march, m, stick.start.tau + 0.5 * taken, taken, stick.f[0] + way[0], stick.f[1] + way[1],
-               stick.f[0] * (dx - drag * taken) + stick.f[1] * dy + 0.5 * (dx * dx + dy * dy) - drag * way[0] * taken);
+        mu_add(march, m, stick.start.tau + 0.5 * taken, taken, stick.f[0] + way[0],
+               stick.f[1] + way[1],
+               stick.f[0] * (dx - drag * taken) + stick.f[1] * dy + 0.5 * (dx * dx + dy * dy) -
+                   drag * way[0] * taken);
         march->mean[MU_MEAN_STUCK] += taken;
         size = mu_length(fx, fy);
         if (share < 1.0 && size > 0.0) {
@@ -616,14 +643,16 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
         }
         while (mu_is_drawn(drawing, march->at.tau, &time)) {
             const mu_moment at = mu_moment_at(m, time);
-            mu_draw(drawing, stick.f[0] + (at.x - stick.start.x), stick.f[1] + (at.y - stick.start.y));
+            mu_draw(drawing, stick.f[0] + (at.x - stick.start.x),
+                    stick.f[1] + (at.y - stick.start.y));
         }
         march->f[0] = fx;
         march->f[1] = fy;
     }
     *fresh = *fresh && share == 1.0 && stick.length < MU_MOTION_SHORT;
     if (share < 1.0) {
-        *ends = march->at.tau - march->began > MU_MOTION_SHORT; /* slip that rounding ends goes on for a step */
+        /* slip that rounding ends goes on for a step */
+        *ends = march->at.tau - march->began > MU_MOTION_SHORT;
         if (march->at.tau - march->began > MU_MOTION_BRIEF && march->slid > MU_MOTION_BRIEF) {
             ++march->sticks;
             march->slid = 0.0;
@@ -632,9 +661,10 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
     }
 }
 
-/* One period from the force f, with this tolerance of a step; the ends of the steps go to march->steps. */
-static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double *f, double tolerance,
-                           mu_march *march, mu_drawing *drawing) {
+/* One period from the force f, with this tolerance of a step; the ends
+ * of the steps go to march->steps. */
+static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double *f,
+                           double tolerance, mu_march *march, mu_drawing *drawing) {
     static const mu_march none;
     const double step = march->step;
     mu_grid *steps = march->steps;
@@ -665,8 +695,10 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
             } else {
                 mu_take_stick(march, m, end, &fresh, &ends, drawing);
             }
-            if (march->at.tau > before && steps->n < steps->room) steps->nodes[steps->n++] = march->at.tau;
-            if (steps->n == steps->room || ++count > 4 * steps->room || !(march->step > 1e-15)) march->failed = 1;
+            if (march->at.tau > before && steps->n < steps->room)
+                steps->nodes[steps->n++] = march->at.tau;
+            if (steps->n == steps->room || ++count > 4 * steps->room || !(march->step > 1e-15))
+                march->failed = 1;
         }
     }
     for (int i = 0; i < MU_MEANS; ++i)
@@ -684,7 +716,8 @@ static void mu_keep_below(double limit, double *f) {
     }
 }
 
-/* A period as a map of the force at its start: how far it moves it, and by how much Newton's method would. */
+/* A period as a map of the force at its start: how far it moves it, and by
+ * how much Newton's method would. */
 typedef struct {
     double moved[2], step[2], size;
 } mu_residual;
@@ -693,7 +726,8 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
     mu_residual r = {{march->f[0] - f[0], march->f[1] - f[1]}, {0.0, 0.0}, 0.0};
     r.size = mu_length(r.moved[0], r.moved[1]);
     if (march->slipped) { /* the derivative of the map is left last first^T */
-        const double left = march->turned * mu_decay(march->decay), *first = march->first, *last = march->last;
+        const double left = march->turned * mu_decay(march->decay), *first = march->first,
+                     *last = march->last;
         const double stays = mu_max(1.0 - left * (first[0] * last[0] + first[1] * last[1]), 1e-16);
         const double along = left * (first[0] * r.moved[0] + first[1] * r.moved[1]) / stays;
         r.step[0] = r.moved[0] + along * last[0];
@@ -718,12 +752,13 @@ static mu_steady mu_steady_of(const mu_march *march, double distance) {
     return out;
 }
 
-/* The cycle whose distance to the steady one is below goal, or the nearest of many periods; f is its start.
+/* The cycle whose distance to the steady one is below goal, or the nearest
+ * of many periods; f is its start.
  *
- * No two forces move apart, so that a step of Newton's method is too long where the force then moves back against it;
- * then the step is cut by the rule of the secant. */
-static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance, double goal,
-                               double *f) {
+ * No two forces move apart, so that a step of Newton's method is too long where the force then
+ * moves back against it; then the step is cut by the rule of the secant. */
+static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                               double tolerance, double goal, double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
     double from[2] = {f[0], f[1]}, share = 1.0;
     mu_residual r, base = {{0.0, 0.0}, {0.0, 0.0}, HUGE_VAL};
@@ -737,7 +772,8 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
         distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_length(r.step[0], r.step[1]));
         if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
         distance = mu_min(distance, 2.0 * limit);
-        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed) return mu_steady_of(&march, distance);
+        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed)
+            return mu_steady_of(&march, distance);
         ahead = base.step[0] * r.moved[0] + base.step[1] * r.moved[1];
         behind = base.step[0] * base.moved[0] + base.step[1] * base.moved[1];
         if (ahead < 0.0 && r.size > 0.5 * base.size && share > 1e-3) {
@@ -759,8 +795,8 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
  *
  * The steps that are left to be halved are then those of the period that slips most: the last one
  * hardly slips, and halves of its steps may be those that the periods before have taken already. */
-static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps, double tolerance,
-                                       double goal, double *f) {
+static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                                       double tolerance, double goal, double *f) {
     double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance, curved = 0.0;
     double most = 0.0, step = 0.0, from[2] = {0.0, 0.0};
     mu_march march;
@@ -807,9 +843,13 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
         }
         f[0] = march.f[0];
         f[1] = march.f[1];
-        /* many equal periods at once: half of what is left, and no more than a straight way that errs little */
-        leap = size[1] / size[2] > 0.8 && rate < 1.0 ? mu_min(0.5 * size[0] / (1.0 - rate), sqrt(0.2 * goal)) : 0.0;
-        if (leap > 2.0 * size[0] && fabs(size[0] / size[1] - size[1] / size[2]) < 0.2 * (1.0 - rate)) {
+        /* many equal periods at once: half of what is left, and no more than
+         * a straight way that errs little */
+        leap = size[1] / size[2] > 0.8 && rate < 1.0
+                   ? mu_min(0.5 * size[0] / (1.0 - rate), sqrt(0.2 * goal))
+                   : 0.0;
+        if (leap > 2.0 * size[0] &&
+            fabs(size[0] / size[1] - size[1] / size[2]) < 0.2 * (1.0 - rate)) {
             f[0] += leap * (moved[0] / size[0]);
             f[1] += leap * (moved[1] / size[0]);
             curved += 0.5 * leap * leap;
@@ -839,9 +879,10 @@ static int mu_halve(const mu_grid *steps, mu_grid *grid) {
     return 1;
 }
 
-/* The steady cycle of a spring: steps are halved until the estimate is below the tolerance, or this many times. */
-static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int levels, mu_grid *grid, mu_grid *steps,
-                                  double *f) {
+/* The steady cycle of a spring: steps are halved until the estimate is below the
+ * tolerance, or this many times. */
+static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int levels, mu_grid *grid,
+                                  mu_grid *steps, double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
     double of_step = mu_cube_root_near(mu_min(0.1 * tolerance, 1e-3));
     const double rounding = mu_max(MU_MOTION_ROUNDING, mu_min(0.05 * tolerance, 5e-9));
@@ -849,15 +890,19 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
     mu_steady last, out;
     of_step *= of_step;
     grid->n = mu_min(m->nodes, (double)grid->room);
-    for (int i = 0; i < grid->n; ++i) grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
+    for (int i = 0; i < grid->n; ++i)
+        grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
     for (int level = 0;; ++level) { /* at rest, the errors of the whole way to the cycle stay */
         mu_keep_below(limit, f);
-        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, goal, f);
-        for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) { /* steps too large to be followed */
+        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, goal,
+                                                                      f);
+        /* steps too large to be followed */
+        for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) {
             f[0] = m->drag > 0.0 ? limit : 0.0;
             f[1] = 0.0;
             of_step *= 0.06;
-            out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, goal, f);
+            out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step,
+                                                                          goal, f);
         }
         out.level = level;
         out.error = 2.0 * limit;
@@ -866,7 +911,9 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
                         3.0 * out.distance + rounding;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
         if (out.error <= tolerance || level == levels) return out;
-        if (m->drag == 0.0 && (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error))) return out;
+        if (m->drag == 0.0 &&
+            (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error)))
+            return out;
         if (!mu_halve(steps, grid)) return out;
         last = out;
         of_step *= 0.06;
@@ -949,20 +996,20 @@ static mu_shaken mu_of_spring(const mu_shaken *m, double share) {
     return out;
 }
 
-/* The springs of a ball at t: xi = 1 - t^2, so that they lie dense at the rim, where little load may behave otherwise
- * than all the rest.  What a spring adds per t is multiplied by 2 t. */
+/* The springs of a ball at t: xi = 1 - t^2, so that they lie dense at the rim, where little load
+ * may behave otherwise than all the rest.  What a spring adds per t is multiplied by 2 t. */
 static double mu_share_at(double t) { return 1.5 * t * t * (2.0 - t * t); }
 
-static mu_steady mu_spring_at(const mu_shaken *m, double t, double tolerance, int levels, mu_grid *grid, mu_grid *steps,
-                              double *f) {
+static mu_steady mu_spring_at(const mu_shaken *m, double t, double tolerance, int levels,
+                              mu_grid *grid, mu_grid *steps, double *f) {
     const double share = mu_share_at(t);
     const mu_shaken one = mu_of_spring(m, share);
     return mu_spring_motion(&one, tolerance / share, levels, grid, steps, f);
 }
 
 /* Where between low and high, with different numbers of slips, the cycle changes its kind. */
-static double mu_kink(const mu_shaken *m, double low, double high, int sticks, double tolerance, mu_grid *grid,
-                      mu_grid *steps, double *f) {
+static double mu_kink(const mu_shaken *m, double low, double high, int sticks, double tolerance,
+                      mu_grid *grid, mu_grid *steps, double *f) {
     const double close = 0.1 * sqrt(tolerance);
     while (high - low > close) {
         const double t = 0.5 * (low + high);
@@ -975,8 +1022,8 @@ static double mu_kink(const mu_shaken *m, double low, double high, int sticks, d
     return 0.5 * (low + high);
 }
 
-/* t at the share u of a panel, and its slope: at a kink, where springs change as (t - kink)^(3/2), it changes as the
- * square. */
+/* t at the share u of a panel, and its slope: at a kink, where springs change as
+ * (t - kink)^(3/2), it changes as the square. */
 static double mu_place_in(const mu_panel *panel, double u, double *slope) {
     const double width = panel->high - panel->low, rest = 1.0 - u;
     double share = u;
@@ -994,8 +1041,8 @@ static double mu_place_in(const mu_panel *panel, double u, double *slope) {
     return panel->low + share * width;
 }
 
-/* The start of the cycle at u, by the parabola through the nearest three of n points (u, f); as it is, where there are
- * less. */
+/* The start of the cycle at u, by the parabola through the nearest three of n points (u, f);
+ * as it is, where there are less. */
 static void mu_predict(double points[15][3], double *f, int n, double u) {
     int near[3] = {-1, -1, -1};
     if (n < 3) return;
@@ -1005,14 +1052,17 @@ static void mu_predict(double points[15][3], double *f, int n, double u) {
                 (near[j] < 0 || fabs(points[i][0] - u) < fabs(points[near[j]][0] - u)))
                 near[j] = i;
     f[0] = f[1] = 0.0;
-    if (fabs(points[near[0]][0] - u) > fabs(points[near[1]][0] - points[near[0]][0])) { /* beyond them */
+    /* beyond them */
+    if (fabs(points[near[0]][0] - u) > fabs(points[near[1]][0] - points[near[0]][0])) {
         f[0] = points[near[0]][1];
         f[1] = points[near[0]][2];
         return;
     }
     for (int j = 0; j < 3; ++j) {
-        const double *one = points[near[j]], *second = points[near[(j + 1) % 3]], *third = points[near[(j + 2) % 3]];
-        const double share = (u - second[0]) * (u - third[0]) / ((one[0] - second[0]) * (one[0] - third[0]));
+        const double *one = points[near[j]], *second = points[near[(j + 1) % 3]],
+                     *third = points[near[(j + 2) % 3]];
+        const double share =
+            (u - second[0]) * (u - third[0]) / ((one[0] - second[0]) * (one[0] - third[0]));
         f[0] += share * one[1];
         f[1] += share * one[2];
     }
@@ -1030,10 +1080,12 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int k
     out.kinks[0] = kink_low;
     out.kinks[1] = kink_high;
     out.decay = HUGE_VAL;
-    for (int k = 0; k < 15; ++k) { /* every other point first, so that the rest lie between known ones */
+    /* every other point first, so that the rest lie between known ones */
+    for (int k = 0; k < 15; ++k) {
         const int i = k < 7 ? 2 * k + 1 : 2 * (k - 7), single = k >= 7 && halvings < 2;
         double weight, slope;
-        const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope), share = mu_share_at(t);
+        const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope);
+        const double share = mu_share_at(t);
         mu_steady spring;
         mu_predict(at, f, k, u);
         spring = mu_spring_at(m, t, tolerance, single ? 0 : MU_MOTION_LEVELS, grid, steps, f);
@@ -1070,8 +1122,8 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int k
     return out;
 }
 
-/* The error of panel i: its own, and that of a kink between its end and its first point, which shows in the neighbour's
- * other value there. */
+/* The error of panel i: its own, and that of a kink between its end and its first point, which
+ * shows in the neighbour's other value there. */
 static double mu_panel_error(const mu_panel *panels, int n, int i) {
     const mu_panel *one = &panels[i];
     double error = one->error;
@@ -1081,7 +1133,8 @@ static double mu_panel_error(const mu_panel *panels, int n, int i) {
             error += (one->high - one->at[14]) *
                      mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
         if (other->high == one->low)
-            error += (one->at[0] - one->low) * mu_length(one->start[0] - other->end[0], one->start[1] - other->end[1]);
+            error += (one->at[0] - one->low) *
+                     mu_length(one->start[0] - other->end[0], one->start[1] - other->end[1]);
     }
     return error;
 }
@@ -1094,7 +1147,8 @@ static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, 
     for (int i = 0; i < MU_MOTION_SCAN; ++i) {
         const double t = (i + 1.0) / MU_MOTION_SCAN;
         const int now = mu_spring_at(m, t, tolerance, 0, grid, steps, f).sticks;
-        if (i > 0 && now != last) edges[++n] = mu_kink(m, before, t, last, tolerance, grid, steps, f);
+        if (i > 0 && now != last)
+            edges[++n] = mu_kink(m, before, t, last, tolerance, grid, steps, f);
         last = now;
         before = t;
     }
@@ -1113,15 +1167,17 @@ static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, 
 /* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the
  * middle.  A kink close to an end is left to later divisions: coarse steps may see it where fine
  * ones do not. */
-static double mu_division(const mu_shaken *m, const mu_panel *panel, double tolerance, mu_grid *grid, mu_grid *steps,
-                          double *f, int *kink) {
-    const double middle = 0.5 * (panel->low + panel->high), near = 0.02 * (panel->high - panel->low);
+static double mu_division(const mu_shaken *m, const mu_panel *panel, double tolerance,
+                          mu_grid *grid, mu_grid *steps, double *f, int *kink) {
+    const double middle = 0.5 * (panel->low + panel->high);
+    const double near = 0.02 * (panel->high - panel->low);
     int best = -1;
     *kink = 0;
     double nearest = HUGE_VAL;
     for (int i = 0; i < 14; ++i) {
         const double distance = fabs(i - 6.5);
-        if (panel->sticks[i] != panel->sticks[i + 1] && distance < nearest) best = i, nearest = distance;
+        if (panel->sticks[i] != panel->sticks[i + 1] && distance < nearest)
+            best = i, nearest = distance;
     }
     if (best >= 0) {
         const double at = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best],
@@ -1133,7 +1189,8 @@ static double mu_division(const mu_shaken *m, const mu_panel *panel, double tole
 }
 
 /* A ball: adaptive quadrature over its springs. */
-static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps) {
+static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *grid,
+                                mu_grid *steps) {
     mu_panel panels[MU_MOTION_PANELS];
     double f[2] = {m->drag > 0.0 ? 1.0 : 0.0, 0.0}, error = 0.0;
     const double half = 0.5 * tolerance;
@@ -1158,8 +1215,10 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
             const mu_panel whole = panels[worst];
             int kink;
             const double middle = mu_division(m, &whole, half, grid, steps, f, &kink);
-            panels[worst] = mu_ball_panel(m, whole.low, middle, whole.kinks[0], kink, half, grid, steps, f);
-            panels[n] = mu_ball_panel(m, middle, whole.high, kink, whole.kinks[1], half, grid, steps, f);
+            panels[worst] =
+                mu_ball_panel(m, whole.low, middle, whole.kinks[0], kink, half, grid, steps, f);
+            panels[n] =
+                mu_ball_panel(m, middle, whole.high, kink, whole.kinks[1], half, grid, steps, f);
         }
     }
     for (int i = 0; i < n; ++i) {
@@ -1175,7 +1234,8 @@ static mu_shaken mu_shaken_as(const int32_t *counts, const double *orders, const
     mu_shaken m = {counts, orders, one + 1, one[0], 1.0, 0.0, 16, 16, 0, {{0.0}}};
     double largest = 1.0;
     for (int i = 0; i < counts[0] + counts[1] + counts[2]; ++i) {
-        if (i < counts[0] + counts[1]) m.acceleration += orders[i] * orders[i] * fabs(m.terms[2 * i]);
+        if (i < counts[0] + counts[1])
+            m.acceleration += orders[i] * orders[i] * fabs(m.terms[2 * i]);
         largest = mu_max(largest, orders[i]);
     }
     if (largest <= MU_MOTION_ORDERS) {
@@ -1194,19 +1254,21 @@ static mu_shaken mu_shaken_as(const int32_t *counts, const double *orders, const
 }
 
 /* Steady cycles of n motions, see library.h. */
-static void mu_motions(int contact, int64_t n, const int32_t *counts, const double *orders, const double *cases,
-                       double tolerance, int64_t room, double *work, double *out) {
+static void mu_motions(int contact, int64_t n, const int32_t *counts, const double *orders,
+                       const double *cases, double tolerance, int64_t room, double *work,
+                       double *out) {
     mu_grid grid = {work, 0, room}, steps = {work + room, 0, room};
     const int64_t numbers = 1 + 2 * ((int64_t)counts[0] + counts[1] + counts[2]);
     for (int64_t i = 0; i < n; ++i, cases += numbers, out += MU_MEANS + 2) {
         const mu_shaken m = mu_shaken_as(counts, orders, cases);
         double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
-        const mu_steady found =
-            contact == MU_BALL ? mu_ball_motion(&m, tolerance, &grid, &steps)
-                               : mu_spring_motion(&m, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
-        memcpy(out, found.mean, sizeof found.mean);
-        out[MU_MEANS] = found.decay;
-        out[MU_MEANS + 1] = found.error;
+        const mu_steady cycle =
+            contact == MU_BALL
+                ? mu_ball_motion(&m, tolerance, &grid, &steps)
+                : mu_spring_motion(&m, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
+        memcpy(out, cycle.mean, sizeof cycle.mean);
+        out[MU_MEANS] = cycle.decay;
+        out[MU_MEANS + 1] = cycle.error;
     }
 }
 

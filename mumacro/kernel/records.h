@@ -9,7 +9,8 @@ typedef struct {
     double low, high;
 } mumacro_axis;
 
-/* One block: what its nodes hold for mu~; what the bound of mu~ allows for rounding, absolute and per factor. */
+/* One block: what its nodes hold for mu~; what the bound of mu~ allows for
+ * rounding, absolute and per factor. */
 typedef struct {
     const char *name;
     int regime;
@@ -25,8 +26,9 @@ typedef struct {
     const char *tabulated;
 } mumacro_piece;
 
-/* One quantity: its name; its variable in a block of a table file; its meaning; whether it is more than zero in
- * continuous sliding; whether it is smooth in v~ at the border (else it has a square root or a jump there). */
+/* One quantity: its name; its variable in a block of a table file; its meaning; whether it is
+ * more than zero in continuous sliding; whether it is smooth in v~ at the border (else it has
+ * a square root or a jump there). */
 typedef struct {
     const char *name, *variable, *meaning;
     int while_sliding, smooth_at_border;

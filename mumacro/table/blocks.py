@@ -70,7 +70,7 @@ class Table:
         """The names of the tabulated quantities, mu_ratio first."""
         return names_in(self.attributes)
 
-    def held(self, chart: atlas.Chart) -> list[atlas.Quantity]:
+    def quantities_of(self, chart: atlas.Chart) -> list[atlas.Quantity]:
         """The quantities that the block of ``chart`` tabulates."""
         return [BY_NAME[name] for name in self.quantities if chart.holds(BY_NAME[name])]
 

@@ -64,8 +64,8 @@ def _version(table: Table) -> int:
 
 def _contacts(table: Table) -> list[tuple[Sequence[atlas.Chart], list[Block]]]:
     """The charts and blocks of every contact that a table has."""
-    found: list[tuple[Sequence[atlas.Chart], list[Block]]] = [(atlas.CHARTS, table.blocks)]
-    return [*found, (atlas.BALL_CHARTS, table.ball)] if table.ball else found
+    contacts: list[tuple[Sequence[atlas.Chart], list[Block]]] = [(atlas.CHARTS, table.blocks)]
+    return [*contacts, (atlas.BALL_CHARTS, table.ball)] if table.ball else contacts
 
 
 def _digest(table: Table) -> str:
@@ -190,7 +190,7 @@ def _fill_blocks(
         axes = (chart.a.name, chart.b.name)
         _put(one, axes[0], block.a, atlas.COORDINATES[axes[0]])
         _put(one, axes[1], block.b, atlas.COORDINATES[axes[1]])
-        for quantity in table.held(chart):
+        for quantity in table.quantities_of(chart):
             meaning = (
                 chart.quantity
                 if quantity.name == "mu_ratio"
@@ -318,7 +318,7 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
             "not a mumacro table: format_version, tolerance or content_sha256 is missing"
         )
     version = root.attribute("format_version")
-    if not any(np.array_equal(version, known) for known in (WITHOUT_BALL, FORMAT_VERSION)):
+    if not any(np.array_equal(version, one) for one in (WITHOUT_BALL, FORMAT_VERSION)):
         raise root.refuse(
             f"format version {version}, this program reads {WITHOUT_BALL} and {FORMAT_VERSION}"
         )

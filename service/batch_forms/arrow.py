@@ -99,7 +99,7 @@ def _is_compressed(metadata: Any) -> bool:
         return True
 
 
-def tables_of(batch: Batch, step: int) -> Iterator[Any]:
+def record_batches(batch: Batch, step: int) -> Iterator[Any]:
     """The answers as record batches, with the reasons in the last column."""
     for outputs, codes, reasons in batch.slices(step):
         arrays = {path: _array(path, column, codes) for path, column in outputs.items()}
@@ -121,10 +121,10 @@ def _write(batch: Batch) -> Iterator[bytes]:
         name: value if isinstance(value, str) else dump(value)
         for name, value in batch.table.signature.items()
     }
-    for made in tables_of(batch, _SLICE):
+    for record_batch in record_batches(batch, _SLICE):
         if writer is None:
-            writer = pa.ipc.new_stream(sink, made.schema.with_metadata(label))
-        writer.write_batch(made)
+            writer = pa.ipc.new_stream(sink, record_batch.schema.with_metadata(label))
+        writer.write_batch(record_batch)
         yield sink.getvalue()
         sink.seek(0)
         sink.truncate()

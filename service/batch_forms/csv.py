@@ -20,7 +20,7 @@ from ..batch import Batch, Body, Form, Reason, text_form, too_large
 from ..models.inputs import INPUTS
 from ..models.options import BatchOptions
 from ..problems import FieldFault, ProblemKind, RequestError, refuse
-from .arrow import tables_of, twice
+from .arrow import record_batches, twice
 
 _LONGEST_HEAD = 64 * 1024  # bytes
 _BLOCK = 1024 * 1024  # bytes that are read at a time; a line may have as many
@@ -150,11 +150,13 @@ def _value(scale: Scale, text: str) -> Any:
 
 def _write(batch: Batch) -> Iterator[bytes]:
     opened = False
-    for made in tables_of(batch, _SLICE):
+    for record_batch in record_batches(batch, _SLICE):
         plain = pa.table(
             {
                 name: column.cast(pa.string()) if pa.types.is_dictionary(column.type) else column
-                for name, column in zip(made.schema.names, made.columns, strict=True)
+                for name, column in zip(
+                    record_batch.schema.names, record_batch.columns, strict=True
+                )
             }
         )
         if not opened:

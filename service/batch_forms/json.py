@@ -22,7 +22,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import by_name, columns_of
 from mumacro.inputs.fields import is_rigid
 from mumacro.inputs.k_range import ENDS
-from mumacro.inputs.kind import Kind, kind_of
+from mumacro.inputs.kind import Kind
 
 from ..batch import Batch, Body, Form, Reason, too_large
 from ..included import REGIME_OF, SOURCES, Outputs, names_of, nested
@@ -43,14 +43,13 @@ _BETWEEN = re.compile(rb"\}\s*,")
 def read(text: bytearray, max_batch: int, options: BatchOptions) -> Body:
     """The cases and the options of a body: columns or one case, or a list of rows."""
     if opening := _OPENS_LIST.match(text):
-        kind = kind_of(options.contact or "spring", options.direction or "across")
-        if body := _quick_rows(text, opening.end(), max_batch, kind):
+        if body := _quick_rows(text, opening.end(), max_batch, options.kind):
             return body
         _limit_values(text, max_batch)
         rows = decode(text, large=True)
         if len(rows) > max_batch:
             raise too_large(max_batch)
-        return _one_by_one(rows, kind)
+        return _one_by_one(rows, options.kind)
     _limit_values(text, max_batch)
     members = _members(text)
     if not isinstance(members, dict):
@@ -88,15 +87,15 @@ def _count(text: bytes | bytearray, character: bytes) -> int:
 def _members(text: bytearray) -> Any:
     """What ``json`` reads, with long lists of numbers by orjson: a text stands in place of each
     while it reads."""
-    kept, lists, at = list[bytes | bytearray](), list[Any](), 0
+    pieces, lists, at = list[bytes | bytearray](), list[Any](), 0
     while (start := text.find(b"[", at)) >= 0 and (end := text.find(b"]", start) + 1) > 0:
         numbers = _list(text[start:end]) if end - start > _SHORT else None
-        kept.append(
+        pieces.append(
             text[at:end] if numbers is None else text[at:start] + b'"%b%d"' % (_TOKEN, len(lists))
         )
         lists += [] if numbers is None else [numbers]
         at = end
-    members = decode(b"".join([*kept, text[at:]]), large=True)
+    members = decode(b"".join([*pieces, text[at:]]), large=True)
     if isinstance(members, dict):
         token = _TOKEN.decode()
         for name, value in members.items():

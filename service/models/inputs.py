@@ -28,8 +28,18 @@ from mumacro.kernel.arrays import Array
 
 #: what a case may hold, in the order in which it is described
 INPUTS = (
-    "mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude", "k_low", "k_high", "k_range",
-)  # fmt: skip
+    "mu0",
+    "Fz",
+    "k",
+    "y0",
+    "omega",
+    "f",
+    "v0",
+    "Fz_amplitude",
+    "k_low",
+    "k_high",
+    "k_range",
+)
 #: the first case of the documentation: mu_macro = 0.2405
 EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
 MAX_REASONS = 1000  # bad cases of a batch that are listed
@@ -195,9 +205,9 @@ def number(name: str, value: object) -> tuple[float, str | None]:
             real = float(value)  # type: ignore[arg-type]
         except OverflowError:
             real = math.inf
-        return (real, None) if _LEAST[name] <= real <= _MOST[name] else (
-            math.nan, refusal(name, real)
-        )  # fmt: skip
+        if _LEAST[name] <= real <= _MOST[name]:
+            return real, None
+        return math.nan, refusal(name, real)
     if name == "k" and isinstance(value, str) and is_rigid(value):
         return math.inf, None
     if value is None and name != "k":

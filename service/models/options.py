@@ -1,5 +1,6 @@
 """What is asked beside the inputs: which contact and table, what else is computed."""
 
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, WithJsonSchema, WrapValidator, model_validator
@@ -47,13 +48,13 @@ class Choice(Strict):
     tolerance: Positive | None = optional(_TOLERANCE)
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        kind_of(self.contact, self.direction)
+    def _has_a_kind(self) -> Self:
+        _ = self.kind
         return self
 
-    @property
+    @cached_property
     def kind(self) -> Kind:
-        """Contact and direction."""
+        """Contact and direction; InputError where they do not go together."""
         return kind_of(self.contact, self.direction)
 
 
@@ -84,17 +85,19 @@ class InputStd(Strict):
         return values
 
 
-def check_std(std: InputStd | None, include: list[Any] | None, direction: str) -> None:
+def _check_std(options: Any) -> Any:
     """Refuse deviations that have no effect, and ``std`` in ``include`` without them."""
-    if (std is None) == ("std" in (include or ())):
+    std, kind = options.std, options.kind
+    if (std is None) == ("std" in (options.include or ())):
         bound = "given if include has std"
         if std is not None:
             bound = "left out: no effect unless include has std"
         raise InputError("std", None, bound)
-    other = "y0" if direction == "normal" else AMPLITUDE
+    other = "y0" if kind.normal else AMPLITUDE
     if std is not None and getattr(std, other):
-        bound = f"without {other}, which direction {direction} does not have"
+        bound = f"without {other}, which direction {kind.names['direction']} does not have"
         raise InputError("std", other, bound)
+    return options
 
 
 class Options(Choice):
@@ -103,12 +106,7 @@ class Options(Choice):
     include: Annotated[list[Include], Field(max_length=16)] | None = optional(_INCLUDE)
     std: InputStd | None = optional("Standard deviations of the inputs, for include=std")
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:  # in place of that of Choice
-        kind_of(self.contact, self.direction)
-        if self.include or self.std is not None:
-            check_std(self.std, self.include, self.direction)
-        return self
+    _std_has_an_effect = model_validator(mode="after")(_check_std)
 
 
 class CaseRequest(Options, Case):
@@ -164,13 +162,7 @@ class QueryOptions(Deviations, Choice):
         f"{_INCLUDE}; joined by commas"
     )
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:  # in place of that of Choice
-        kind_of(self.contact, self.direction)
-        std = self.std
-        if self.include or std is not None:
-            check_std(std, self.include, self.direction)
-        return self
+    _std_has_an_effect = model_validator(mode="after")(_check_std)
 
 
 class BatchOptions(Deviations):
@@ -183,11 +175,12 @@ class BatchOptions(Deviations):
         f"{_INCLUDE}; joined by commas"
     )
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        kind_of(self.contact or "spring", self.direction or "across")
-        check_std(self.std, self.include, self.direction or "across")
-        return self
+    _std_has_an_effect = model_validator(mode="after")(_check_std)
+
+    @cached_property
+    def kind(self) -> Kind:
+        """Contact and direction; InputError where they do not go together."""
+        return kind_of(self.contact or "spring", self.direction or "across")
 
     @property
     def members(self) -> dict[str, Any]:

@@ -200,8 +200,11 @@ def _of_points(value: Any, info: ValidationInfo) -> Any:
 
 
 _LISTED = {
-    "type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": MAX_POINTS,
-}  # fmt: skip
+    "type": "array",
+    "items": {"type": "number"},
+    "minItems": 1,
+    "maxItems": MAX_POINTS,
+}
 
 
 _POINTS = PlainValidator(_of_points)
@@ -255,7 +258,7 @@ class FitRequest(Choice):
     )
 
     @model_validator(mode="after")
-    def _what_is_left_out(self) -> Self:
+    def _refuse_unknowns_and_other_amplitude(self) -> Self:
         for name in self.unknowns:
             if getattr(self, name) is not None:
                 raise InputError(name, None, "left out: it is among the unknowns")

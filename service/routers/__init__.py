@@ -49,8 +49,8 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 #: of every question in the query, and in the body
-ASKED = problems(400, 401, 422, 503)
-POSTED = problems(400, 401, 408, 413, 415, 422, 503)
+GET_PROBLEMS = problems(400, 401, 422, 503)
+POST_PROBLEMS = problems(400, 401, 408, 413, 415, 422, 503)
 
 
 class _File(FileResponse):

@@ -23,7 +23,7 @@ from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body, within
 from ..models.options import BatchOptions, CaseRequest
 from ..problems import FieldFault, ProblemKind, RequestError, document_of, meaning, refuse
 from ..reading import DirectRoute, decode, dump, of_members, validated
-from . import POSTED, router_of
+from . import POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
@@ -232,7 +232,7 @@ _ANSWERS: Any = {
     "/mu-macro/batch",
     response_class=Response,
     openapi_extra={"requestBody": {"required": True, "content": _BODIES}},
-    responses={200: _ANSWERS, **POSTED},
+    responses={200: _ANSWERS, **POST_PROBLEMS},
     summary="Macroscopic friction of many cases",
 )
 async def post_mu_macro_batch(

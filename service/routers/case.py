@@ -12,7 +12,7 @@ from ..included import Plan, answer_case
 from ..models.answers import CaseAnswer
 from ..models.options import CaseQuery, CaseRequest, TextQuery
 from ..reading import DirectRoute, Json, dump
-from . import ASKED, POSTED, router_of
+from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
@@ -39,7 +39,9 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
 
 
 @router.get(
-    "/mu-macro", responses={200: _CACHED, **ASKED}, summary="Macroscopic friction of one case"
+    "/mu-macro",
+    responses={200: _CACHED, **GET_PROBLEMS},
+    summary="Macroscopic friction of one case",
 )
 async def get_mu_macro(request: Request, case: Annotated[CaseQuery, Query()]) -> Response:
     """Answer one case given as a query.  The answer can be cached."""
@@ -49,7 +51,7 @@ async def get_mu_macro(request: Request, case: Annotated[CaseQuery, Query()]) ->
 
 @router.post(
     "/mu-macro",
-    responses={200: {"model": CaseAnswer}, **POSTED},
+    responses={200: {"model": CaseAnswer}, **POST_PROBLEMS},
     summary="Macroscopic friction of one case, as JSON",
 )
 async def post_mu_macro(request: Request, case: CaseRequest) -> Response:
@@ -60,7 +62,7 @@ async def post_mu_macro(request: Request, case: CaseRequest) -> Response:
 @router.get(
     "/mu-macro.txt",
     response_class=PlainTextResponse,
-    responses={200: {"headers": _CACHED["headers"]}, **ASKED},
+    responses={200: {"headers": _CACHED["headers"]}, **GET_PROBLEMS},
     summary="One value of one case, for spreadsheets (WEBSERVICE)",
 )
 async def get_mu_macro_text(request: Request, case: Annotated[TextQuery, Query()]) -> Response:

@@ -24,7 +24,7 @@ from ..models.questions import FitRequest, StiffnessRequest
 from ..problems import ProblemKind, RequestError
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
-from . import POSTED, problems, router_of
+from . import POST_PROBLEMS, problems, router_of
 
 router = router_of("answers", StrictRoute)
 _CURVE = 200  # points of the fitted law
@@ -33,7 +33,7 @@ _MEASURED = ("mu_macro", STD)
 
 @router.post(
     "/stiffness",
-    responses={200: {"model": StiffnessAnswer}, **POSTED},
+    responses={200: {"model": StiffnessAnswer}, **POST_PROBLEMS},
     summary="The stiffness of a contact from materials and geometry",
 )
 async def post_stiffness(contact: StiffnessRequest) -> Response:
@@ -45,7 +45,7 @@ async def post_stiffness(contact: StiffnessRequest) -> Response:
 
 @router.post(
     "/fit",
-    responses={200: {"model": FitAnswer}, **POSTED, **problems(501)},
+    responses={200: {"model": FitAnswer}, **POST_PROBLEMS, **problems(501)},
     summary="k and mu0 from measured points",
 )
 async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Response:

@@ -13,7 +13,7 @@ from ..limits import Working
 from ..models.motion import MotionAnswer, MotionRequest
 from ..problems import FieldFault, reason_of, refuse
 from ..reading import Json, StrictRoute
-from . import POSTED, router_of
+from . import POST_PROBLEMS, router_of
 
 router = router_of("answers", StrictRoute)
 _NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnswer.model_fields]
@@ -21,7 +21,7 @@ _NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnsw
 
 @router.post(
     "/motion",
-    responses={200: {"model": MotionAnswer}, **POSTED},
+    responses={200: {"model": MotionAnswer}, **POST_PROBLEMS},
     summary="The mean friction of any periodic motion",
 )
 async def post_motion(scene: MotionRequest, work: Working) -> Response:

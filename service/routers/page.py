@@ -21,7 +21,7 @@ STATIC = Path(__file__).resolve().parent.parent / "static"
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _FRESH = {"Cache-Control": "no-cache"}
 # what is vendored changes with its version only
-_KEPT = {"Cache-Control": "public, max-age=86400"}
+_ONE_DAY = {"Cache-Control": "public, max-age=86400"}
 # Inline styles are allowed at /docs: the interface sets some on its elements.
 _DOCS_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
@@ -79,5 +79,5 @@ async def get_asset(request: Request, folder: str, name: str) -> Response:
     path = _FILES.get(f"/static/{folder}/{name}")
     if path is None:
         raise HTTPException(404)
-    headers = _KEPT if name.startswith("swagger-ui") else _FRESH
+    headers = _ONE_DAY if name.startswith("swagger-ui") else _FRESH
     return file_answer(request, path, headers, media_type=_TYPES[path.suffix])

@@ -27,7 +27,7 @@ from ..models.options import MODEL
 from ..models.questions import LawQuery, LawRequest, SolveForRequest
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
-from . import ASKED, POSTED, router_of
+from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", StrictRoute)
 
@@ -85,7 +85,7 @@ def _remarks_on(
 
 @router.post(
     "/law",
-    responses={200: {"model": LawAnswer}, **POSTED},
+    responses={200: {"model": LawAnswer}, **POST_PROBLEMS},
     summary="mu_macro over a range of one input",
 )
 async def post_law(question: LawRequest, tables: Loaded, work: Working) -> Response:
@@ -109,7 +109,7 @@ _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "s
 @router.get(
     "/law.csv",
     response_class=Response,
-    responses={200: _CSV, **ASKED},
+    responses={200: _CSV, **GET_PROBLEMS},
     summary="mu_macro over a range of one input, as a table",
 )
 async def get_law_csv(
@@ -160,7 +160,7 @@ _NO_LIMIT = 1e300
 
 @router.post(
     "/solve-for",
-    responses={200: {"model": SolveForAnswer}, **POSTED},
+    responses={200: {"model": SolveForAnswer}, **POST_PROBLEMS},
     summary="The value of one input that gives a wanted mu_macro",
 )
 async def post_solve_for(question: SolveForRequest, tables: Loaded, work: Working) -> Response:

@@ -12,7 +12,7 @@ from ..models.answers import TableAnswer
 from ..models.inputs import Positive, Strict
 from ..reading import Json, StrictRoute
 from ..tables import Loaded
-from . import ASKED, file_answer, problems, router_of
+from . import GET_PROBLEMS, file_answer, problems, router_of
 
 router = router_of("table", StrictRoute)
 
@@ -27,7 +27,9 @@ Chosen = Annotated[TableQuery, Query()]
 
 
 @router.get(
-    "/table", responses={200: {"model": TableAnswer}, **ASKED}, summary="Properties of a table"
+    "/table",
+    responses={200: {"model": TableAnswer}, **GET_PROBLEMS},
+    summary="Properties of a table",
 )
 async def get_table(chosen: Chosen, tables: Loaded) -> Response:
     """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
@@ -57,7 +59,7 @@ _PARTS: dict[int | str, Any] = {
 @router.get(
     "/table.nc",
     response_class=Response,
-    responses={**_PARTS, **ASKED, **problems(416)},
+    responses={**_PARTS, **GET_PROBLEMS, **problems(416)},
     summary="The table as a netCDF-4 file",
 )
 async def get_table_file(request: Request, chosen: Chosen, tables: Loaded) -> Response:

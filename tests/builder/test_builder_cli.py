@@ -77,9 +77,9 @@ def test_ball_gives_a_table_a_ball_and_leaves_its_springs(
     run_builder: Run, tables_dir: Path, tmp_path: Path
 ) -> None:
     whole = read_table(tables_dir / "mumacro-1e-4.nc")
-    kept = {name: x for name, x in whole.attributes.items() if not name.startswith("ball_")}
+    attributes = {name: x for name, x in whole.attributes.items() if not name.startswith("ball_")}
     old, new = tmp_path / "old.nc", tmp_path / "new.nc"
-    write_table(dataclasses.replace(whole, ball=[], attributes=kept), old)
+    write_table(dataclasses.replace(whole, ball=[], attributes=attributes), old)
     done = run_builder("ball", old, "--out", new)
     assert done.returncode == 0, done.stderr
     report, opened = json.loads(done.stdout), Surrogate.open(new)
@@ -107,9 +107,9 @@ def test_verify_stores_what_it_finds_only_when_asked(
     assert after.attributes["verified_points"] == report["points"]
     assert after.max_abs_error == report["max_abs_error"] < before.max_abs_error
     for name, part in report["distribution"].items():
-        told = [*part["error_quantiles"], *part["bound_over_error"]]
-        assert [*after.error_distribution[name].values()] == told
-        assert told != [*before.error_distribution[name].values()]
+        numbers = [*part["error_quantiles"], *part["bound_over_error"]]
+        assert [*after.error_distribution[name].values()] == numbers
+        assert numbers != [*before.error_distribution[name].values()]
     # a table that misses its bounds is left as it is
     table = read_table(path)
     table.attributes["tolerance"] = 1e-9

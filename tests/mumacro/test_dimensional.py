@@ -34,13 +34,13 @@ def exactly(numerator: list[float], denominator: list[float]) -> float:
         return math.inf
 
 
-def same_digits(given: Any, expected: float) -> bool:
+def same_digits(value: Any, expected: float) -> bool:
     """Equal to a few rounding errors, or to the last digit of denormal numbers, or both
     infinite."""
-    found = float(given)
-    if math.isinf(expected) or math.isinf(found):
-        return min(found, expected) > 1.797e308
-    return abs(found - expected) <= 8e-16 * expected + 5e-324
+    number = float(value)
+    if math.isinf(expected) or math.isinf(number):
+        return min(number, expected) > 1.797e308
+    return abs(number - expected) <= 8e-16 * expected + 5e-324
 
 
 # --- the groups -----------------------------------------------------------------------------------
@@ -58,17 +58,17 @@ def test_groups_are_right_whatever_overflows_and_the_answer_is_finite(
     table: Surrogate, case: Case
 ) -> None:
     mu0, Fz, k, y0, omega, v0 = (case[name] for name in FIELDS)
-    found = table.evaluate(case)
-    assert same_digits(found.v_tilde, exactly([v0, k], [mu0, Fz, omega]))
-    assert same_digits(found.y_tilde, exactly([y0, k], [mu0, Fz]))
-    assert same_digits(found.length_scale, exactly([mu0, Fz], [k]))
-    assert 0.0 <= found.mu_ratio <= 1.0
-    assert 0.0 <= found.mu_macro <= mu0
-    assert 0.0 <= found.error_bound <= mu0  # a larger bound would be useless
+    answer = table.evaluate(case)
+    assert same_digits(answer.v_tilde, exactly([v0, k], [mu0, Fz, omega]))
+    assert same_digits(answer.y_tilde, exactly([y0, k], [mu0, Fz]))
+    assert same_digits(answer.length_scale, exactly([mu0, Fz], [k]))
+    assert 0.0 <= answer.mu_ratio <= 1.0
+    assert 0.0 <= answer.mu_macro <= mu0
+    assert 0.0 <= answer.error_bound <= mu0  # a larger bound would be useless
     for columns in ({**case, "mu0": [mu0]}, {name: np.array([x]) for name, x in case.items()}):
         many = table.evaluate(columns, groups=True)
         for name in ("v_tilde", "y_tilde", "length_scale", "mu_ratio", "error_bound"):
-            assert getattr(many, name)[0] == getattr(found, name)
+            assert getattr(many, name)[0] == getattr(answer, name)
 
 
 # --- edge cases of the answer ---------------------------------------------------------------------
@@ -79,23 +79,23 @@ def test_groups_are_right_whatever_overflows_and_the_answer_is_finite(
 )
 @pytest.mark.parametrize("k", [1e6, "rigid", 5e-324, 1e308])
 def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: Case, k: Any) -> None:
-    found = table.evaluate(**{**CASE, **stillness, "k": k})
-    answer = found.mu_macro, found.mu_ratio, found.error_bound, found.source
+    coulomb = table.evaluate(**{**CASE, **stillness, "k": k})
+    answer = coulomb.mu_macro, coulomb.mu_ratio, coulomb.error_bound, coulomb.source
     assert answer == (CASE["mu0"], 1.0, 0.0, "no_oscillation")
 
 
 @pytest.mark.parametrize("y", [1e-300, 0.3, 0.6, 0.999, 1.0, 1.2, 1e5, 1e300])
 def test_no_drive_is_the_static_limit(table: Surrogate, y: float) -> None:
-    found = table.evaluate(mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=7.0, v0=0.0)
-    assert (found.v_tilde, found.y_tilde, found.regime, found.source) == (
+    answer = table.evaluate(mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=7.0, v0=0.0)
+    assert (answer.v_tilde, answer.y_tilde, answer.regime, answer.source) == (
         0.0,
         y,
         "static",
         "static_limit",
     )
-    assert found.mu_ratio == close(math.sqrt((1.0 - y) * (1.0 + y)) if y < 1.0 else 0.0, rel=5e-16)
+    assert answer.mu_ratio == close(math.sqrt((1.0 - y) * (1.0 + y)) if y < 1.0 else 0.0, rel=5e-16)
     # the last digit of y~ = y0 k/(mu0 Fz) enters by its root only at the edge of the static limit
-    assert 0.0 <= found.error_bound < (1e-7 if y == 1.0 else 1e-12)
+    assert 0.0 <= answer.error_bound < (1e-7 if y == 1.0 else 1e-12)
 
 
 @pytest.mark.parametrize(
@@ -118,10 +118,10 @@ def test_no_drive_is_the_static_limit(table: Surrogate, y: float) -> None:
 def test_groups_that_leave_double_precision_have_their_limit(
     table: Surrogate, inputs: Case, expected: float
 ) -> None:
-    found = table.evaluate(**{**CASE, **inputs})
-    assert abs(found.mu_ratio - expected) <= found.error_bound / CASE["mu0"] + 1e-15
-    assert found.mu_ratio == close(expected, rel=1e-12, abs=1e-280)
-    assert found.regime != "static" or expected in (0.0, 0.9428090415820634)
+    answer = table.evaluate(**{**CASE, **inputs})
+    assert abs(answer.mu_ratio - expected) <= answer.error_bound / CASE["mu0"] + 1e-15
+    assert answer.mu_ratio == close(expected, rel=1e-12, abs=1e-280)
+    assert answer.regime != "static" or expected in (0.0, 0.9428090415820634)
 
 
 exponent = st.integers(min_value=-60, max_value=60)
@@ -154,21 +154,23 @@ def test_only_the_two_groups_matter(
 # --- illegal values and their messages ------------------------------------------------------------
 
 BAD = [
-    (field, bad) for field in FIELDS for bad in (-1.0, -5e-324, math.nan, math.inf, -math.inf)
+    (field, bad)
+    for field in FIELDS
+    for bad in (-1.0, -5e-324, math.nan, math.inf, -math.inf)
     if (field, bad) != ("k", math.inf)
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
 def test_illegal_value_is_named_with_field_and_bound(
     table: Surrogate, field: str, bad: float
 ) -> None:
-    for given_inputs, index in (
+    for case, index in (
         ({**CASE, field: bad}, None),
         ({**CASE, field: [CASE[field], bad, bad]}, 1),
     ):
         with pytest.raises(InputError) as caught:
-            table.evaluate(given_inputs, gradient=True, illegal="raise")
+            table.evaluate(case, gradient=True, illegal="raise")
         error = caught.value
         bound = STIFFNESS if field == "k" and math.isnan(bad) else BOUNDS[field]
         assert (error.field, error.index, error.bound) == (field, index, bound)
@@ -179,27 +181,27 @@ def test_illegal_value_is_named_with_field_and_bound(
 
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
-@pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"groups": True}, {"gradient": True}], ids=str)
 def test_an_illegal_value_of_an_array_spoils_its_case(
-    table: Surrogate, field: str, bad: float, asked: Case
+    table: Surrogate, field: str, bad: float, options: Case
 ) -> None:
     column = [CASE[field], bad, CASE[field]]
-    found = table.evaluate(**{**CASE, field: column}, **asked)
+    answer = table.evaluate(**{**CASE, field: column}, **options)
     sound = table.evaluate(**CASE, gradient=True)
     for name, none in (("source_code", -1), ("regime_code", -1), ("source", ""), ("regime", "")):
-        assert getattr(found, name).tolist() == [getattr(sound, name), none, getattr(sound, name)]
-    numbers = [found.mu_macro, found.mu_ratio, found.error_bound]
-    if asked:
-        numbers += [found.v_tilde, found.y_tilde, found.length_scale]
-        assert found.regime_certain.tolist() == [True, False, True]
-    if "gradient" in asked:
-        numbers += [*found.gradient.values(), *found.gradient_bound.values()]
+        assert getattr(answer, name).tolist() == [getattr(sound, name), none, getattr(sound, name)]
+    numbers = [answer.mu_macro, answer.mu_ratio, answer.error_bound]
+    if options:
+        numbers += [answer.v_tilde, answer.y_tilde, answer.length_scale]
+        assert answer.regime_certain.tolist() == [True, False, True]
+    if "gradient" in options:
+        numbers += [*answer.gradient.values(), *answer.gradient_bound.values()]
     for values in numbers:
         assert np.isnan(values).tolist() == [False, True, False]
         assert values[0] == values[2]
     # an illegal scalar together with an array makes every case illegal
     other = next(name for name in FIELDS if name != field)
-    spoilt = table.evaluate(**{**CASE, field: bad, other: [CASE[other]] * 2}, **asked)
+    spoilt = table.evaluate(**{**CASE, field: bad, other: [CASE[other]] * 2}, **options)
     assert spoilt.source_code.tolist() == [-1, -1]
 
 
@@ -220,9 +222,9 @@ def test_zero_is_legal_only_where_documented(table: Surrogate, field: str) -> No
 @pytest.mark.parametrize("field", FIELDS)
 def test_every_input_must_be_given(table: Surrogate, field: str) -> None:
     rest = without(CASE, field)
-    said = {"omega": r", or f \[Hz\]", "k": ': .*"rigid" or math.inf'}.get(field, "")
+    remedy = {"omega": r", or f \[Hz\]", "k": ': .*"rigid" or math.inf'}.get(field, "")
     for cases, keywords in (((), rest), ((rest,), {})):
-        with pytest.raises(InputError, match=f"^{field} must be given{said}"):
+        with pytest.raises(InputError, match=f"^{field} must be given{remedy}"):
             table.evaluate(*cases, **keywords)
 
 
@@ -327,9 +329,9 @@ def test_rigid_is_given_as_the_word_or_infinity_in_numbers_and_in_arrays(table: 
     "gap", [None, math.nan, "", "much", ["rigid", None], ["rigid", ""], [1e6, "much"]]
 )
 def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap: Any) -> None:
-    told = '^k must be a number > 0 .*"rigid" or math.inf'
+    message = '^k must be a number > 0 .*"rigid" or math.inf'
     rest = without(CASE, "k", "v0")
-    asked: list[Callable[[], Any]] = [
+    calls: list[Callable[[], Any]] = [
         lambda: table.evaluate(**{**CASE, "k": gap}),
         lambda: table.evaluate({**CASE, "k": gap}),
         lambda: settling(table, **{**CASE, "k": gap}),
@@ -339,12 +341,12 @@ def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap:
             {"v0": [0.01, 0.02], "mu_macro": [0.2, 0.2]}, "mu0", k=gap, **without(rest, "mu0")
         ),
     ]
-    for ask in asked[: 2 if isinstance(gap, list) else None]:
-        with pytest.raises(InputError, match=told):
+    for ask in calls[: 2 if isinstance(gap, list) else None]:
+        with pytest.raises(InputError, match=message):
             ask()
     series = pd.Series([0.01, 0.02])
     if gap is None:
-        with pytest.raises(InputError, match=told):
+        with pytest.raises(InputError, match=message):
             table.evaluate(**{**CASE, "k": gap, "v0": series})
 
 
@@ -372,16 +374,16 @@ def test_single_cases_equal_the_array(table: Surrogate, n: int) -> None:
         math.inf,
     )
     for fixed in (None, 0, 2, 5):
-        given: list[Any] = [c[:1].copy() if i == fixed else c for i, c in enumerate(columns)]
-        found = table.evaluate(dict(zip(FIELDS, given, strict=True)))
+        some: list[Any] = [c[:1].copy() if i == fixed else c for i, c in enumerate(columns)]
+        answer = table.evaluate(dict(zip(FIELDS, some, strict=True)))
         macro, mu, bound, source = (
-            found.mu_macro,
-            found.mu_ratio,
-            found.error_bound,
-            found.source_code,
+            answer.mu_macro,
+            answer.mu_ratio,
+            answer.error_bound,
+            answer.source_code,
         )
         for i in range(0, n, 17):
-            case = [float(c[i if c.size == n else 0]) for c in given]
+            case = [float(c[i if c.size == n else 0]) for c in some]
             np.testing.assert_array_equal(
                 table.evaluate_case(*case), (macro[i], mu[i], bound[i], source[i])
             )

@@ -53,9 +53,9 @@ OUT_OF_BOUNDS = [-1.0, -1e6, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0),
 table = tables(1e-4)
 
 
-def parts(found: Any) -> tuple[Any, ...]:
+def parts(answer: Any) -> tuple[Any, ...]:
     """A value alone, or with bound or slopes."""
-    return found if isinstance(found, tuple) else (found,)
+    return answer if isinstance(answer, tuple) else (answer,)
 
 
 @pytest.mark.parametrize("method", PLANE)

@@ -42,16 +42,16 @@ def columns(n: int = N) -> Case:
     return result
 
 
-def same(found: Any, expected: Any) -> None:
+def same(answer: Any, expected: Any) -> None:
     """Two answers have the same values, for any array type; the expected ones are plain arrays."""
     for name in (*VALUES, "regime_code", "regime_certain"):
         np.testing.assert_array_equal(
-            np.asarray(getattr(found, name)), getattr(expected, name), err_msg=name
+            np.asarray(getattr(answer, name)), getattr(expected, name), err_msg=name
         )
     for name in ("gradient", "gradient_bound"):
         for field in FIELDS:
             np.testing.assert_array_equal(
-                np.asarray(getattr(found, name)[field]), getattr(expected, name)[field]
+                np.asarray(getattr(answer, name)[field]), getattr(expected, name)[field]
             )
 
 

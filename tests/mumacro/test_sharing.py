@@ -225,7 +225,7 @@ def in_another_process(data: bytes, folder: Path, repository: Path) -> str:
     return done.stdout.decode().strip()
 
 
-def told(table: Surrogate) -> str:
+def summary(table: Surrogate) -> str:
     return f"{table.threads} {table.checksum} {table.mu_ratio(0.1, 0.5).hex()}"
 
 
@@ -235,7 +235,7 @@ def test_a_bundled_table_is_pickled_by_name_and_checksum(tmp_path: Path, reposit
     assert len(data) < 500
     assert str(opened.path.parent).encode() not in data  # its path may differ in the other process
     assert opened.checksum.encode() in data
-    assert in_another_process(data, tmp_path, repository) == told(opened)
+    assert in_another_process(data, tmp_path, repository) == summary(opened)
 
 
 def test_another_table_carries_its_bytes(
@@ -249,7 +249,7 @@ def test_another_table_carries_its_bytes(
     assert len(data) > FILES[-2].stat().st_size
     monkeypatch.chdir(tmp_path)
     shutil.rmtree(tmp_path / "mine")
-    assert in_another_process(data, tmp_path, repository) == told(opened)
+    assert in_another_process(data, tmp_path, repository) == summary(opened)
     again = pickle.loads(data)  # noqa: S301 (our own bytes)
     assert everything(again, 1000) == everything(opened, 1000)
     assert len(pickle.dumps(again)) == close(len(data), rel=0.01)
@@ -260,7 +260,8 @@ def test_a_table_replaced_after_it_was_opened_is_pickled_as_it_was_opened(tmp_pa
     shutil.copy(FILES[0], path)
     opened = Surrogate.open(path)
     shutil.copy(FILES[1], path)
-    assert pickle.loads(pickle.dumps(opened)).checksum == opened.checksum  # noqa: S301 (our own bytes)
+    again = pickle.loads(pickle.dumps(opened))  # noqa: S301 (our own bytes)
+    assert again.checksum == opened.checksum
 
 
 def test_a_bundled_table_of_another_release_is_refused() -> None:

@@ -204,16 +204,16 @@ def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(
     assert all(np.array_equal(result.ravel(), expected) for result in others)
 
 
-@pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"groups": True}, {"gradient": True}], ids=str)
 @pytest.mark.parametrize("shape", [(0,), (0, 3)])
 def test_empty_arrays_give_empty_answers(
-    fine: Surrogate, shape: tuple[int, ...], asked: Case
+    fine: Surrogate, shape: tuple[int, ...], options: Case
 ) -> None:
     for mu0 in (0.3, -0.3):
-        answer = fine.evaluate(**{**CASE, "mu0": mu0, "v0": np.empty(shape)}, **asked)
+        answer = fine.evaluate(**{**CASE, "mu0": mu0, "v0": np.empty(shape)}, **options)
         assert answer.mu_macro.shape == answer.error_bound.shape == answer.source.shape == shape
     with pytest.raises(InputError, match="mu0"):
-        fine.evaluate(**{**CASE, "mu0": -0.3, "v0": np.empty(shape)}, illegal="raise", **asked)
+        fine.evaluate(**{**CASE, "mu0": -0.3, "v0": np.empty(shape)}, illegal="raise", **options)
 
 
 # --- threads and xarray ---------------------------------------------------------------------------

@@ -48,7 +48,10 @@ def test_a_result_is_put_between_its_markers(
     monkeypatch.setattr(measuring, "PAGES", (page,))
     monkeypatch.setattr(measuring, "RESULTS", tmp_path / "results")
     monkeypatch.setattr(sys, "argv", ["benchmarks/trial.py", "--write", "--points", "7"])
-    sections = {"times": lambda points: f"{points} points", "other": lambda points: "elsewhere"}  # noqa: ARG005
+    sections = {
+        "times": lambda points: f"{points} points",
+        "other": lambda points: "elsewhere",  # noqa: ARG005
+    }
     measuring.main(None, sections, points=5)
     stored = (tmp_path / "results" / "trial-times.md").read_text("utf-8")
     assert stored.startswith("7 points\n\nTook 0.0 min. Machine: ")
@@ -79,11 +82,11 @@ SECTIONS = [
 ]
 
 
-def check(found: list[list[Row]]) -> None:
-    assert found
-    assert all(found)
+def check(tables: list[list[Row]]) -> None:
+    assert tables
+    assert all(tables)
     assert not {"nan", "inf", "-inf"} & {
-        cell for table in found for row in table for cell in row.values()
+        cell for table in tables for row in table for cell in row.values()
     }
 
 
@@ -108,18 +111,18 @@ def test_tables_keep_their_tolerance_where_plain_grids_do_not(script: str, least
     """The ball of the finest table is one of 1e-10."""
     (comparison,) = run(script, "--quick", "--rounds", "1")
     check([comparison])
-    seen = []
+    names = []
     for row in comparison:
         if row["max abs error"] == "-":
             continue
         name, error = row["method"].strip("*"), float(row["max abs error"])
         if name.startswith("mumacro-"):
             assert 0.0 < error <= max(float(name.removeprefix("mumacro-")), least)
-            seen.append(name)
+            names.append(name)
         assert " x " not in row["data"] or error > 1e-3, (
             "24 and 48 nodes a side cannot follow the border"
         )
-    assert sorted(seen) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
+    assert sorted(names) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
 
 
 @pytest.mark.slow

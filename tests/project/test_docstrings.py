@@ -8,10 +8,10 @@ import pytest
 
 import mumacro
 
-LEFT_OUT = {"mumacro.__main__", "mumacro._kernel"}  # no module of Python
+NO_PYTHON = {"mumacro.__main__", "mumacro._kernel"}  # no module of Python
 MODULES = sorted(
     {"mumacro", *(one.name for one in pkgutil.walk_packages(mumacro.__path__, "mumacro."))}
-    - LEFT_OUT
+    - NO_PYTHON
 )
 
 

@@ -64,47 +64,45 @@ def test_github_strikes_nothing_through_and_eats_nothing(page: Path) -> None:
 
 def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Surrogate) -> None:
     page = (DOCS / "python.md").read_text("utf-8")
-    seen = set()
-    for column, given, errors in re.findall(
+    columns = set()
+    for column, span, errors in re.findall(
         r"^\| `(\w+)` \| .+ \| (.+) \| (.+ %.*) \|$", page, re.MULTILINE
     ):
-        seen.add(column)
-        whole = (
-            (1e-4, 1.0) if r"\le 1" in given else (1.0, 1e8) if r"\ge 1" in given else (1e-4, 1e8)
-        )
-        for told in errors.split("; "):
+        columns.add(column)
+        whole = (1e-4, 1.0) if r"\le 1" in span else (1.0, 1e8) if r"\ge 1" in span else (1e-4, 1e8)
+        for error in errors.split("; "):
             ends = [*whole]
-            if inner := re.search(r"(up to|from) \$\\tilde\{y\} = ([\d.]+)\$", told):
+            if inner := re.search(r"(up to|from) \$\\tilde\{y\} = ([\d.]+)\$", error):
                 ends[inner[1] == "up to"] = float(inner[2])
             y = np.geomspace(ends[0], ends[1], 4001)
             y[[0, -1]] = ends
             off = np.abs(borders(y)[column] / surrogate.v_tilde_crit(y) - 1.0).max()
-            figure = float(re.findall(r"\d[\d.e-]*", told)[0])  # "12.6 %" is 0.126
-            assert (100.0 * off if "%" in told else off) == close(figure, rel=0.03), (
-                f"{column}: {told}"
+            figure = float(re.findall(r"\d[\d.e-]*", error)[0])  # "12.6 %" is 0.126
+            assert (100.0 * off if "%" in error else off) == close(figure, rel=0.03), (
+                f"{column}: {error}"
             )
-    assert seen == BORDERS.keys() - {"exact"}
+    assert columns == BORDERS.keys() - {"exact"}
 
 
 def cells(page: str, head: str) -> dict[str, list[str]]:
     """The rows of the table whose first head begins so, by their first cells."""
-    (found,) = (table for table in tables(page) if next(iter(table[0])).startswith(head))
-    return {title: cells for title, *cells in (row.values() for row in found)}
+    (table,) = (table for table in tables(page) if next(iter(table[0])).startswith(head))
+    return {title: cells for title, *cells in (row.values() for row in table)}
 
 
 def test_the_deviations_of_the_border_are_those_of_the_page_on_validation() -> None:
     shown = cells((DOCS / "validation.md").read_text("utf-8"), "deviation")
-    made = cells(validation.deviations(), "deviation")
-    for title, told in shown.items():
+    computed = cells(validation.deviations(), "deviation")
+    for title, figures in shown.items():
         compared = [
             (float(one), float(other))
-            for one, other in zip(told, made.pop(title), strict=True)
+            for one, other in zip(figures, computed.pop(title), strict=True)
             if one
         ]
         assert len(compared) >= 4, title  # the page leaves out what is far beyond a formula's range
         for one, other in compared:
             assert one == close(other, rel=6e-3, abs=5e-5), title
-    assert made.keys() == {"*exact v~crit*"}
+    assert computed.keys() == {"*exact v~crit*"}
 
 
 def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate: Surrogate) -> None:
@@ -114,11 +112,13 @@ def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate: S
     assert surrogate.ratio_with_bound(0.05, 0.4, contact="ball")[0] == close(ball, abs=5e-5)
     assert surrogate.mu_ratio(0.05, 0.4) == close(spring, abs=5e-5)
     assert surrogate.mu_ratio(0.05 / 1.5, 0.4 / 1.5) == close(softer, abs=5e-5)
-    heads, told = re.findall(r"^\| (?:\$\\tilde\{y\}\$|difference) \| (.*) \|$", page, re.MULTILINE)
-    made = cells(validity.partial_slip(), "y~")
-    assert heads.split(" | ") == list(made)
-    assert [float(one) for one in told.split(" | ")] == close(
-        [float(one) for (one,) in made.values()], rel=0.15
+    heads, figures = re.findall(
+        r"^\| (?:\$\\tilde\{y\}\$|difference) \| (.*) \|$", page, re.MULTILINE
+    )
+    computed = cells(validity.partial_slip(), "y~")
+    assert heads.split(" | ") == list(computed)
+    assert [float(one) for one in figures.split(" | ")] == close(
+        [float(one) for (one,) in computed.values()], rel=0.15
     )
 
 
@@ -132,9 +132,9 @@ def test_the_folds_along_k_are_those_on_the_page(surrogate: Surrogate) -> None:
         rises = np.flatnonzero(np.diff(surrogate.mu_ratio(y / r, y)) > 0.0)
         return float(y[rises[0]]) if rises.size else math.nan
 
-    found = np.array([minimum(r) for r in born + np.linspace(-0.005, 0.005, 101)])
-    assert np.isnan(found[0])
-    assert found[np.isfinite(found)][0] == close(last, abs=0.05)
+    minima = np.array([minimum(r) for r in born + np.linspace(-0.005, 0.005, 101)])
+    assert np.isnan(minima[0])
+    assert minima[np.isfinite(minima)][0] == close(last, abs=0.05)
     assert minimum(1e8) == close(first, abs=0.05)
 
 
@@ -143,10 +143,10 @@ def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(
 ) -> None:
     y = np.geomspace(1e-4, 1e8, 20_001)
     text = (DOCS / "accuracy.md").read_text("utf-8")
-    told = re.findall(
+    bounds = re.findall(
         r"up to ([\d.e-]+) with the tightest table, ([\d.e-]+\d) with the coarsest", text
     )[0]
-    for table, bound in zip((surrogate, Surrogate.open(1e-4)), told, strict=True):
+    for table, bound in zip((surrogate, Surrogate.open(1e-4)), bounds, strict=True):
         shares = (1.0, 1.0 - 1e-15, 1.0 + 1e-15)
         largest = max(
             table.stick_fraction_with_bound(share * table.v_tilde_crit(y), y)[1].max()
@@ -158,16 +158,16 @@ def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(
 def shown_distribution() -> dict[tuple[str, str, str], list[str]]:
     """The figures of the page on accuracy by contact, quantity and table."""
     page = (DOCS / "accuracy.md").read_text("utf-8")
-    (found,) = (table for table in tables(page) if "bound/error, median" in table[0])
-    rows = (list(row.values()) for row in found)
+    (table,) = (table for table in tables(page) if "bound/error, median" in table[0])
+    rows = (list(row.values()) for row in table)
     return {(contact, name, table): figures for contact, name, table, *figures in rows}
 
 
 def test_the_distribution_of_errors_on_the_page_is_what_the_tables_state() -> None:
     shown = shown_distribution()
-    made = {(row[0], row[1], row[2]): row[3:] for row in error_distribution.spring_across()}
-    assert len(made) == 24
-    assert {place: shown[place] for place in made} == made
+    computed = {(row[0], row[1], row[2]): row[3:] for row in error_distribution.spring_across()}
+    assert len(computed) == 24
+    assert {place: shown[place] for place in computed} == computed
     assert {contact for contact, *_ in shown} == {
         "spring across",
         "ball across",
@@ -222,13 +222,13 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
 
     text = "\n".join(_operations(create_app(Settings(tables=(ROOT / "tables",))).openapi()))
     rows = re.findall(r"^\| `(\S+?)`(?:, required)? \| (.*?) \|", text, re.MULTILINE)
-    wanted = {
+    paths = {
         "power.saved",
         "results[].roots[].settling.periods",
         "border[].value",
         "errors[].reason",
     }
-    assert wanted <= {field for field, _ in rows}
+    assert paths <= {field for field, _ in rows}
     # an object is followed by its fields, unless the description does not fix them
     objects = (
         (one, other)
@@ -242,12 +242,12 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
 def test_metadata_agrees_with_the_package() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
-    said = (
+    lines = (
         f"version: {__version__}\n",
         f"license: {project['license']}\n",
         f"title: {project['name']}\n",
     )
-    assert [text for text in said if text not in citation] == []
+    assert [text for text in lines if text not in citation] == []
 
 
 def test_the_columns_of_a_law_are_all_described() -> None:

@@ -115,7 +115,7 @@ ELSEWHERE = {
         "tests/builder/export/test_c_languages.py",
         "test_octave_has_the_same_answers",
     ),
-}  # fmt: skip
+}
 #: pages whose Python programs another file runs
 PROGRAMS_ELSEWHERE = {"docs/how-to/scale.md": "tests/project/test_recipes.py"}
 SHELL = ("bash", "console")
@@ -125,7 +125,7 @@ HERE = (
     (r"--port \d+", "--port 0"),
     (r"/srv/mumacro/", f"{ROOT}/tables/"),
 )
-TOLD = "put it into a ```bash block, name in ELSEWHERE what runs it, or say Not run by the checks"
+REMEDY = "put it into a ```bash block, name in ELSEWHERE what runs it, or say Not run by the checks"
 
 
 def name(page: Path) -> str:
@@ -170,10 +170,10 @@ def is_covered(block: Block) -> bool:
 @pytest.mark.parametrize("page", [*PAGES, *MANIFESTS], ids=name)
 def test_every_command_and_program_is_run_or_said_not_to_be(page: Path) -> None:
     commands = run_here() | ELSEWHERE.keys() | {*INSTALLS.values()}
-    found = comments(page) if page in MANIFESTS else mentions(page)
+    commands_shown = comments(page) if page in MANIFESTS else mentions(page)
     missing = [
         f"{name(page)}:{one.line}: {one.command}"
-        for one in found
+        for one in commands_shown
         if not one.marked and (one.indented or not is_run(one, commands))
     ]
     if page not in MANIFESTS:
@@ -182,14 +182,14 @@ def test_every_command_and_program_is_run_or_said_not_to_be(page: Path) -> None:
             for block in blocks(page)
             if not is_covered(block)
         ]
-    assert missing == [], TOLD
+    assert missing == [], REMEDY
 
 
 def test_what_runs_elsewhere_is_there_and_is_still_told() -> None:
-    told = run_here() | {one.command for page in PAGES for one in mentions(page)}
-    assert {*INSTALLS.values()} <= told
+    commands = run_here() | {one.command for page in PAGES for one in mentions(page)}
+    assert {*INSTALLS.values()} <= commands
     for command, (file, words) in ELSEWHERE.items():
-        assert command in told, f"no document has it any more: {command}"
+        assert command in commands, f"no document has it any more: {command}"
         assert words in (ROOT / file).read_text("utf-8"), f"{file} does not run {command}"
     for page, file in PROGRAMS_ELSEWHERE.items():
         assert Path(page).name in (ROOT / file).read_text("utf-8")
@@ -227,13 +227,13 @@ def test_a_new_command_must_be_run_or_said_not_to_be(
 
 
 def environment(programs: Path, **more: str) -> dict[str, str]:
-    kept = {
+    variables = {
         name: value
         for name, value in os.environ.items()
         if not name.startswith(("PYTHON", "MUMACRO_"))
     }
     path = f"{programs}{os.pathsep}/usr/local/bin{os.pathsep}/usr/bin{os.pathsep}/bin"
-    return {**kept, "PATH": path, "COLUMNS": "120", "MPLBACKEND": "agg", **more}
+    return {**variables, "PATH": path, "COLUMNS": "120", "MPLBACKEND": "agg", **more}
 
 
 def run(programs: Path, folder: Path, *words: str | Path, **more: str) -> str:
@@ -347,14 +347,14 @@ def test_a_number_of_the_guide_has_a_last_place() -> None:
     ]
 
 
-def compare(found: str, shown: str, command: str) -> None:
+def compare(output: str, shown: str, command: str) -> None:
     """What a command printed, with what the page shows."""
-    (words, numbers), (shown_words, shown_numbers) = number_parts(found), number_parts(shown)
-    assert words == shown_words, f"{command}\n{found}"
+    (words, numbers), (shown_words, shown_numbers) = number_parts(output), number_parts(shown)
+    assert words == shown_words, f"{command}\n{output}"
     for number, shown_number in zip(numbers, shown_numbers, strict=True):
         # the last of sixteen digits depend on the processor
         expected = close(float(shown_number), rel=1e-9, abs=1.01 * last_place(shown_number))
-        assert float(number) == expected, f"{command}\n{found}"
+        assert float(number) == expected, f"{command}\n{output}"
 
 
 def serve(programs: Path, log: Path, command: str) -> None:
@@ -396,6 +396,6 @@ def test_commands(page: Path, reader: Path, request: pytest.FixtureRequest) -> N
         if runs_until_a_signal:
             serve(programs, reader / "log.jsonl", command)
             continue
-        found = run(programs, ROOT if in_checkout else reader, "sh", "-c", command, **more)
+        output = run(programs, ROOT if in_checkout else reader, "sh", "-c", command, **more)
         if shown:
-            compare(found, shown, command)
+            compare(output, shown, command)

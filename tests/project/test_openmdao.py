@@ -27,7 +27,7 @@ def component(repository: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     table = Surrogate.open(1e-10, threads=1)
     friction = importlib.import_module("openmdao_component").Friction
 
-    def made(**options: Any) -> Any:
+    def problem_of(**options: Any) -> Any:
         problem = om.Problem(reports=None)
         problem.model.add_subsystem(
             "friction", friction(surrogate=table, vec_size=4, **options), promotes=["*"]
@@ -40,7 +40,7 @@ def component(repository: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
         problem.run_model()
         return problem
 
-    return made
+    return problem_of
 
 
 def test_openmdao_checks_the_partials(component: Any) -> None:

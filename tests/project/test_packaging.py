@@ -62,10 +62,10 @@ def test_the_manifests_give_each_worker_the_memory_that_was_tried(repository: Pa
     def read(name: str) -> str:
         return (repository / name).read_text("utf-8")
 
-    (tried,) = re.findall(r"^WORKER_MB=(\d+) ", read("deploy/container.sh"), re.MULTILINE)
-    assert re.findall(r"limits: \{memory: (\d+)Mi\}", read("deploy/kubernetes.yaml")) == [tried]
-    assert re.findall(r"mem_limit: (\d+)m", read("deploy/compose.yaml")) == [tried]
-    assert f"{tried} MiB for each worker" in read("docs/operations.md")
+    (megabytes,) = re.findall(r"^WORKER_MB=(\d+) ", read("deploy/container.sh"), re.MULTILINE)
+    assert re.findall(r"limits: \{memory: (\d+)Mi\}", read("deploy/kubernetes.yaml")) == [megabytes]
+    assert re.findall(r"mem_limit: (\d+)m", read("deploy/compose.yaml")) == [megabytes]
+    assert f"{megabytes} MiB for each worker" in read("docs/operations.md")
     (largest,) = re.findall(r"^LARGEST_MB=\S+:-(\d+)\}", read("deploy/container.sh"), re.MULTILINE)
     assert f"at most {largest} MB over its base" in read("docs/operations.md")
 
@@ -148,8 +148,8 @@ def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: P
     done = python(repository, BUILD, tmp_path, CC="gcc", MUMACRO_BUILD_DEBUG="1")
     assert done.returncode == 0, done.stderr
     for folder, debug in ((tmp_path, True), (repository / "mumacro", False)):
-        made = (folder / "_kernel.so").read_bytes()
-        assert (b"libasan" in made, b"libubsan" in made) == (debug, debug)
+        library = (folder / "_kernel.so").read_bytes()
+        assert (b"libasan" in library, b"libubsan" in library) == (debug, debug)
 
 
 def test_dev_py_sees_a_changed_c_source(
@@ -163,9 +163,9 @@ def test_dev_py_sees_a_changed_c_source(
     for path in ("hatch_build.py", "mumacro/kernel/kernel.c", "mumacro/_kernel.so"):
         (tmp_path / path).write_text(path)
     shutil.copytree(repository / "requirements", tmp_path / "requirements")
-    seen = {dev.current()["kernel"]}
+    digests = {dev.current()["kernel"]}
     (kernel / "kernel.c").touch()
-    assert seen == {dev.current()["kernel"]}
+    assert digests == {dev.current()["kernel"]}
     for change in (
         lambda: (kernel / "kernel.c").write_text("other"),
         lambda: (kernel / "new.h").write_text("new"),
@@ -173,8 +173,8 @@ def test_dev_py_sees_a_changed_c_source(
         lambda: (tmp_path / "mumacro" / "_kernel.so").unlink(),
     ):
         change()
-        seen.add(dev.current()["kernel"])
-    assert len(seen) == 5
+        digests.add(dev.current()["kernel"])
+    assert len(digests) == 5
 
 
 @pytest.mark.slow
@@ -227,9 +227,9 @@ LACKS += [
 ]
 
 
-@pytest.mark.parametrize(("module", "lacks", "said"), LACKS)
+@pytest.mark.parametrize(("module", "lacks", "message"), LACKS)
 def test_one_line_says_what_is_missing(
-    repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any
+    repository: Path, tmp_path: Path, module: Any, lacks: Any, message: Any
 ) -> None:
     ignored = shutil.ignore_patterns("__pycache__", *(["_kernel.*"] if lacks == "kernel" else []))
     for name in {"mumacro", module}:
@@ -241,7 +241,7 @@ def test_one_line_says_what_is_missing(
         command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
     )
     assert (done.returncode, done.stdout) == (1, "")
-    assert re.fullmatch(said, done.stderr.strip())
+    assert re.fullmatch(message, done.stderr.strip())
 
 
 def test_a_missing_module_of_the_project_itself_is_not_explained_away() -> None:

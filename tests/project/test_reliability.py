@@ -69,7 +69,7 @@ def test_answers_have_their_properties_over_the_full_double_range(
     table: Surrogate, check: Any
 ) -> None:
     result = check(table, 0.02)
-    assert result.tried >= 500
+    assert result.cases >= 500
     assert result.broken == 0
 
 
@@ -170,10 +170,10 @@ def test_numbers_in_text_have_the_bits_of_float_or_are_refused(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", faults.QUICK)
 def test_a_fault_loses_no_data(name: str) -> None:
-    what, seen = faults.tried(faults.FAULTS[name])
+    what, report = faults.outcome_of(faults.FAULTS[name])
     if what == "not tried":
-        pytest.skip(seen)
-    assert what == "held", seen
+        pytest.skip(report)
+    assert what == "held", report
 
 
 @pytest.mark.slow
@@ -190,10 +190,10 @@ def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Pa
             Sweep(1, checkpoint=disk / "work.checkpoint") as sweep,
         ):
             sweep.solve("full", v[:20], y[:20])
-            kept, many = faults.left(disk), np.geomspace(0.1, 10.0, 600)  # 29 kB of results
+            files, many = faults.files_in(disk), np.geomspace(0.1, 10.0, 600)  # 29 kB of results
             words = r"work\.checkpoint: finished work cannot be stored: No space left"
             with pytest.raises(CheckpointError, match=words):
                 sweep.solve("full", many, many)
-            assert faults.left(disk) == kept
+            assert faults.files_in(disk) == files
     except faults.NotTriedError as error:
         pytest.skip(str(error))

@@ -49,7 +49,7 @@ class Installed:
         self.run("python", *pip, "-c", str(pins), str(wheel))
 
     def run(self, *words: Any, code: int = 0) -> Any:
-        kept = {
+        variables = {
             name: value
             for name, value in os.environ.items()
             if not name.startswith(("PYTHON", "MUMACRO_"))
@@ -60,7 +60,7 @@ class Installed:
             capture_output=True,
             text=True,
             timeout=600,
-            env={**kept, "PATH": str(self.bin)},
+            env={**variables, "PATH": str(self.bin)},
             check=False,
         )
         assert done.returncode == code, done.stdout + done.stderr
@@ -104,17 +104,17 @@ def build(folder: Path, platform: str | None = None) -> Path:
     newest = max(
         path.stat().st_mtime for path in (*files, ROOT / "hatch_build.py", ROOT / "pyproject.toml")
     )
-    made = [
+    wheels = [
         path
         for path in ROOT.glob(f"dist/*-{platform}.whl")
         if platform and path.stat().st_mtime > newest
     ]
-    if not made:
+    if not wheels:
         env = {**os.environ, "MUMACRO_BUILD_PLATFORM": platform}
         command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
         subprocess.run(command, cwd=ROOT, env=env, check=True)
-        made = [*folder.glob("*.whl")]
-    (result,) = made
+        wheels = [*folder.glob("*.whl")]
+    (result,) = wheels
     return result
 
 
@@ -218,10 +218,13 @@ def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(inst
 
 @pytest.mark.parametrize(
     ("words", "extra"),
-    [("mumacro serve", "service"), ("mumacro eval cases.csv -o out.csv", "files"),
-     ("python -m mumacro.service", "service"),
-     ("python -m mumacro.builder solve --v 0.1 --y 0.5", "builder")],
-)  # fmt: skip
+    [
+        ("mumacro serve", "service"),
+        ("mumacro eval cases.csv -o out.csv", "files"),
+        ("python -m mumacro.service", "service"),
+        ("python -m mumacro.builder solve --v 0.1 --y 0.5", "builder"),
+    ],
+)
 def test_without_an_extra_one_line_says_what_to_install(
     installed: Any, words: Any, extra: Any
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.support.forms import BATCH, Row, asked, number
+from benchmarks.support.forms import BATCH, Row, answered_rows, number
 from benchmarks.support.serving import CASE
 from mumacro import Surrogate
 
@@ -104,9 +104,9 @@ WAYS: dict[str, Callable[[Any], list[Row]]] = {
     "GET": lambda client: [by_get(client, row) for row in ROWS],
     "rows": by_rows,
     "columns": by_columns,
-    "lines": lambda client: list(map(of_one, asked(client, "ndjson", ROWS))),
-    "CSV": lambda client: asked(client, "csv", ROWS),
-    "Arrow": lambda client: asked(client, "arrow", ROWS),
+    "lines": lambda client: list(map(of_one, answered_rows(client, "ndjson", ROWS))),
+    "CSV": lambda client: answered_rows(client, "csv", ROWS),
+    "Arrow": lambda client: answered_rows(client, "arrow", ROWS),
 }
 
 
@@ -114,14 +114,14 @@ WAYS: dict[str, Callable[[Any], list[Row]]] = {
 def test_the_service_answers_in_every_format_what_the_library_does(
     client: Any, expected: list[Row], way: str
 ) -> None:
-    found = WAYS[way](client)
+    rows = WAYS[way](client)
     i = REASONS.index(f"k: {GAP}")
     if way == "GET":  # an empty value is no number there
-        assert found[i]["error"]
+        assert rows[i]["error"]
     if way == "GET":
-        found[i] = expected[i]
-    assert found == expected
-    assert {tuple(row) for row in found} == {(*COLUMNS, "error")}
+        rows[i] = expected[i]
+    assert rows == expected
+    assert {tuple(row) for row in rows} == {(*COLUMNS, "error")}
 
 
 INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "std"]
@@ -130,27 +130,27 @@ INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling
 def flat(document: Row, path: str = "") -> Row:
     """Leaves of nested objects by their paths; JSON has no number that is not finite, and says
     null."""
-    found: Row = {}
+    leaves: Row = {}
     for name, value in document.items():
         if isinstance(value, dict):
-            found |= flat(value, f"{path}{name}.")
+            leaves |= flat(value, f"{path}{name}.")
         else:
-            found[path + name] = (
+            leaves[path + name] = (
                 None if isinstance(value, float) and not math.isfinite(value) else value
             )
-    return found
+    return leaves
 
 
 def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any) -> None:
     good, std = list(GOOD), {"v0": 1e-3, "mu0": 0.01}
-    asked_for = {"include": INCLUDED, "std": std}
-    single = [flat(client.post("/v1/mu-macro", json={**row, **asked_for}).json()) for row in good]
+    options = {"include": INCLUDED, "std": std}
+    single = [flat(client.post("/v1/mu-macro", json={**row, **options}).json()) for row in good]
     names = [name for name in single[0] if not name.startswith(("table", "api"))]
     assert names[: len(COLUMNS)] == list(COLUMNS)
     assert len(names) > 30
     single = [{name: row[name] for name in names} for row in single]
     columns = client.post(
-        BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **asked_for}
+        BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **options}
     ).json()
     listed = {name: values for name, values in flat(columns).items() if name in names}
     assert [
@@ -162,6 +162,6 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     reply = client.post(BATCH, params=query, json=good).json()
     assert [{name: flat(row)[name] for name in names} for row in reply["results"]] == single
     for form in ("arrow", "csv", "ndjson"):
-        rows = asked(client, form, GOOD, **query)
+        rows = answered_rows(client, form, GOOD, **query)
         assert form == "ndjson" or list(rows[0]) == [*names, "error"]
         assert [{name: row[name] for name in names} for row in map(flat, rows)] == single

@@ -80,15 +80,15 @@ def run(folder: Path, *arguments: str) -> str:
 @pytest.fixture(scope="module")
 def folder(live_server: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The client, and a program that uses it."""
-    made = tmp_path_factory.mktemp("client")
-    (made / "openapi.json").write_bytes(live_server.ask("GET", "/openapi.json")[2])
-    (made / "config.yaml").write_text(
+    folder_of_client = tmp_path_factory.mktemp("client")
+    (folder_of_client / "openapi.json").write_bytes(live_server.ask("GET", "/openapi.json")[2])
+    (folder_of_client / "config.yaml").write_text(
         "content_type_overrides:\n  application/x-netcdf: application/octet-stream\n"
     )
-    (made / "program.py").write_text(PROGRAM)
+    (folder_of_client / "program.py").write_text(PROGRAM)
     options = "--meta none --config config.yaml --path openapi.json --output-path mumacro_client"
-    run(made, "-m", "openapi_python_client", "generate", *options.split())
-    return made
+    run(folder_of_client, "-m", "openapi_python_client", "generate", *options.split())
+    return folder_of_client
 
 
 def test_it_is_typed(folder: Path) -> None:

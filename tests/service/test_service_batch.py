@@ -8,7 +8,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from benchmarks.support.forms import BATCH, as_csv, as_ndjson, asked, posted, read, stream_of
+from benchmarks.support.forms import (
+    BATCH,
+    answered_rows,
+    as_csv,
+    as_ndjson,
+    posted,
+    read,
+    stream_of,
+)
 from mumacro import Surrogate
 from tests.support.cases import Case
 
@@ -69,10 +77,10 @@ def test_a_gap_in_k_is_never_a_rigid_contact(client: Any, case: Case, gap: Any) 
         (fault,) = client.post(BATCH, content=json.dumps(body)).json()["errors"]
         assert (fault["index"], fault["field"], "rigid" in fault["reason"]) == (1, "k", True)
         assert gap is not None or fault["reason"] == GAP
-    first, second, third = asked(client, "ndjson", rows)
+    first, second, third = answered_rows(client, "ndjson", rows)
     assert (first["source"], second["status"], third["source"]) == ("stick_slip_low", 422, "rigid")
     assert second["errors"][0]["field"] == "k"
-    assert [row["error"] and row["error"][:2] for row in asked(client, "csv", rows)] == [
+    assert [row["error"] and row["error"][:2] for row in answered_rows(client, "csv", rows)] == [
         None,
         "k:",
         None,
@@ -229,7 +237,7 @@ def test_an_odd_line_among_plain_ones_affects_only_itself(
 ) -> None:
     good = json.dumps(case)
     answers = read("ndjson", posted(client, "ndjson", "\n".join([good, "", odd, good])))
-    (expected,) = asked(client, "ndjson", [case])
+    (expected,) = answered_rows(client, "ndjson", [case])
     assert answers[0] == answers[-1] == expected
     assert [answer.get("status") for answer in answers[1:-1]] == ([] if status is ... else [status])
     if status not in (..., None):
@@ -277,8 +285,8 @@ def test_a_wrong_line_of_csv_keeps_its_place_beside_blank_lines(client: Any, cas
 
 def test_a_number_of_csv_beyond_double_range_is_no_rigid_contact(client: Any, case: Case) -> None:
     rows = [{**case, "k": k} for k in ("1e999", "inf", "rigid", 1e6)]
-    found = read("csv", posted(client, "csv", as_csv(rows)))
-    assert [row["error"] and row["error"][:2] for row in found] == ["k:", "k:", None, None]
+    answers = read("csv", posted(client, "csv", as_csv(rows)))
+    assert [row["error"] and row["error"][:2] for row in answers] == ["k:", "k:", None, None]
 
 
 def test_arrow_keeps_order_over_batches_and_names_its_table(
@@ -310,17 +318,17 @@ def test_a_bad_arrow_case_affects_only_itself(client: Any, case: Case) -> None:
 
 
 def test_arrow_numbers_of_other_types_are_numbers(client: Any, case: Case) -> None:
-    given = pa.record_batch(
+    record_batch = pa.record_batch(
         {name: pa.array([value], type=pa.float32()) for name, value in case.items()}
     )
-    given = given.set_column(1, "Fz", pa.array([10], type=pa.int16()))
-    (row,) = read("arrow", posted(client, "arrow", stream_of(given)))
+    record_batch = record_batch.set_column(1, "Fz", pa.array([10], type=pa.int16()))
+    (row,) = read("arrow", posted(client, "arrow", stream_of(record_batch)))
     assert (
         row["mu_macro"]
         == one(client, {name: float(np.float32(x)) for name, x in case.items()})["mu_macro"]
     )
     answer = pa.ipc.open_stream(
-        posted(client, "arrow", stream_of(given.slice(1))).content
+        posted(client, "arrow", stream_of(record_batch.slice(1))).content
     ).read_all()
     assert (answer.num_rows, answer.schema.names[:5]) == (0, list(VALUES))
 

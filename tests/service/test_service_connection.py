@@ -47,8 +47,8 @@ def strict(serving: Any, surrogate: Surrogate) -> Any:
 
 @pytest.fixture
 def raw(live_server: Any) -> Any:
-    with connect(live_server) as made:
-        yield made
+    with connect(live_server) as connection:
+        yield connection
 
 
 def answer(raw: Any) -> Any:
@@ -124,8 +124,8 @@ HEADS = [
 @pytest.mark.parametrize(("text", "status"), HEADS, ids=range(len(HEADS)))
 def test_a_head_is_refused_with_its_status(raw: Any, text: bytes, status: Any) -> None:
     raw.sendall(text)
-    found, content = answer(raw)
-    assert found == status
+    code, content = answer(raw)
+    assert code == status
     assert status == 200 or json.loads(content)["status"] == status
 
 
@@ -147,7 +147,7 @@ SLOW = {
 }
 
 
-def given_up(server: Any, text: bytes, drop: Any) -> Any:
+def until_closed(server: Any, text: bytes, drop: Any) -> Any:
     """All that a client gets until it is disconnected."""
     received, until = b"", time.monotonic() + PATIENCE_S
     with connect(server) as raw, suppress(ConnectionError):
@@ -166,9 +166,9 @@ def given_up(server: Any, text: bytes, drop: Any) -> Any:
 
 def test_a_client_that_stops_or_drips_is_given_up(strict: Any) -> None:
     with ThreadPoolExecutor(len(SLOW)) as pool:
-        found = pool.map(lambda slow: given_up(strict, *slow[:2]), SLOW.values())
+        texts = pool.map(lambda slow: until_closed(strict, *slow[:2]), SLOW.values())
         assert strict.ask("GET", "/livez")[0] == 200
-        received = dict(zip(SLOW, found, strict=True))
+        received = dict(zip(SLOW, texts, strict=True))
     assert {name: text for name, text in received.items() if SLOW[name][2] not in text} == {}
     assert not received["lines until the deadline"].endswith(END)
 
@@ -218,8 +218,8 @@ def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
     large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
     compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
     assert len(compact) < 64 * 1024
-    with ExitStack() as held:
-        idle = [held.enter_context(connect(strict)) for _ in range(3)]
+    with ExitStack() as connections:
+        idle = [connections.enter_context(connect(strict)) for _ in range(3)]
         for raw in idle:
             raw.sendall(head(BATCH, None, NDJSON))
             assert raw.recv(65536).startswith(b"HTTP/1.1 200 ")  # before its first line
@@ -230,7 +230,7 @@ def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
                 pass
         status, headers, _ = strict.ask("POST", BATCH, large)
         assert (status, headers["retry-after"], headers["connection"]) == (503, "1", "close")
-        unread = held.enter_context(connect(strict))
+        unread = connections.enter_context(connect(strict))
         unread.sendall(head(BATCH, 10_000_000))
         assert answer(unread)[0] == 503
         assert strict.ask("POST", BATCH, iter([large]), encode_chunked=True)[0] == 503
@@ -243,13 +243,13 @@ def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
 
 def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
     query = "&".join(f"{name}={value}" for name, value in CASE.items())
-    with ExitStack() as held:
+    with ExitStack() as connections:
         for _ in range(3 * FULL):  # silent ones: the oldest gives way
-            held.enter_context(connect(strict))
+            connections.enter_context(connect(strict))
         assert strict.ask("GET", f"{SINGLE}?{query}")[0] == 200
-    with ExitStack() as held:
+    with ExitStack() as connections:
         for _ in range(FULL):  # busy ones
-            held.enter_context(connect(strict)).sendall(head(SINGLE, 90) + b"x")
+            connections.enter_context(connect(strict)).sendall(head(SINGLE, 90) + b"x")
         time.sleep(0.2)
         assert [strict.ask("GET", path)[0] for path in ("/livez", "/readyz", "/v1/table")] == [
             200,
@@ -266,11 +266,11 @@ def test_a_body_is_read_in_any_pieces_after_100_continue(
 ) -> None:
     body = columns(20_000)
     raw.sendall(head(BATCH, len(body), kind, "Expect: 100-continue\r\n"))
-    said = b""
-    while not said.endswith(b"\r\n\r\n"):
-        said += raw.recv(4096)
-    assert said.startswith(b"HTTP/1.1 100 ")  # and nothing else before the body
-    assert said.count(b"HTTP/1.1") == 1
+    interim = b""
+    while not interim.endswith(b"\r\n\r\n"):
+        interim += raw.recv(4096)
+    assert interim.startswith(b"HTTP/1.1 100 ")  # and nothing else before the body
+    assert interim.count(b"HTTP/1.1") == 1
     for start in range(0, len(body), step):
         raw.sendall(body[start : start + step])
     status, received = answer(raw)
@@ -325,11 +325,11 @@ def test_short_requests_are_answered_while_a_large_batch_is(
         status, _, received = large.result()
         assert (status, len(json.loads(received)["mu_macro"])) == (200, n)
         # threads for batches have a lower priority
-        found = {
+        times_of = {
             int(task.name): int((task / "stat").read_text().rpartition(")")[2].split()[16])
             for task in Path(f"/proc/{server.process.pid}/task").iterdir()
         }
-        assert found.pop(server.process.pid) < max(found.values())
+        assert times_of.pop(server.process.pid) < max(times_of.values())
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.support.forms import BATCH, as_csv, asked, posted, read
+from benchmarks.support.forms import BATCH, answered_rows, as_csv, posted, read
 from mumacro import Surrogate
 from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES
@@ -20,7 +20,7 @@ NORMAL = {"k": 1e6, "Fz_amplitude": 4.0}
 ACROSS = {"k": 1e6, "y0": 2e-6}
 ENDS = {"k_low": 0.8e6, "k_high": 1.3e6}
 BALL = {"contact": "ball"}
-ASKED: dict[str, tuple[Case, Case]] = {
+CASES: dict[str, tuple[Case, Case]] = {
     "spring": ({}, ACROSS),
     "ball": (BALL, ACROSS),
     "rigid ball": (BALL, {"k": "rigid", "y0": 2e-6}),
@@ -33,15 +33,15 @@ ASKED: dict[str, tuple[Case, Case]] = {
 }
 
 
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", CASES)
 def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate, name: str) -> None:
-    options, inputs = ASKED[name]
+    options, inputs = CASES[name]
     inputs = {**RIG, **inputs}
-    known = {**inputs, "k": np.inf} if inputs.get("k") == "rigid" else inputs
-    found = surrogate.evaluate(**known, v0=np.array(V0), **options)
+    case = {**inputs, "k": np.inf} if inputs.get("k") == "rigid" else inputs
+    own = surrogate.evaluate(**case, v0=np.array(V0), **options)
     ends = ("mu_macro_low", "mu_macro_high") if "k_low" in inputs else ()
     names = ("mu_macro", "mu_ratio", "regime", "error_bound", "source", *ends)
-    columns = {name: list(getattr(found, name)) for name in names}
+    columns = {name: list(getattr(own, name)) for name in names}
     expected = [dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     rows = [{**inputs, "v0": v0} for v0 in V0]
 
@@ -53,7 +53,7 @@ def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate,
         more = (
             {"table": answer["table"], "api_version": "1"} if form == "ndjson" else {"error": None}
         )
-        answers = asked(client, form, rows, **options)
+        answers = answered_rows(client, form, rows, **options)
         assert answers == [{**one, **more} for one in expected]
         assert list(answers[0]) == [*names, *more]
 
@@ -63,7 +63,7 @@ def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate,
         of_query = {name: x for name, x in of_query.items() if name not in ENDS} | {
             "k": f"{low}..{high}"
         }
-    of_one = surrogate.evaluate(**{**known, "v0": V0[2]}, **options)
+    of_one = surrogate.evaluate(**{**case, "v0": V0[2]}, **options)
     alone = {name: getattr(of_one, name) for name in names} | {
         "table": answer["table"],
         "api_version": "1",
@@ -77,22 +77,22 @@ def test_columns_may_have_units_in_csv(client: Any) -> None:
     rows = [{**rig, "f": 20690.0, **ENDS, "y0": 2e-6, "v0": 0.02}]
     text = as_csv(rows).replace("k_low", "k_low [N/mm]").replace("800000.0", "800.0")
     text = text.replace("f,", "f [kHz],").replace("20690.0", "20.69")
-    assert read("csv", posted(client, "csv", text)) == asked(client, "csv", rows)
+    assert read("csv", posted(client, "csv", text)) == answered_rows(client, "csv", rows)
 
 
 def test_bad_rows_spoil_only_themselves(client: Any) -> None:
-    given = {
+    body = {
         **RIG,
         "y0": 2e-6,
         "v0": 0.01,
         "k_low": [8e5, None, 2e6, 1e6],
         "k_high": [1e6, 1e6, 1e6, "rigid"],
     }
-    answer = client.post(BATCH, json=given).json()
+    answer = client.post(BATCH, json=body).json()
     assert [mu is None for mu in answer["mu_macro_low"]] == [False, True, True, True]
     assert [fault["field"] for fault in answer["errors"]] == ["k_low", "k_range", "k_high"]
-    given = {**RIG, "k": 1e6, "v0": 0.01, "Fz_amplitude": [3.0, 10.0], "direction": "normal"}
-    answer = client.post(BATCH, json=given).json()
+    body = {**RIG, "k": 1e6, "v0": 0.01, "Fz_amplitude": [3.0, 10.0], "direction": "normal"}
+    answer = client.post(BATCH, json=body).json()
     assert answer["mu_macro"][0] is not None
     (fault,) = answer["errors"]
     assert (fault["index"], fault["field"]) == (1, "Fz_amplitude")
@@ -104,16 +104,16 @@ def test_bad_rows_spoil_only_themselves(client: Any) -> None:
 def test_included_quantities_are_the_librarys(
     client: Any, surrogate: Surrogate, name: str, v0: Any
 ) -> None:
-    options, inputs = ASKED[name]
+    options, inputs = CASES[name]
     case = {**RIG, **inputs, "v0": v0}
     include = ["groups", "limits", "gradient", "stick_fraction", "std"]
     include += [] if name == "normal" else ["power"]
     more = {**options, "include": include, "std": {"k": 1e4}}
     answer = client.post(PATH, json={**case, **more}).json()
-    found = surrogate.evaluate(**case, **options, gradient=True)
-    v, y, l0 = found.v_tilde, found.y_tilde, found.length_scale
+    own = surrogate.evaluate(**case, **options, gradient=True)
+    v, y, l0 = own.v_tilde, own.y_tilde, own.length_scale
     assert answer["groups"] == {"v_tilde": v, "y_tilde": y, "l0": l0}
-    assert (answer["gradient"], answer["gradient_bound"]) == (found.gradient, found.gradient_bound)
+    assert (answer["gradient"], answer["gradient_bound"]) == (own.gradient, own.gradient_bound)
     fraction = surrogate.stick_fraction_with_bound(v, y, **options)
     assert (answer["stick_fraction"], answer["stick_fraction_bound"]) == fraction
     limits = answer["limits"]
@@ -128,11 +128,11 @@ def test_included_quantities_are_the_librarys(
     if "power" in include:
         unit = case["mu0"] * case["Fz"] * l0 * case["omega"]
         power, bound = surrogate.power_with_bound(v, y, **options)
-        saved = (case["mu0"] - found.mu_macro) * case["Fz"] * v0
+        saved = (case["mu0"] - own.mu_macro) * case["Fz"] * v0
         assert answer["power"] == close({"oscillation": power * unit, "saved": saved}, rel=1e-13)
         assert answer["power_bound"]["oscillation"] == close(bound * unit, rel=1e-13)
         assert answer["power_bound"]["saved"] == close(
-            found.error_bound * case["Fz"] * v0, rel=1e-2, abs=1e-14
+            own.error_bound * case["Fz"] * v0, rel=1e-2, abs=1e-14
         )
     batch = client.post(BATCH, json={**case, "v0": [v0], **more}).json()
     for quantity in ("limits", "gradient"):
@@ -145,17 +145,17 @@ def test_what_the_model_leaves_out(client: Any, surrogate: Surrogate) -> None:
     answer = client.post(PATH, json={**case, "contact": "ball", "include": ["model"]}).json()
     assert answer["model"] == model_rows(surrogate, case, contact="ball")
     assert answer["digits"] == digits(k_effect(surrogate, case, contact="ball"))
-    told = {**RIG, "y0": 2e-6, "k_range": [8e5, 1.2e6], "v0": 0.02, "include": ["model"]}
-    assert "k is known" not in [row["row"] for row in client.post(PATH, json=told).json()["model"]]
+    body = {**RIG, "y0": 2e-6, "k_range": [8e5, 1.2e6], "v0": 0.02, "include": ["model"]}
+    assert "k is known" not in [row["row"] for row in client.post(PATH, json=body).json()["model"]]
 
 
 def test_a_law_has_a_band_and_an_inverse_its_contact(client: Any, surrogate: Surrogate) -> None:
     rig = {**RIG, "y0": 2e-6, "contact": "ball"}
     sweep = {"start": 1e-3, "stop": 1.0, "points": 5}
     law = client.post("/v1/law", json={**rig, "k_range": [8e5, 1.2e6], **sweep}).json()
-    found = surrogate.evaluate(**rig, k_range=(8e5, 1.2e6), v0=np.array(law["values"]))
-    assert law["mu_macro_low"] == found.mu_macro_low.tolist()
-    assert law["mu_macro_high"] == found.mu_macro_high.tolist()
+    own = surrogate.evaluate(**rig, k_range=(8e5, 1.2e6), v0=np.array(law["values"]))
+    assert law["mu_macro_low"] == own.mu_macro_low.tolist()
+    assert law["mu_macro_high"] == own.mu_macro_high.tolist()
     answer = client.post(
         "/v1/solve-for", json={**rig, "k": 1e6, "unknown": "v0", "target": 0.26}
     ).json()

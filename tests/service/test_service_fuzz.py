@@ -12,17 +12,17 @@ MOST_MB, MOST_S = 512, 2.0  # the aim for the wait is 0.25 s, on a machine that 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", attacks.ATTACKS)
 def test_an_attack_takes_little_memory_and_keeps_nobody_waiting(name: str) -> None:
-    memory, wait = attacks.tried(attacks.ATTACKS[name], SHARE)
+    memory, wait = attacks.cost_of(attacks.ATTACKS[name], SHARE)
     assert memory < MOST_MB
     assert wait < MOST_S
 
 
 def test_a_strange_request_is_answered_or_refused_and_never_an_error(live_server: Server) -> None:
-    found = strange.Found()
-    found.ask(live_server, 1, 1000)
-    assert found.bad == []
-    assert set(found.counts) == set(strange.KINDS)
-    assert {200, 400, 404, 422} <= set(found.statuses)
+    tally = strange.Tally()
+    tally.ask(live_server, 1, 1000)
+    assert tally.bad == []
+    assert set(tally.counts) == set(strange.KINDS)
+    assert {200, 400, 404, 422} <= set(tally.statuses)
     assert live_server.errors() == []
 
 

@@ -108,14 +108,14 @@ def test_a_wrong_method_is_answered_with_the_right_ones(
     "offered", ["abc-123", "A.b_c:9", "x" * 128, "", "x" * 129, "a b", "a;b", 'a"b', "ä"]
 )
 def test_an_ill_formed_request_id_is_replaced(client: Any, offered: Any) -> None:
-    given = client.get("/livez", headers={"X-Request-ID": offered.encode("latin-1")}).headers[
+    request_id = client.get("/livez", headers={"X-Request-ID": offered.encode("latin-1")}).headers[
         "x-request-id"
     ]
     if offered in ("abc-123", "A.b_c:9", "x" * 128):
-        assert given == offered
+        assert request_id == offered
     else:
-        assert len(given) == 32
-        assert int(given, 16) >= 0
+        assert len(request_id) == 32
+        assert int(request_id, 16) >= 0
 
 
 def test_an_unexpected_error_is_logged_and_not_shown(
@@ -340,12 +340,12 @@ def examples_of(operation: Any, schemas: Any) -> Any:
     bodies = operation.get("requestBody", {}).get("content", {})
     for media_type, content in bodies.items():
         schema = schemas.get(content["schema"].get("$ref", "").rpartition("/")[2], {})
-        found = [
+        examples = [
             *schema.get("examples", []),
             *([content["example"]] if "example" in content else []),
         ]
-        assert found or "arrow" in media_type, f"{media_type} has no example"
-        for example in found:
+        assert examples or "arrow" in media_type, f"{media_type} has no example"
+        for example in examples:
             text = example if isinstance(example, str) else json.dumps(example)
             yield {"content": text, "headers": {"Content-Type": media_type}}
     if not bodies:
@@ -363,8 +363,8 @@ def test_the_described_examples_are_answered(client: Any) -> None:
         for method, operation in methods.items():
             examples = list(examples_of(operation, document["components"]["schemas"]))
             assert examples
-            for asked in examples:
-                answer = client.request(method, path, **asked)
+            for example in examples:
+                answer = client.request(method, path, **example)
                 assert answer.status_code == 200, f"{method} {path}: {answer.text}"
                 assert b"urn:problem-type" not in answer.content
 
@@ -400,7 +400,7 @@ def test_a_page_that_the_client_has_is_not_sent_again(client: Any, path: Any) ->
 
 
 @pytest.mark.parametrize(
-    ("given", "status"),
+    ("byte_range", "status"),
     [
         ("bytes=99999999-", 416),
         ("bytes=-0", 416),
@@ -415,9 +415,9 @@ def test_a_page_that_the_client_has_is_not_sent_again(client: Any, path: Any) ->
 )
 @pytest.mark.parametrize("path", ["/v1/table.nc", "/", "/static/page/main.js"])
 def test_a_range_beyond_the_file_is_a_problem(
-    client: Any, problem: Any, path: Any, given: Any, status: Any
+    client: Any, problem: Any, path: Any, byte_range: Any, status: Any
 ) -> None:
-    response = client.get(path, headers={"Range": given.encode("latin-1")})
+    response = client.get(path, headers={"Range": byte_range.encode("latin-1")})
     problem(response, status)
     size = client.get(path).headers["content-length"]
     assert response.headers.get("content-range") == (f"bytes */{size}" if status == 416 else None)
@@ -448,16 +448,16 @@ def test_every_answer_has_the_security_headers(client: Any, case: Case) -> None:
 
 
 def test_pages_of_other_hosts_are_answered_only_where_a_setting_allows_them(started: Any) -> None:
-    asked = {"Origin": "https://tool.example", "Access-Control-Request-Method": "POST"}
+    preflight = {"Origin": "https://tool.example", "Access-Control-Request-Method": "POST"}
     with started(cors_origins=("https://tool.example",)) as client:
         allowed, answer = (
-            client.options("/v1/mu-macro", headers=asked),
-            client.get("/livez", headers=asked),
+            client.options("/v1/mu-macro", headers=preflight),
+            client.get("/livez", headers=preflight),
         )
         for response in (allowed, answer):
             assert response.headers["access-control-allow-origin"] == "https://tool.example"
         assert allowed.headers["access-control-allow-methods"] == "GET, HEAD, POST"
         refused = client.options(
-            "/v1/mu-macro", headers={**asked, "Origin": "https://other.example"}
+            "/v1/mu-macro", headers={**preflight, "Origin": "https://other.example"}
         )
         assert "access-control-allow-origin" not in refused.headers

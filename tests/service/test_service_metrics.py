@@ -43,7 +43,7 @@ def test_requests_are_counted_by_route_method_and_status(fresh: Any, case: Case)
     fresh.post(f"{PATH}/batch", json=[case])
     fresh.get("/nowhere/at/all")
     fresh.request("BREW", "/livez")
-    found = scrape(fresh)
+    counters = scrape(fresh)
     for route, method, status, number in (
         (PATH, "POST", "200", 3),
         (PATH, "GET", "200", 1),
@@ -52,15 +52,15 @@ def test_requests_are_counted_by_route_method_and_status(fresh: Any, case: Case)
         ("other", "GET", "404", 1),
         ("/livez", "other", "405", 1),
     ):
-        assert found["mumacro_requests_total", *sorted((route, method, status))] == number
-    assert found["mumacro_request_duration_seconds_count", PATH] == 5
-    assert found["mumacro_request_duration_seconds_bucket", *sorted((PATH, "+Inf"))] == 5
-    assert found["mumacro_request_duration_seconds_sum", PATH] > 0
+        assert counters["mumacro_requests_total", *sorted((route, method, status))] == number
+    assert counters["mumacro_request_duration_seconds_count", PATH] == 5
+    assert counters["mumacro_request_duration_seconds_bucket", *sorted((PATH, "+Inf"))] == 5
+    assert counters["mumacro_request_duration_seconds_sum", PATH] > 0
     for path in fresh.get("/openapi.json").json()["paths"]:
         fresh.put(path)
-    found = scrape(fresh)
+    counters = scrape(fresh)
     for path in fresh.get("/openapi.json").json()["paths"]:  # by its own name
-        assert found["mumacro_requests_total", *sorted((path, "other", "405"))] >= 1
+        assert counters["mumacro_requests_total", *sorted((path, "other", "405"))] >= 1
 
 
 def test_clients_cannot_add_labels(fresh: Any, case: Case) -> None:
@@ -94,36 +94,36 @@ def test_cases_are_counted_by_source_and_regime(
         headers={"Content-Type": "application/jsonl"},
     )
     fresh.post(f"{PATH}/batch", json={**case, "v0": [rows[4]["v0"]] * 1000})
-    found = scrape(fresh)
+    counters = scrape(fresh)
     expected: dict[tuple[str, ...], int] = {}
     for answer in [*answers * 3, answers[1], answers[2], *[answers[4]] * 1000]:
         key = ("mumacro_cases_total", *sorted((surrogate.id, answer["source"], answer["regime"])))
         expected[key] = expected.get(key, 0) + 1
     assert {
-        key: value for key, value in found.items() if key[0] == "mumacro_cases_total"
+        key: value for key, value in counters.items() if key[0] == "mumacro_cases_total"
     } == expected
     # of the batch; bad lines are not counted here
-    assert found["mumacro_bad_cases_total", surrogate.id] == 4
-    assert found["mumacro_table_info", *sorted((surrogate.id, f"{surrogate.tolerance:g}"))] == 1
+    assert counters["mumacro_bad_cases_total", surrogate.id] == 4
+    assert counters["mumacro_table_info", *sorted((surrogate.id, f"{surrogate.tolerance:g}"))] == 1
 
 
 @pytest.mark.slow
 def test_several_workers_behind_a_key_count_together_and_stop(
     serving: Any, surrogate: Surrogate, case: Case
 ) -> None:
-    body, asked, key = json.dumps(case), 40, {"X-API-Key": "k3y"}
+    body, requests, key = json.dumps(case), 40, {"X-API-Key": "k3y"}
     with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
         server.wait_until_ready(2)
         assert server.ask("GET", "/metrics")[0] == 401
-        for _ in range(asked):
+        for _ in range(requests):
             assert server.ask("POST", PATH, body, key)[0] == 200
         counted = ("mumacro_requests_total", *sorted((PATH, "POST", "200")))
         deadline = time.monotonic() + 60
         in_a_row = 0
         while in_a_row < 20:  # more scrapes than one worker would get by chance
-            found = samples(server.ask("GET", "/metrics", headers=key)[2].decode())
-            assert found.get(counted, 0) <= asked
-            in_a_row = in_a_row + 1 if found.get(counted) == asked else 0
+            counters = samples(server.ask("GET", "/metrics", headers=key)[2].decode())
+            assert counters.get(counted, 0) <= requests
+            in_a_row = in_a_row + 1 if counters.get(counted) == requests else 0
             assert time.monotonic() < deadline
         assert server.stop() == 0
     assert all(json.loads(line) for line in server.lines)

@@ -20,9 +20,15 @@ from tests.support.cases import Case
 PATH = "/v1/motion"
 RIG: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
 NUMBERS = (
-    "mu_macro", "mu_lateral", "stick_fraction", "slip_path", "power", "power_drive",
-    "error_estimate", "periods",
-)  # fmt: skip
+    "mu_macro",
+    "mu_lateral",
+    "stick_fraction",
+    "slip_path",
+    "power",
+    "power_drive",
+    "error_estimate",
+    "periods",
+)
 SCENES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "across": ({"y": 2e-6}, {"y": 2e-6}),
     "ellipse": ({"x": [1e-6, 90], "y": 2e-6}, {"x": (1e-6, 90.0), "y": 2e-6}),
@@ -34,10 +40,12 @@ SCENES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"x": 2e-6, "normal": [3, 45], "tolerance": 1e-4},
         {"x": 2e-6, "normal": (3.0, 45.0), "tolerance": 1e-4},
     ),
-    "ball": ({"x": [1e-6, 90], "y": 2e-6, "contact": "ball", "tolerance": 1e-4},
-             {"x": (1e-6, 90.0), "y": 2e-6, "contact": "ball", "tolerance": 1e-4}),
+    "ball": (
+        {"x": [1e-6, 90], "y": 2e-6, "contact": "ball", "tolerance": 1e-4},
+        {"x": (1e-6, 90.0), "y": 2e-6, "contact": "ball", "tolerance": 1e-4},
+    ),
     "drag alone": ({"y": []}, {}),
-}  # fmt: skip
+}
 WHOLE = "whole number"
 
 
@@ -46,8 +54,8 @@ def test_the_answer_is_the_librarys(client: Any, name: str) -> None:
     sent, same = SCENES[name]
     answer = client.post(PATH, json={**RIG, **sent})
     assert answer.status_code == 200, answer.text
-    found = mumacro.motion(**RIG, **same)
-    expected = {name: getattr(found, name) for name in NUMBERS}
+    own = mumacro.motion(**RIG, **same)
+    expected = {name: getattr(own, name) for name in NUMBERS}
     expected |= {"contact": same.get("contact", "spring"), "api_version": "1"}
     assert answer.json() == expected
 
@@ -148,13 +156,13 @@ def test_long_motions_have_slots_that_hold_nobody_else(
     motions of one spring."""
     begun, end, real = threading.Semaphore(0), threading.Event(), mumacro.motion
 
-    def held(**scene: Any) -> Any:
+    def slow_motion(**scene: Any) -> Any:
         if MotionRequest(**RIG, **long_one).case.items() <= scene.items():
             begun.release()
             assert end.wait(60)
         return real(**{**scene, "contact": "spring"})
 
-    monkeypatch.setattr(mumacro, "motion", held)
+    monkeypatch.setattr(mumacro, "motion", slow_motion)
     work = client.app.state.work
     body, threads = {**RIG, **long_one}, processors()
     with ThreadPoolExecutor(LONG_QUESTIONS) as clients:
@@ -185,11 +193,11 @@ def test_a_motion_beyond_the_time_limit_is_answered_and_keeps_its_slot_until_it_
 ) -> None:
     end, real = threading.Event(), mumacro.motion
 
-    def held(**scene: Any) -> Any:
+    def slow_motion(**scene: Any) -> Any:
         assert end.wait(60)
         return real(**{**scene, "contact": "spring"})
 
-    monkeypatch.setattr(mumacro, "motion", held)
+    monkeypatch.setattr(mumacro, "motion", slow_motion)
     with started(time_limit_s=1) as client:
         slots = client.app.state.work.long_questions
         late = client.post(PATH, json={**RIG, **LONG_ONES[0]})

@@ -46,9 +46,9 @@ def fields_of(lines: Any) -> Any:
         assert len(names) == len(set(names)), names
         return dict(pairs)
 
-    found = [json.loads(line, object_pairs_hook=once) for line in lines]
-    assert all({"time", "level", "logger", "message"} <= line.keys() for line in found)
-    return found
+    records = [json.loads(line, object_pairs_hook=once) for line in lines]
+    assert all({"time", "level", "logger", "message"} <= line.keys() for line in records)
+    return records
 
 
 def accesses(lines: Any) -> Any:
@@ -129,9 +129,9 @@ def test_a_stop_at_an_import_of_the_start_is_a_success(
     path = os.pathsep.join([str(tmp_path), os.getcwd()])
     variables = {"PYTHONPATH": path, "STOPPED_AT": module, "MUMACRO_WORKERS": workers}
     with begun(repository, surrogate, **variables) as process:
-        told = process.communicate(timeout=60)[0].decode()
-    assert process.returncode == 0, told
-    assert "Traceback" not in told
+        log = process.communicate(timeout=60)[0].decode()
+    assert process.returncode == 0, log
+    assert "Traceback" not in log
 
 
 @pytest.mark.slow
@@ -147,9 +147,9 @@ def test_a_stop_soon_after_the_start_is_a_success(
             caught = int(re.findall(r"^SigCgt:\s*(\w+)$", status.read_text(), re.MULTILINE)[0], 16)
         time.sleep(after)
         process.terminate()
-        told = process.communicate(timeout=60)[0].decode()
-    assert process.returncode == 0, told
-    assert "Traceback" not in told
+        log = process.communicate(timeout=60)[0].decode()
+    assert process.returncode == 0, log
+    assert "Traceback" not in log
 
 
 @pytest.mark.slow
@@ -185,8 +185,8 @@ def command(repository: Path, *arguments: Any) -> Any:
 def test_the_health_check_and_a_port_that_is_taken(
     live_server: Any, repository: Path, surrogate: Surrogate
 ) -> None:
-    found = command(repository, "healthcheck", "--port", str(live_server.port))
-    assert found.returncode == 0, found.stderr
+    check = command(repository, "healthcheck", "--port", str(live_server.port))
+    assert check.returncode == 0, check.stderr
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         assert (
@@ -202,20 +202,20 @@ def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
     serving: Any, surrogate: Surrogate, case: dict[str, Any]
 ) -> None:
     alice, bob, wrong = "k3y-of-alice", "k3y-of-bob", "wr0ng-key"
-    body, told = json.dumps(case), []
-    known = "&".join(f"{name}={value}" for name, value in case.items())
+    body, answers = json.dumps(case), []
+    query = "&".join(f"{name}={value}" for name, value in case.items())
     with serving(
         surrogate.path, "--log-level", "debug", MUMACRO_API_KEYS=f"alice={alice},bob={bob}"
     ) as server:
         for text in NO_ADDRESS:
-            said = {"X-API-Key": alice, "X-Forwarded-For": text.encode("latin-1")}
-            assert server.ask("POST", SINGLE, body, said)[0] == 200
-            assert server.ask("GET", f"{SINGLE}?{known}", headers=said)[0] == 200
-            assert server.ask("POST", BATCH, f"[{body}]", said)[0] == 200
-            assert server.ask("GET", "/nowhere", headers=said)[0] == 404
+            forged = {"X-API-Key": alice, "X-Forwarded-For": text.encode("latin-1")}
+            assert server.ask("POST", SINGLE, body, forged)[0] == 200
+            assert server.ask("GET", f"{SINGLE}?{query}", headers=forged)[0] == 200
+            assert server.ask("POST", BATCH, f"[{body}]", forged)[0] == 200
+            assert server.ask("GET", "/nowhere", headers=forged)[0] == 404
         for path in NO_PATH:
             assert server.ask("GET", path, headers={"X-API-Key": alice})[0] == 404
-        asked = [
+        requests = [
             ("POST", SINGLE, body),
             ("POST", BATCH, f"[{body}]"),
             ("POST", SINGLE, "{"),
@@ -226,14 +226,14 @@ def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
             {"X-API-Key": wrong},
             *({"Authorization": text} for text in (f"Bearer {bob}", f"Basic {wrong}", bob)),
         ):
-            told += [
+            answers += [
                 str(server.ask(*request, headers))
-                for request in (*asked, ("GET", "/openapi.json", None))
+                for request in (*requests, ("GET", "/openapi.json", None))
             ]
         assert server.stop() == 0
     for text in (alice, bob, wrong):
         assert text not in "".join(server.lines)
-        assert text not in "".join(told)
+        assert text not in "".join(answers)
     lines = accesses(server.lines)
     assert {line.get("key") for line in lines} == {None, "alice", "bob"}
     shown = [line["client"] for line in lines if line["path"] == "/nowhere"]
@@ -257,11 +257,11 @@ def unread(repository: Path, surrogate: Surrogate) -> Any:
     try:
         lines: list[bytes] = []
         while not (
-            found := re.search(rb"running on http://[^ ]+:(\d+) ", lines[-1] if lines else b"")
+            address := re.search(rb"running on http://[^ ]+:(\d+) ", lines[-1] if lines else b"")
         ):
             lines.append(process.stdout.readline())
             assert lines[-1], b"".join(lines)
-        yield process, int(found[1]), lines
+        yield process, int(address[1]), lines
         process.terminate()
         assert process.wait(60) == 0
     finally:
@@ -272,14 +272,14 @@ def unread(repository: Path, surrogate: Surrogate) -> Any:
 
 def statuses(port: Any, path: Any, many: Any) -> Any:
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-    found = []
+    codes = []
     for _ in range(many):
         connection.request("GET", path)
         response = connection.getresponse()
         response.read()
-        found.append(response.status)
+        codes.append(response.status)
     connection.close()
-    return found
+    return codes
 
 
 @pytest.mark.slow
@@ -295,7 +295,8 @@ def test_a_log_reader_that_stalls_delays_no_request(
         # Some 250 bytes a line: a pipe holds 64 kB, and the service a megabyte.
         with ThreadPoolExecutor(4) as pool:
             answered = [
-                pool.submit(statuses, port, *asked) for asked in 4 * [(query, many), ("/x", 500)]
+                pool.submit(statuses, port, *question)
+                for question in 4 * [(query, many), ("/x", 500)]
             ]
         assert [one.result() for one in answered] == 4 * [many * [200], 500 * [404]]
         if then != "reads":
@@ -305,9 +306,9 @@ def test_a_log_reader_that_stalls_delays_no_request(
         process.terminate()
         assert process.wait(60) == 0
         reader.join(60)
-    told = [line for line in fields_of(lines) if "were dropped" in line["message"]]
-    assert {line["level"] for line in told} == {"warning"}
-    lost = sum(int(line["message"].split()[0]) for line in told)
+    drops = [line for line in fields_of(lines) if "were dropped" in line["message"]]
+    assert {line["level"] for line in drops} == {"warning"}
+    lost = sum(int(line["message"].split()[0]) for line in drops)
     assert lost > 0
     assert lost + len(accesses(lines)) >= 14_000
 

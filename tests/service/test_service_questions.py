@@ -31,9 +31,9 @@ LAW = {
 }
 
 
-def answered(client: Any, path: Any, given: Any, **changed: Any) -> Any:
-    given = {name: value for name, value in {**given, **changed}.items() if value is not ...}
-    response = client.post(f"/v1/{path}", json=given)
+def answered(client: Any, path: Any, question: Any, **changed: Any) -> Any:
+    question = {name: value for name, value in {**question, **changed}.items() if value is not ...}
+    response = client.post(f"/v1/{path}", json=question)
     assert response.status_code == 200, response.text
     return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
@@ -75,12 +75,12 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any
     reach = answer["reachable"]
     assert reach["min"] == close(0.3 * math.sqrt(5) / 3, rel=1e-9)
     assert (reach["max"], reach["min_included"], reach["max_included"]) == (0.3, True, False)
-    told = f"is not in the reachable range [{reach['min']!r}, 0.3)"
+    reason = f"is not in the reachable range [{reach['min']!r}, 0.3)"
     assert [result.get("reason") for result in answer["results"]] == [
         None,
-        f"0.1 {told}",
+        f"0.1 {reason}",
         None,
-        f"0.4 {told}",
+        f"0.4 {reason}",
     ]
     (result,) = answered(client, "solve-for", SOLVE, unknown="v0", y0=0.0, v0=None)["results"]
     assert result["roots"] == []
@@ -138,14 +138,14 @@ def test_a_law_is_single_answers_in_a_row(client: Any) -> None:
 def test_a_law_goes_along_any_input(client: Any, along: Any) -> None:
     name, per = ("omega", 2 * math.pi) if along == "f" else (along, 1.0)
     middle = CASE[name] / per
-    asked = {
+    question = {
         "along": along,
         "start": 0.1 * middle,
         "stop": 10 * middle,
         "scale": "linear",
         name: None,
     }
-    law = answered(client, "law", {**CASE, **asked})
+    law = answered(client, "law", {**CASE, **question})
     assert len(law["values"]) == 201
     there = answered(client, "mu-macro", CASE, **{name: law["values"][77] * per})
     assert law["mu_macro"][77] == close(there["mu_macro"], rel=1e-14)
@@ -185,8 +185,8 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
 def test_every_quantity_has_its_unit_in_the_description(client: Any) -> None:
     for direction, amplitude in (("across", "y0"), ("normal", "Fz_amplitude")):
         names = [name for name, one in INCLUDABLE.items() if direction not in one.lacks]
-        given = {**LAW, "y0": ..., amplitude: 1e-6, "direction": direction, "std": {"mu0": 0.01}}
-        law = answered(client, "law", given, include=names)
+        question = {**LAW, "y0": ..., amplitude: 1e-6, "direction": direction, "std": {"mu0": 0.01}}
+        law = answered(client, "law", question, include=names)
         for name in names:
             for part in law[name] if isinstance(law[name], dict) else [""]:
                 assert unit_at(f"{name}.{part}" if part else name)
@@ -203,20 +203,20 @@ BODIES = [
 
 def test_a_wide_contact_is_told_with_its_stiffness(client: Any) -> None:
     soft = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "nu": 0.3}
-    (told,) = answered(client, "stiffness", {**soft, "E": 1e6})["warnings"]
-    assert "0.82 of the radius" in told
+    (warning,) = answered(client, "stiffness", {**soft, "E": 1e6})["warnings"]
+    assert "0.82 of the radius" in warning
     refused = client.post("/v1/stiffness", json={**soft, "E": 210})
     assert refused.status_code == 422
     assert "did you mean 210 GPa?" in refused.text
 
 
-@pytest.mark.parametrize(("geometry", "given"), BODIES)
-def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, given: Any) -> None:
-    found = contact_of(
-        geometry, **STEEL, **{name: np.inf if x == "rigid" else x for name, x in given.items()}
+@pytest.mark.parametrize(("geometry", "arguments"), BODIES)
+def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, arguments: Any) -> None:
+    own = contact_of(
+        geometry, **STEEL, **{name: np.inf if x == "rigid" else x for name, x in arguments.items()}
     )
-    answer = answered(client, "stiffness", {"geometry": geometry, **STEEL, **given})
-    assert answer == {"geometry": geometry, **vars(found), "warnings": [], "api_version": "1"}
+    answer = answered(client, "stiffness", {"geometry": geometry, **STEEL, **arguments})
+    assert answer == {"geometry": geometry, **vars(own), "warnings": [], "api_version": "1"}
 
 
 def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:
@@ -225,16 +225,16 @@ def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:
         17.0 * np.arange(20)
     )
     rig: Case = {"Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
-    found = mumacro.fit({"v0": v0, "mu_macro": mu}, contact="ball", surrogate=surrogate, **rig)
+    own = mumacro.fit({"v0": v0, "mu_macro": mu}, contact="ball", surrogate=surrogate, **rig)
     body = {"v0": v0.tolist(), "mu_macro": mu.tolist(), **rig, "contact": "ball"}
     answer = answered(client, "fit", body)
     assert (answer["values"], answer["std"], answer["chi2"]) == (
-        found.values,
-        found.std,
-        found.chi2,
+        own.values,
+        own.std,
+        own.chi2,
     )
     for name in ("covariance", "residuals"):
-        assert answer[name] == getattr(found, name).tolist()
+        assert answer[name] == getattr(own, name).tolist()
     curve = answer["curve"]
     assert (curve["v0"][0], curve["v0"][-1]) == (v0[0], v0[-1])
     assert all(

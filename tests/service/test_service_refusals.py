@@ -8,7 +8,15 @@ from urllib.parse import urlencode
 import pyarrow as pa
 import pytest
 
-from benchmarks.support.forms import BATCH, as_arrow, as_csv, as_table, asked, posted, stream_of
+from benchmarks.support.forms import (
+    BATCH,
+    answered_rows,
+    as_arrow,
+    as_csv,
+    as_table,
+    posted,
+    stream_of,
+)
 from benchmarks.support.serving import CASE
 
 SINGLE = "/v1/mu-macro"
@@ -24,7 +32,7 @@ POINTS = {
 NORMAL = {"y0": ..., "Fz_amplitude": 1.0, "direction": "normal"}
 RANGE = {"k": ..., "k_range": [1e6, 2e6]}
 #: a question that is answered, by its path; the table changes it
-ASKED = {
+QUESTIONS = {
     "mu-macro": CASE,
     "mu-macro.txt": CASE,
     "mu-macro/batch": {**CASE, "v0": [0.1, 0.2]},
@@ -223,9 +231,11 @@ def faults_of(client: Any, problem: Any, request_line: str, changed: Any) -> dic
     """The faults of a refused request, by their places."""
     method, _, path = request_line.partition(" ")
     path, _, query = path.partition("?")
-    given = {name: value for name, value in {**ASKED[path], **changed}.items() if value is not ...}
+    question = {
+        name: value for name, value in {**QUESTIONS[path], **changed}.items() if value is not ...
+    }
     body, query = (
-        ("", f"{urlencode(given)}&{query}") if method == "GET" else (json.dumps(given), query)
+        ("", f"{urlencode(question)}&{query}") if method == "GET" else (json.dumps(question), query)
     )
     document = problem(client.request(method, f"/v1/{path}?{query}", content=body), 422)
     first = document["errors"][0]
@@ -308,8 +318,8 @@ def test_a_number_out_of_bounds_is_refused_and_shown(
         assert (fault["parameter"], fault["field"]) == (name, name)
     listed = json.dumps({**CASE, name: [CASE[name], "@"]}).replace('"@"', text)
     for batch in (listed, f"[{json.dumps(CASE)}, {body}]"):
-        found = client.post(BATCH, content=batch).json()
-        assert found["errors"] == [{"index": 1, "field": name, "reason": reason}]
+        answer = client.post(BATCH, content=batch).json()
+        assert answer["errors"] == [{"index": 1, "field": name, "reason": reason}]
     other = "Fz" if name == "v0" else "v0"
     scalar = json.dumps({**CASE, name: "@", other: [CASE[other]] * 2}).replace('"@"', text)
     (fault,) = problem(client.post(BATCH, content=scalar), 422)["errors"]
@@ -392,15 +402,15 @@ def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_na
     for body in ([case, {**case, "f": 1.0}], {**case, "f": [1.7e308, 1.0]}):
         (fault,) = client.post(BATCH, json=body).json()["errors"]
         assert (fault["index"], fault["field"]) == (0, "f")
-    assert asked(client, "ndjson", [case])[0]["errors"][0]["field"] == "f"
-    assert asked(client, "csv", [case])[0]["error"].startswith("f: must be finite")
-    held = {name: value for name, value in case.items() if name != "v0"}
+    assert answered_rows(client, "ndjson", [case])[0]["errors"][0]["field"] == "f"
+    assert answered_rows(client, "csv", [case])[0]["error"].startswith("f: must be finite")
+    rest = {name: value for name, value in case.items() if name != "v0"}
     for path, more in (
         ("law", {"start": 0.1, "stop": 1.0}),
         ("solve-for", {"unknown": "v0", "target": 0.1}),
     ):
         assert (
-            problem(client.post(f"/v1/{path}", json={**held, **more}), 422)["errors"][0]["field"]
+            problem(client.post(f"/v1/{path}", json={**rest, **more}), 422)["errors"][0]["field"]
             == "f"
         )
 
@@ -423,9 +433,9 @@ def test_columns_that_do_not_fit_are_refused(
 ) -> None:
     body: Any = f"{columns}\r\n1\r\n"
     if form == "arrow":
-        given = {**{name: [value] for name, value in CASE.items()}, **columns}
+        lists = {**{name: [value] for name, value in CASE.items()}, **columns}
         body = stream_of(
-            pa.record_batch({name: pa.array(x) for name, x in given.items() if x is not ...})
+            pa.record_batch({name: pa.array(x) for name, x in lists.items() if x is not ...})
         )
     document = problem(posted(client, form, body), 422)
     assert any(words in f"{fault['field']}: {fault['reason']}" for fault in document["errors"]), (

@@ -77,8 +77,8 @@ def test_a_misspelt_variable_is_noticed(
     monkeypatch.setenv("MUMACRO_TABLE", "x")
     monkeypatch.setenv("MUMACRO_PORT", "81")
     with started():
-        told = [message for message in caplog.messages if "not a setting" in message]
-    assert told == ["MUMACRO_TABLE is not a setting and has no effect"]
+        warnings = [message for message in caplog.messages if "not a setting" in message]
+    assert warnings == ["MUMACRO_TABLE is not a setting and has no effect"]
 
 
 def test_the_key_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,10 +92,10 @@ def test_the_health_check_asks_this_machine(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(
         "urllib.request.OpenerDirector.open", opened := Mock(side_effect=LookupError)
     )
-    for host, asked in (("0.0.0.0", "127.0.0.1"), ("::", "[::1]"), ("10.1.2.3", "10.1.2.3")):  # noqa: S104
+    for host, address in (("0.0.0.0", "127.0.0.1"), ("::", "[::1]"), ("10.1.2.3", "10.1.2.3")):  # noqa: S104
         with pytest.raises(LookupError):
             main(["healthcheck", "--host", host])
-        assert opened.call_args.args == (f"http://{asked}:8000/readyz",)
+        assert opened.call_args.args == (f"http://{address}:8000/readyz",)
 
 
 def test_the_manual_and_the_settings_agree(repository: Path) -> None:
@@ -103,16 +103,16 @@ def test_the_manual_and_the_settings_agree(repository: Path) -> None:
     # any text is allowed
     assert set(BAD) | {"MUMACRO_CORS_ORIGINS", "MUMACRO_TRUSTED_PROXIES"} == names
     text = (repository / "docs" / "operations.md").read_text()
-    told = dict(re.findall(r"^\| `(MUMACRO_\w+)` \| (.*?) \| ", text, re.MULTILINE))
-    assert told.keys() == names
+    defaults = dict(re.findall(r"^\| `(MUMACRO_\w+)` \| (.*?) \| ", text, re.MULTILINE))
+    assert defaults.keys() == names
     for name, field in Settings.model_fields.items():
         default = "none" if field.default in (None, "", ()) else f"`{field.default}`"
-        assert field.default_factory or told[f"MUMACRO_{name.upper()}"] == default
+        assert field.default_factory or defaults[f"MUMACRO_{name.upper()}"] == default
     assert load_settings().tables == (repository / "tables",)
 
 
 @pytest.mark.parametrize(
-    ("option", "told"),
+    ("option", "message"),
     [
         (["--port", "70000"], "MUMACRO_PORT must be"),
         (["--workers=0"], "MUMACRO_WORKERS must be"),
@@ -122,10 +122,10 @@ def test_the_manual_and_the_settings_agree(repository: Path) -> None:
     ],
 )
 def test_a_bad_argument_ends_the_process_without_a_traceback(
-    repository: Path, option: Any, told: Any
+    repository: Path, option: Any, message: Any
 ) -> None:
     words = [sys.executable, "-m", "service", *option]
     process = subprocess.run(words, cwd=repository, capture_output=True, text=True, check=False)
     assert (process.returncode, process.stdout) == (2, "")
-    assert process.stderr.startswith(told)
+    assert process.stderr.startswith(message)
     assert "Traceback" not in process.stderr

@@ -43,12 +43,12 @@ def ask(client: Any, case: Case, **options: Any) -> Any:
 
 
 @settings(max_examples=200, deadline=None)
-@given(given_case=cases)
+@given(one_case=cases)
 def test_the_answer_is_the_surrogates_and_always_json(
-    client: Any, surrogate: Surrogate, given_case: Any
+    client: Any, surrogate: Surrogate, one_case: Any
 ) -> None:
-    answer = ask(client, given_case, include=["groups", "limits", "stick_fraction"])
-    expected = surrogate.evaluate(**given_case)
+    answer = ask(client, one_case, include=["groups", "limits", "stick_fraction"])
+    expected = surrogate.evaluate(**one_case)
     assert answer["error_bound"] == (
         expected.error_bound if math.isfinite(expected.error_bound) else None
     )
@@ -57,11 +57,11 @@ def test_the_answer_is_the_surrogates_and_always_json(
     assert 0.0 <= answer["mu_ratio"] <= 1.0
     assert list(answer["groups"]) == ["v_tilde", "y_tilde", "l0"]
     assert list(answer["limits"]) == ["mu_static", "v0_crit", "mu_crit"]
-    if answer["groups"]["y_tilde"] == 0.0 < given_case["y0"] * given_case["omega"]:
+    if answer["groups"]["y_tilde"] == 0.0 < one_case["y0"] * one_case["omega"]:
         assert answer["stick_fraction_bound"] == 1.0  # the groups do not show whether it sticks
     plain = {name: answer[name] for name in DEFAULT}
-    assert ask(client, given_case) == plain
-    query = {name: value if value == "rigid" else repr(value) for name, value in given_case.items()}
+    assert ask(client, one_case) == plain
+    query = {name: value if value == "rigid" else repr(value) for name, value in one_case.items()}
     assert client.get(PATH, params=query).json() == plain
 
 
@@ -104,8 +104,8 @@ def test_one_value_is_returned_as_text_and_answers_may_be_cached(client: Any, ca
         answer["mu_macro"],
         "text/plain; charset=utf-8",
     )
-    asked = {**case, "include": "power", "value": "power.saved"}
-    assert float(client.get(f"{PATH}.txt", params=asked).text) == answer["power"]["saved"]
+    query = {**case, "include": "power", "value": "power.saved"}
+    assert float(client.get(f"{PATH}.txt", params=query).text) == answer["power"]["saved"]
     assert client.get(f"{PATH}.txt", params={**case, "value": "regime"}).text == "stick_slip"
     head, get = client.head(PATH, params=case), client.get(PATH, params=case)
     assert (head.status_code, head.content, head.headers["content-length"]) == (

@@ -137,13 +137,13 @@ def test_a_wrong_known_answer_is_not_ready(
     started: Any, surrogate: Surrogate, problem: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wrong = TableError(Path("x.nc"), "the known answer is wrong")
-    for error, told in ((wrong, "known answer"), (RuntimeError("secret"), "the log has")):
+    for error, words in ((wrong, "known answer"), (RuntimeError("secret"), "the log has")):
         monkeypatch.setattr("mumacro.Surrogate.self_check", Mock(side_effect=error))
         client = started(tables=(surrogate.path,))
         assert "not loaded yet" in problem(client.get("/readyz"), 503)["detail"]  # before the start
         with client:
             detail = problem(client.get("/readyz"), 503)["detail"]
-        assert told in detail
+        assert words in detail
         assert "secret" not in detail
 
 

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 
-def close(expected: Any, *, rel: float = 0.0, abs: float = 0.0) -> Any:  # noqa: A002 (the names of pytest)
+# the names of pytest
+def close(expected: Any, *, rel: float = 0.0, abs: float = 0.0) -> Any:  # noqa: A002
     """``pytest.approx`` with no tolerance but the stated ones; given ``rel`` alone, pytest adds
     abs=1e-12."""
     assert rel > 0.0 or abs > 0.0, "state a tolerance"

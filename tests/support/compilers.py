@@ -25,11 +25,11 @@ def compiler(name: str) -> tuple[str, ...]:
     return (result,)
 
 
-def run(*command: object, cwd: Path | None = None, given: str = "") -> str:
+def run(*command: object, cwd: Path | None = None, stdin: str = "") -> str:
     """The output of a command that must succeed."""
     words = [str(word) for word in command]
     done = subprocess.run(
-        words, cwd=cwd, input=given, capture_output=True, text=True, timeout=300, check=False
+        words, cwd=cwd, input=stdin, capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, f"{' '.join(words)}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
     return done.stdout

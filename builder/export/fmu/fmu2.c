@@ -18,12 +18,14 @@ typedef struct {
 EXPORT String fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT String fmi2GetVersion(void) { return "2.0"; }
 
-EXPORT Instance *fmi2Instantiate(String name, int type, String guid, String resources, const Callbacks *functions,
-                                 Boolean visible, Boolean logging) {
-    return instantiate(name, guid, functions ? functions->logger : NULL, functions ? functions->environment : NULL);
+EXPORT Instance *fmi2Instantiate(String name, int type, String guid, String resources,
+                                 const Callbacks *functions, Boolean visible, Boolean logging) {
+    return instantiate(name, guid, functions ? functions->logger : NULL,
+                       functions ? functions->environment : NULL);
 }
 
-EXPORT Status fmi2SetupExperiment(ME, Boolean known, double tolerance, double start, Boolean ends, double stop) {
+EXPORT Status fmi2SetupExperiment(ME, Boolean known, double tolerance, double start, Boolean ends,
+                                  double stop) {
     return fmi2SetTime(m, start);
 }
 

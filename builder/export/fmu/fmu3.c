@@ -4,44 +4,49 @@
 
 EXPORT String fmi3GetVersion(void) { return "3.0"; }
 
-EXPORT Instance *fmi3InstantiateModelExchange(String name, String token, String path, bool visible, bool logging,
-                                              void *environment, Logger logger) {
+EXPORT Instance *fmi3InstantiateModelExchange(String name, String token, String path, bool visible,
+                                              bool logging, void *environment, Logger logger) {
     return instantiate(name, token, logger, environment);
 }
 
-EXPORT Instance *fmi3InstantiateCoSimulation(String name, String token, String path, bool visible, bool logging,
-                                             bool events, bool early, AT, void *environment, Logger logger,
+EXPORT Instance *fmi3InstantiateCoSimulation(String name, String token, String path, bool visible,
+                                             bool logging, bool events, bool early, AT,
+                                             void *environment, Logger logger,
                                              void (*update)(void)) {
     return instantiate(name, token, logger, environment);
 }
 
-EXPORT Instance *fmi3InstantiateScheduledExecution(String name, String token, String path, bool visible, bool logging,
-                                                   void *environment, Logger logger, void (*clocks)(void),
+EXPORT Instance *fmi3InstantiateScheduledExecution(String name, String token, String path,
+                                                   bool visible, bool logging, void *environment,
+                                                   Logger logger, void (*clocks)(void),
                                                    void (*lock)(void), void (*unlock)(void)) {
     return NULL;
 }
 
-EXPORT Status fmi3EnterInitializationMode(ME, bool known, double tolerance, double start, bool ends, double stop) {
+EXPORT Status fmi3EnterInitializationMode(ME, bool known, double tolerance, double start, bool ends,
+                                          double stop) {
     return fmi3SetTime(m, start);
 }
 
-EXPORT Status fmi3GetAdjointDerivative(ME, const Reference unknowns[], size_t n, const Reference knowns[], size_t k,
-                                       const double seeds[], size_t seeded, double out[], size_t outs) {
+EXPORT Status fmi3GetAdjointDerivative(ME, const Reference unknowns[], size_t n,
+                                       const Reference knowns[], size_t k, const double seeds[],
+                                       size_t seeded, double out[], size_t outs) {
     if (seeded < n || outs < k) return ERROR;
     memset(out, 0, k * sizeof *out);
-    for (size_t i = 0; i < n; ++i) EACH(j, k, add_slope(m, unknowns[i], knowns[j], seeds[i], out + j))
+    for (size_t i = 0; i < n; ++i)
+        EACH(j, k, add_slope(m, unknowns[i], knowns[j], seeds[i], out + j))
     return OK;
 }
 
-EXPORT Status fmi3UpdateDiscreteStates(ME, bool *again, bool *terminate, bool *nominals, bool *values, bool *event,
-                                       double *next) {
+EXPORT Status fmi3UpdateDiscreteStates(ME, bool *again, bool *terminate, bool *nominals,
+                                       bool *values, bool *event, double *next) {
     *again = *terminate = *nominals = *values = *event = false;
     *next = 0.0;
     return OK;
 }
 
-EXPORT Status fmi3DoStep(ME, double time, double step, bool keeps, bool *event, bool *terminate, bool *early,
-                         double *last) {
+EXPORT Status fmi3DoStep(ME, double time, double step, bool keeps, bool *event, bool *terminate,
+                         bool *early, double *last) {
     *event = *terminate = *early = false;
     m->state.time = *last = time + step;
     return answered(m);
@@ -68,7 +73,8 @@ RETURNS(NONE, GetClock, ME, AT, bool value[])
 RETURNS(NONE, SetClock, ME, AT, const bool value[])
 RETURNS(NONE, GetIntervalDecimal, ME, AT, double interval[], int qualifier[])
 RETURNS(NONE, SetIntervalDecimal, ME, AT, const double interval[])
-RETURNS(NONE, GetIntervalFraction, ME, AT, uint64_t counter[], uint64_t resolution[], int qualifier[])
+RETURNS(NONE, GetIntervalFraction, ME, AT, uint64_t counter[], uint64_t resolution[],
+        int qualifier[])
 RETURNS(NONE, SetIntervalFraction, ME, AT, const uint64_t counter[], const uint64_t resolution[])
 RETURNS(NONE, GetShiftDecimal, ME, AT, double shift[])
 RETURNS(NONE, SetShiftDecimal, ME, AT, const double shift[])
@@ -81,5 +87,5 @@ RETURNS(OK, EvaluateDiscreteStates, ME)
 RETURNS(ERROR, ActivateModelPartition, ME, Reference clock, double time)
 /* of single elements of arrays, which this unit does not have and does not promise */
 RETURNS(ERROR, GetNumberOfVariableDependencies, ME, Reference at, size_t *n)
-RETURNS(ERROR, GetVariableDependencies, ME, Reference at, size_t elements[], Reference inputs[], size_t of[],
-        int kinds[], size_t n)
+RETURNS(ERROR, GetVariableDependencies, ME, Reference at, size_t elements[], Reference inputs[],
+        size_t of[], int kinds[], size_t n)

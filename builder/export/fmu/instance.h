@@ -1,9 +1,9 @@
-/* What FMI 2.0 and 3.0 share; MUMACRO_FMI is 2 or 3.  The model has no states, events or clocks, so most functions of
- * the standards have nothing to do.
- * Value references, as in modelDescription.xml: 0 is the time (3.0 only), 1 to 7 are the inputs, the last of them
- * Fz_amplitude; then come mu_macro and mu_ratio (outputs), error_bound, v_tilde, y_tilde, regime, source, the
- * parameters contact and direction, the output force and its parameter v_rest.  v0 may be negative: all but the force
- * are those of its absolute value. */
+/* What FMI 2.0 and 3.0 share; MUMACRO_FMI is 2 or 3.  The model has no states, events or clocks, so
+ * most functions of the standards have nothing to do.
+ * Value references, as in modelDescription.xml: 0 is the time (3.0 only), 1 to 7 are the inputs,
+ * the last of them Fz_amplitude; then come mu_macro and mu_ratio (outputs), error_bound, v_tilde,
+ * y_tilde, regime, source, the parameters contact and direction, the output force and its parameter
+ * v_rest.  v0 may be negative: all but the force are those of its absolute value. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -19,10 +19,12 @@
 #define EXPORT
 #endif
 #if defined __GNUC__
-#pragma GCC diagnostic ignored "-Wunused-parameter" /* what a standard passes and this model has no use for */
+/* what a standard passes and this model has no use for */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-enum { TIME, Y0 = 4, V0 = 6, INPUTS, MU_MACRO, MU_RATIO, ERROR_BOUND, V_TILDE, Y_TILDE, REGIME, SOURCE };
+enum { TIME, Y0 = 4, V0 = 6, INPUTS };
+enum { MU_MACRO = INPUTS + 1, MU_RATIO, ERROR_BOUND, V_TILDE, Y_TILDE, REGIME, SOURCE };
 enum { CONTACT = SOURCE + 1, DIRECTION, FORCE, V_REST };
 enum { CONTACTS = 2, DIRECTIONS = 3 };
 typedef enum { OK, WARNING, DISCARD, ERROR } Status;
@@ -31,7 +33,8 @@ typedef uint32_t Reference;
 
 #if MUMACRO_FMI == 2
 typedef int Boolean, Choice;
-typedef void (*Logger)(void *environment, String instance, Status status, String category, String text, ...);
+typedef void (*Logger)(void *environment, String instance, Status status, String category,
+                       String text, ...);
 #define FMI(name) fmi2##name
 #define STATE(before, after) fmi2##before##FMUstate##after
 #define DESERIALIZE fmi2DeSerializeFMUstate
@@ -59,7 +62,7 @@ typedef void (*Logger)(void *environment, Status status, String category, String
 typedef struct {
     double time, x[INPUTS], v_rest;
     int contact, direction;
-    int known; /* whether the answer and the force belong to x */
+    int valid; /* whether the answer and the force belong to x */
     mumacro_answer answer;
     double force, force_slopes[6];
 } State;
@@ -78,7 +81,7 @@ typedef struct {
 #define RETURNING(result, name, ...) \
     EXPORT Status name(__VA_ARGS__) { return result; }
 
-/* --- the model ------------------------------------------------------------------------------------------------ */
+/* --- the model -------------------------------------------------------------------------------- */
 
 static void say(Logger logger, void *environment, String name, Status status, String text) {
     const String category = status == ERROR ? "logStatusError" : "logStatusDiscard";
@@ -90,27 +93,32 @@ static void say(Logger logger, void *environment, String name, Status status, St
 #endif
 }
 
-/* The input in whose place its amplitude goes: that of the normal force, or y0; the other one has no influence. */
-static Reference amplitude(const Instance *m) { return m->state.direction == MUMACRO_NORMAL ? INPUTS : Y0; }
+/* The input in whose place its amplitude goes: that of the normal force, or y0;
+ * the other one has no influence. */
+static Reference amplitude(const Instance *m) {
+    return m->state.direction == MUMACRO_NORMAL ? INPUTS : Y0;
+}
 
 /* OK when the inputs are legal; else DISCARD, and the log says which is not. */
 static Status answered(ME) {
     State *s = &m->state;
-    if (!s->known) {
+    if (!s->valid) {
         const double *x = s->x, moved = x[amplitude(m) - 1];
-        const int error =
-            mumacro_evaluate_as(s->contact, s->direction, x[0], x[1], x[2], moved, x[4], fabs(x[V0 - 1]), &s->answer);
+        const int error = mumacro_evaluate_as(s->contact, s->direction, x[0], x[1], x[2], moved,
+                                              x[4], fabs(x[V0 - 1]), &s->answer);
         if (error) say(m->logger, m->environment, m->name, DISCARD, mumacro_error_text(error));
-        else mumacro_evaluate_force(s->contact, s->direction, x[V0 - 1], s->v_rest, x[0], x[1], x[2], moved, x[4],
-                                    &s->force, s->force_slopes);
-        s->known = error == 0;
+        else
+            mumacro_evaluate_force(s->contact, s->direction, x[V0 - 1], s->v_rest, x[0], x[1], x[2],
+                                   moved, x[4], &s->force, s->force_slopes);
+        s->valid = error == 0;
     }
-    return s->known ? OK : DISCARD;
+    return s->valid ? OK : DISCARD;
 }
 
 static Status get_number(ME, Reference variable, double *value) {
     const mumacro_answer *a = &m->state.answer;
-    if ((MUMACRO_FMI == 2 && variable == TIME) || (variable > Y_TILDE && variable < FORCE) || variable > V_REST)
+    if ((MUMACRO_FMI == 2 && variable == TIME) || (variable > Y_TILDE && variable < FORCE) ||
+        variable > V_REST)
         return ERROR;
     if (variable == TIME || variable == V_REST) {
         *value = variable == TIME ? m->state.time : m->state.v_rest;
@@ -118,9 +126,9 @@ static Status get_number(ME, Reference variable, double *value) {
         *value = m->state.x[variable - 1];
     } else {
         const Status status = answered(m);
-        const double found[] = {a->mu_macro, a->mu_ratio, a->error_bound, a->v_tilde, a->y_tilde};
+        const double outputs[] = {a->mu_macro, a->mu_ratio, a->error_bound, a->v_tilde, a->y_tilde};
         if (status != OK) return status;
-        *value = variable == FORCE ? m->state.force : found[variable - MU_MACRO];
+        *value = variable == FORCE ? m->state.force : outputs[variable - MU_MACRO];
     }
     return OK;
 }
@@ -148,7 +156,7 @@ static Status set_choice(ME, Reference variable, Choice value) {
         return ERROR;
     }
     *(variable == CONTACT ? &m->state.contact : &m->state.direction) = (int)value;
-    return m->state.known = 0, OK;
+    return m->state.valid = 0, OK;
 }
 
 static Status set_number(ME, Reference variable, double value) {
@@ -162,7 +170,7 @@ static Status set_number(ME, Reference variable, double value) {
     } else {
         m->state.x[variable - 1] = value;
     }
-    return m->state.known = 0, OK;
+    return m->state.valid = 0, OK;
 }
 
 /* Adds seed times d output / d input. */
@@ -170,19 +178,24 @@ static Status add_slope(ME, Reference output, Reference input, double seed, doub
     const mumacro_answer *a = &m->state.answer;
     const double *slopes = output == FORCE ? m->state.force_slopes : a->gradient;
     double slope;
-    if ((output != MU_MACRO && output != MU_RATIO && output != FORCE) || input <= TIME || input > INPUTS) return ERROR;
+    if ((output != MU_MACRO && output != MU_RATIO && output != FORCE) || input <= TIME ||
+        input > INPUTS)
+        return ERROR;
     if (answered(m) != OK) return DISCARD;
-    slope = input == amplitude(m) ? slopes[Y0 - 1] : input == Y0 || input == INPUTS ? 0.0 : slopes[input - 1];
+    slope = input == amplitude(m)            ? slopes[Y0 - 1]
+            : input == Y0 || input == INPUTS ? 0.0
+                                             : slopes[input - 1];
     if (output != FORCE && input == V0 && m->state.x[V0 - 1] < 0.0) slope = -slope;
     if (output == MU_RATIO) slope = (slope - (input == 1 ? a->mu_ratio : 0.0)) / m->state.x[0];
     if (seed != 0.0) *sum += seed * slope;
     return OK;
 }
 
-/* --- an instance ---------------------------------------------------------------------------------------------- */
+/* --- an instance ------------------------------------------------------------------------------ */
 
 EXPORT Status FMI(Reset)(ME) {
-    static const State start = {.x = MUMACRO_FMU_STARTS, .v_rest = MUMACRO_FMU_REST}; /* a spring, across */
+    /* a spring, across */
+    static const State start = {.x = MUMACRO_FMU_STARTS, .v_rest = MUMACRO_FMU_REST};
     return m->state = start, OK;
 }
 
@@ -204,18 +217,20 @@ static Instance *instantiate(String name, String token, Logger logger, void *env
 
 EXPORT void FMI(FreeInstance)(ME) { free(m); }
 
-EXPORT Status STATE(Get, )(ME, void **kept) {
-    if (*kept == NULL) *kept = malloc(sizeof(State));
-    return *kept == NULL ? ERROR : (memcpy(*kept, &m->state, sizeof(State)), OK);
+EXPORT Status STATE(Get, )(ME, void **state) {
+    if (*state == NULL) *state = malloc(sizeof(State));
+    return *state == NULL ? ERROR : (memcpy(*state, &m->state, sizeof(State)), OK);
 }
-EXPORT Status STATE(Set, )(ME, const void *kept) { return memcpy(&m->state, kept, sizeof(State)), OK; }
-EXPORT Status STATE(Free, )(ME, void **kept) { return free(*kept), *kept = NULL, OK; }
+EXPORT Status STATE(Set, )(ME, const void *state) {
+    return memcpy(&m->state, state, sizeof(State)), OK;
+}
+EXPORT Status STATE(Free, )(ME, void **state) { return free(*state), *state = NULL, OK; }
 /* which modelDescription.xml does not promise */
-EXPORT Status STATE(Serialized, Size)(ME, void *kept, size_t *size) { return ERROR; }
-EXPORT Status STATE(Serialize, )(ME, const void *kept, void *bytes, size_t size) { return ERROR; }
-EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **kept) { return ERROR; }
+EXPORT Status STATE(Serialized, Size)(ME, void *state, size_t *size) { return ERROR; }
+EXPORT Status STATE(Serialize, )(ME, const void *state, void *bytes, size_t size) { return ERROR; }
+EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **state) { return ERROR; }
 
-/* --- values and time ------------------------------------------------------------------------------------------ */
+/* --- values and time -------------------------------------------------------------------------- */
 
 #define EACH(i, n, call) \
     for (size_t i = 0; i < n; ++i) { \
@@ -233,17 +248,20 @@ FOR_ALL(SET_NUMBERS, const double, set_number(m, at[i], value[i]))
 FOR_ALL(GET_CHOICES, Choice, get_choice(m, at[i], value + i))
 FOR_ALL(SET_CHOICES, const Choice, set_choice(m, at[i], value[i]))
 
-EXPORT Status FMI(GetDirectionalDerivative)(ME, const Reference unknowns[], size_t n, const Reference knowns[],
-                                            size_t k, const double seeds[] SIZE(seeded), double out[] SIZE(outs)) {
+EXPORT Status FMI(GetDirectionalDerivative)(ME, const Reference unknowns[], size_t n,
+                                            const Reference knowns[], size_t k,
+                                            const double seeds[] SIZE(seeded),
+                                            double out[] SIZE(outs)) {
     if (SHORTER(seeded, k) || SHORTER(outs, n)) return ERROR;
     memset(out, 0, n * sizeof *out);
-    for (size_t i = 0; i < n; ++i) EACH(j, k, add_slope(m, unknowns[i], knowns[j], seeds[j], out + i))
+    for (size_t i = 0; i < n; ++i)
+        EACH(j, k, add_slope(m, unknowns[i], knowns[j], seeds[j], out + i))
     return OK;
 }
 
 EXPORT Status FMI(SetTime)(ME, double time) { return m->state.time = time, OK; }
 
-/* --- functions that have nothing to do, in both standards ----------------------------------------------------- */
+/* --- functions that have nothing to do, in both standards ------------------------------------- */
 
 RETURNS(OK, SetDebugLogging, ME, Boolean on, size_t n, const String names[])
 RETURNS(OK, ExitInitializationMode, ME)

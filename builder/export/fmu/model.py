@@ -156,7 +156,9 @@ def _compile(texts: dict[str, str], command: list[str]) -> bytes:
             Path(folder, name).write_text(text, "ascii")
         # the folder by its whole name: zig's cache would take two files "./mumacro.h" for one
         arguments = [*command, f"-I{folder}", "-o", "made"]
-        process = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        process = subprocess.run(  # noqa: S603
+            arguments, cwd=folder, capture_output=True, text=True, check=False
+        )
         if process.returncode != 0:
             raise ExportError(f"{' '.join(arguments)}: {process.stderr.strip()[-2000:]}")
         return Path(folder, "made").read_bytes()

@@ -125,9 +125,9 @@ def ask(function: Any, n: int, columns: Any, *arrays: Any) -> Any:
     return out
 
 
-def same(found: Any, expected: Any) -> Any:
+def same(numbers: Any, expected: Any) -> Any:
     """Whether two arrays hold the same numbers."""
-    return np.array_equal(found, expected, equal_nan=True)
+    return np.array_equal(numbers, expected, equal_nan=True)
 
 
 def neighbours(x: Any, most: int = 3) -> Any:
@@ -239,9 +239,9 @@ def test_a_header_has_no_names_of_the_kernel_of_its_own(table: Surrogate) -> Non
 
 
 @pytest.mark.parametrize(
-    ("out", "made"), [("mumacro.h", []), ("made", ["mumacro.c", "mumacro.h", "mumacro_table.c"])]
+    ("out", "files"), [("mumacro.h", []), ("made", ["mumacro.c", "mumacro.h", "mumacro_table.c"])]
 )
-def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, made: Any) -> None:
+def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, files: Any) -> None:
     program = (
         "import sys\nfor name in ('rich', 'scipy', 'netCDF4', 'xarray', 'numba'): "
         "sys.modules[name] = None\n"
@@ -252,8 +252,8 @@ def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, 
     done = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "mumacro-1e-7.nc" in done.stdout
-    assert sorted(path.name for path in (tmp_path / out).glob("*")) == made
-    assert made or (tmp_path / out).read_text("ascii").startswith("/*")
+    assert sorted(path.name for path in (tmp_path / out).glob("*")) == files
+    assert files or (tmp_path / out).read_text("ascii").startswith("/*")
 
 
 # --- the same bits --------------------------------------------------------------------------------

@@ -69,7 +69,7 @@ def fortran(folder: Path) -> Any:
         return lambda *lines: numbers(
             compilers.run(
                 folder / name,
-                given="".join(" ".join(map(repr, map(float, line))) + "\n" for line in lines),
+                stdin="".join(" ".join(map(repr, map(float, line))) + "\n" for line in lines),
             )
         )
 

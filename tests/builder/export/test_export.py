@@ -94,7 +94,7 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "said"),
+    ("arguments", "code", "message"),
     [
         (["pyproject.toml", "--format", "csv"], 1, "pyproject.toml"),
         (["x.nc", "--format", "xls"], 2, "--format"),
@@ -112,7 +112,7 @@ def test_what_the_command_cannot_export_is_reported_in_one_line(
     capsys: Capture,
     arguments: Any,
     code: Any,
-    said: Any,
+    message: Any,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(PATH.parent.parent / "pyproject.toml", tmp_path)
@@ -120,7 +120,7 @@ def test_what_the_command_cannot_export_is_reported_in_one_line(
         sys.exit(main(["export", *arguments]))
     assert end.value.code == code
     output = capsys.readouterr().err
-    assert said in output
+    assert message in output
     assert len(output.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 

@@ -27,9 +27,9 @@ table = tables(1e-4)
 def unit(
     request: pytest.FixtureRequest, table: Surrogate, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
-    made = tmp_path_factory.mktemp("fmu") / f"{request.param}.fmu"
-    export_table(table.path, request.param, made)
-    return made
+    path = tmp_path_factory.mktemp("fmu") / f"{request.param}.fmu"
+    export_table(table.path, request.param, path)
+    return path
 
 
 @pytest.fixture
@@ -142,29 +142,29 @@ class Loaded:
 def test_directional_derivatives_are_the_gradient(
     unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path
 ) -> None:
-    made = Loaded(fmpy, unit, tmp_path)
-    assert made.outputs == [made.at[name] for name in ("mu_macro", "mu_ratio", "force")]
+    model = Loaded(fmpy, unit, tmp_path)
+    assert model.outputs == [model.at[name] for name in ("mu_macro", "mu_ratio", "force")]
     for case in (CASE, {**CASE, "v0": 1.0}, {**CASE, "y0": 2e-5}, {**CASE, "v0": -0.01}):
-        made.put(**case)
+        model.put(**case)
         answer = table.evaluate({**case, "v0": abs(case["v0"])}, gradient=True)
         sign = math.copysign(1.0, case["v0"])
-        assert made.get("force") == [close(sign * answer.mu_macro * case["Fz"], rel=1e-13)]
+        assert model.get("force") == [close(sign * answer.mu_macro * case["Fz"], rel=1e-13)]
         signs = {name: sign if name == "v0" else 1.0 for name in FIELDS}
         gradient = {name: answer.gradient[name] * signs[name] for name in FIELDS}
         for name in FIELDS:
             of_ratio = (gradient[name] - answer.mu_ratio * (name == "mu0")) / case["mu0"]
             of_force = sign * (gradient[name] * case["Fz"] + answer.mu_macro * (name == "Fz"))
             result = [
-                made.slope(output, **{name: 1.0}) for output in ("mu_macro", "mu_ratio", "force")
+                model.slope(output, **{name: 1.0}) for output in ("mu_macro", "mu_ratio", "force")
             ]
             assert result == close([gradient[name], of_ratio, of_force], rel=1e-9)
         seeds = {name: 1e-3 * value for name, value in case.items()}
         expected = sum(gradient[name] * seed for name, seed in seeds.items())
-        assert made.slope("mu_macro", **seeds) == close(expected, rel=1e-9)
-        if hasattr(made.unit, "getAdjointDerivative"):
-            fixed = [made.at[name] for name in FIELDS]
-            adjoint = made.unit.getAdjointDerivative(
-                [made.at["mu_macro"]], fixed, [2.0], len(FIELDS)
+        assert model.slope("mu_macro", **seeds) == close(expected, rel=1e-9)
+        if hasattr(model.unit, "getAdjointDerivative"):
+            fixed = [model.at[name] for name in FIELDS]
+            adjoint = model.unit.getAdjointDerivative(
+                [model.at["mu_macro"]], fixed, [2.0], len(FIELDS)
             )
             assert adjoint == close([2.0 * slope for slope in gradient.values()], rel=1e-9)
 
@@ -174,18 +174,18 @@ def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path,
     kind = {"contact": CONTACTS.index(pair[0]), "direction": DIRECTIONS.index(pair[1])}
     words, fields, _ = as_kind(CASE, pair)
     case = {name: {**CASE, "Fz_amplitude": 4.0}[name] for name in fields}
-    made = Loaded(fmpy, unit, tmp_path, **kind)
-    made.put(Fz_amplitude=4.0)
-    assert made.get(*kind, whole=True) == list(kind.values())
+    model = Loaded(fmpy, unit, tmp_path, **kind)
+    model.put(Fz_amplitude=4.0)
+    assert model.get(*kind, whole=True) == list(kind.values())
     for v0 in 10.0 ** np.linspace(-4.0, 1.0, 21):
-        made.put(v0=v0)
+        model.put(v0=v0)
         answer = table.evaluate({**case, "v0": v0}, **words, groups=True)
         expected = [answer.mu_macro, answer.y_tilde, answer.mu_macro * CASE["Fz"]]
-        assert made.get("mu_macro", "y_tilde", "force") == close(expected, rel=1e-13)
-    made.put(v0=CASE["v0"])
+        assert model.get("mu_macro", "y_tilde", "force") == close(expected, rel=1e-13)
+    model.put(v0=CASE["v0"])
     exact = table.evaluate(case, **words, gradient=True).gradient
     for name in (*FIELDS, "Fz_amplitude"):
-        assert made.slope("mu_macro", **{name: 1.0}) == close(exact.get(name, 0.0), rel=1e-9)
+        assert model.slope("mu_macro", **{name: 1.0}) == close(exact.get(name, 0.0), rel=1e-9)
     for name, wrong in (
         ("contact", -1),
         ("contact", 2),
@@ -194,22 +194,22 @@ def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path,
         ("source", 0),
     ):
         with pytest.raises(Exception, match="status 3"):
-            made.put(**{name: wrong})
-    made.put(contact=1, direction=2)
+            model.put(**{name: wrong})
+    model.put(contact=1, direction=2)
     with pytest.raises(Exception, match="status 2"):  # a ball whose normal force oscillates
-        made.get("mu_macro")
+        model.get("mu_macro")
 
 
 @pytest.mark.parametrize("kind", [{}, {"contact": 1}, {"direction": 1}, {"direction": 2}])
 def test_the_force_passes_through_zero_with_its_derivatives(
     unit: Path, fmpy: Any, tmp_path: Path, kind: Any
 ) -> None:
-    made = Loaded(fmpy, unit, tmp_path, **kind, v_rest=1e-3)
-    made.put(Fz_amplitude=4.0)
+    model = Loaded(fmpy, unit, tmp_path, **kind, v_rest=1e-3)
+    model.put(Fz_amplitude=4.0)
 
     def force(**moved: Any) -> Any:
-        made.put(**moved)
-        return made.get("force")[0]
+        model.put(**moved)
+        return model.get("force")[0]
 
     assert (force(v0=0.0), force(v0=-4e-4)) == (0.0, -force(v0=4e-4))
     assert (
@@ -217,47 +217,47 @@ def test_the_force_passes_through_zero_with_its_derivatives(
         < force(v0=4e-4)
         < force(v0=9e-4)
         < force(v0=1e-3)
-        == CASE["Fz"] * made.get("mu_macro")[0]
+        == CASE["Fz"] * model.get("mu_macro")[0]
     )
     for case in ({**CASE, "v0": 4e-4}, {**CASE, "v0": -9e-4}, {**CASE, "v0": 0.0}):
-        made.put(**case)
-        slopes = {name: made.slope("force", **{name: 1.0}) for name in FIELDS}
+        model.put(**case)
+        slopes = {name: model.slope("force", **{name: 1.0}) for name in FIELDS}
         for name, value in case.items():
             step = 1e-5 * (value or 1e-3)
             difference = (force(**{name: value + step}) - force(**{name: value - step})) / (
                 2.0 * step
             )
-            made.put(**{name: value})
+            model.put(**{name: value})
             assert slopes[name] == close(
                 difference, rel=2e-4, abs=1e-5 * abs(force()) / (abs(value) + 1e-3)
             ), name
     for wrong in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(Exception, match="status 3"):
-            made.put(v_rest=wrong)
-    assert made.get("v_rest") == [1e-3]
+            model.put(v_rest=wrong)
+    assert model.get("v_rest") == [1e-3]
 
 
 def test_states_are_kept_and_illegal_inputs_discarded(
     unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path
 ) -> None:
-    made = Loaded(fmpy, unit, tmp_path)
+    model = Loaded(fmpy, unit, tmp_path)
     expected = table.evaluate(CASE).mu_macro
-    assert made.get("mu_macro") == [close(expected, rel=1e-13)]
-    kept = made.save()
-    made.put(y0=-1.0)
+    assert model.get("mu_macro") == [close(expected, rel=1e-13)]
+    state = model.save()
+    model.put(y0=-1.0)
     for output in ("mu_macro", "force"):
         with pytest.raises(Exception, match="status 2"):  # discard
-            made.get(output)
-    made.put(y0=CASE["y0"], v0=1.0)
-    assert made.get("mu_macro") != [close(expected, rel=1e-3)]
-    made.restore(kept)
-    made.drop(kept)
-    assert made.get("mu_macro", "v0") == [close(expected, rel=1e-13), 0.01]
-    made.at["nothing"] = 99
+            model.get(output)
+    model.put(y0=CASE["y0"], v0=1.0)
+    assert model.get("mu_macro") != [close(expected, rel=1e-3)]
+    model.restore(state)
+    model.drop(state)
+    assert model.get("mu_macro", "v0") == [close(expected, rel=1e-13), 0.01]
+    model.at["nothing"] = 99
     with pytest.raises(Exception, match="status 3"):
-        made.get("nothing")
-    made.unit.reset()
-    assert made.get("k", "v_rest") == [1e6, 1e-4]
+        model.get("nothing")
+    model.unit.reset()
+    assert model.get("k", "v_rest") == [1e6, 1e-4]
 
 
 def test_another_units_token_is_refused(unit: Path, fmpy: Any, tmp_path: Path) -> None:

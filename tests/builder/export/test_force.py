@@ -47,11 +47,16 @@ def sources(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
 def library(sources: Any) -> Any:
     """The exported functions in a shared library."""
     options = ("-O1", "-std=c99", *compilers.STRICT, "-shared", "-fPIC")
-    made = sources / "force.so"
+    library_file = sources / "force.so"
     compilers.run(
-        *compilers.compiler("gcc"), *options, *sorted(sources.glob("*.c")), "-o", made, "-lm"
+        *compilers.compiler("gcc"),
+        *options,
+        *sorted(sources.glob("*.c")),
+        "-o",
+        library_file,
+        "-lm",
     )
-    loaded = ctypes.CDLL(str(made))
+    loaded = ctypes.CDLL(str(library_file))
     loaded.mumacro_force.restype, loaded.mumacro_force.argtypes = NUMBER, [NUMBER] * 7
     loaded.mumacro_evaluate_force.argtypes = [WHOLE, WHOLE, *[NUMBER] * 7, ARRAY, ARRAY]
     loaded.mumacro_element_step.argtypes = [WHOLE, *[NUMBER] * 5, ARRAY, ARRAY]
@@ -178,9 +183,9 @@ def test_steps_in_c_are_those_of_python(library: Any) -> None:
             np.zeros((springs, 2)),
             np.zeros(2),
         )
-        held = [array.ctypes.data_as(ARRAY) for array in (state, sums)]
+        pointers = [array.ctypes.data_as(ARRAY) for array in (state, sums)]
         for dx, dy in rng.normal(scale=2e-6, size=(50, 2)):
-            assert library.mumacro_element_step(springs, 0.3, 10.0, 1e6, dx, dy, *held) == 0
+            assert library.mumacro_element_step(springs, 0.3, 10.0, 1e6, dx, dy, *pointers) == 0
             assert tuple(sums) == close(mine.step(dx, dy), rel=1e-14, abs=1e-15)
         assert state == close(mine.state, rel=1e-14, abs=1e-15)
 
@@ -202,9 +207,9 @@ def test_a_bad_step_moves_nothing_and_says_why(
     library: Any, bad: Any, error: Any, says: Any
 ) -> None:
     inputs = {"springs": 2, "mu0": 0.3, "Fz": 10.0, "k": 1e6, "dx": 1e-6, "dy": 0.0, **bad}
-    held, sums = (NUMBER * 4)(*[1.0] * 4), (NUMBER * 2)(5.0, 6.0)
-    assert library.mumacro_element_step(*inputs.values(), held, sums) == error
-    assert (list(held), list(sums)) == ([1.0] * 4, [5.0, 6.0])
+    state, sums = (NUMBER * 4)(*[1.0] * 4), (NUMBER * 2)(5.0, 6.0)
+    assert library.mumacro_element_step(*inputs.values(), state, sums) == error
+    assert (list(state), list(sums)) == ([1.0] * 4, [5.0, 6.0])
     assert library.mumacro_error_text(error).decode().startswith(says)
     assert library.mumacro_element_step(1, 0.3, 10.0, 1e6, 0.0, 0.0, None, sums) == -1
     assert library.mumacro_error_text(-7) == b"there is no such error"
@@ -213,7 +218,7 @@ def test_a_bad_step_moves_nothing_and_says_why(
 
 def test_the_shaker_ends_stick_slip(sources: Any, repository: Path) -> None:
     """A mass on a belt swings without, and rests with transverse oscillation."""
-    source, made = repository / "examples" / "c" / "mass_on_belt.c", sources / "mass_on_belt"
+    source, program = repository / "examples" / "c" / "mass_on_belt.c", sources / "mass_on_belt"
     assert len(source.read_text().splitlines()) <= 60
     words = [
         *compilers.compiler("gcc"),
@@ -223,8 +228,8 @@ def test_the_shaker_ends_stick_slip(sources: Any, repository: Path) -> None:
         f"-I{sources}",
         source,
     ]
-    compilers.run(*words, *sources.glob("*.c"), "-o", made, "-lm")
-    swings = [float(line.split()[6]) for line in compilers.run(made).splitlines()]
+    compilers.run(*words, *sources.glob("*.c"), "-o", program, "-lm")
+    swings = [float(line.split()[6]) for line in compilers.run(program).splitlines()]
     # between sticking to the belt and slipping back the spring is stretched by at most twice the
     # fall of friction
     assert 0.5 < swings[0] < 1.5

@@ -160,9 +160,11 @@ def test_the_smallest_slip_speed_is_seen_in_stiff_steps() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("along", "fixed"),
-    [*(("v", y) for y in (1e-15, 1e-12, 0.5, 1.0, 1.3, 1e5, 1e14)),
-     *(("y", v) for v in (1e-60, 1e-40, 1e-18, 1e-3, 1.0, 1e5, 1e10))],
-)  # fmt: skip
+    [
+        *(("v", y) for y in (1e-15, 1e-12, 0.5, 1.0, 1.3, 1e5, 1e14)),
+        *(("y", v) for v in (1e-60, 1e-40, 1e-18, 1e-3, 1.0, 1e5, 1e10)),
+    ],
+)
 def test_mu_rises_with_speed_and_falls_with_amplitude_everywhere(
     along: str, fixed: float, sweep: Sweep
 ) -> None:

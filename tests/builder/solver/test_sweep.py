@@ -169,11 +169,11 @@ def test_compiled_functions_are_kept_until_a_source_changes(tmp_path: Path) -> N
         )
         return float(done.stdout), set(store.rglob("*.nbc"))
 
-    first, kept = result(2)
-    again, kept_again = result(2)
-    changed, kept_after_change = result(3)
+    first, files = result(2)
+    again, files_again = result(2)
+    changed, files_after_change = result(3)
     assert (first, again, changed) == (2.0, 2.0, 3.0)
-    assert kept == kept_again < kept_after_change
+    assert files == files_again < files_after_change
 
 
 def test_the_solver_runs_where_nothing_can_be_kept(tmp_path: Path) -> None:

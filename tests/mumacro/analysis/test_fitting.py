@@ -39,11 +39,11 @@ def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> An
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("given", [True, False], ids=["std", "scatter"])
+@pytest.mark.parametrize("has_std", [True, False], ids=["std", "scatter"])
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_inputs_lie_within_their_covariance(
-    surrogate: Surrogate, contact: Any, unknowns: Any, given: Any
+    surrogate: Surrogate, contact: Any, unknowns: Any, has_std: Any
 ) -> None:
     """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for
     itself."""
@@ -52,23 +52,24 @@ def test_inputs_lie_within_their_covariance(
 
     truth: Case = {"k": 1e6, "mu0": 0.3}
     v0, y0, spread = np.tile(V0, 2), np.repeat([1e-6, 2.5e-6], 20), 2e-3
-    known = {name: value for name, value in truth.items() if name not in unknowns}
+    inputs = {name: value for name, value in truth.items() if name not in unknowns}
     n = len(unknowns)
     inside: Any = 0
     intervals: Any = np.zeros(n, dtype=int)
     clean = friction(surrogate, contact, v0=v0, y0=y0)
     for seed in range(200):
         mu = clean + np.random.default_rng(seed).normal(scale=spread, size=40)
-        data = {"v0": v0, "y0": y0, "mu_macro": mu} | ({"std": spread} if given else {})
-        found = fit(data, unknowns, contact=contact, Fz=10.0, f=20e3, **known)
-        off = np.array([found.values[name] - truth[name] for name in unknowns])
-        limit = chi2.ppf(0.95, n) if given else n * fisher.ppf(0.95, n, 40 - n)
-        inside += off @ np.linalg.solve(found.covariance, off) <= limit
+        data = {"v0": v0, "y0": y0, "mu_macro": mu} | ({"std": spread} if has_std else {})
+        estimate = fit(data, unknowns, contact=contact, Fz=10.0, f=20e3, **inputs)
+        off = np.array([estimate.values[name] - truth[name] for name in unknowns])
+        limit = chi2.ppf(0.95, n) if has_std else n * fisher.ppf(0.95, n, 40 - n)
+        inside += off @ np.linalg.solve(estimate.covariance, off) <= limit
         intervals += [
-            found.interval[name][0] <= truth[name] <= found.interval[name][1] for name in unknowns
+            estimate.interval[name][0] <= truth[name] <= estimate.interval[name][1]
+            for name in unknowns
         ]
-        assert len(found.solutions) == 1
-        assert found.reduced_chi2 * (1.0 if given else spread**-2) == close(1.0, abs=1.0)
+        assert len(estimate.solutions) == 1
+        assert estimate.reduced_chi2 * (1.0 if has_std else spread**-2) == close(1.0, abs=1.0)
     low, high = (float(binom.ppf(level, 200, 0.95)) for level in (0.0005, 0.9995))
     assert low <= inside <= high
     assert np.all((low <= intervals) & (intervals <= high))
@@ -79,9 +80,9 @@ def test_the_variance_is_that_of_the_scatter_over_the_degrees_of_freedom(
 ) -> None:
     # without oscillation mu_macro is mu0: its mean, and the deviation of a mean
     mu = [0.28, 0.31, 0.3, 0.29]
-    found = fit({"v0": np.ones(4), "mu_macro": mu}, "mu0", k=1e6, **{**RIG, "y0": 0.0})
-    assert found.values["mu0"] == close(np.mean(mu), rel=1e-8)
-    assert found.std["mu0"] == close(np.std(mu, ddof=1) / 2.0, rel=1e-8)
+    estimate = fit({"v0": np.ones(4), "mu_macro": mu}, "mu0", k=1e6, **{**RIG, "y0": 0.0})
+    assert estimate.values["mu0"] == close(np.mean(mu), rel=1e-8)
+    assert estimate.std["mu0"] == close(np.std(mu, ddof=1) / 2.0, rel=1e-8)
     both = fit({"v0": V0[::4], "mu_macro": noisy(surrogate, 3e-3, v0=V0[::4])}, **RIG)
     case: Case = {**both.values, **RIG, "v0": V0[::4]}
     slopes: Any = surrogate.evaluate(case, gradient=True).gradient
@@ -92,12 +93,12 @@ def test_the_variance_is_that_of_the_scatter_over_the_degrees_of_freedom(
 def test_exact_points_that_hardly_tell_k_give_it(surrogate: Surrogate) -> None:
     rig: Case = {"Fz": 10.0, "y0": 0.004 * 3.0 / 3e4, "f": 20e3}  # y~ = 0.004
     v0 = np.geomspace(1e-3, 3.0, 20) * 1e-4 * 2.0 * math.pi * 20e3
-    asked: list[tuple[str, Case]] = [("k mu0", {}), ("k", {"mu0": 0.3})]
-    for names, known in asked:
+    questions: list[tuple[str, Case]] = [("k mu0", {}), ("k", {"mu0": 0.3})]
+    for names, inputs in questions:
         mu = np.asarray(surrogate.evaluate(mu0=0.3, k=3e4, v0=v0, **rig).mu_macro)
-        found = fit({"v0": v0, "mu_macro": mu}, names.split(), **{**rig, **known})
-        assert found.values["k"] == close(3e4, rel=1e-7)
-        assert found.interval["k"][0] <= 3e4 <= found.interval["k"][1]
+        estimate = fit({"v0": v0, "mu_macro": mu}, names.split(), **{**rig, **inputs})
+        assert estimate.values["k"] == close(3e4, rel=1e-7)
+        assert estimate.interval["k"][0] <= 3e4 <= estimate.interval["k"][1]
 
 
 def test_mu0_may_be_known_at_each_point(surrogate: Surrogate) -> None:
@@ -114,9 +115,9 @@ def test_mu0_may_be_known_at_each_point(surrogate: Surrogate) -> None:
 @pytest.mark.parametrize("k", [2e5, 1e6, 1e7])
 def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: Any, k: Any) -> None:
     mu = friction(surrogate, contact, v0=V0, k=k)
-    found = fit({"v0": V0, "mu_macro": mu}, contact=contact, **RIG)
-    assert found.values == {"k": close(k, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
-    assert np.abs(found.residuals).max() < 1e-9
+    estimate = fit({"v0": V0, "mu_macro": mu}, contact=contact, **RIG)
+    assert estimate.values == {"k": close(k, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
+    assert np.abs(estimate.residuals).max() < 1e-9
     assert fit({"v0": V0, "mu_macro": mu}, "k", contact=contact, mu0=0.3, **RIG).values[
         "k"
     ] == close(k, rel=1e-8)
@@ -134,8 +135,8 @@ def test_every_input_may_vary(surrogate: Surrogate) -> None:
         "omega": rng.uniform(1e4, 2e5, 30),
     }
     mu = np.asarray(surrogate.evaluate(mu0=0.3, k=1e6, **columns).mu_macro)
-    found = fit({**columns, "mu_macro": mu})
-    assert found.values == {"k": close(1e6, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
+    estimate = fit({**columns, "mu_macro": mu})
+    assert estimate.values == {"k": close(1e6, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame({**columns, "mu_macro": mu, "std": 1e-3, "remark": "x"})
     assert fit(frame).values == {"k": close(1e6, rel=1e-6), "mu0": close(0.3, rel=1e-7)}
@@ -144,9 +145,9 @@ def test_every_input_may_vary(surrogate: Surrogate) -> None:
 def test_weights_are_the_standard_deviations(surrogate: Surrogate) -> None:
     mu, std = noisy(surrogate, 1e-4, v0=V0), np.full(20, 1e-4)
     mu[3], std[3] = 0.9, 1e6
-    found = fit({"v0": V0, "mu_macro": mu, "std": std}, **RIG)
-    assert found.values["k"] == close(1e6, rel=2e-3)
-    assert found.warnings == ()
+    estimate = fit({"v0": V0, "mu_macro": mu, "std": std}, **RIG)
+    assert estimate.values["k"] == close(1e6, rel=2e-3)
+    assert estimate.warnings == ()
     assert any(
         "scatter by more than their std" in text
         for text in fit({"v0": V0, "mu_macro": mu, "std": 1e-5}, **RIG).warnings
@@ -154,11 +155,11 @@ def test_weights_are_the_standard_deviations(surrogate: Surrogate) -> None:
 
 
 def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate: Surrogate) -> None:
-    found = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0), "std": 1e-3}, **RIG)
-    mu, off = found.predict(v0=0.05)
-    both = np.linalg.cholesky(found.covariance)
+    estimate = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0), "std": 1e-3}, **RIG)
+    mu, off = estimate.predict(v0=0.05)
+    both = np.linalg.cholesky(estimate.covariance)
     drawn = both @ np.random.default_rng(2).normal(size=(2, 4000)) + np.array(
-        [[x] for x in found.values.values()]
+        [[x] for x in estimate.values.values()]
     )
     each = surrogate.evaluate(k=drawn[0], mu0=drawn[1], v0=0.05, **RIG).mu_macro
     assert float(mu[0]) == close(each.mean(), abs=3.0 * off[0] / 60.0)
@@ -187,12 +188,12 @@ def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(
     soft, large = measured(1e3), measured(5e7, 1e-4)
     assert soft.interval["k"][0] == 0.0 < 1e3 < soft.interval["k"][1] < 2e6
     assert large.interval["k"][0] < 5e7 < large.interval["k"][1]
-    for found, said in (
+    for estimate, message in (
         (stiff, "only a lower bound"),
         (soft, "only an upper bound"),
         (large, "above 20"),
     ):
-        assert any(said in text for text in found.warnings)
+        assert any(message in text for text in estimate.warnings)
 
 
 def test_all_solutions_are_found(surrogate: Surrogate) -> None:
@@ -205,18 +206,18 @@ def test_all_solutions_are_found(surrogate: Surrogate) -> None:
     expected = k[:-1][np.diff(np.sign(mu - target)) != 0.0]
     assert expected.size == 3
     for std in ({}, {"std": 1e-4}):
-        found = fit({"v0": [v0], "mu_macro": [target], **std}, "k", mu0=0.3, **RIG)
-        assert sorted(one["k"] for one in found.solutions) == [
+        estimate = fit({"v0": [v0], "mu_macro": [target], **std}, "k", mu0=0.3, **RIG)
+        assert sorted(one["k"] for one in estimate.solutions) == [
             close(one, rel=1e-3) for one in expected
         ]
-        assert any("3 solutions" in text for text in found.warnings)
+        assert any("3 solutions" in text for text in estimate.warnings)
     # any of which may be the truth
     for draw in np.random.default_rng(0).normal(scale=1e-5, size=10):
-        found = fit({"v0": [v0], "mu_macro": [target + draw], "std": 1e-5}, "k", mu0=0.3, **RIG)
-        assert found.interval["k"][0] < expected[0] < expected[-1] < found.interval["k"][1]
+        estimate = fit({"v0": [v0], "mu_macro": [target + draw], "std": 1e-5}, "k", mu0=0.3, **RIG)
+        assert estimate.interval["k"][0] < expected[0] < expected[-1] < estimate.interval["k"][1]
         assert any(
             "3 solutions fit within 95 %, the interval covers them all" in text
-            for text in found.warnings
+            for text in estimate.warnings
         )
     # with the scatter of a usual measurement the three are one
     assert (
@@ -227,13 +228,13 @@ def test_all_solutions_are_found(surrogate: Surrogate) -> None:
 
 def test_as_many_points_as_unknowns_have_no_error_without_std(surrogate: Surrogate) -> None:
     v0 = np.array([0.002, 0.1])
-    found = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0)}, **RIG)
-    assert found.values["k"] == close(1e6, rel=1e-6)
-    assert math.isinf(found.std["k"])
-    assert math.isnan(found.reduced_chi2)
-    assert any("no measure of the error" in text for text in found.warnings)
-    known = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0), "std": 1e-3}, **RIG)
-    assert 0.0 < known.std["k"] < 1e5
+    estimate = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0)}, **RIG)
+    assert estimate.values["k"] == close(1e6, rel=1e-6)
+    assert math.isinf(estimate.std["k"])
+    assert math.isnan(estimate.reduced_chi2)
+    assert any("no measure of the error" in text for text in estimate.warnings)
+    with_std = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0), "std": 1e-3}, **RIG)
+    assert 0.0 < with_std.std["k"] < 1e5
 
 
 @pytest.mark.parametrize(
@@ -255,12 +256,12 @@ def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     x = {"v0": np.append(0.0, V0), "y0": np.geomspace(1e-7, 1e-5, 21)}[along]
-    given = {**RIG, "v0": 0.05, along: x}
-    found = fit(
-        {along: x, "mu_macro": friction(surrogate, **given), "std": 1e-3},
-        **{name: value for name, value in given.items() if name != along},
+    case = {**RIG, "v0": 0.05, along: x}
+    estimate = fit(
+        {along: x, "mu_macro": friction(surrogate, **case), "std": 1e-3},
+        **{name: value for name, value in case.items() if name != along},
     )
-    axes = found.plot()
+    axes = estimate.plot()
     assert axes.get_xlabel() == {"v0": "$v_0$ [m/s]", "y0": "$y_0$ [m]"}[along]
     assert axes.get_ylabel() == r"$\mu_\mathrm{macro}$ [-]"
     points, curve = axes.lines[0], axes.lines[-1]
@@ -277,7 +278,7 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
 
 
 @pytest.mark.parametrize(
-    ("data", "given", "said"),
+    ("data", "inputs", "message"),
     [
         (POINTS, {**RIG, "unknowns": ("k", "y0")}, 'unknowns must be one or both of "k" and "mu0"'),
         (POINTS, {**RIG, "contact": "cube"}, "contact must be one of"),
@@ -331,9 +332,9 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
         ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "0.3"]}, RIG, "mu_macro must be a real number"),
     ],
 )
-def test_bad_input_is_named_with_the_remedy(data: Any, given: Any, said: Any) -> None:
-    with pytest.raises(InputError, match=said):
-        fit(data, **given)
+def test_bad_input_is_named_with_the_remedy(data: Any, inputs: Any, message: Any) -> None:
+    with pytest.raises(InputError, match=message):
+        fit(data, **inputs)
 
 
 @pytest.mark.parametrize("amplitude", [-1.0, 10.0, 20.0])
@@ -368,14 +369,14 @@ def test_extreme_points_are_refused_or_give_no_nan(seed: int) -> None:
         data = {key: x.copy() for key, x in columns.items() if key != "std" or not scattered}
         data.setdefault(name, columns[name].copy())[chance.integers(4)] = size
         try:
-            found = fit(data, Fz=10.0, f=20e3)
+            estimate = fit(data, Fz=10.0, f=20e3)
         except InputError:
             continue
-        told = [
-            *found.values.values(),
-            *found.std.values(),
-            *sum(found.interval.values(), ()),
-            *found.covariance.flat,
+        numbers = [
+            *estimate.values.values(),
+            *estimate.std.values(),
+            *sum(estimate.interval.values(), ()),
+            *estimate.covariance.flat,
         ]
-        assert not np.isnan([*told, found.chi2, *found.residuals]).any(), (name, size)
-        assert min(low for low, _ in found.interval.values()) >= 0.0
+        assert not np.isnan([*numbers, estimate.chi2, *estimate.residuals]).any(), (name, size)
+        assert min(low for low, _ in estimate.interval.values()) >= 0.0

@@ -297,21 +297,21 @@ REFUSED: list[tuple[str, Any, Case, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("direction", "asked", "changed", "said"), REFUSED)
+@pytest.mark.parametrize(("direction", "question", "changed", "message"), REFUSED)
 def test_a_bad_question_is_refused(
-    surrogate: Surrogate, direction: str, asked: Any, changed: Case, said: str
+    surrogate: Surrogate, direction: str, question: Any, changed: Case, message: str
 ) -> None:
     keywords, _, case = as_kind(CASE, ("spring", direction))
-    unknown, target, *within = asked
-    given = {**without(case, unknown), **changed}
+    unknown, target, *within = question
+    inputs = {**without(case, unknown), **changed}
     gone = [name for name, value in changed.items() if value is None and name != "k"]
-    with pytest.raises(InputError, match=f"^{said}"):
+    with pytest.raises(InputError, match=f"^{message}"):
         solve_for(
             surrogate,
             unknown,
             target,
             within=within[0] if within else None,
-            **without(given, *gone),
+            **without(inputs, *gone),
             **keywords,
         )
 
@@ -375,7 +375,7 @@ def test_outside_its_range_there_is_no_border(surrogate: Surrogate) -> None:
 # --- bracketed Newton steps -----------------------------------------------------------------------
 
 
-class Known:
+class Curve:
     """A curve of a known function: f(x) and df / d ln x."""
 
     def __init__(self, function: Any, slope: Any) -> None:
@@ -409,7 +409,7 @@ def test_neighbouring_doubles_are_found_at_any_scale() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_levels_are_met_to_rounding_in_a_few_steps(sign: Any) -> None:
-    curve = Known(lambda x: sign * np.arctan(x), lambda x: sign * x / (1.0 + x * x))
+    curve = Curve(lambda x: sign * np.arctan(x), lambda x: sign * x / (1.0 + x * x))
     branch = branch_of(curve, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
     level = sign * np.array([1e-290, 1e-12, 0.3, 0.78, 1.5, 1.57])
     roots = branch.meet(level)
@@ -422,14 +422,14 @@ def test_levels_are_met_to_rounding_in_a_few_steps(sign: Any) -> None:
 
 
 def test_a_slope_that_vanishes_at_the_root_is_no_obstacle() -> None:
-    curve = Known(lambda x: 1.0 + np.log(x) ** 3, lambda x: 3.0 * np.log(x) ** 2)
+    curve = Curve(lambda x: 1.0 + np.log(x) ** 3, lambda x: 3.0 * np.log(x) ** 2)
     (roots,) = branch_of(curve, 1e-5, 1e4).meet(np.array([1.0]))
     assert roots == close(1.0, abs=1e-5)  # closer to the root the cube is below rounding
 
 
 @pytest.mark.parametrize("slope", [math.nan, math.inf, 0.0, -1.0, 1e-300, 1e300])
 def test_a_wrong_slope_costs_steps_but_no_digits(slope: Any) -> None:
-    curve = Known(lambda x: np.where(x < math.pi, 0.25, 0.75), lambda x: np.full_like(x, slope))
+    curve = Curve(lambda x: np.where(x < math.pi, 0.25, 0.75), lambda x: np.full_like(x, slope))
     branch = branch_of(curve, 0.0, 1e300)
     (roots,) = branch.meet(np.array([0.5]))
     assert roots in (math.pi, math.nextafter(math.pi, 0.0))
@@ -440,17 +440,17 @@ def test_a_plateau_is_met_at_its_first_double_and_left_at_its_last() -> None:
     def stairs(x: Any) -> Any:
         return np.searchsorted([0.1, 10.0, 100.0], x, side="right") - 1.0
 
-    curve = Known(stairs, np.zeros_like)
+    curve = Curve(stairs, np.zeros_like)
     branch = branch_of(curve, 1e-6, 1e-2, 1.0, 30.0, 1e6)
     assert branch.meet(np.array([1.0])).tolist() == [10.0]
-    (left,) = branch.meet(np.array([1.0]), leave=True)
-    assert left in (100.0, math.nextafter(100.0, 0.0))
+    (end,) = branch.meet(np.array([1.0]), leave=True)
+    assert end in (100.0, math.nextafter(100.0, 0.0))
     both = branch.meet(np.array([1.0, 1.0]), leave=np.array([False, True]))
-    assert both.tolist() == [10.0, left]
+    assert both.tolist() == [10.0, end]
 
 
 def test_a_level_that_is_never_reached_gives_an_end() -> None:
-    curve = Known(np.arctan, lambda x: x / (1.0 + x * x))
+    curve = Curve(np.arctan, lambda x: x / (1.0 + x * x))
     branch = branch_of(curve, 0.5, 2.0)
     assert branch.meet(np.array([0.1, 1.5])).tolist() == [0.5, 2.0]
     assert curve.calls == 0

@@ -50,12 +50,17 @@ def test_a_range_has_its_ends_exactly(scale: Any) -> None:
 
 @pytest.mark.parametrize(
     ("field", "arguments"),
-    [("along", ("x", 1.0, 2.0, 5, "log")), ("scale", ("v0", 1.0, 2.0, 5, "cubic")),
-     ("points", ("v0", 1.0, 2.0, 1, "log")),
-     ("start", ("v0", 0.0, 2.0, 5, "log")), ("start", ("k", 0.0, 2.0, 5, "linear")),
-     ("stop", ("v0", 2.0, 2.0, 5, "log")),
-     ("stop", ("v0", 1.0, math.inf, 5, "log")), ("start", ("v0", math.nan, 1.0, 5, "log"))],
-)  # fmt: skip
+    [
+        ("along", ("x", 1.0, 2.0, 5, "log")),
+        ("scale", ("v0", 1.0, 2.0, 5, "cubic")),
+        ("points", ("v0", 1.0, 2.0, 1, "log")),
+        ("start", ("v0", 0.0, 2.0, 5, "log")),
+        ("start", ("k", 0.0, 2.0, 5, "linear")),
+        ("stop", ("v0", 2.0, 2.0, 5, "log")),
+        ("stop", ("v0", 1.0, math.inf, 5, "log")),
+        ("start", ("v0", math.nan, 1.0, 5, "log")),
+    ],
+)
 def test_a_bad_range_names_its_field(field: str, arguments: Any) -> None:
     with pytest.raises(InputError) as caught:
         sweep_values(*arguments)
@@ -184,7 +189,7 @@ def test_the_articles_formulas_are_refused_for_another_contact(
 
 
 @pytest.mark.parametrize(
-    ("along", "case", "direction", "said"),
+    ("along", "case", "direction", "message"),
     [
         ("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
         ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
@@ -206,9 +211,9 @@ def test_the_articles_formulas_are_refused_for_another_contact(
     ],
 )
 def test_a_bad_interval_is_named(
-    surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any
+    surrogate: Surrogate, along: Any, case: Case, direction: Any, message: Any
 ) -> None:
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         friction_law(surrogate, along, values=[1.0, 10.0], **case, direction=direction)
 
 

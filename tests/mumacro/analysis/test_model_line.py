@@ -120,15 +120,15 @@ def test_digits_are_those_that_the_uncertainty_leaves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         ({"v0": -1.0}, "v0 must be"),
         ({"k": [1e6, 2e6]}, "case must be one case"),
         ({"contact": 1}, "contact"),
     ],
 )
-def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> None:
-    with pytest.raises((InputError, TypeError), match=said):
+def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, message: Any) -> None:
+    with pytest.raises((InputError, TypeError), match=message):
         model_rows(surrogate, {**CASE, **changed})
     with pytest.raises(InputError, match="uncertainty must be finite and > 0"):
         k_effect(surrogate, CASE, uncertainty=0.0)

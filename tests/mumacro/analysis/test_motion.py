@@ -48,20 +48,20 @@ def test_power_stick_slip_and_decay_are_those_of_the_table(
     kind: Any = {"contact": contact, "direction": direction}
     for v0, size in ((0.02, 2e-6), (0.1, 6e-6), (2.0, 3e-6)):
         part: Any = {"y" if direction == "across" else "x": size}
-        found = motion(**{**SCENE, "v0": v0}, **part, contact=contact)
+        marched = motion(**{**SCENE, "v0": v0}, **part, contact=contact)
         answer = surrogate.evaluate(**{**SCENE, "v0": v0}, y0=size, groups=True, **kind)
         groups = answer.v_tilde, answer.y_tilde
         unit = 0.3 * 10.0 * L0 * 2.0 * math.pi * 20e3
-        assert found.power == close(unit * surrogate.power(*groups, **kind), abs=2e-6 * unit)
+        assert marched.power == close(unit * surrogate.power(*groups, **kind), abs=2e-6 * unit)
         share = surrogate.stick_fraction(*groups, **kind)
-        assert found.stick_fraction == close(share, abs=2e-5)
-        assert found.power_drive == close(answer.mu_macro * 10.0 * v0, abs=3e-6 * 10.0 * v0)
+        assert marched.stick_fraction == close(share, abs=2e-5)
+        assert marched.power_drive == close(answer.mu_macro * 10.0 * v0, abs=3e-6 * 10.0 * v0)
         if contact == "spring" and direction == "across":
             slow = settling(surrogate, **{**SCENE, "v0": v0}, y0=size)
-            assert found.slip_path == close(L0 * slow.slip_path, rel=1e-5)
-            assert found.periods <= slow.periods * (1.0 + 1e-5)
+            assert marched.slip_path == close(L0 * slow.slip_path, rel=1e-5)
+            assert marched.periods <= slow.periods * (1.0 + 1e-5)
             if not share:
-                assert found.periods == close(slow.periods, rel=1e-5)
+                assert marched.periods == close(slow.periods, rel=1e-5)
 
 
 def marched(cases: list[dict[str, Any]], steps: int, periods: int) -> tuple[Array, Array]:
@@ -99,8 +99,8 @@ def test_an_independent_march_has_the_same_means() -> None:
     settled = marched(cases, 400, 12)[1] < 1e-7
     assert np.count_nonzero(settled) > 15
     for i in np.flatnonzero(settled):
-        found = motion(**cases[i])
-        mean = np.array([found.mu_macro, found.mu_lateral]) / CASE["mu0"]
+        answer = motion(**cases[i])
+        mean = np.array([answer.mu_macro, answer.mu_lateral]) / CASE["mu0"]
         # a march errs by less than its last two lengths of step differ
         off = np.abs(fine[:, i] - coarse[:, i]).max()
         assert np.abs(mean - fine[:, i]).max() < 2.0 * off + 1e-5
@@ -126,8 +126,8 @@ def test_no_lateral_force_where_there_can_be_none() -> None:
         {"normal": 5.0},
         {"x": 2e-6, "normal": (5.0, 30.0)},
     ):
-        found = motion(**SCENE, **part)
-        assert abs(found.mu_lateral) <= found.error_estimate
+        answer = motion(**SCENE, **part)
+        assert abs(answer.mu_lateral) <= answer.error_estimate
     assert motion(**SCENE, x=4e-6, y=2e-6).mu_lateral < -0.01
 
 
@@ -173,9 +173,9 @@ def test_a_scene_that_is_turned_has_its_forces_turned() -> None:
 
 def test_drive_and_shaker_pay_for_the_slip() -> None:
     for case in random_motions(80, ball=True, seed=8):  # a constant load
-        found = motion(**case)
-        heat = 0.3 * 10.0 * found.slip_path * CASE["omega"] / (2.0 * math.pi)
-        assert found.power + found.power_drive == close(heat, rel=1e-5, abs=1e-6)
+        answer = motion(**case)
+        heat = 0.3 * 10.0 * answer.slip_path * CASE["omega"] / (2.0 * math.pi)
+        assert answer.power + answer.power_drive == close(heat, rel=1e-5, abs=1e-6)
 
 
 def test_a_load_in_step_turns_friction_into_a_push() -> None:
@@ -205,12 +205,12 @@ def test_the_estimate_covers_and_the_tolerance_holds(
 def test_steps_that_are_halved_come_nearer() -> None:
     case = {**SCENE, "x": (3e-6, 90.0), "y": 4e-6, "normal": (3.0, 45.0)}
     finest = motion(**case, tolerance=1e-9)
-    found = [motion(**case, tolerance=10.0**-n) for n in (2, 5, 8)]
-    errors = [abs(one.mu_macro - finest.mu_macro) for one in found]
+    answers = [motion(**case, tolerance=10.0**-n) for n in (2, 5, 8)]
+    errors = [abs(one.mu_macro - finest.mu_macro) for one in answers]
     assert errors[2] < 1e-9
     assert all(
         error <= one.error_estimate + finest.error_estimate
-        for error, one in zip(errors, found, strict=True)
+        for error, one in zip(errors, answers, strict=True)
     )
 
 
@@ -221,9 +221,9 @@ def test_slip_that_hardly_begins_does_not_stop_the_search() -> None:
     case = [*random_motions(56)][-1]
     assert [n for n, _, _ in case["x"]] == [n for n, _, _ in orders]
     assert [size / L0 for _, size, _ in case["y"]] == close([s for _, s, _ in across], rel=1e-6)
-    found = motion(**case)
-    assert found.error_estimate <= 3e-7
-    assert 0.0 < found.mu_macro < 0.3
+    answer = motion(**case)
+    assert answer.error_estimate <= 3e-7
+    assert 0.0 < answer.mu_macro < 0.3
 
 
 def test_a_kink_of_a_ball_close_to_an_end_is_seen() -> None:
@@ -231,9 +231,9 @@ def test_a_kink_of_a_ball_close_to_an_end_is_seen() -> None:
     table = Surrogate.open()
     for v, y in ((0.00382, 0.66671), (0.0038, 0.6667), (0.01, 0.66)):
         case = {**CASE, "v0": v * L0 * CASE["omega"]}
-        found = motion(**case, x=y * L0, contact="ball")
+        answer = motion(**case, x=y * L0, contact="ball")
         there = table.evaluate(**case, y0=y * L0, contact="ball", direction="along")
-        assert abs(found.mu_macro - there.mu_macro) <= found.error_estimate + there.error_bound
+        assert abs(answer.mu_macro - there.mu_macro) <= answer.error_estimate + there.error_bound
 
 
 def test_small_differences_of_two_lengths_of_step_do_not_hide_an_error() -> None:
@@ -241,8 +241,8 @@ def test_small_differences_of_two_lengths_of_step_do_not_hide_an_error() -> None
     table = Surrogate.open()
     case = {**CASE, "v0": 0.02704 * L0 * CASE["omega"]}
     for size in (1.2727, 1.272, 1.273):
-        found, there = motion(**case, y=size * L0), table.evaluate(**case, y0=size * L0)
-        assert abs(found.mu_macro - there.mu_macro) <= found.error_estimate + there.error_bound
+        answer, there = motion(**case, y=size * L0), table.evaluate(**case, y0=size * L0)
+        assert abs(answer.mu_macro - there.mu_macro) <= answer.error_estimate + there.error_bound
 
 
 def in_tau(drag: float, *parts: list[tuple[int, float, float]]) -> dict[str, Any]:
@@ -280,10 +280,10 @@ def test_the_way_to_a_cycle_that_sticks_counts_in_the_estimate(
     case: dict[str, Any], tolerance: float
 ) -> None:
     """At rest the errors of all periods before stay; the estimate saw those of the last."""
-    found, finer = motion(**case, tolerance=tolerance), motion(**case, tolerance=1e-9)
-    off = math.hypot(found.mu_macro - finer.mu_macro, found.mu_lateral - finer.mu_lateral)
-    assert off <= found.error_estimate + 1e-9 * CASE["mu0"]
-    assert found.error_estimate <= tolerance * CASE["mu0"]
+    answer, finer = motion(**case, tolerance=tolerance), motion(**case, tolerance=1e-9)
+    off = math.hypot(answer.mu_macro - finer.mu_macro, answer.mu_lateral - finer.mu_lateral)
+    assert off <= answer.error_estimate + 1e-9 * CASE["mu0"]
+    assert answer.error_estimate <= tolerance * CASE["mu0"]
 
 
 def test_springs_at_the_rim_that_large_steps_cannot_follow() -> None:
@@ -293,27 +293,27 @@ def test_springs_at_the_rim_that_large_steps_cannot_follow() -> None:
         [(3, 53.0443409, 3.93149217), (1, 26.9158905, 3.80594382), (1, 52.6787117, 4.7490568)],
         [(1, 7.21927714, 3.04738354), (1, 3.08669959, 5.09255859), (1, 9.72855129, 0.0461786133)],
     )
-    found = motion(**case, contact="ball")
+    answer = motion(**case, contact="ball")
     finer = motion(**case, contact="ball", tolerance=1e-8)
-    assert found.error_estimate <= 1e-6 * CASE["mu0"]
-    off = math.hypot(found.mu_macro - finer.mu_macro, found.mu_lateral - finer.mu_lateral)
-    assert off <= found.error_estimate
+    assert answer.error_estimate <= 1e-6 * CASE["mu0"]
+    off = math.hypot(answer.mu_macro - finer.mu_macro, answer.mu_lateral - finer.mu_lateral)
+    assert off <= answer.error_estimate
 
 
 def test_a_ball_at_rest_that_hardly_comes_to_stick_has_an_answer() -> None:
     """Some of its springs move by a thousandth less in each period: it took minutes."""
     rest = next(case for case in random_motions(40, ball=True, seed=5) if not case["v0"])
-    found = motion(**rest, contact="ball")
-    assert found.error_estimate <= 1e-6 * CASE["mu0"]
+    answer = motion(**rest, contact="ball")
+    assert answer.error_estimate <= 1e-6 * CASE["mu0"]
 
 
 def test_far_and_near_ends_have_answers(surrogate: Surrogate) -> None:
     for y in (1e-9, 1e-3, 1e3, 1e9):
         for v in (1e-9, 1e-3, 1e3, 1e9):
             case = {**CASE, "v0": v * L0 * CASE["omega"]}
-            found, there = motion(**case, y=y * L0), surrogate.evaluate(**case, y0=y * L0)
-            off = found.error_estimate + there.error_bound
-            assert abs(found.mu_macro - there.mu_macro) <= off < 4e-7
+            answer, there = motion(**case, y=y * L0), surrogate.evaluate(**case, y0=y * L0)
+            off = answer.error_estimate + there.error_bound
+            assert abs(answer.mu_macro - there.mu_macro) <= off < 4e-7
 
 
 # --- rest -----------------------------------------------------------------------------------------
@@ -321,11 +321,11 @@ def test_far_and_near_ends_have_answers(surrogate: Surrogate) -> None:
 
 def test_a_contact_that_only_sticks_keeps_what_its_start_gave_it() -> None:
     rest = {**SCENE, "v0": 0.0}
-    found = motion(**rest, x=(1e-6, 90.0))  # it begins at +1 um without force
-    assert found.mu_macro == close(-1e6 * 1e-6 / 10.0, abs=1e-9)
-    assert found.stick_fraction == close(1.0, abs=1e-12)
-    assert found.periods == math.inf
-    assert found.slip_path == 0.0
+    answer = motion(**rest, x=(1e-6, 90.0))  # it begins at +1 um without force
+    assert answer.mu_macro == close(-1e6 * 1e-6 / 10.0, abs=1e-9)
+    assert answer.stick_fraction == close(1.0, abs=1e-12)
+    assert answer.periods == math.inf
+    assert answer.slip_path == 0.0
     assert motion(**rest, x=1e-6).mu_macro == close(0.0, abs=1e-9)
 
 
@@ -335,11 +335,11 @@ def test_a_contact_that_only_sticks_keeps_what_its_start_gave_it() -> None:
 @pytest.mark.parametrize("contact", ["spring", "ball"])
 def test_the_cycle_is_closed_has_the_mean_and_stays_below_the_limit(contact: str) -> None:
     normal = (3.0, 45.0) if contact == "spring" else 0.0
-    found = motion(**SCENE, x=(2e-6, 90.0), y=4e-6, normal=normal, contact=contact)
-    cycle = found.cycle(points=4000)
+    answer = motion(**SCENE, x=(2e-6, 90.0), y=4e-6, normal=normal, contact=contact)
+    cycle = answer.cycle(points=4000)
     assert cycle.t[-1] == close(1.0 / 20e3, rel=1e-12)
     assert cycle.x[-1] - cycle.x[0] == close(0.02 / 20e3, rel=1e-9)
-    for force, mu in ((cycle.Fx, found.mu_macro), (cycle.Fy, found.mu_lateral)):
+    for force, mu in ((cycle.Fx, answer.mu_macro), (cycle.Fy, answer.mu_lateral)):
         assert force[-1] == close(float(force[0]), abs=1e-5)
         assert float(np.mean(force[1:])) / 10.0 == close(mu, abs=1e-6 if normal else 3e-5)
     assert (np.hypot(cycle.Fx, cycle.Fy) <= 0.3 * cycle.Fz * (1.0 + 1e-9)).all()
@@ -443,19 +443,19 @@ def test_in_an_array_such_a_case_is_nan_alone(change: dict[str, Any], name: str,
         value = (1e-6 * np.array([2.0, 1.0]), np.array([0.0, value[1]]))
     else:
         value = np.array([case.get(field, 0.0) if field != "v0" else 0.02, value])
-    found = motion(**{**case, field: value})
+    answer = motion(**{**case, field: value})
     if not rest:
-        assert found.mu_macro[0] == close(good, abs=1e-8)  # harmonics set the steps
-    assert math.isnan(found.mu_macro[1])
-    assert math.isnan(found.periods[1])
+        assert answer.mu_macro[0] == close(good, abs=1e-8)  # harmonics set the steps
+    assert math.isnan(answer.mu_macro[1])
+    assert math.isnan(answer.periods[1])
     with pytest.raises(InputError, match="with an answer"):
-        found.cycle(1)
+        answer.cycle(1)
 
 
 def test_a_load_that_stays_above_zero_is_no_lift_off() -> None:
     """The sum of its amplitudes is more than Fz, but not at one time."""
-    found = motion(**SCENE, normal=[(1, 8.0, 0.0), (3, 4.0, 0.0)])
-    assert 0.0 < found.mu_macro < 0.3
+    answer = motion(**SCENE, normal=[(1, 8.0, 0.0), (3, 4.0, 0.0)])
+    assert 0.0 < answer.mu_macro < 0.3
 
 
 def test_places_and_points_of_a_cycle_are_checked() -> None:
@@ -470,15 +470,15 @@ def test_places_and_points_of_a_cycle_are_checked() -> None:
 # --- command and pictures -------------------------------------------------------------------------
 
 
-def said(capsys: Capture, code: int, *words: str) -> str:
+def output_of(capsys: Capture, code: int, *words: str) -> str:
     assert main(["motion", *words]) == code
-    found = capsys.readouterr()
-    return found.err if code else found.out
+    output = capsys.readouterr()
+    return output.err if code else output.out
 
 
 def test_the_command_has_the_librarys_answer(capsys: Capture) -> None:
     words = ("--x", "2um@90deg", "--y", "4um,3:0.5um@0.5rad", "--normal", "3N@45deg")
-    found = json.loads(said(capsys, 0, COMMAND, *words, "--json"))
+    answer = json.loads(output_of(capsys, 0, COMMAND, *words, "--json"))
     expected = motion(
         **SCENE,
         x=(2e-6, 90.0),
@@ -486,11 +486,11 @@ def test_the_command_has_the_librarys_answer(capsys: Capture) -> None:
         normal=(3.0, 45.0),
     )
     for name in ("mu_macro", "mu_lateral", "power", "slip_path", "periods"):
-        assert found[name] == close(getattr(expected, name), rel=1e-9)
-    text = said(capsys, 0, COMMAND, *words)
+        assert answer[name] == close(getattr(expected, name), rel=1e-9)
+    text = output_of(capsys, 0, COMMAND, *words)
     assert f"{expected.mu_macro:.6g}" in text
     assert "numerical error" in text
-    ball = json.loads(said(capsys, 0, COMMAND, "--y", "2um", "--contact", "ball", "--json"))
+    ball = json.loads(output_of(capsys, 0, COMMAND, "--y", "2um", "--contact", "ball", "--json"))
     assert ball["mu_macro"] == motion(**SCENE, y=2e-6, contact="ball").mu_macro
 
 
@@ -514,7 +514,7 @@ def test_the_command_has_the_librarys_answer(capsys: Capture) -> None:
 def test_the_command_refuses_in_one_line(
     capsys: Capture, words: tuple[str, ...], text: str
 ) -> None:
-    line = said(capsys, 2, *words)
+    line = output_of(capsys, 2, *words)
     assert text in line
     assert len(line.splitlines()) == 1
 
@@ -524,13 +524,13 @@ def test_the_command_writes_pictures_and_csv(capsys: Capture, tmp_path: Any) -> 
     words = (COMMAND, "--x", "2um@90deg", "--y", "4um")
     for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
         out = tmp_path / f"cycle{ending}"
-        assert f"written: {out}" in said(capsys, 0, *words, "-o", str(out))
+        assert f"written: {out}" in output_of(capsys, 0, *words, "-o", str(out))
         assert out.read_bytes().startswith(begin)
-    said(capsys, 0, *words, "-o", str(tmp_path / "cycle.csv"))
+    output_of(capsys, 0, *words, "-o", str(tmp_path / "cycle.csv"))
     head, *rows = (tmp_path / "cycle.csv").read_text().splitlines()
     assert head == "t [s],x [m],y [m],Fx [N],Fy [N],Fz [N]"
     assert len(rows) == 401
-    assert "ends in .png" in said(capsys, 2, *words, "-o", str(tmp_path / "cycle.xyz"))
+    assert "ends in .png" in output_of(capsys, 2, *words, "-o", str(tmp_path / "cycle.xyz"))
 
 
 def test_the_picture_has_forces_and_path() -> None:

@@ -35,13 +35,13 @@ def at_rest_angles(v: float, y: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
 def test_the_slip_path_is_the_solvers(surrogate: Surrogate, v: Any, y: Any) -> None:
-    found = of(surrogate, v, y)
+    decay = of(surrogate, v, y)
     exact = 2.0 * math.pi * solve(v, y).slip_speed
-    assert found.slip_path == close(exact, rel=1e-10)
-    assert abs(found.periods - math.log(100.0) / exact) <= found.error_bound
-    assert found.periods_any == 2.0 * found.periods
-    assert found.time == close(found.periods * 2.0 * math.pi, rel=1e-14)
-    assert of(surrogate, v, y, remaining=0.1).periods == close(0.5 * found.periods, rel=1e-14)
+    assert decay.slip_path == close(exact, rel=1e-10)
+    assert abs(decay.periods - math.log(100.0) / exact) <= decay.error_bound
+    assert decay.periods_any == 2.0 * decay.periods
+    assert decay.time == close(decay.periods * 2.0 * math.pi, rel=1e-14)
+    assert of(surrogate, v, y, remaining=0.1).periods == close(0.5 * decay.periods, rel=1e-14)
 
 
 @pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
@@ -70,7 +70,7 @@ def test_a_small_disturbance_decays_as_derived(surrogate: Surrogate, v: Any, y: 
 
 @pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (0.004, 0.5), (0.01, 0.95)])
 def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -> None:
-    found = of(surrogate, v, y)
+    decay = of(surrogate, v, y)
     steady = naive.march(v, y, 4000, naive.periods_until_steady(v, y))[-1]
     rng = np.random.default_rng(1)
     angle, radius = rng.uniform(0.0, 2.0 * math.pi, 12), np.sqrt(rng.uniform(0.0, 1.0, 12))
@@ -81,12 +81,12 @@ def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -
     ]
     for start in starts:
         first = float(np.hypot(*(np.array(start) - steady)))
-        for n in (1, 3, math.ceil(found.periods_any)):
-            left = float(np.hypot(*(naive.march(v, y, 4000, n, *start)[-1] - steady)))
+        for n in (1, 3, math.ceil(decay.periods_any)):
+            distance = float(np.hypot(*(naive.march(v, y, 4000, n, *start)[-1] - steady)))
             # error of the time steps
-            assert left <= first * math.exp(-0.5 * n * found.slip_path) + 2e-3
-            if n >= found.periods_any:
-                assert left <= 0.01 * first + 2e-3
+            assert distance <= first * math.exp(-0.5 * n * decay.slip_path) + 2e-3
+            if n >= decay.periods_any:
+                assert distance <= 0.01 * first + 2e-3
 
 
 @pytest.mark.parametrize(
@@ -103,8 +103,8 @@ def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -
 def test_without_slip_nothing_settles_and_rigid_at_once(
     surrogate: Surrogate, changed: Any, periods: Any
 ) -> None:
-    found = settling(surrogate, **{**CASE, **changed})
-    assert (found.periods, found.time, found.slip_path) == (
+    decay = settling(surrogate, **{**CASE, **changed})
+    assert (decay.periods, decay.time, decay.slip_path) == (
         periods,
         periods,
         0.0 if periods else math.inf,
@@ -116,16 +116,16 @@ def test_the_frequency_may_be_f(surrogate: Surrogate) -> None:
     expected = settling(surrogate, **rest, omega=2.0 * math.pi * 2e4)
     assert settling(surrogate, **rest, f=2e4) == expected
     wrong: list[Any] = [{}, {"f": 2e4, "omega": 1e5}]
-    for told in wrong:
+    for frequency in wrong:
         with pytest.raises(InputError, match=r"omega must be (given, or f|left out beside f)"):
-            settling(surrogate, **rest, **told)
+            settling(surrogate, **rest, **frequency)
 
 
 def test_without_oscillation_the_drag_decides(surrogate: Surrogate) -> None:
     l0 = 3e-6
     for changed in ({"y0": 0.0}, {"omega": 0.0}):
-        found = settling(surrogate, **{**CASE, **changed})
-        assert found.time == close(l0 * math.log(100.0) / 0.01, rel=1e-14)
+        decay = settling(surrogate, **{**CASE, **changed})
+        assert decay.time == close(l0 * math.log(100.0) / 0.01, rel=1e-14)
     dragged = settling(surrogate, **{**CASE, "y0": 0.0})
     assert dragged.slip_path == close(2.0 * math.pi * 0.01 / (l0 * 1.3e5), rel=1e-14)
     # the limit of small amplitudes is the same
@@ -134,13 +134,13 @@ def test_without_oscillation_the_drag_decides(surrogate: Surrogate) -> None:
 
 def test_at_zero_speed_only_large_amplitudes_settle(surrogate: Surrogate) -> None:
     for y, slips in ((0.5, False), (1.0, False), (1.5, True)):
-        found = of(surrogate, 0.0, y)
+        decay = of(surrogate, 0.0, y)
         # slip in every half period is the stroke 2 y~ minus the diameter
-        assert found.slip_path == close(4.0 * (y - 1.0) if slips else 0.0, rel=1e-9)
+        assert decay.slip_path == close(4.0 * (y - 1.0) if slips else 0.0, rel=1e-9)
 
 
 def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> None:
-    found = settling(
+    decay = settling(
         surrogate,
         **{
             **CASE,
@@ -148,14 +148,14 @@ def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> 
             "y0": np.array([0.0, 2e-6, 1e300]),
         },
     )
-    assert found.periods.shape == found.time.shape == found.error_bound.shape == (4, 3)
-    assert not np.isnan(found.periods).any()
-    assert not np.isnan(found.time).any()
-    assert found.periods[2, 1] == settling(surrogate, **CASE).periods
+    assert decay.periods.shape == decay.time.shape == decay.error_bound.shape == (4, 3)
+    assert not np.isnan(decay.periods).any()
+    assert not np.isnan(decay.time).any()
+    assert decay.periods[2, 1] == settling(surrogate, **CASE).periods
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         *(({"remaining": x}, "remaining must be") for x in (0.0, 1.0, -1.0, math.nan, 2.0)),
         ({"Fz": -1.0}, "Fz must be"),
@@ -165,33 +165,35 @@ def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> 
         ),
     ],
 )
-def test_bad_input_is_named_with_the_reason(surrogate: Surrogate, changed: Any, said: Any) -> None:
-    with pytest.raises(InputError, match=said):
+def test_bad_input_is_named_with_the_reason(
+    surrogate: Surrogate, changed: Any, message: Any
+) -> None:
+    with pytest.raises(InputError, match=message):
         settling(surrogate, **{**CASE, **changed})
 
 
 def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:
-    found = settling(
+    decay = settling(
         surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.full(3, 0.3)}
     )
-    assert found.periods[0] == settling(surrogate, **CASE).periods
+    assert decay.periods[0] == settling(surrogate, **CASE).periods
     for column in (
-        found.periods,
-        found.periods_any,
-        found.time,
-        found.slip_path,
-        found.error_bound,
+        decay.periods,
+        decay.periods_any,
+        decay.time,
+        decay.slip_path,
+        decay.error_bound,
     ):
         assert np.isnan(column[1:]).all()
 
 
 @pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (1e-3, 30.0), (3.0, 0.1)])
 def test_a_ball_settles_as_its_slowest_spring(surrogate: Surrogate, v: Any, y: Any) -> None:
-    found = of(surrogate, v, y, contact="ball")
+    decay = of(surrogate, v, y, contact="ball")
     # a spring with the share s of the middle one's load has l0 that is 1.5 s as long
     loads = 1.5 * np.linspace(1, 0.01, 50) * UNIT["Fz"]
     springs = [settling(surrogate, **{**UNIT, "Fz": load}, y0=y, v0=v) for load in loads]
-    assert found.periods == close(max(spring.periods for spring in springs), rel=1e-12)
-    assert found.time == close(springs[0].time, rel=1e-12)
-    assert found.slip_path == close(springs[0].slip_path, rel=1e-12)
-    assert found.periods_any == 2.0 * found.periods
+    assert decay.periods == close(max(spring.periods for spring in springs), rel=1e-12)
+    assert decay.time == close(springs[0].time, rel=1e-12)
+    assert decay.slip_path == close(springs[0].slip_path, rel=1e-12)
+    assert decay.periods_any == 2.0 * decay.periods

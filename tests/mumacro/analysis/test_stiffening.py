@@ -340,8 +340,8 @@ def test_the_command_refuses_what_cannot_be(
     assert message in run(capsys, 2, *words)
 
 
-def posted(client: Any, path: str, code: int = 200, **asked: Any) -> Any:
-    response = client.post(f"/v1/{path}", json={**CASE, **asked})
+def posted(client: Any, path: str, code: int = 200, **question: Any) -> Any:
+    response = client.post(f"/v1/{path}", json={**CASE, **question})
     assert response.status_code == code, response.text
     return response.json()
 
@@ -378,7 +378,7 @@ def test_the_service_takes_the_load_at_which_k_holds(client: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "field", "message"),
+    ("question", "field", "message"),
     [
         (SWEPT, "Fz", "left out, because Fz is the unknown"),
         ({**SWEPT, "Fz": None, "stiffness_exponent": 0.5}, "Fz", "the load at which k holds"),
@@ -391,8 +391,8 @@ def test_the_service_takes_the_load_at_which_k_holds(client: Any) -> None:
     ],
 )
 def test_the_service_refuses_what_cannot_be(
-    client: Any, asked: Any, field: str, message: str
+    client: Any, question: Any, field: str, message: str
 ) -> None:
-    problem = json.dumps(posted(client, "law", 422, **asked))
+    problem = json.dumps(posted(client, "law", 422, **question))
     assert message in problem
     assert f"/{field}" in problem

@@ -26,22 +26,22 @@ CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
 VALUES: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
 
 
-def said(capsys: Capture, code: Any, *words: Any) -> Any:
+def output_of(capsys: Capture, code: Any, *words: Any) -> Any:
     """The output of ``mumacro WORDS``; from stderr, one line, if it fails."""
     assert main(words) == code
-    found = capsys.readouterr()
+    output = capsys.readouterr()
     if code:
-        lines = found.err.splitlines()
-        assert len(lines) == 1, found.err
-        assert found.out == ""
+        lines = output.err.splitlines()
+        assert len(lines) == 1, output.err
+        assert output.out == ""
         return lines[0]
-    return found.out
+    return output.out
 
 
 def test_one_case_is_answered_with_units_regime_bound_and_source(
     capsys: Capture, surrogate: Surrogate
 ) -> None:
-    text = said(capsys, 0, CASE, "--digits", "15")
+    text = output_of(capsys, 0, CASE, "--digits", "15")
     expected = surrogate.evaluate(**VALUES)
     row = next(line for line in text.splitlines() if line.startswith("mu_macro"))
     assert float(row.split()[1]) == close(expected.mu_macro, rel=1e-14)
@@ -50,18 +50,20 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(
     assert "+-" not in text
     for part in (expected.regime, expected.source, surrogate.id):
         assert part in text
-    shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
+    shown, *rows = output_of(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
     assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
-    told = [f"assumes  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
-    told = [line.replace("k_range", "k=0.9..1.1N/um") for line in told]
-    assert rows[-len(told) - 1 : -1] == told
+    assumptions = [f"assumes  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
+    assumptions = [line.replace("k_range", "k=0.9..1.1N/um") for line in assumptions]
+    assert rows[-len(assumptions) - 1 : -1] == assumptions
     assert (
-        said(capsys, 0, CASE.replace("k=1e6", "k=0.9..1.1N/um")).splitlines()[1].startswith("from ")
+        output_of(capsys, 0, CASE.replace("k=1e6", "k=0.9..1.1N/um"))
+        .splitlines()[1]
+        .startswith("from ")
     )
-    assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(
+    assert json.loads(output_of(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(
         surrogate, VALUES
     )
-    assert "model" not in json.loads(said(capsys, 0, CASE, "--json"))
+    assert "model" not in json.loads(output_of(capsys, 0, CASE, "--json"))
 
 
 @pytest.mark.parametrize("name", ["mumacro-1e-4.nc", "mumacro-1e-10.nc"])
@@ -70,11 +72,11 @@ def test_a_table_is_picked_by_path_or_tolerance(
 ) -> None:
     tolerance = name.removeprefix("mumacro-").removesuffix(".nc")
     for which in (str(tables_dir / name), tolerance):
-        assert json.loads(said(capsys, 0, CASE, "--json", "--table", which))["table"][
+        assert json.loads(output_of(capsys, 0, CASE, "--json", "--table", which))["table"][
             "tolerance"
         ] == float(tolerance)
     loose = str(3.0 * float(tolerance))
-    assert json.loads(said(capsys, 0, CASE, "--json", "--table", loose))["table"][
+    assert json.loads(output_of(capsys, 0, CASE, "--json", "--table", loose))["table"][
         "tolerance"
     ] == float(tolerance)
 
@@ -104,11 +106,11 @@ WRONG = {
 
 @pytest.mark.parametrize("words", WRONG)
 def test_wrong_arguments_get_advice_in_one_line(capsys: Capture, words: str) -> None:
-    assert WRONG[words] in said(capsys, 2, words)
+    assert WRONG[words] in output_of(capsys, 2, words)
 
 
 def test_everything_that_is_wrong_with_a_case_is_told_at_once(capsys: Capture) -> None:
-    message = said(capsys, 2, "mu0=-0.3 Fzz=10 k=soft v0=nan f=-1 fast")
+    message = output_of(capsys, 2, "mu0=-0.3 Fzz=10 k=soft v0=nan f=-1 fast")
     for part in (
         "mu0 must be finite and > 0",
         "did you mean Fz?",
@@ -129,28 +131,28 @@ def test_a_unit_may_be_given_beside_the_number_or_apart(
         "mu0=30% Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s",
         "mu0=30 % Fz = 0.01 kN k=1 N/um y0=2 um f=20690Hz, v0=10mm/s",
     ):
-        assert json.loads(said(capsys, 0, case, "--json"))["mu_macro"] == expected
-    known = CASE.replace("v0=0.01", "")
+        assert json.loads(output_of(capsys, 0, case, "--json"))["mu_macro"] == expected
+    inputs = CASE.replace("v0=0.01", "")
     for ends in (("1e-3", "1"), ("1mm/s", "100cm/s")):
         law = json.loads(
-            said(capsys, 0, "law", known, "--along", "v0", *ends, "--points", "2", "--json")
+            output_of(capsys, 0, "law", inputs, "--along", "v0", *ends, "--points", "2", "--json")
         )
         assert law["v0"] == [1e-3, 1.0]
-    assert "v0=1um" in said(capsys, 2, "law", known, "--along", "v0", "1um", "1")
-    assert "1 to 2 m/s" in said(
-        capsys, 1, "solve-for", "v0", known, "--target", "0.1", "--between", "1", "200cm/s"
+    assert "v0=1um" in output_of(capsys, 2, "law", inputs, "--along", "v0", "1um", "1")
+    assert "1 to 2 m/s" in output_of(
+        capsys, 1, "solve-for", "v0", inputs, "--target", "0.1", "--between", "1", "200cm/s"
     )
 
 
 def test_no_words_show_three_examples_that_run_and_a_misspelt_command_is_corrected(
     capsys: Capture,
 ) -> None:
-    lines = [line.split(": ", 1)[1].strip() for line in said(capsys, 0).splitlines()]
+    lines = [line.split(": ", 1)[1].strip() for line in output_of(capsys, 0).splitlines()]
     assert len(lines) == 4
     for line in lines[:3]:
-        assert said(capsys, 0, *shlex.split(line)[1:])
-    assert "unknown command 'evl': did you mean eval?" in said(capsys, 2, "evl", "cases.csv")
-    assert "did you mean solve-for?" in said(capsys, 2, "solve_for", "y0")
+        assert output_of(capsys, 0, *shlex.split(line)[1:])
+    assert "unknown command 'evl': did you mean eval?" in output_of(capsys, 2, "evl", "cases.csv")
+    assert "did you mean solve-for?" in output_of(capsys, 2, "solve_for", "y0")
 
 
 def test_eval_of_a_case_in_place_of_a_file_names_the_command_for_one_case(capsys: Capture) -> None:
@@ -160,10 +162,10 @@ def test_eval_of_a_case_in_place_of_a_file_names_the_command_for_one_case(capsys
 
 def test_a_table_that_cannot_be_read_or_does_not_exist(capsys: Capture, tmp_path: Path) -> None:
     (tmp_path / "text.nc").write_text("no table")
-    assert "text.nc" in said(capsys, 1, CASE, "--table", str(tmp_path / "text.nc"))
-    assert "no such file" in said(capsys, 1, CASE, "--table", str(tmp_path / "none.nc"))
-    assert "tolerance must be >=" in said(capsys, 2, CASE, "--table", "1e-30")
-    assert "tolerance" in said(capsys, 2, CASE, "--table", "-1")
+    assert "text.nc" in output_of(capsys, 1, CASE, "--table", str(tmp_path / "text.nc"))
+    assert "no such file" in output_of(capsys, 1, CASE, "--table", str(tmp_path / "none.nc"))
+    assert "tolerance must be >=" in output_of(capsys, 2, CASE, "--table", "1e-30")
+    assert "tolerance" in output_of(capsys, 2, CASE, "--table", "-1")
 
 
 def ended(capsys: Capture, code: int, *words: str) -> str:
@@ -208,29 +210,31 @@ def test_wrong_options_are_reported_in_one_line(capsys: Capture, words: Any) -> 
 
 
 def test_a_law_along_the_frequency_is_one_along_omega_and_marks_the_border(capsys: Capture) -> None:
-    known = CASE.replace("f=20690", "")
-    words = ("law", known, "--along", "f", "100", "1e5")
-    over_f = json.loads(said(capsys, 0, *words, "--json"))
+    inputs = CASE.replace("f=20690", "")
+    words = ("law", inputs, "--along", "f", "100", "1e5")
+    over_f = json.loads(output_of(capsys, 0, *words, "--json"))
     ends = (repr(math.tau * 100), repr(math.tau * 1e5))
-    over_omega = json.loads(said(capsys, 0, "law", known, "--along", "omega", *ends, "--json"))
+    over_omega = json.loads(
+        output_of(capsys, 0, "law", inputs, "--along", "omega", *ends, "--json")
+    )
     assert over_f["mu_macro"] == over_omega["mu_macro"]
     assert np.array(over_f["f"]) * math.tau == close(np.array(over_omega["omega"]), rel=1e-15)
     assert over_f["border"][0]["f"] * math.tau == close(over_omega["border"][0]["omega"], rel=1e-14)
-    text = said(capsys, 0, *words, "--approximations")
+    text = output_of(capsys, 0, *words, "--approximations")
     assert "small_amplitude" in text
     assert "border of continuous sliding at f" in text
 
 
 def test_a_range_of_k_is_told_with_that_of_mu_macro_and_checked(capsys: Capture) -> None:
     words = CASE.replace("1e6", "0.1..100 N/um")
-    found = json.loads(said(capsys, 0, words, "--json"))
-    assert found["inputs"]["k"] == close(math.sqrt(1e5 * 1e8), rel=1e-15)
-    text = said(capsys, 0, words)
-    assert f"{found['k_range']['mu_macro_low']:#.4g}" in text
+    answer = json.loads(output_of(capsys, 0, words, "--json"))
+    assert answer["inputs"]["k"] == close(math.sqrt(1e5 * 1e8), rel=1e-15)
+    text = output_of(capsys, 0, words)
+    assert f"{answer['k_range']['mu_macro_low']:#.4g}" in text
     assert "k is known" not in text
     for wrong in ("2..1", "0..1", "1..inf", "a..2"):
-        assert "k=" in said(capsys, 2, CASE.replace("1e6", wrong))
-    assert "one k is needed" in said(capsys, 2, "map", words, "-o", "x.csv")
+        assert "k=" in output_of(capsys, 2, CASE.replace("1e6", wrong))
+    assert "one k is needed" in output_of(capsys, 2, "map", words, "-o", "x.csv")
 
 
 NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
@@ -249,7 +253,7 @@ KINDS: dict[str, tuple[str, Case, Case]] = {
 }
 
 
-def asked(name: str) -> Any:
+def question_of(name: str) -> Any:
     """The words and options of a case, and the keywords of the library."""
     words, kind, more = KINDS[name]
     inputs = {**VALUES, **more, **kind}
@@ -262,20 +266,22 @@ def asked(name: str) -> Any:
 def test_an_answer_is_the_librarys_to_every_bit(
     capsys: Capture, surrogate: Surrogate, name: str
 ) -> None:
-    words, options, inputs = asked(name)
+    words, options, inputs = question_of(name)
     expected = surrogate.evaluate(**inputs, gradient=True)
     apart = (*words.split()[:2], "--json", *words.split()[2:])
-    found = json.loads(said(capsys, 0, *apart, *options, "--gradient"), parse_constant=pytest.fail)
+    answer = json.loads(
+        output_of(capsys, 0, *apart, *options, "--gradient"), parse_constant=pytest.fail
+    )
     for key in ("mu_macro", "regime", "source", "error_bound", "gradient"):
-        assert found[key] == getattr(expected, key)
+        assert answer[key] == getattr(expected, key)
     # JSON has no infinity
-    assert found["v_tilde"] == (None if name == "rigid" else expected.v_tilde)
-    assert found["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
-    assert {key: found[key] for key in ("contact", "direction") if key in found} == KINDS[name][1]
+    assert answer["v_tilde"] == (None if name == "rigid" else expected.v_tilde)
+    assert answer["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
+    assert {key: answer[key] for key in ("contact", "direction") if key in answer} == KINDS[name][1]
     if "k_range" in inputs:
         ends = {key: getattr(expected, key) for key in ("mu_macro_low", "mu_macro_high")}
-        assert found["k_range"] == {"k": [0.8e6, 1.2e6], **ends}
-    text = said(capsys, 0, words, *options, "--digits", "15")
+        assert answer["k_range"] == {"k": [0.8e6, 1.2e6], **ends}
+    text = output_of(capsys, 0, words, *options, "--digits", "15")
     assert f"{expected.mu_macro:#.15g}" in text
     assert expected.regime in text
 
@@ -284,10 +290,10 @@ def test_an_answer_is_the_librarys_to_every_bit(
 def test_law_and_solve_for_know_them_too(
     capsys: Capture, tmp_path: Path, surrogate: Surrogate, name: str
 ) -> None:
-    words, options, inputs = asked(name)
+    words, options, inputs = question_of(name)
     words = words.replace("v0=0.01", "")
     out = tmp_path / "law.csv"
-    said(
+    output_of(
         capsys,
         0,
         "law",
@@ -314,16 +320,16 @@ def test_law_and_solve_for_know_them_too(
     assert [row["regime"] for row in rows] == expected.regime.tolist()
     if "k_range" in inputs:
         both = json.loads(
-            said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json")
+            output_of(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json")
         )["roots"]
         assert [root["k"] for root in both][:: len(both) - 1] == list(inputs["k_range"])
         return
-    found = json.loads(
-        said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json")
+    answer = json.loads(
+        output_of(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json")
     )
-    for root in found["roots"]:
+    for root in answer["roots"]:
         assert surrogate.evaluate(**{**inputs, "v0": root["v0"]}).mu_macro == close(0.29, abs=1e-10)
-    assert found["roots"]
+    assert answer["roots"]
 
 
 ALONG, ALONG_NORMAL = (
@@ -352,7 +358,7 @@ UNFIT = {
 def test_what_does_not_belong_to_a_contact_or_direction_is_named(
     capsys: Capture, words: tuple[str, ...]
 ) -> None:
-    assert UNFIT[words] in said(capsys, 2, *words)
+    assert UNFIT[words] in output_of(capsys, 2, *words)
 
 
 @pytest.fixture
@@ -380,19 +386,21 @@ def test_fit_is_the_librarys(
 ) -> None:
     pytest.importorskip("scipy")
     path, points = measured
-    known: Case = {
+    inputs: Case = {
         name: value for name, value in {"k": 1e6, "mu0": 0.3}.items() if name not in unknowns
     }
-    words = [*RIG, *(f"{name}={value!r}" for name, value in known.items()), "--contact", "ball"]
-    expected = fit(points, unknowns, contact="ball", Fz=10.0, y0=2e-6, f=20e3, **known)
-    found = json.loads(said(capsys, 0, "fit", str(path), "--unknown", *unknowns, *words, "--json"))
+    words = [*RIG, *(f"{name}={value!r}" for name, value in inputs.items()), "--contact", "ball"]
+    expected = fit(points, unknowns, contact="ball", Fz=10.0, y0=2e-6, f=20e3, **inputs)
+    answer = json.loads(
+        output_of(capsys, 0, "fit", str(path), "--unknown", *unknowns, *words, "--json")
+    )
     for name in unknowns:
-        assert found["values"][name] == close(expected.values[name], rel=1e-9)
-        assert found["std"][name] == close(expected.std[name], rel=1e-6)
-        assert found["interval"][name] == close(list(expected.interval[name]), rel=1e-6)
-    assert (found["contact"], found["warnings"]) == ("ball", list(expected.warnings))
+        assert answer["values"][name] == close(expected.values[name], rel=1e-9)
+        assert answer["std"][name] == close(expected.std[name], rel=1e-6)
+        assert answer["interval"][name] == close(list(expected.interval[name]), rel=1e-6)
+    assert (answer["contact"], answer["warnings"]) == ("ball", list(expected.warnings))
     monkeypatch.setattr(sys, "stdin", io.StringIO(path.read_text()))
-    text = said(capsys, 0, "fit", "-", *words, "--unknown", *unknowns)
+    text = output_of(capsys, 0, "fit", "-", *words, "--unknown", *unknowns)
     assert [line.split()[0] for line in text.splitlines()[: len(unknowns)]] == list(unknowns)
     assert f"+- {expected.std[unknowns[0]]:.2g}" in text
     assert "95 %" in text
@@ -401,7 +409,9 @@ def test_fit_is_the_librarys(
 def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, measured: Any) -> None:
     pytest.importorskip("scipy")
     path, points = measured
-    said(capsys, 0, "fit", str(path), *RIG, "--contact", "ball", "-o", str(tmp_path / "fit.csv"))
+    output_of(
+        capsys, 0, "fit", str(path), *RIG, "--contact", "ball", "-o", str(tmp_path / "fit.csv")
+    )
     with (tmp_path / "fit.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["v0 [m/s]"]) for row in rows] == close(points["v0"].tolist(), rel=1e-15)
@@ -409,7 +419,7 @@ def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, meas
     curve = (points["mu_macro"] - fitted.residuals).tolist()
     assert [float(row["mu_macro fitted"]) for row in rows] == close(curve, rel=1e-9)
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:3]))
-    assert "warning: as many points as unknowns" in said(
+    assert "warning: as many points as unknowns" in output_of(
         capsys, 0, "fit", str(path), *RIG, "--contact", "ball"
     )
 
@@ -454,7 +464,7 @@ def test_bad_points_are_refused(
     capsys: Capture, tmp_path: Path, text: str, words: Any, code: Any, parts: Any
 ) -> None:
     (tmp_path / "points.csv").write_text(text)
-    message = said(capsys, code, "fit", str(tmp_path / "points.csv"), *words)
+    message = output_of(capsys, code, "fit", str(tmp_path / "points.csv"), *words)
     assert all(part in message for part in parts), message
 
 
@@ -472,11 +482,11 @@ def test_a_file_in_another_encoding_or_with_an_interval_in_k_gets_a_remedy(
     pytest.importorskip("pyarrow")
     path, out = tmp_path / "points.csv", str(tmp_path / "out.csv")
     path.write_bytes("v0,mu_macro,y0 [µm]\n1,0.2,2\n2,0.21,2\n".encode("cp1252"))
-    assert "line 1 is not in UTF-8; save the file as UTF-8" in said(
+    assert "line 1 is not in UTF-8; save the file as UTF-8" in output_of(
         capsys, 1, "fit", str(path), "Fz=10N", "f=20kHz"
     )
     path.write_bytes("mu0,Fz,k,y0 [µm],f,v0\n0.3,10,1e6,2,2e4,0.01\n".encode("cp1252"))
-    assert "line 1 is not in UTF-8; save the file as UTF-8" in said(
+    assert "line 1 is not in UTF-8; save the file as UTF-8" in output_of(
         capsys, 1, "eval", str(path), "-o", out
     )
     path.write_text("mu0,Fz,k,y0,f,v0\n0.3,10,0.8..1.2,2e-6,2e4,0.01\n")
@@ -492,9 +502,10 @@ def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measu
         "\ufeff" + path.read_text().replace(",", ";").replace(".", ","), "utf-8"
     )
     words = (*RIG, "--sep", ";", "--decimal", ",", "--json")
-    german = json.loads(said(capsys, 0, "fit", str(tmp_path / "german.csv"), *words))
+    german = json.loads(output_of(capsys, 0, "fit", str(tmp_path / "german.csv"), *words))
     assert (
-        german["values"] == json.loads(said(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
+        german["values"]
+        == json.loads(output_of(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
     )
 
 
@@ -505,8 +516,8 @@ def test_a_german_file_of_two_columns_gets_advice_that_works(
     path = tmp_path / "german.csv"
     path.write_text("v0 [mm/s];mu_macro\n1;0,069\n5;0,174\n20;0,247\n100;0,289\n")
     words = ("fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz")
-    assert "give --sep ';' --decimal ','" in said(capsys, 1, *words)
-    assert said(capsys, 0, *words, "--sep", ";", "--decimal", ",").startswith("k ")
+    assert "give --sep ';' --decimal ','" in output_of(capsys, 1, *words)
+    assert output_of(capsys, 0, *words, "--sep", ";", "--decimal", ",").startswith("k ")
 
 
 def test_a_fit_takes_mu0_of_each_point(capsys: Capture, tmp_path: Path) -> None:
@@ -515,8 +526,10 @@ def test_a_fit_takes_mu0_of_each_point(capsys: Capture, tmp_path: Path) -> None:
     path.write_text(
         "v0 [mm/s],mu_macro,mu0\n1,0.069,0.31\n5,0.174,0.305\n20,0.247,0.3\n100,0.289,0.295\n"
     )
-    found = json.loads(said(capsys, 0, "fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz", "--json"))
-    assert [*found["values"]] == ["k"]
+    answer = json.loads(
+        output_of(capsys, 0, "fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz", "--json")
+    )
+    assert [*answer["values"]] == ["k"]
 
 
 PICTURES = {
@@ -547,13 +560,13 @@ def test_results_go_into_pictures_and_csv(
     words = [str(measured[0]) if word == "MEASURED" else word for word in words]
     for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
         out = tmp_path / f"out{ending}"
-        assert str(out) in said(capsys, 0, *words, "-o", str(out))
+        assert str(out) in output_of(capsys, 0, *words, "-o", str(out))
         assert out.read_bytes().startswith(begin)
-    said(capsys, 0, *words, "-o", str(tmp_path / "out.csv"))
+    output_of(capsys, 0, *words, "-o", str(tmp_path / "out.csv"))
     head, *rows = (tmp_path / "out.csv").read_text().splitlines()
     assert rows
     assert {row.count(",") for row in rows} == {head.count(",")}
-    wrong = said(capsys, 2, *words, "-o", str(tmp_path / "out.xyz"))
+    wrong = output_of(capsys, 2, *words, "-o", str(tmp_path / "out.xyz"))
     assert "ends in .png, .svg, .pdf, or for the command in .csv" in wrong
     assert b"<dc:date>" not in (tmp_path / "out.svg").read_bytes()
 
@@ -564,26 +577,30 @@ def test_a_picture_names_the_extra_it_needs(
     for name in ("figure", "pyplot"):
         monkeypatch.setitem(sys.modules, f"matplotlib.{name}", None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert "pip install 'mumacro[plot]'" in said(capsys, 1, "map", "-o", str(tmp_path / "map.png"))
+    assert "pip install 'mumacro[plot]'" in output_of(
+        capsys, 1, "map", "-o", str(tmp_path / "map.png")
+    )
 
 
 def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path) -> None:
     out = str(tmp_path / "map.csv")
-    assert "outside" not in said(capsys, 0, "map", CASE, "-o", out)
+    assert "outside" not in output_of(capsys, 0, "map", CASE, "-o", out)
     for case in (
         CASE.replace("1e6", "rigid"),
         CASE.replace("0.01", "0"),
         CASE.replace("1e6", "1e30"),
     ):
-        assert "the case lies outside the map: v~ = " in said(capsys, 0, "map", case, "-o", out)
+        assert "the case lies outside the map: v~ = " in output_of(
+            capsys, 0, "map", case, "-o", out
+        )
 
 
 def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
     from mumacro import law as friction_law
 
-    known = {name: value for name, value in VALUES.items() if name != "v0"}
-    law = friction_law(surrogate, start=1e-3, stop=1.0, points=20, **known)
+    inputs = {name: value for name, value in VALUES.items() if name != "v0"}
+    law = friction_law(surrogate, start=1e-3, stop=1.0, points=20, **inputs)
     axes = law.plot(figure.add_subplot())
     np.testing.assert_array_equal(
         axes.lines[0].get_xydata(), np.column_stack((law.values, law.answer.mu_macro))
@@ -629,7 +646,7 @@ BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3"
 
 
 @pytest.mark.parametrize(
-    ("words", "geometry", "given"),
+    ("words", "geometry", "arguments"),
     [
         (BALL, "ball", {}),
         ((*BALL, "--E2", "3 MPa", "--nu2", "0.5"), "ball", {"E2": 3e6, "nu2": 0.5}),
@@ -643,15 +660,15 @@ BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3"
     ],
 )
 def test_what_stiffness_prints_goes_into_a_command(
-    capsys: Capture, words: Any, geometry: Any, given: Any
+    capsys: Capture, words: Any, geometry: Any, arguments: Any
 ) -> None:
-    found = json.loads(said(capsys, 0, "stiffness", *words, "--json"))
-    expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **given)
-    assert (found["k"], found["contact"]) == (expected.k, expected.contact)
-    lines = said(capsys, 0, "stiffness", *words).partition("\nwarning")[0].splitlines()
+    stiffness = json.loads(output_of(capsys, 0, "stiffness", *words, "--json"))
+    expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **arguments)
+    assert (stiffness["k"], stiffness["contact"]) == (expected.k, expected.contact)
+    lines = output_of(capsys, 0, "stiffness", *words).partition("\nwarning")[0].splitlines()
     assert lines[-2].split() == ["contact", expected.contact]
     pasted = lines[-1].split()[1:]
-    answer = json.loads(said(capsys, 0, CASE.replace("k=1e6", ""), *pasted, "--json"))
+    answer = json.loads(output_of(capsys, 0, CASE.replace("k=1e6", ""), *pasted, "--json"))
     assert answer.get("contact", "spring") == expected.contact
     assert answer["inputs"]["k"] == close(expected.k, rel=1e-3)
 
@@ -659,19 +676,19 @@ def test_what_stiffness_prints_goes_into_a_command(
 def test_a_wide_contact_is_told_below_its_stiffness(capsys: Capture) -> None:
     words = "stiffness", "ball", "--radius", "5mm", "--Fz", "10N", "--nu", "0.3", "--E"
     assert (
-        said(capsys, 0, *words, "1MPa")
+        output_of(capsys, 0, *words, "1MPa")
         .splitlines()[-1]
         .startswith("warning: the contact's half width 0.00409 m")
     )
-    assert "did you mean 210 GPa?" in said(capsys, 2, *words, "210")
-    assert "warning" not in said(capsys, 0, *words, "210GPa")
+    assert "did you mean 210 GPa?" in output_of(capsys, 2, *words, "210")
+    assert "warning" not in output_of(capsys, 0, *words, "210GPa")
 
 
 def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys: Capture) -> None:
-    message = said(capsys, 2, "stiffness", *BALL[:2], "5mN", "--Fz", "10V", *BALL[5:])
+    message = output_of(capsys, 2, "stiffness", *BALL[:2], "5mN", "--Fz", "10V", *BALL[5:])
     assert "radius=5mN" in message
     assert "Fz=10V" in message
-    assert "nu must be" in said(capsys, 2, "stiffness", *BALL[:-1], "0.7")
+    assert "nu must be" in output_of(capsys, 2, "stiffness", *BALL[:-1], "0.7")
     for geometry, about in GEOMETRIES.items():
         error = ended(capsys, 2, "stiffness", geometry)
         assert all(f"--{name}" in error for name in (*about.arguments, "E", "nu"))
@@ -680,41 +697,47 @@ def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys: Capture)
 
 @pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])
 def test_solve_for_finds_what_gives_the_target(capsys: Capture, unknown: Any) -> None:
-    known = " ".join(
+    inputs = " ".join(
         w
         for w in CASE.split()
         if not w.startswith("f=" if unknown in ("f", "omega") else f"{unknown}=")
     )
-    found = json.loads(said(capsys, 0, "solve-for", unknown, known, "--target", "0.24", "--json"))
-    assert found["roots"]
-    for root in found["roots"]:
-        again = json.loads(said(capsys, 0, f"{known} {unknown}={root[unknown]!r}", "--json"))
+    answer = json.loads(
+        output_of(capsys, 0, "solve-for", unknown, inputs, "--target", "0.24", "--json")
+    )
+    assert answer["roots"]
+    for root in answer["roots"]:
+        again = json.loads(output_of(capsys, 0, f"{inputs} {unknown}={root[unknown]!r}", "--json"))
         assert again["mu_macro"] == close(0.24, abs=1e-11)
         assert root["low"] <= root[unknown] <= root["high"]
 
 
 def test_solve_for_reports_the_reachable_range(capsys: Capture) -> None:
-    known = CASE.replace("v0=0.01", "")
-    assert "to 0.3" in said(capsys, 1, "solve-for", "v0", known, "--target", "0.5")
-    assert "leave v0 out" in said(capsys, 2, "solve-for", "v0", CASE, "--target", "0.2")
+    inputs = CASE.replace("v0=0.01", "")
+    assert "to 0.3" in output_of(capsys, 1, "solve-for", "v0", inputs, "--target", "0.5")
+    assert "leave v0 out" in output_of(capsys, 2, "solve-for", "v0", CASE, "--target", "0.2")
     still = CASE.replace("y0=2e-6", "y0=0").replace("v0=0.01", "")
-    assert "no influence" in said(capsys, 1, "solve-for", "v0", still, "--target", "0.2")
-    words = ("solve-for", "v0", known, "--target")
-    assert json.loads(said(capsys, 0, *words, "0.8", "--ratio", "--json"))["target"] == close(
+    assert "no influence" in output_of(capsys, 1, "solve-for", "v0", still, "--target", "0.2")
+    words = ("solve-for", "v0", inputs, "--target")
+    assert json.loads(output_of(capsys, 0, *words, "0.8", "--ratio", "--json"))["target"] == close(
         0.24, rel=1e-15
     )
-    assert "v0 from 0.0001 to 0.001 m/s" in said(
+    assert "v0 from 0.0001 to 0.001 m/s" in output_of(
         capsys, 1, *words, "0.24", "--between", "1e-4", "1e-3"
     )
 
 
 def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) -> None:
-    found = json.loads(said(capsys, 0, "table", "--json"))
+    properties = json.loads(output_of(capsys, 0, "table", "--json"))
     expected = (str(surrogate.path), surrogate.checksum, surrogate.max_abs_error)
-    assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
-    assert found["error_distribution"] == surrogate.error_distribution
-    text = said(capsys, 0, "table")
-    assert text.count(".nc") > len(found["bundled"])
+    assert (
+        properties["path"],
+        properties["checksum"],
+        properties["verified_max_abs_error"],
+    ) == expected
+    assert properties["error_distribution"] == surrogate.error_distribution
+    text = output_of(capsys, 0, "table")
+    assert text.count(".nc") > len(properties["bundled"])
     assert "times the error its bound is: 1 or more is a bound that holds." in text
     assert f"{surrogate.error_distribution['border']['0.95']:.2g}" in text
 
@@ -722,8 +745,8 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:
     out, table = tmp_path / "grid.csv", str(tables_dir / "mumacro-1e-4.nc")
     words = ("export", "--format", "csv", "--out", str(out), "--table", "1e-4")
-    assert json.loads(said(capsys, 0, *words, "--json"))["table"] == table
-    rows = [line.split() for line in said(capsys, 0, *words).splitlines()]
+    assert json.loads(output_of(capsys, 0, *words, "--json"))["table"] == table
+    rows = [line.split() for line in output_of(capsys, 0, *words).splitlines()]
     assert rows[:3] == [["table", table], ["format", "csv"], ["out", str(out)]]
     assert out.read_text().startswith("v_tilde,")
 
@@ -759,7 +782,7 @@ def test_every_input_is_known_by_its_name_in_any_case_and_in_its_si_unit(name: s
 
 
 def test_units_are_turned_into_si_and_powers_of_ten_exactly() -> None:
-    for name, unit, given, si in (
+    for name, unit, number, si in (
         ("k", "N/mm", 1e3, 1e6),
         ("k", "N/um", 1.0, 1e6),
         ("k", "kN/m", 7.0, 7e3),
@@ -775,17 +798,17 @@ def test_units_are_turned_into_si_and_powers_of_ten_exactly() -> None:
         ("y0", "N", 1.0, None),
     ):
         scale = scale_of(name, unit)
-        assert (scale and scale.si(given)) == si, (name, unit)
+        assert (scale and scale.si(number)) == si, (name, unit)
 
 
 def test_headings_and_numbers_are_read_as_they_are_written() -> None:
-    given = {
+    headings = {
         "k [N/mm]": ("k", "N/mm"),
         " v0(mm/s) ": ("v0", "mm/s"),
         "mu0": ("mu0", None),
         "a[0][1]": ("a[0]", "1"),
     }
-    assert {head: split_unit(head) for head in given} == given
+    assert {head: split_unit(head) for head in headings} == headings
     assert (read_number("y0", " 2e-6 "), read_number("k", "Rigid")) == (2e-6, math.inf)
     with pytest.raises(ValueError, match="plain number"):
         read_number("y0", "0x10")

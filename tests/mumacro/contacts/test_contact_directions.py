@@ -24,7 +24,7 @@ table = tables(1e-4)
 
 def test_the_play_operator_marched_by_events(table: Surrogate) -> None:
     """At any amplitude, near the border and where reverse slip begins."""
-    rng, n, seen = np.random.default_rng(1), 250, set()
+    rng, n, cycles = np.random.default_rng(1), 250, set()
     a = 10.0 ** rng.uniform(-2, 3, n)
     x = np.where(
         rng.random(n) < 0.5, 10.0 ** rng.uniform(-5, 0, n), 1.0 - 10.0 ** rng.uniform(-6, 0, n)
@@ -39,8 +39,8 @@ def test_the_play_operator_marched_by_events(table: Surrogate) -> None:
             value, bound, source = table.quantity(name, v, y, **ALONG)
             assert abs(value - expected) <= bound + 1e-16 * abs(expected), (name, v, y)
             assert bound <= (1e-7 if name == "stick_fraction" else 1e-9 * max(1.0, y))
-        seen.add(SOURCES[source])
-    assert seen == {"along_stick_slip", "along_reverse_slip"}
+        cycles.add(SOURCES[source])
+    assert cycles == {"along_stick_slip", "along_reverse_slip"}
 
 
 def test_any_amplitude_up_to_the_largest_number(table: Surrogate) -> None:

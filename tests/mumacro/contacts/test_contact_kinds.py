@@ -139,14 +139,14 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("changed", "field", "said"), REFUSED)
+@pytest.mark.parametrize(("changed", "field", "message"), REFUSED)
 def test_what_does_not_belong_is_refused_by_name(
-    table: Surrogate, changed: Any, field: str, said: Any
+    table: Surrogate, changed: Any, field: str, message: Any
 ) -> None:
     inputs = {**CASE, **changed}
-    left_out = [name for name in ("k", "y0") if inputs[name] is None]
-    with pytest.raises(InputError, match=said) as caught:
-        table.evaluate(**without(inputs, *left_out))
+    absent = [name for name in ("k", "y0") if inputs[name] is None]
+    with pytest.raises(InputError, match=message) as caught:
+        table.evaluate(**without(inputs, *absent))
     assert caught.value.field == field
 
 

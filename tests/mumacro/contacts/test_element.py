@@ -253,7 +253,7 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "message"),
     [
         (lambda: Element(0.3, 10.0, 1e6, contact="cube"), "contact must be one of spring, ball"),
         (
@@ -302,6 +302,6 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
         ),
     ],
 )
-def test_bad_input_is_named_and_moves_nothing(call: Any, said: Any) -> None:
-    with pytest.raises(InputError, match=said):
+def test_bad_input_is_named_and_moves_nothing(call: Any, message: Any) -> None:
+    with pytest.raises(InputError, match=message):
         call()

@@ -221,7 +221,7 @@ def test_a_named_geometry_is_its_function() -> None:
 
 
 @pytest.mark.parametrize(
-    ("geometry", "given", "said"),
+    ("geometry", "arguments", "message"),
     [
         ("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
         ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
@@ -236,9 +236,11 @@ def test_a_named_geometry_is_its_function() -> None:
         ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be finite and > 0"),
     ],
 )
-def test_a_bad_argument_is_named_with_the_remedy(geometry: Any, given: Any, said: Any) -> None:
-    with pytest.raises(InputError, match=said):
-        contact_of(geometry, **given)
+def test_a_bad_argument_is_named_with_the_remedy(
+    geometry: Any, arguments: Any, message: Any
+) -> None:
+    with pytest.raises(InputError, match=message):
+        contact_of(geometry, **arguments)
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)

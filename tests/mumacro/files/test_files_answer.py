@@ -40,19 +40,19 @@ def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any)
     assert answers.num_rows == len(rows)
     slopes = {name: answers.column(f"d_mu_macro_d_{name}").to_pylist() for name in NAMES}
     bad = {reject["row"]: reject["field"] for reject in rejects.to_pylist()}
-    for i, (row, said) in enumerate(
+    for i, (row, row_answer) in enumerate(
         zip(rows, answers.select(list(ANSWERS)).to_pylist(), strict=True)
     ):
         case = dict(zip(NAMES, row, strict=True))
         case["k"] = "rigid" if case["k"] == math.inf else case["k"]
         if i in bad:
-            assert {*said.values(), *(slopes[name][i] for name in NAMES)} == {None}
+            assert {*row_answer.values(), *(slopes[name][i] for name in NAMES)} == {None}
             with pytest.raises(InputError) as caught:
                 surrogate.evaluate(**case)
             assert caught.value.field == bad[i]
         else:
             expected = surrogate.evaluate(**case, gradient=True)
-            assert said == {name: getattr(expected, name) for name in ANSWERS}
+            assert row_answer == {name: getattr(expected, name) for name in ANSWERS}
             for name, slope in expected.gradient.items():  # a rigid contact has no k
                 assert slopes[name][i] == (
                     None if name == "k" and case["k"] == "rigid" else slope
@@ -150,7 +150,7 @@ LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
 
 
 @pytest.mark.parametrize(
-    ("left_out", "columns", "refused"),
+    ("absent", "columns", "refused"),
     [
         *(
             ("k", {"k_low [N/um]": low, "k_high [N/um]": high}, refused)
@@ -179,16 +179,14 @@ LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
     ],
 )
 def test_ends_of_k_and_amplitudes_are_refused(
-    surrogate: Surrogate, left_out: Any, columns: Any, refused: Any
+    surrogate: Surrogate, absent: Any, columns: Any, refused: Any
 ) -> None:
-    batch = batch_of(**{name: [cell] for name, cell in columns.items()}).drop_columns(left_out)
-    answers, rejects = answer(
-        batch, surrogate, direction="normal" if left_out == "y0" else "across"
-    )
+    batch = batch_of(**{name: [cell] for name, cell in columns.items()}).drop_columns(absent)
+    answers, rejects = answer(batch, surrogate, direction="normal" if absent == "y0" else "across")
     assert [(reject["field"], reject["reason"]) for reject in rejects.to_pylist()] == (
         [refused] if refused else []
     )
-    if not refused and left_out == "k":
+    if not refused and absent == "k":
         low, middle, high = (
             answers.column(f"mu_macro{end}")[0].as_py() for end in ("_low", "", "_high")
         )
@@ -242,8 +240,8 @@ SIMILAR = "{!r} is similar: rename that column to {}"
             ],
         ),
         *(
-            (f"mu0,Fz,{more},y0,omega,v0", {}, [said])
-            for more, said in (
+            (f"mu0,Fz,{more},y0,omega,v0", {}, [message])
+            for more, message in (
                 ("k,f", "both f [Hz] and omega"),
                 ("k,k [N/mm]", "k is there twice"),
                 ("k,k_low", "both k and k_low"),

@@ -39,15 +39,15 @@ def cases(n: int, seed: int = 1) -> Any:
     return pa.table(columns)
 
 
-def write(given: Any, path: Any) -> Any:
+def write(cases: Any, path: Any) -> Any:
     """Cases in the format of the name; an infinite k is the word rigid, where the format has no
     infinity."""
     if path.suffix == ".parquet":
-        pq.write_table(given, path, row_group_size=100)
+        pq.write_table(cases, path, row_group_size=100)
         return path
     rows = [
         {name: "rigid" if x == math.inf else x for name, x in row.items()}
-        for row in given.to_pylist()
+        for row in cases.to_pylist()
     ]
     data = (as_csv if ".csv" in path.name else as_ndjson)(rows).encode()
     path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else data)

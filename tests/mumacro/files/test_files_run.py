@@ -56,7 +56,7 @@ def copied(cases: Any, kind: Any, folder: Path) -> Any:
     return shutil.copy(cases / f"cases.{kind}", folder)
 
 
-def left(folder: Path) -> Any:
+def files_in(folder: Path) -> Any:
     return sorted(path.name for path in folder.iterdir())
 
 
@@ -79,7 +79,7 @@ def assert_whole(out: Any, cases: Any) -> None:
             out.with_name(out.name + ending).read_bytes()
             == (cases / f"whole.{kind}{ending}").read_bytes()
         )
-    assert [name for name in left(out.parent) if name.startswith("out")] == [
+    assert [name for name in files_in(out.parent) if name.startswith("out")] == [
         f"out.{kind}",
         f"out.{kind}.rejects.csv",
         f"out.{kind}.run.json",
@@ -234,7 +234,7 @@ def test_an_input_that_changes_is_not_reported_complete(
 
     with pytest.raises(FilesError, match="changed while it was read"):
         evaluate_files([source], out, TABLE, progress=change)
-    assert left(tmp_path) == [source.name]
+    assert files_in(tmp_path) == [source.name]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -258,7 +258,7 @@ def test_a_fault_that_a_change_brings_in_is_told_as_a_change(
     with pytest.raises(FilesError, match="changed while it was read") as failure:
         evaluate_files([source], out, TABLE, progress=change)
     assert "quote" not in str(failure.value)
-    assert left(tmp_path) == [source.name]
+    assert files_in(tmp_path) == [source.name]
     if kind.startswith("csv"):  # the fault alone is told as what it is
         with pytest.raises(FilesError, match=r"row 20: a quote is not closed"):
             evaluate_files([source], out, TABLE)
@@ -294,15 +294,15 @@ def test_another_content_contact_or_direction_is_another_run(
 
 
 @pytest.mark.parametrize("name", ["out.csv", "out.csv.rejects.csv"])
-@pytest.mark.parametrize("given", ["", "link.csv"])
+@pytest.mark.parametrize("link", ["", "link.csv"])
 def test_an_output_never_replaces_an_input(
-    tmp_path: Path, capsys: Capture, cases: Any, name: str, given: Any
+    tmp_path: Path, capsys: Capture, cases: Any, name: str, link: Any
 ) -> None:
     shutil.copy(cases / "cases.csv", tmp_path / name)
-    if given:
-        (tmp_path / given).hardlink_to(tmp_path / name)
+    if link:
+        (tmp_path / link).hardlink_to(tmp_path / name)
     assert (
-        main(["eval", str(tmp_path / (given or name)), "-o", str(tmp_path / "out.csv"), "--force"])
+        main(["eval", str(tmp_path / (link or name)), "-o", str(tmp_path / "out.csv"), "--force"])
         == 1
     )
     assert "is an input, and would be overwritten" in capsys.readouterr().err

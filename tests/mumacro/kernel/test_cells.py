@@ -54,9 +54,9 @@ def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
     """In stick_slip_mid the power is what is tabulated, 1 q."""
     index = BLOCK_NAMES.index("stick_slip_mid")
     rng = np.random.default_rng(8)
-    made = Cells((1, 1))
-    v, y = made.points(index, rng.random(200), rng.uniform(0.5, 0.99, 200))
-    block, a, b = kernel.places(made.data, v, y)
+    table = Cells((1, 1))
+    v, y = table.points(index, rng.random(200), rng.uniform(0.5, 0.99, 200))
+    block, a, b = kernel.places(table.data, v, y)
     assert np.all(block == index)
     (low_a, high_a), (low_b, high_b) = CHARTS[index].a.span, CHARTS[index].b.span
     u, w = 2.0 * (a - low_a) / (high_a - low_a) - 1.0, 2.0 * (b - low_b) / (high_b - low_b) - 1.0
@@ -65,7 +65,7 @@ def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
         cell[-1, -1] += 10.0  # below zero a power is cut off
         coef = np.zeros((len(CHARTS), WIDTH, WIDTH))
         coef[index] = cell
-        result = made.values(coef, v, y, kernel)
+        result = table.values(coef, v, y, kernel)
         expected = np.polynomial.polynomial.polyval2d(w, u, cell[::-1, ::-1])
         assert result == close(expected, rel=1e-14)
 
@@ -77,17 +77,17 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(
 ) -> None:
     """A table whose cells hold their own numbers: none is skipped, neighbours follow one
     another."""
-    made = Cells(cells)
+    table = Cells(cells)
     chart, n = CHARTS[index], cells[0] * cells[1]
     number = np.zeros((n * len(CHARTS), WIDTH, WIDTH))
     number[:, -1, -1] = np.tile(np.arange(n), len(CHARTS))
     for axis, other in ((0, 0.37), (1, 0.73)):
         along = np.linspace(1e-6, 1.0 - 1e-6, 997)
-        v, y = made.points(index, *((along, other) if axis == 0 else (other, along)))
-        mine = kernels[-1].places(made.data, v, y)[0] == index
+        v, y = table.points(index, *((along, other) if axis == 0 else (other, along)))
+        mine = kernels[-1].places(table.data, v, y)[0] == index
         if chart.regime == atlas.CONTINUOUS or axis == 1:
             assert np.count_nonzero(mine) > 200
-        result = np.rint(made.tabulated(index, number, v[mine], y[mine])).astype(int)
+        result = np.rint(table.tabulated(index, number, v[mine], y[mine])).astype(int)
         assert np.all((result >= 0) & (result < n))
         a, b = np.divmod(result, cells[1])
         moving, fixed = (a, b) if axis == 0 else (b, a)

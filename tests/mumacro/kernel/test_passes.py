@@ -32,16 +32,16 @@ table = tables(1e-4, 1e-12)
 def one_by_one(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> list[Array]:
     """Value, bound, source, slopes and their bounds of points (n,), each an array of one."""
     data, code = table._with(name), atlas.QUANTITY_NAMES.index(name)
-    found = []
+    rows = []
     for i in range(v.size):
         one = slice(i, i + 1)
-        found.append(
+        rows.append(
             (
                 *shared_out.values(code, data, v[one], y[one], 1),
                 *shared_out.slopes(code, data, v[one], y[one], 1),
             )
         )
-    return [np.concatenate(part) for part in zip(*found, strict=True)]
+    return [np.concatenate(part) for part in zip(*rows, strict=True)]
 
 
 def around(x: Array) -> Array:
@@ -168,27 +168,25 @@ def test_every_level_with_fused_multiply_add_gives_the_same_bits(
     v, y = log_uniform(rng, 1e-9, 1e6, n), log_uniform(rng, 1e-6, 1e8, n)
     code, data = atlas.QUANTITY_NAMES.index(name), table._with(name)
 
-    def asked(kernel: Kernel) -> list[Any]:
-        found: list[Any] = [np.empty(n), np.empty(n), np.empty(n, np.int8), np.empty((5, n))]
-        kernel.values(data, code, v, y, *found[:3])
-        kernel.slopes(data, code, v, y, found[3])
-        return found
+    def rows_of(kernel: Kernel) -> list[Any]:
+        rows: list[Any] = [np.empty(n), np.empty(n), np.empty(n, np.int8), np.empty((5, n))]
+        kernel.values(data, code, v, y, *rows[:3])
+        kernel.slopes(data, code, v, y, rows[3])
+        return rows
 
-    best = asked(kernels[-1])
+    best = rows_of(kernels[-1])
     for kernel in kernels[:-1]:
-        found = asked(kernel)
+        rows = rows_of(kernel)
         if kernel.level != "base":
-            for ours, theirs in zip(found, best, strict=True):
+            for ours, theirs in zip(rows, best, strict=True):
                 np.testing.assert_array_equal(ours, theirs)
             continue
         # without fused multiply-add: within the allowance for rounding that both bounds contain
-        same = (found[2] == best[2]) & (np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-6)
-        assert np.mean(found[2] == best[2]) > 0.9999
-        off = np.abs(found[0] - best[0])
-        assert np.all(
-            (off <= 1e-13 * (1.0 + np.abs(best[0])))[same] & (off <= 2.0 * found[1])[same]
-        )
-        assert np.all((np.abs(found[3][1:3] - best[3][1:3]) <= 2.0 * found[3][3:])[:, same])
+        same = (rows[2] == best[2]) & (np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-6)
+        assert np.mean(rows[2] == best[2]) > 0.9999
+        off = np.abs(rows[0] - best[0])
+        assert np.all((off <= 1e-13 * (1.0 + np.abs(best[0])))[same] & (off <= 2.0 * rows[1])[same])
+        assert np.all((np.abs(rows[3][1:3] - best[3][1:3]) <= 2.0 * rows[3][3:])[:, same])
 
 
 @pytest.mark.parametrize(
@@ -209,18 +207,18 @@ def test_contacts_and_directions_have_the_same_bits(
     six[5][:20], six[3][20:40], six[2][40:60] = 0.0, 0.0, np.inf
     data = table.cells("mu_ratio", Kind(*kind))
 
-    def asked(kernel: Kernel, part: slice) -> list[Any]:
+    def numbers_of(kernel: Kernel, part: slice) -> list[Any]:
         columns = [np.ascontiguousarray(column[part]) for column in six]
         answers = CaseRows.empty(columns[0].shape, "gradient")
         kernel.cases(data, columns, answers, slice(0, columns[0].size), kind)
         return [answers.numbers, answers.source]
 
-    best = asked(kernels[-1], slice(None))
+    best = numbers_of(kernels[-1], slice(None))
     assert np.unique(best[1]).size >= 4
     for kernel in kernels[1:] or kernels:
-        for ours, theirs in zip(asked(kernel, slice(None)), best, strict=True):
+        for ours, theirs in zip(numbers_of(kernel, slice(None)), best, strict=True):
             np.testing.assert_array_equal(ours, theirs)
         for i in range(0, n, 5):
-            alone = asked(kernel, slice(i, i + 1))
+            alone = numbers_of(kernel, slice(i, i + 1))
             np.testing.assert_array_equal(alone[0][:, 0], best[0][:, i])
             assert alone[1][0] == best[1][i]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.contacts import NAMES as BALL_NAMES
-from benchmarks.contacts import asked, hard_points
+from benchmarks.contacts import hard_points, rows_of
 from builder.solver.sweep import Sweep
 from builder.tables.measure import fast_from
 from builder.tables.quantities import solver_noise
@@ -46,10 +46,12 @@ def shares(ask: Ask, coarse: Any, n: int, kinds: Sequence[str] = KINDS) -> tuple
     ours, worst, medians = (opened(coarse) if isinstance(coarse, float) else coarse), 0.0, [1.0]
     for kind in kinds:
         v, y = draw(kind, n, ours, seed=8)
-        (value, bound), (truth, left) = (np.array(ask(s, v, y)) for s in (ours, opened(1e-12)))
+        (value, bound), (truth, fine_bound) = (
+            np.array(ask(s, v, y)) for s in (ours, opened(1e-12))
+        )
         error = np.abs(value - truth)
-        assert np.all(error <= (bound + left) * (1.0 + 1e-12)), kind
-        share = np.maximum(error - left, 0.0) / np.maximum(bound, 1e-300)
+        assert np.all(error <= (bound + fine_bound) * (1.0 + 1e-12)), kind
+        share = np.maximum(error - fine_bound, 0.0) / np.maximum(bound, 1e-300)
         worst = max(worst, float(share[np.isfinite(bound) & (bound > 1e-12)].max(initial=0.0)))
         if kind == "random":
             medians.append(float(np.median(bound[error > 0.0] / error[error > 0.0])))
@@ -74,8 +76,8 @@ def gradient(s: Surrogate, v: Array, y: Array) -> Any:
 
 
 def settled(s: Surrogate, v: Array, y: Array) -> Any:
-    found = settling(s, **UNIT, y0=y, v0=v)
-    return found.periods, found.error_bound
+    decay = settling(s, **UNIT, y0=y, v0=v)
+    return decay.periods, decay.error_bound
 
 
 def border(s: Surrogate, _: Array, y: Array) -> Any:
@@ -107,21 +109,21 @@ def test_a_ball_is_never_beyond_its_bounds(tolerance: float) -> None:
     """Over all of the legal range, beside the finest table.  Its ball is the one of 1e-10, which
     test_ball_table.py compares with fresh quadratures."""
     v, y = hard_points(3000, along=False, seed=11)
-    truths, found = asked(opened(1e-12), v, y, "across"), {}
-    rows = zip(BALL_NAMES, asked(opened(tolerance), v, y, "across"), truths, strict=True)
-    for name, (value, bound), (truth, left) in rows:
+    truths, largest = rows_of(opened(1e-12), v, y, "across"), {}
+    rows = zip(BALL_NAMES, rows_of(opened(tolerance), v, y, "across"), truths, strict=True)
+    for name, (value, bound), (truth, fine_bound) in rows:
         error, slope = np.abs(value - truth), name.startswith("slope")
         assert slope or not np.isnan(value).any()
         if slope:  # a gradient is a slope over y0, which underflows where y0 is huge
             error = np.where(y < 1e100, error, 0.0)
-        assert np.all((error <= (bound + left) * (1.0 + 1e-12)) | (slope & ~np.isfinite(error))), (
-            name
-        )
-        share = np.where(bound > 1e-290, (error - left) / np.maximum(bound, 1e-290), 0.0)
-        found[name] = float(np.nanmax(share))
-    assert min(found[name] for name in BALL_NAMES) > 0.25
+        assert np.all(
+            (error <= (bound + fine_bound) * (1.0 + 1e-12)) | (slope & ~np.isfinite(error))
+        ), name
+        share = np.where(bound > 1e-290, (error - fine_bound) / np.maximum(bound, 1e-290), 0.0)
+        largest[name] = float(np.nanmax(share))
+    assert min(largest[name] for name in BALL_NAMES) > 0.25
     plain = (v > 1e-3) & (v < 1e2) & (y > 1e-2) & (y < 1e2)
-    mu, bound = asked(opened(tolerance), v[plain], y[plain], "across")[0]
+    mu, bound = rows_of(opened(tolerance), v[plain], y[plain], "across")[0]
     error = np.abs(mu - truths[0][0][plain])
     assert np.median(bound[error > 0] / error[error > 0]) < 150.0
 
@@ -181,18 +183,18 @@ def test_bounds_of_slopes_hold_where_the_regime_is_uncertain_and_next_to_it(
     """Of two tables one may say stick-slip and the other continuous sliding; of a root the slope is
     then unbounded."""
     ours, fine = opened(coarse), opened(1e-12)
-    rng, known_to = np.random.default_rng(5), ours.border.max_rel_error
+    rng, precision = np.random.default_rng(5), ours.border.max_rel_error
     smooth = QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border
-    for low, high in ((0.0, known_to), (known_to, 4.0 * known_to), (1e-13, 1e-2)):
+    for low, high in ((0.0, precision), (precision, 4.0 * precision), (1e-13, 1e-2)):
         y = 10.0 ** rng.uniform(-4.0, 7.0, 20_000)
         v = ours.v_tilde_crit(y) * (
             1.0 + rng.choice([-1.0, 1.0], y.size) * rng.uniform(low, high, y.size)
         )
-        found, truth = (np.array(table.slopes(v, y, name, bounds=True)) for table in (ours, fine))
-        assert np.all(np.abs(found[1:3] - truth[1:3]) <= found[3:] + truth[3:])
-        assert not smooth or np.isfinite(found).all()
-        assert low <= known_to or np.isfinite(found[3:]).mean() > 0.5
-        assert smooth or high != known_to or np.isinf(found[3:]).all()
+        slopes, truth = (np.array(table.slopes(v, y, name, bounds=True)) for table in (ours, fine))
+        assert np.all(np.abs(slopes[1:3] - truth[1:3]) <= slopes[3:] + truth[3:])
+        assert not smooth or np.isfinite(slopes).all()
+        assert low <= precision or np.isfinite(slopes[3:]).mean() > 0.5
+        assert smooth or high != precision or np.isinf(slopes[3:]).all()
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.1, 1.88), (1.88, 1e4)])
@@ -203,8 +205,8 @@ def test_what_the_border_does_to_stick_is_well_bounded(
     sliding."""
     y = np.geomspace(low, high, 2000)
     v = np.minimum(sweep.solve("border", np.ones_like(y), y)["deficit"], table.v_tilde_crit(y))
-    found, bound = table.stick_fraction_with_bound(v, y)
-    error = np.abs(found - sweep.solve("full", v, y)["stick_fraction"])
+    share, bound = table.stick_fraction_with_bound(v, y)
+    error = np.abs(share - sweep.solve("full", v, y)["stick_fraction"])
     assert 0.5 < (error / bound).max() <= 1.0
 
 
@@ -334,10 +336,10 @@ def test_the_rounding_of_one_spring_along_and_normal_is_bounded_tightly(
     six = CLOSEST[form]
     name = "Fz_amplitude" if form == "normal" else "y0"
     case = {(name if key == "y0" else key): value for key, value in six.items()}
-    found = table.evaluate(case, direction=form)
+    answer = table.evaluate(case, direction=form)
     with mpmath.workdps(40):
-        error = abs(found.mu_macro - six["mu0"] * exact(form, **six))
-    assert 0.45 < float(error) / found.error_bound <= 1.0
+        error = abs(answer.mu_macro - six["mu0"] * exact(form, **six))
+    assert 0.45 < float(error) / answer.error_bound <= 1.0
 
 
 @pytest.mark.parametrize("form", ["rigid", "at rest", "along", "normal"])
@@ -360,14 +362,14 @@ def test_closed_forms_of_six_inputs_are_bounded_tightly(table: Surrogate, form: 
                 y * 10.0 ** rng.uniform(-4, 0) * mu0 * Fz / k * omega,
             )
         six = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
-        given = {
+        case = {
             "Fz_amplitude" if name == "y0" and form == "normal" else name: x
             for name, x in six.items()
         }
-        found = table.evaluate(given, direction=kind)
+        answer = table.evaluate(case, direction=kind)
         with mpmath.workdps(40):
             worst = max(
-                worst, float(abs(found.mu_macro - mu0 * exact(form, **six)) / found.error_bound)
+                worst, float(abs(answer.mu_macro - mu0 * exact(form, **six)) / answer.error_bound)
             )
     assert (0.5 if direction == "across" else 0.3) < worst <= 1.0
 
@@ -385,8 +387,8 @@ def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(
     ours, fine, worst = opened(coarse), opened(1e-12), 0.0
     for kind in KINDS:
         v, y = draw(kind, 20_000, ours, seed=5)
-        (mu, bound, _), (truth, left, _) = (s.ratio_with_bound(v, y) for s in (ours, fine))
-        share = np.maximum(np.abs(mu - truth) - left, 0.0) / np.maximum(bound, 1e-300)
+        (mu, bound, _), (truth, fine_bound, _) = (s.ratio_with_bound(v, y) for s in (ours, fine))
+        share = np.maximum(np.abs(mu - truth) - fine_bound, 0.0) / np.maximum(bound, 1e-300)
         for i in np.argsort(share)[-20::4]:
             point: Case = {"v0": float(v[i]), "y0": float(y[i])}
             target = float(fine.evaluate(**UNIT, **point).mu_macro)
@@ -419,10 +421,10 @@ def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(
     v: float, y: float
 ) -> None:
     coarse = opened(1e-4)
-    found = settling(coarse, **UNIT, y0=y, v0=v)
+    decay = settling(coarse, **UNIT, y0=y, v0=v)
     less = 2.0 * math.pi * (v * coarse.ratio_with_bound(v, y)[1] + coarse.power_with_bound(v, y)[1])
-    assert found.error_bound == close(
-        math.log(100.0) / (found.slip_path - less) - found.periods, rel=1e-9
+    assert decay.error_bound == close(
+        math.log(100.0) / (decay.slip_path - less) - decay.periods, rel=1e-9
     )
 
 
@@ -430,19 +432,22 @@ def test_the_standard_deviation_adds_the_inputs_in_squares(client: Any, case: Ca
     """The part of every input alone, its bound too, then all together."""
     each = {"mu0": 0.01, "Fz": 0.5, "k": 2e5, "y0": 3e-7, "omega": 2e3, "v0": 1e-3}
 
-    def asked(std: Case) -> Any:
+    def answer_to(std: Case) -> Any:
         return client.post(
             "/v1/mu-macro", json={**case, "include": ["std", "gradient"], "std": std}
         ).json()
 
-    alone, together = {name: asked({name: value}) for name, value in each.items()}, asked(each)
-    for name, found in alone.items():
-        assert found["std"] == close(abs(found["gradient"][name]) * each[name], rel=1e-14)
-        assert found["std_bound"] == close(found["gradient_bound"][name] * each[name], rel=1e-14)
+    alone, together = (
+        {name: answer_to({name: value}) for name, value in each.items()},
+        answer_to(each),
+    )
+    for name, answer in alone.items():
+        assert answer["std"] == close(abs(answer["gradient"][name]) * each[name], rel=1e-14)
+        assert answer["std_bound"] == close(answer["gradient_bound"][name] * each[name], rel=1e-14)
         assert together["std_share"][name] == close(
-            (found["std"] / together["std"]) ** 2, rel=1e-13
+            (answer["std"] / together["std"]) ** 2, rel=1e-13
         )
     for part in ("std", "std_bound"):
         assert together[part] == close(
-            math.sqrt(sum(found[part] ** 2 for found in alone.values())), rel=1e-13
+            math.sqrt(sum(answer[part] ** 2 for answer in alone.values())), rel=1e-13
         )

@@ -74,8 +74,8 @@ def test_fresh_solves_lie_within_tolerance_and_bounds(table: Surrogate, sweep: S
     assert report["distribution"].keys() == table.error_distribution.keys()
     for name, part in report["distribution"].items():
         stated = table.error_distribution[name]
-        for found, share in zip(part["error_quantiles"][1:3], ("0.95", "0.99"), strict=True):
-            assert stated[share] / 2.5 - 1e-13 <= found <= 2.5 * stated[share] + 1e-13, name
+        for error, share in zip(part["error_quantiles"][1:3], ("0.95", "0.99"), strict=True):
+            assert stated[share] / 2.5 - 1e-13 <= error <= 2.5 * stated[share] + 1e-13, name
 
 
 def test_bounds_hold_on_the_border_in_the_corner_and_at_creeping_speeds(
@@ -132,8 +132,8 @@ def test_a_table_meets_the_check_values_of_six_inputs_within_its_bounds(table: S
     assert rows
     for row in rows:  # the others are the reference itself
         case = {name: math.inf if row[name] == "rigid" else float(row[name]) for name in FIELDS}
-        found = table.evaluate(case)
-        assert abs(found.mu_macro - float(row["value"])) <= found.error_bound + float(
+        answer = table.evaluate(case)
+        assert abs(answer.mu_macro - float(row["value"])) <= answer.error_bound + float(
             row["tolerance"]
         ), row
 
@@ -187,13 +187,13 @@ def test_every_committed_file_is_tested() -> None:
 
 
 def test_the_stated_shares_of_errors_end_at_the_largest(table: Surrogate) -> None:
-    told: Any = table.attributes
+    attributes: Any = table.attributes
     largest = {name: part["1"] for name, part in table.error_distribution.items()}
-    assert largest["mu_ratio"] == told["verified_max_abs_error"] <= table.tolerance
-    assert largest["power"] == told["verified_max_rel_power_error"]
-    assert largest["stick_fraction"] == told["verified_max_stick_error"]
+    assert largest["mu_ratio"] == attributes["verified_max_abs_error"] <= table.tolerance
+    assert largest["power"] == attributes["verified_max_rel_power_error"]
+    assert largest["stick_fraction"] == attributes["verified_max_stick_error"]
     slopes = largest["slope_along_v"], largest["slope_along_y"]
-    assert max(slopes) == told["verified_max_slope_error"]
+    assert max(slopes) == attributes["verified_max_slope_error"]
     assert largest["border"] <= table.border.max_rel_error
     for part in table.error_distribution.values():
         assert part["0.5"] <= part["0.95"] <= part["0.99"] <= part["1"]

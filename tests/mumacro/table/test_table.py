@@ -252,9 +252,9 @@ def test_another_atlas_is_refused(
     path, index = tmp_path / "other.nc", CHARTS.index(MID)
     new, stated = ATLASES.get(change, (MID, "high: range is"))
     part, (name, axis, quantity) = sound.blocks[index], BORDER_PIECES[2]
-    for held in (part.nodes, part.cell_errors):  # the stick fraction, in stick-slip only
+    for arrays in (part.nodes, part.cell_errors):  # the stick fraction, in stick-slip only
         if not new.holds(atlas.QUANTITIES[2]):
-            del held["stick_fraction"]
+            del arrays["stick_fraction"]
     part.a, part.b = (
         nodes(x.size, axis.low, axis.high) for x, axis in ((part.a, new.a), (part.b, new.b))
     )
@@ -323,15 +323,15 @@ def test_one_checksum_covers_every_number_that_takes_part(sound: Table) -> None:
             yield lambda t, i=i: setattr(t.blocks[i], "max_abs_error", 0.5)
             yield lambda t, i=i: setattr(t.blocks[i], "max_rel_error", 0.5)
 
-    seen = {_digest(sound)}
+    digests = {_digest(sound)}
     sound.attributes["title"] = "a corrected title"
-    assert seen == {_digest(sound)}
+    assert digests == {_digest(sound)}
     for count, change in enumerate(changes(), 2):
         table = deepcopy(sound)
         change(table)
-        seen.add(_digest(table))
-        assert len(seen) == count
-    assert len(seen) > 150
+        digests.add(_digest(table))
+        assert len(digests) == count
+    assert len(digests) > 150
 
 
 def test_an_older_table_that_states_no_distribution_of_its_errors_opens(

@@ -15,9 +15,11 @@ void borders(const double *y, int n, double *out) {
     for (int i = 0; i < n; ++i) out[i] = mumacro_v_tilde_crit(y[i]);
 }
 
-/* out (n, 9): value, bound, slopes along ln v~ and ln y~, their bounds, source, return value, value alone */
+/* out (n, 9): value, bound, slopes along ln v~ and ln y~, their bounds,
+ * source, return value, value alone */
 void points(int quantity, const double *v, const double *y, int n, double *out) {
-    double (*const alone[])(double, double) = {mumacro_mu_ratio, mumacro_power, mumacro_stick_fraction};
+    double (*const alone[])(double, double) = {mumacro_mu_ratio, mumacro_power,
+                                               mumacro_stick_fraction};
     for (int i = 0; i < n; ++i, out += 9) {
         mumacro_point p;
         out[7] = mumacro_evaluate_point(quantity, v[i], y[i], &p);
@@ -32,14 +34,16 @@ int values(int quantity, const double *v, const double *y, int n, double *out) {
     return mumacro_values(quantity, n, v, y, out, out + n);
 }
 
-/* in (6, n); out (n, 21): mu_macro, mu_ratio, bound, v~, y~, source, regime, return value, gradient, its bounds, value
- * alone */
+/* in (6, n); out (n, 21): mu_macro, mu_ratio, bound, v~, y~, source, regime, return value,
+ * gradient, its bounds, value alone */
 void cases(int contact, int direction, const double *in, int n, double *out) {
     for (int i = 0; i < n; ++i, ++in, out += 21) {
-        const double mu0 = in[0], Fz = in[n], k = in[2 * n], y0 = in[3 * n], omega = in[4 * n], v0 = in[5 * n];
+        const double mu0 = in[0], Fz = in[n], k = in[2 * n], y0 = in[3 * n], omega = in[4 * n];
+        const double v0 = in[5 * n];
         mumacro_answer a;
         out[7] = mumacro_evaluate_as(contact, direction, mu0, Fz, k, y0, omega, v0, &a);
-        out[0] = a.mu_macro, out[1] = a.mu_ratio, out[2] = a.error_bound, out[3] = a.v_tilde, out[4] = a.y_tilde;
+        out[0] = a.mu_macro, out[1] = a.mu_ratio, out[2] = a.error_bound, out[3] = a.v_tilde,
+        out[4] = a.y_tilde;
         out[5] = a.source, out[6] = a.regime;
         memcpy(out + 8, a.gradient, sizeof a.gradient);
         memcpy(out + 14, a.gradient_bound, sizeof a.gradient_bound);
@@ -52,11 +56,13 @@ void case_arrays(const double *in, int n, double *out) {
     mumacro_mu_macros(n, in, in + n, in + 2 * n, in + 3 * n, in + 4 * n, in + 5 * n, out, out + n);
 }
 
-/* in (6, n); out (n, 6): v0 at the border, power, its bound, stick fraction, its bound, return value */
+/* in (6, n); out (n, 6): v0 at the border, power, its bound, stick
+ * fraction, its bound, return value */
 void cycles(const double *in, int n, double *out) {
     for (int i = 0; i < n; ++i, ++in, out += 6) {
         mumacro_cycle c;
-        out[5] = mumacro_evaluate_cycle(in[0], in[n], in[2 * n], in[3 * n], in[4 * n], in[5 * n], &c);
+        out[5] =
+            mumacro_evaluate_cycle(in[0], in[n], in[2 * n], in[3 * n], in[4 * n], in[5 * n], &c);
         out[0] = c.v0_crit, out[1] = c.power, out[2] = c.power_bound;
         out[3] = c.stick_fraction, out[4] = c.stick_fraction_bound;
     }

@@ -1,6 +1,6 @@
-/* Every entry of the kernel and of mumacro.h under sanitizers: random, nasty and illegal inputs, with a real table and
- * with tables of nonsense.  Arrays are allocated to the last number, so that one too many is seen.  What the numbers are
- * is tested elsewhere.  Prints how much was asked. */
+/* Every entry of the kernel and of mumacro.h under sanitizers: random, nasty and illegal inputs,
+ * with a real table and with tables of nonsense.  Arrays are allocated to the last number, so that
+ * one too many is seen.  What the numbers are is tested elsewhere.  Prints how much was asked. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -12,9 +12,11 @@ extern const mumacro_export mumacro_table;
 #include "interface.c"
 
 static const double nasty[] = {
-    -1.0, -0.0, 0.0, 5e-324, 1e-310, 1e-160, 1.0, 1e160, 1.7976931348623157e308, HUGE_VAL, -HUGE_VAL, NAN,
+    -1.0,     -0.0,      0.0, 5e-324, 1e-310, 1e-160, 1.0, 1e160, 1.7976931348623157e308,
+    HUGE_VAL, -HUGE_VAL, NAN,
 };
-enum { NASTY = sizeof nasty / sizeof *nasty, LONGEST = 1000, FEW = 16, MOTIONS = 400 }; /* a ball costs as much as 100 springs */
+/* a ball costs as much as 100 springs */
+enum { NASTY = sizeof nasty / sizeof *nasty, LONGEST = 1000, FEW = 16, MOTIONS = 400 };
 
 static uint64_t state = 88172645463325252u;
 
@@ -56,8 +58,8 @@ static void wrong(const char *what) {
 static volatile double used; /* by it no call is left out as needless */
 
 /* Points v, y through every function of points, in an array of n and alone. */
-static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, const double *v,
-                       const double *y) {
+static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n,
+                       const double *v, const double *y) {
     double *value = numbers((size_t)n), *bound = numbers((size_t)n), *again = numbers((size_t)n);
     double *rows = numbers(5 * (size_t)n);
     int8_t *source = (int8_t *)malloc((size_t)n);
@@ -66,7 +68,8 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, NULL);
         kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, source);
         kernel->values(data, 0, 0, quantity, n, v, y, again, bound, NULL);
-        /* the ball's cells have no errors of slopes but those of mu~, which is all that is asked of a ball */
+        /* the ball's cells have no errors of slopes but those of mu~, which
+         * is all that is asked of a ball */
         for (int contact = data == &mumacro_table.ball; contact < MU_CONTACTS; ++contact)
             kernel->slopes(data, contact, quantity, n, v, y, rows, n);
         for (int64_t i = 0; i < n; ++i)
@@ -77,14 +80,15 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         const int contact = kind / MU_DIRECTIONS, direction = kind % MU_DIRECTIONS;
         kernel->border_as(data, contact, direction, n, y, bound);
         for (int quantity = 0; quantity < 3; ++quantity)
-            kernel->values(data, contact, direction, quantity, n < FEW ? n : FEW, v, y, value, bound, source);
+            kernel->values(data, contact, direction, quantity, n < FEW ? n : FEW, v, y, value,
+                           bound, source);
     }
     free(value), free(bound), free(again), free(rows), free(source);
 }
 
 /* n cases through every function of cases; where column i is single, all have its first number. */
-static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, double *const *columns,
-                      int single) {
+static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n,
+                      double *const *columns, int single) {
     static const int ends[3] = {MU_ROW_V_TILDE, MU_ROW_GRADIENT, MU_ROWS};
     const size_t size = (size_t)n;
     double *rows[3], *high = numbers(size), *extremes = numbers(MU_EXTREME_ROWS * size);
@@ -100,12 +104,15 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
         kernel->cases(data, 0, 0, n, &in, ends[i], rows[i], n, source);
     }
     for (int kind = 1; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
-        kernel->cases(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW, &in, MU_ROWS, rows[2], n,
-                      source);
+        kernel->cases(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW, &in,
+                      MU_ROWS, rows[2], n, source);
     for (int64_t i = 0; i < n; ++i)
         high[i] = columns[2][single == 2 ? 0 : i] * scaled(-0.1, drawn() < 0.5 ? 4.0 : 600.0);
     for (int kind = 0; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
-        kernel->intervals(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, kind ? n < 2 ? n : 2 : n < FEW ? n : FEW,
+        kernel->intervals(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS,
+                          kind      ? n < 2 ? n : 2
+                          : n < FEW ? n
+                                    : FEW,
                           &in, high, extremes, n);
     for (int64_t i = 0; i < n; ++i) {
         double x[6];
@@ -118,15 +125,18 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
     free(rows[0]), free(rows[1]), free(rows[2]), free(high), free(extremes), free(source);
 }
 
-/* A motion of a few harmonics, in room for few steps or for many; every eighth is that of a ball. */
+/* A motion of a few harmonics, in room for few steps or for many; every eighth is that of a
+ * ball. */
 static void ask_motions(const mumacro_kernel *kernel, int turn) {
     const int ball = turn % 8 == 1;
-    const int32_t counts[3] = {(int32_t)(drawn() * 3.0), (int32_t)(drawn() * 3.0), ball ? 0 : (int32_t)(drawn() * 2.0)};
+    const int32_t counts[3] = {(int32_t)(drawn() * 3.0), (int32_t)(drawn() * 3.0),
+                               ball ? 0 : (int32_t)(drawn() * 2.0)};
     const int terms = counts[0] + counts[1] + counts[2], n = 1 + (int)(drawn() * 50.0);
     const int64_t room = (int64_t)1 << (3 + (int)(drawn() * 14.0));
     const double tolerance = scaled(ball ? -5.0 : -8.0, -2.0);
     double *orders = numbers((size_t)terms + 1), *one = numbers(1 + 2 * (size_t)terms);
-    double *work = numbers(2 * (size_t)room), *out = numbers(7), *forces = numbers(2 * (size_t)n + 2);
+    double *work = numbers(2 * (size_t)room), *out = numbers(7),
+           *forces = numbers(2 * (size_t)n + 2);
     double *shares = numbers(2), *weights = numbers(2);
     one[0] = drawn() < 0.1 ? 0.0 : scaled(-6.0, 2.0);
     for (int i = 0; i < terms; ++i) {
@@ -144,7 +154,8 @@ static void ask_motions(const mumacro_kernel *kernel, int turn) {
 static void ask_elements(const mumacro_kernel *kernel, int64_t n, double *const *x) {
     const int springs = 1 + (int)(drawn() * 5.0);
     double *held = nonsense(2 * (size_t)(n * springs)), *sums = numbers(2 * (size_t)n);
-    for (int step = 0; step < 3; ++step) kernel->element_steps(n, springs, x[0], x[1], x[2], x[3], x[5], held, sums);
+    for (int step = 0; step < 3; ++step)
+        kernel->element_steps(n, springs, x[0], x[1], x[2], x[3], x[5], held, sums);
     free(held), free(sums);
 }
 
@@ -164,18 +175,24 @@ static void check_point(double v, double y) {
     mumacro_point p;
     for (int quantity = -1; quantity <= 3; ++quantity) {
         const int error = mumacro_evaluate_point(quantity, v, y, &p);
-        if ((error == 0) != (p.value == p.value) || (p.source >= 0) != (error == 0)) wrong("value without right");
+        if ((error == 0) != (p.value == p.value) || (p.source >= 0) != (error == 0))
+            wrong("value without right");
     }
-    used = mumacro_mu_ratio(v, y) + mumacro_power(v, y) + mumacro_stick_fraction(v, y) + mumacro_v_tilde_crit(y);
+    used = mumacro_mu_ratio(v, y) + mumacro_power(v, y) + mumacro_stick_fraction(v, y) +
+           mumacro_v_tilde_crit(y);
 }
 
 /* Without a place for the answer, and with codes that there are not. */
 static void check_misuse(void) {
-    if (mumacro_evaluate(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT) wrong("no place");
-    if (mumacro_evaluate_cycle(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT) wrong("no place");
-    if (mumacro_evaluate_point(0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT) wrong("no place for the point");
+    if (mumacro_evaluate(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT)
+        wrong("no place");
+    if (mumacro_evaluate_cycle(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT)
+        wrong("no place");
+    if (mumacro_evaluate_point(0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT)
+        wrong("no place for the point");
     for (int code = -1000; code < 1000; ++code)
-        if (!mumacro_source_name(code)[0] || (code && !mumacro_error_text(code)[0])) wrong("no text");
+        if (!mumacro_source_name(code)[0] || (code && !mumacro_error_text(code)[0]))
+            wrong("no text");
 }
 
 /* One case in every contact and direction; its force, and the elements of a few springs. */
@@ -185,8 +202,10 @@ static void ask_calls(const double *x, double v_rest) {
     if (answer == NULL) exit(2);
     for (int contact = -1; contact <= MU_CONTACTS; ++contact)
         for (int direction = -1; direction <= MU_DIRECTIONS; ++direction) {
-            const int error = mumacro_evaluate_as(contact, direction, x[0], x[1], x[2], x[3], x[4], x[5], answer);
-            if ((error != 0) != (answer->source < 0) || (error != 0) != (answer->mu_macro != answer->mu_macro))
+            const int error =
+                mumacro_evaluate_as(contact, direction, x[0], x[1], x[2], x[3], x[4], x[5], answer);
+            if ((error != 0) != (answer->source < 0) ||
+                (error != 0) != (answer->mu_macro != answer->mu_macro))
                 wrong("an answer beside its error");
         }
     used = mumacro_force(x[5], v_rest, x[0], x[1], x[2], x[3], x[4]);
@@ -213,8 +232,8 @@ static void ask_builder(const mumacro_kernel *kernel, int64_t n, const double *v
     free(one), free(two), free(rows);
 }
 
-static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, double (*number)(int),
-                    int single) {
+static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n,
+                    double (*number)(int), int single) {
     double *columns[6];
     for (int i = 0; i < 6; ++i) columns[i] = numbers(i == single ? 1 : (size_t)n);
     for (int64_t j = 0; j < n; ++j)
@@ -236,7 +255,8 @@ static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int6
 
 /* Inputs whose groups fall into every block. */
 static double ordinary(int input) {
-    static const double low[6] = {-1.0, -1.0, 3.0, -9.0, 1.0, -7.0}, high[6] = {0.3, 4.0, 9.0, -2.0, 6.0, 2.0};
+    static const double low[6] = {-1.0, -1.0, 3.0, -9.0, 1.0, -7.0},
+                        high[6] = {0.3, 4.0, 9.0, -2.0, 6.0, 2.0};
     return drawn() < 0.02 ? anything() : scaled(low[input], high[input]);
 }
 
@@ -278,13 +298,15 @@ static void ask_nonsense(const mumacro_kernel *kernel) {
 int main(int count, char **words) {
     static const int64_t lengths[] = {0, 1, 7, 8, 255, 256, 257, LONGEST};
     const mumacro_kernel *kernel = &mumacro_kernel_base;
-    const long random = count > 1 ? atol(words[1]) : 300000, hostile = count > 2 ? atol(words[2]) : 172800;
+    const long random = count > 1 ? atol(words[1]) : 300000,
+               hostile = count > 2 ? atol(words[2]) : 172800;
     const long tables = count > 3 ? atol(words[3]) : 1000;
     long asked = 0, combinations = 0;
     check_misuse();
     for (int i = 0; asked < random; ++i) {
         const int64_t n = lengths[i % 8];
-        ask_all(kernel, i % 4 == 1 ? &mumacro_table.ball : &mumacro_table.data, n, ordinary, i % 7 - 1);
+        ask_all(kernel, i % 4 == 1 ? &mumacro_table.ball : &mumacro_table.data, n, ordinary,
+                i % 7 - 1);
         asked += (long)n;
     }
     while (combinations < hostile) {
