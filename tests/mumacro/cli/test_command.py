@@ -156,7 +156,7 @@ def test_no_words_show_three_examples_that_run_and_a_misspelt_command_is_correct
 
 
 def test_eval_of_a_case_in_place_of_a_file_names_the_command_for_one_case(capsys: Capture) -> None:
-    fault = said(capsys, 2, "eval", "mu0=0.4", "Fz=0.5N", "k=2e6")
+    fault = output_of(capsys, 2, "eval", "mu0=0.4", "Fz=0.5N", "k=2e6")
     assert "one case is given without eval: mumacro mu0=0.4 Fz=0.5N k=2e6" in fault
 
 
