@@ -22,7 +22,7 @@ from benchmarks.support.driven import answered, hard, ordinary
 from builder.solver.ball import Springs
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
-from builder.tables.contacts import Contact, ball
+from builder.tables.contacts import SolvedContact, ball
 from builder.tables.verify import BALL_CASES, Neighbours, bound_over_error
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
@@ -245,7 +245,7 @@ def nearby(rng: np.random.Generator, v: Array, y: Array, size: float) -> tuple[A
 Ratios = dict[str, tuple[Array, Array]]  # by row: error over bound, bound over error
 
 
-def compared(table: Surrogate, of: Contact, v: Array, y: Array, slopes: bool) -> Ratios:
+def compared(table: Surrogate, of: SolvedContact, v: Array, y: Array, slopes: bool) -> Ratios:
     """A ball across at v~ and y~ of its middle spring against fresh quadratures, beyond what those
     may be wrong by."""
     ratios = {}

@@ -20,7 +20,7 @@ from mumacro.table.polynomials import (
 )
 
 from ..solver.sweep import Sweep
-from .contacts import Contact
+from .contacts import SolvedContact
 from .quantities import SOLVED
 
 MAX_NODES = 96
@@ -31,7 +31,7 @@ NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more
 
 
 def solve_nodes(
-    of: Contact, index: int, shape: tuple[int, int], border: Border
+    of: SolvedContact, index: int, shape: tuple[int, int], border: Border
 ) -> tuple[Array, Array, dict[str, Array], dict[str, Array]]:
     """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from
     fresh solves.
@@ -158,7 +158,7 @@ def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
 
 
 def build_block(
-    of: Contact,
+    of: SolvedContact,
     index: int,
     border: Border,
     tolerance: float,

@@ -22,7 +22,7 @@ from mumacro.version import __version__
 from ..solver.ball import Springs
 from ..solver.sweep import Sweep
 from .blocks import build_block, build_border
-from .contacts import FINE, Contact, ball, spring
+from .contacts import FINE, SolvedContact, ball, spring
 from .measure import block_errors, border_errors
 from .quantities import ABS_TO_REL, SOLVED
 from .verify import QUANTILES, holds, uncovered, verify, verify_ball
@@ -253,7 +253,7 @@ def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
 def _meet_tolerance(
     table: Table,
     out: Path,
-    of: Contact,
+    of: SolvedContact,
     tolerance: float,
     targets: list[float],
     build: Callable[[int], Block],
@@ -269,7 +269,9 @@ def _meet_tolerance(
             of.blocks(table)[i] = build(i)
 
 
-def _state_errors(table: Table, out: Path, of: Contact, seed: int, tolerance: float) -> list[int]:
+def _state_errors(
+    table: Table, out: Path, of: SolvedContact, seed: int, tolerance: float
+) -> list[int]:
     """Measure the errors of the blocks and write them into the table; the blocks that miss its
     tolerance."""
     late = []

@@ -45,7 +45,7 @@ class Solve(Protocol):
 Noise = Callable[[str, Array, Array, dict[str, Array], Sliding], Array]
 
 
-class Contact(NamedTuple):
+class SolvedContact(NamedTuple):
     """One contact; ``noise`` as :func:`.quantities.solver_noise`."""
 
     kind: Kind
@@ -105,7 +105,7 @@ def slopes_of(surrogate: Surrogate, kind: Kind, name: str, v: Array, y: Array) -
     return np.array(shared_out.slopes(code, data, MIDDLE * v, MIDDLE * y, None, kind.contact))
 
 
-def spring(sweep: Sweep) -> Contact:
+def spring(sweep: Sweep) -> SolvedContact:
     """One spring, solved anew at every point."""
 
     def solve(
@@ -113,12 +113,12 @@ def spring(sweep: Sweep) -> Contact:
     ) -> dict[str, Array]:
         return sweep.solve("continuous" if continuous else "full", v, y, eta)
 
-    return Contact(
+    return SolvedContact(
         SPRING, atlas.CHARTS, solve, solver_noise, solver_noise, atlas.QUANTITY_NAMES, 1.0, None
     )
 
 
-def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> Contact:
+def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> SolvedContact:
     """A ball, integrated over springs well below ``tolerance``."""
     integral = Ball(springs, points_for(tolerance), workers)
 
@@ -128,7 +128,7 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> Contact
         del continuous  # no block of a ball reaches over the border
         return integral.solve(v, y, eta)
 
-    return Contact(
+    return SolvedContact(
         BALL,
         atlas.BALL_CHARTS,
         solve,

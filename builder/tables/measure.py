@@ -42,7 +42,7 @@ from mumacro.table.polynomials import (
 
 from ..solver.sweep import Sweep
 from .blocks import solve_nodes
-from .contacts import Contact
+from .contacts import SolvedContact
 from .quantities import SOLVED
 
 
@@ -120,7 +120,7 @@ def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int
     return np.asarray(np.abs(border(y) / exact - 1.0))
 
 
-def _stating(surrogate: Surrogate, of: Contact, error: float, of_border: float) -> Surrogate:
+def _stating(surrogate: Surrogate, of: SolvedContact, error: float, of_border: float) -> Surrogate:
     """The same table with one error for all that it tabulates, and a share of the border's.
 
     With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the
@@ -144,7 +144,7 @@ def _stating(surrogate: Surrogate, of: Contact, error: float, of_border: float) 
     )
 
 
-def block_errors(surrogate: Surrogate, of: Contact, n: int, seed: int) -> list[BlockErrors]:
+def block_errors(surrogate: Surrogate, of: SolvedContact, n: int, seed: int) -> list[BlockErrors]:
     """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
     neighbour."""
     stating = tuple(_stating(surrogate, of, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
@@ -169,7 +169,7 @@ _FROM_BORDER = ("ln_rho", "s", "s_root")
 BESIDE = 24  # steps of the border between two points of a cell
 
 
-def _bends(surrogate: Surrogate, of: Contact, true: Border, index: int, name: str) -> Array:
+def _bends(surrogate: Surrogate, of: SolvedContact, true: Border, index: int, name: str) -> Array:
     """What a slope along a is off by, over its share, because the table's border is not the true
     one, (cells a, POINTS, cells b, POINTS).
 
@@ -209,7 +209,7 @@ def _bends(surrogate: Surrogate, of: Contact, true: Border, index: int, name: st
 def _value_errors(
     surrogate: Surrogate,
     stating: tuple[Surrogate, ...],
-    of: Contact,
+    of: SolvedContact,
     index: int,
     rng: np.random.Generator,
     n: int,
@@ -347,7 +347,7 @@ def _without_edge(off: Array, b: _Along, axis: Axis, cells: int) -> None:
 
 
 def cell_errors(
-    of: Contact, index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
+    of: SolvedContact, index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
 ) -> dict[str, Array]:
     """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and
     along b; of a quantity whose slopes a table does not give, 0 for the derivatives.
@@ -366,14 +366,14 @@ def cell_errors(
     return found
 
 
-def _truths(of: Contact, exact: Array, noise: Array) -> list[Array]:
+def _truths(of: SolvedContact, exact: Array, noise: Array) -> list[Array]:
     """Chebyshev coefficients of the model: without what may be rounding; of a ball also all of
     them, since its quadrature's error is no rounding of the nodes."""
     clean = _without_noise(exact, noise)
     return [clean, chebyshev_coefficients(exact)] if of.kind == BALL else [clean]
 
 
-def _largest(of: Contact, index: int, block: Block, name: str, exact: Array) -> Array:
+def _largest(of: SolvedContact, index: int, block: Block, name: str, exact: Array) -> Array:
     """A quantity's largest errors over every cell, (cells, 3)."""
     chart, quantity = of.charts[index], QUANTITIES[QUANTITY_NAMES.index(name)]
     off, a, b = _difference(chart, block, block.nodes[name], exact)

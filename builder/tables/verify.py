@@ -22,7 +22,7 @@ from mumacro.table.atlas import (
 )
 
 from ..solver.sweep import Sweep
-from .contacts import Contact, ratio_of, slopes_of, spring
+from .contacts import SolvedContact, ratio_of, slopes_of, spring
 from .measure import BALL_SEAMS, SEAMS, border_errors, fast_from, near_ball_seams, near_seams
 from .measure import log_uniform as _log
 from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE
@@ -192,7 +192,7 @@ class Neighbours:
     A step is a share of the distance to what is not smooth: border and corner.
     """
 
-    def __init__(self, surrogate: Surrogate, of: Contact, v: Array, y: Array) -> None:
+    def __init__(self, surrogate: Surrogate, of: SolvedContact, v: Array, y: Array) -> None:
         self.v, self.y, self.crit, mu = v, y, surrogate.v_tilde_crit(y), surrogate.mu_ratio(v, y)
         self.noise = of.noise
         gap = np.abs(np.log(v / self.crit))
@@ -250,7 +250,7 @@ def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
 
 
 def _values(
-    surrogate: Surrogate, of: Contact, name: str, v: Array, y: Array, solved: dict[str, Array]
+    surrogate: Surrogate, of: SolvedContact, name: str, v: Array, y: Array, solved: dict[str, Array]
 ) -> _Compared:
     value, bound, source = of.quantity(surrogate, name, v, y)
     truth = solved[name]
@@ -263,7 +263,7 @@ def _values(
     return _Compared(error, error / scale, bound, over, missed, source)
 
 
-def _slopes(surrogate: Surrogate, of: Contact, around: Neighbours, name: str) -> _Compared:
+def _slopes(surrogate: Surrogate, of: SolvedContact, around: Neighbours, name: str) -> _Compared:
     """The logarithmic slopes, both of each point."""
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
     source = of.quantity(surrogate, "mu_ratio", v, y)[2]
@@ -387,14 +387,16 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     return _verify(surrogate, spring(sweep), CASES, points, seed, border)
 
 
-def verify_ball(surrogate: Surrogate, of: Contact, points: int, seed: int = 2018) -> dict[str, Any]:
+def verify_ball(
+    surrogate: Surrogate, of: SolvedContact, points: int, seed: int = 2018
+) -> dict[str, Any]:
     """The same of a ball with fresh quadratures, drawn as in :data:`BALL_CASES`; no border."""
     return _verify(surrogate, of, BALL_CASES, points, seed, None)
 
 
 def _verify(
     surrogate: Surrogate,
-    of: Contact,
+    of: SolvedContact,
     cases: dict[str, tuple[float, _How]],
     points: int,
     seed: int,

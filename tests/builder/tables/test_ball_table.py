@@ -13,7 +13,7 @@ from scipy.special import ellipe, ellipk
 from builder.solver.ball import NAMES, Ball, Springs
 from builder.solver.sweep import Sweep
 from builder.tables.build import BuildError, springs_for
-from builder.tables.contacts import BALL_NOISE, Contact, ball, ratio_of
+from builder.tables.contacts import BALL_NOISE, SolvedContact, ball, ratio_of
 from builder.tables.measure import block_errors
 from builder.tables.verify import BALL_CASES, Neighbours, seam_jumps
 from mumacro import InputError, Surrogate, closed_forms, surrogate
@@ -34,7 +34,7 @@ def springs() -> Springs:
 
 
 @pytest.fixture(scope="module")
-def of(springs: Springs) -> Contact:
+def of(springs: Springs) -> SolvedContact:
     return ball(springs)
 
 
@@ -79,7 +79,7 @@ def test_springs_that_the_solver_does_not_give_are_refused(
 # --- the solver -----------------------------------------------------------------------------------
 
 
-def test_twice_the_points_give_the_same(springs: Springs, of: Contact) -> None:
+def test_twice_the_points_give_the_same(springs: Springs, of: SolvedContact) -> None:
     v, y = wide(60, 1)
     few, many = Ball(springs).solve(v, y), Ball(springs, 146).solve(v, y)
     for name in NAMES:
@@ -186,7 +186,7 @@ CORNERS: dict[str, Any] = {
 @pytest.mark.parametrize("corner", CORNERS)
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10])
 def test_no_error_is_beyond_its_bound(
-    of: Contact, tolerance: float, corner: str, name: str
+    of: SolvedContact, tolerance: float, corner: str, name: str
 ) -> None:
     table = opened(tolerance)
     v, y = of.as_asked(*CORNERS[corner](60))
@@ -202,7 +202,7 @@ def test_no_error_is_beyond_its_bound(
     "corner",
     ["ridge", "corner at creep", "steepest ray", "border at y~ 1.5", "creep below the ridge"],
 )
-def test_no_slope_is_beyond_its_bound(of: Contact, corner: str) -> None:
+def test_no_slope_is_beyond_its_bound(of: SolvedContact, corner: str) -> None:
     table = opened(COARSE)
     v, y = of.as_asked(*CORNERS[corner](40))
     truth, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
@@ -233,7 +233,7 @@ def test_power_at_large_speeds_is_known_in_closed_form(tolerance: float) -> None
     assert np.all(bound <= tolerance * exact)
 
 
-def test_a_slope_where_the_border_has_a_knot_is_within_its_bound(of: Contact) -> None:
+def test_a_slope_where_the_border_has_a_knot_is_within_its_bound(of: SolvedContact) -> None:
     """The border's pieces meet at y~ = 1.5, within a block of the ball."""
     table = opened(COARSE)
     y = 1.5 + np.linspace(-0.05, 0.01, 121)
@@ -253,7 +253,7 @@ def test_seams_are_invisible() -> None:
 
 
 @pytest.mark.slow
-def test_the_errors_that_are_measured_are_those_that_the_table_states(of: Contact) -> None:
+def test_the_errors_that_are_measured_are_those_that_the_table_states(of: SolvedContact) -> None:
     table = opened(1e-4)
     for chart, block, found in zip(
         BALL_CHARTS, table.table.ball, block_errors(table, of, 300, seed=4), strict=True
@@ -299,7 +299,7 @@ def test_an_error_in_a_cell_widens_the_bounds_in_that_cell_alone(name: str) -> N
     np.testing.assert_array_equal(after[1][~wider], before[1][~wider])
 
 
-def test_an_error_of_a_block_is_found(of: Contact) -> None:
+def test_an_error_of_a_block_is_found(of: SolvedContact) -> None:
     table = read_table(opened(1e-4).path)
     index = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
     table.ball[index].nodes["mu_ratio"][-3:] *= 1.01
