@@ -1,7 +1,7 @@
 """One stiff step of slip by Radau IIA collocation, with nodes, weights and derivatives from NumPy's
 Legendre series.
 
-Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols and charts as in :mod:`.model`.
+Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols and charts as in :mod:`.slip`.
 """
 
 import math

@@ -9,7 +9,7 @@ Two sections are used, because neither is well conditioned everywhere:
   and th0 hardly moves.
 
 ``eta`` = y~ - 1 is a separate argument: next to the corner rounding y~ to double costs 1e-16 / mu~.
-v = v~ [-], y = y~ [-]; angles and charts as in :mod:`.model`.
+v = v~ [-], y = y~ [-]; angles and charts as in :mod:`.slip`.
 """
 
 import math

@@ -3,7 +3,7 @@ roots.
 
 Every polynomial is a row (ORDER + 2,) of the workspace ``w``, its coefficients in powers of the
 time [rad] since the start of the step.  Equations: Benad, Nakano, Popov, Popov (2018), (11), (12);
-symbols as in :mod:`.model`.
+symbols as in :mod:`.slip`.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 During stick u moves with the upper point, eqs. (9), (10): |u|^2 - 1 is explicit in the time, its
 first root ends it. Time is sigma = tau - pi/2 [rad]; v = v~ [-], y = y~ [-], eta = y~ - 1 [-];
-angles of u as in :mod:`.model`.
+angles of u as in :mod:`.slip`.
 """
 
 import math

@@ -1,1 +1,18 @@
-"""The compiled kernel, and the only Python that calls it."""
+"""The compiled kernel, and the only Python that calls it.
+
+Read ``kernel.c`` first: it includes the other files in an order in which each needs only those
+before it.  ``level.c`` is compiled once for each instruction level, ``dispatch.c`` chooses one when
+the library is loaded.
+
+- ``data.h``, ``records.h``, ``mumacro.h``: a table in memory, a quantity, what C programs call
+- ``lanes.h``, ``arithmetic.c``, ``closed_forms.c``: several points at once, functions, formulas
+- ``atlas.c``, ``border.c``, ``charts.c``, ``cells.c``: the blocks, their coordinates and polynomials;
+  ``ball_atlas.c``, ``ball_charts.c``: those of a ball
+- ``quantities.c``, ``records.c``, ``ball_records.c``: how each quantity follows from them
+- ``points.c``, ``passes.c``: one point, many points
+- ``directions.c``, ``contact.c``: along and normal, of one spring and of a ball; the dispatch over
+  contact and direction
+- ``dimensional.c``, ``interval.c``: cases in SI units, an interval of k
+- ``element.c``, ``motion.c``: steps in time, steady cycles of any motion
+- ``binding.py``, ``arrays.py``, ``threads.py``: the shared object from Python, and long arrays
+"""

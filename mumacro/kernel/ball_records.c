@@ -128,7 +128,7 @@ static double mu_ball_stick_slack(const mumacro_data *data, const mu_place *at, 
 }
 
 /* Meanings are those of one spring. */
-static const mu_quantity MU_BALL_QUANTITY[MU_QUANTITIES] = {
+static const mu_quantity MU_BALL_QUANTITY[] = {
     {{"mu_ratio", "value", "macroscopic over Coulomb friction coefficient", 1, 1},
      1.0,
      {{MU_ONE, MU_SLIP_DEFICIT}, {MU_ONE_LN_V, MU_DEFICIT}, {MU_NO_BASE, MU_COSINE}, {MU_NO_BASE, MU_COSINE},
@@ -151,6 +151,12 @@ static const mu_quantity MU_BALL_QUANTITY[MU_QUANTITIES] = {
       {MU_NO_BASE, MU_ROOT_Y}, {MU_NO_BASE, MU_ROOT_Y}},
      mu_ball_stick_slack, mu_ball_stick_limit, mu_ball_stick_fast, mu_stick_fast_slopes},
 };
+
+/* The compiler refuses a quantity without a record. */
+typedef char mu_record_of_each_quantity[sizeof MU_SPRING_QUANTITY == MU_QUANTITIES * sizeof(mu_quantity) &&
+                                                sizeof MU_BALL_QUANTITY == MU_QUANTITIES * sizeof(mu_quantity)
+                                            ? 1
+                                            : -1];
 
 /* The record of a quantity of a contact, or in a block. */
 MU_INLINE const mu_quantity *mu_quantity_of(int contact, int quantity) {

@@ -1,4 +1,4 @@
-/* The tabulated quantities: one record each.
+/* How a value follows from what a block tabulates; the records of the quantities are in records.c.
  *
  * mu_ratio        mu~ = mu_macro/mu0 = <u_x>, eq. (15)
  * power           p = <y~ cos tau u_y>, the mean power of the shaker over mu0 Fz l0 omega; that of the drive is v~ mu~

@@ -172,7 +172,7 @@ static double mu_stick_slack(const mumacro_data *data, const mu_place *at, doubl
 
 /* --- the records ------------------------------------------------------------------------------ */
 
-static const mu_quantity MU_SPRING_QUANTITY[MU_QUANTITIES] = {
+static const mu_quantity MU_SPRING_QUANTITY[] = {
     {{"mu_ratio", "value", "macroscopic over Coulomb friction coefficient", 1, 1},
      1.0,
      {{MU_ONE, MU_SLIP_DEFICIT}, {MU_NO_BASE, MU_COSINE}, {MU_NO_BASE, MU_COSINE},
