@@ -228,7 +228,7 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(
 def test_k_grows_with_the_load_along_the_law_and_to_a_root(
     open_page: Any, surrogate: Surrogate
 ) -> None:
-    page = open_page()
+    page = open_page(new=True)
     assert not page.find("#exponent").is_displayed()
     page.choose("#along", "Fz")
     page.choose("#unknown", "Fz", "input")
