@@ -223,7 +223,94 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(
     assert float(page.value("#field-omega").removesuffix(" kHz")) == close(at, rel=0.05)
 
 
+M_OF = {
+    "law": "#law-section [name=stiffness_exponent]",
+    "solve": "#solve [name=stiffness_exponent]",
+}
+
+
+def test_k_grows_with_the_load_along_fz(open_page: Any, surrogate: Surrogate) -> None:
+    page = open_page(new=True)
+    fields = [page.find(selector) for selector in M_OF.values()]
+    assert [field.is_displayed() for field in fields] == [False, False]
+    page.choose("#along", "Fz")
+    page.choose("#unknown", "Fz", "input")
+    assert [field.is_displayed() for field in fields] == [True, True]
+    assert [field.get_attribute("placeholder") for field in fields] == ["0", "0"]
+    page.type(M_OF["law"], "1/2")
+    assert page.value(M_OF["solve"]) == "1/2"
+    page.touched("#law", 0.7, 0.5)
+    read = page.wait_for("#law-read", r"Fz = (\S+) N: µ = (\S+),")
+    load = float(read[1])
+    grown = {**START, "Fz": load, "k": START["k"] * (load / 10.0) ** 0.5}
+    assert float(read[2]) == close(surrogate.evaluate(**grown).mu_macro, rel=1e-2)
+    # the point moves along the law, and k with it
+    page.touched("#law", 0.7, 0.5, click=True)
+    load = float(page.value("#field-Fz").removesuffix(" N"))
+    k = START["k"] * (load / 10.0) ** 0.5
+    assert 1e6 * float(page.value("#field-k").removesuffix(" N/µm")) == close(k, rel=1e-5)
+    page.click("#reset")
+    page.choose("#along", "Fz")
+    page.choose("#unknown", "Fz", "input")
+    page.type(M_OF["solve"], "0.5")
+    page.click("#solve-form button")
+    page.wait_for("#solve-result", r"^Fz = \S+ N: µ = 0.15, stick slip")
+    page.click("#solve-result button")
+    assert page.number() == 0.15
+    # the service says what it refuses, beside both fields
+    page.type(M_OF["law"], "1.5")
+    page.click("#solve-form button")
+    for status in ("#law-status", "#solve-status"):
+        page.wait_for(status, "stiffness_exponent: must be less than or equal to 1")
+    page.type(M_OF["law"], "half")
+    page.wait_for("#law-status", "^m: “half” is not a number")
+    page.press(M_OF["law"], "ESCAPE")
+    assert page.value(M_OF["law"]) == "1.5"
+    page.choose("#along", "v0")
+    assert (fields[0].is_displayed(), page.text("#law-status")) == (False, "")
+
+
+def test_a_ball_under_another_load_is_stiffer_unless_it_is_said_otherwise(
+    open_page: Any, tmp_path: Path
+) -> None:
+    with open_page.faked(RECORDED, "#contact=ball&along=Fz") as page:
+        asked = page.asked("v1/law")
+        assert (asked["Fz"], asked["stiffness_exponent"]) == (10, close(1.0 / 3.0, rel=1e-15))
+        assert page.find(M_OF["law"]).get_attribute("placeholder") == "1/3"
+        rows = [
+            *csv.DictReader(page.download("#csv", tmp_path, "friction-law-Fz.csv").splitlines())
+        ]
+        for row in rows[:: len(rows) // 5]:
+            assert float(row["k [N/m]"]) == close(
+                1e6 * (float(row["Fz [N]"]) / 10) ** (1 / 3), rel=1e-9
+            )
+        page.type(M_OF["law"], "0")
+        assert "Fz" not in page.asked("v1/law")
+
+
+@pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
+def test_the_exponent_appears_without_a_jump(open_page: Any, width: int) -> None:
+    page = open_page(width=width)
+    places = (
+        "return ['field-v0', 'along', 'scale', 'range', 'law-image', 'solve', 'readout'].map((id) =>"
+        " document.getElementById(id).getBoundingClientRect().y + scrollY);"
+    )
+    before = page.run(places)
+    page.choose("#along", "Fz")
+    assert page.run(places) == before
+    assert page.find(M_OF["law"]).is_displayed()
+    page.choose("#unknown", "Fz", "input")
+    assert page.run(places) == before
+    assert page.run("return document.documentElement.scrollWidth;") <= width
+
+
 ENDS = {
+    "#direction=normal&along=Fz": "Fz [N]",
+    "#direction=normal&along=Fz_amplitude&scale=linear": "ΔFz [N]",
+    "#direction=normal&along=Fz_amplitude": "ΔFz [N]",
+    "#contact=ball&along=Fz": "Fz [N]",
+    "#k=0.8..1.2N/um&along=Fz&stiffness_exponent=1": "Fz [N]",
+    "#k=rigid&along=Fz&contact=ball": "Fz [N]",
     "#along=mu0": "µ₀",
     "#along=Fz": "Fz [N]",
     "#along=k&scale=linear": "k [N/µm]",

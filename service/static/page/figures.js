@@ -1,7 +1,7 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
 import {
-  RIGID, about, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
+  RIGID, about, caption, caseAround, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
@@ -149,7 +149,8 @@ export function mapPanel(set, nudge, status) {
 const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 
-/** The interval of the swept input: what was chosen, else whole decades around the point and its border. */
+/** The interval of the swept input: what was chosen, else whole decades around the point and its border, as far as the
+ *  contact does not lift off. */
 function lawRange({ along, scale, range, ...state }, border) {
   if (range.text) return range;
   const { unit, low, high } = state[along];
@@ -159,11 +160,15 @@ function lawRange({ along, scale, range, ...state }, border) {
   const [least, most] = [Math.min(...shown), Math.max(...shown)];
   const linear = [about.inputs[along].positive ? (least / 100).toPrecision(1) : 0, (4 * most).toPrecision(1)];
   const decades = [`1e${Math.floor(Math.log10(least)) - 2}`, `1e${Math.ceil(Math.log10(most)) + 2}`];
-  return readInterval(along, (scale === "linear" ? linear : decades).join(".."), unit);
+  const ends = (scale === "linear" ? linear : decades).map(Number);
+  const near = (name, share) => Number((share * fromSI(name, state[name].low, unit)).toPrecision(3));
+  if (along === "Fz" && state.direction === "normal") ends[0] = Math.max(ends[0], near("Fz_amplitude", 1.01));
+  if (along === "Fz_amplitude") ends[1] = Math.min(ends[1], near("Fz", 0.99));
+  return readInterval(along, ends.join(".."), unit);
 }
 
-/** The law: `set({ name: value [SI] })`, `nudge(name, steps)`. */
-export function lawPanel(set, nudge) {
+/** The law: `move(name, value [SI])`, `nudge(name, steps)`. */
+export function lawPanel(move, nudge) {
   let state, answer, asked, law, frame, along, unit;
   let cursor = null;
   const status = new Status("law-status", "law-section");
@@ -223,9 +228,10 @@ export function lawPanel(set, nudge) {
 
   /** All that is drawn, as CSV (RFC 4180), in the units that are shown. */
   function csv() {
-    const { values, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high } = law;
+    const { values, k, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high } = law;
     const columns = {
-      [heading()]: values.map((value) => Number(shown(value).toPrecision(15))), "mu_macro [-]": mu_macro,
+      [heading()]: values.map((value) => Number(shown(value).toPrecision(15))), ...(k && { "k [N/m]": k }),
+      "mu_macro [-]": mu_macro,
       "mu_static [-]": mu_static, regime, ...(low && { "mu_macro_low [-]": low, "mu_macro_high [-]": high }),
     };
     const rows = values.map((_, i) => Object.values(columns).map((column) => column[i]));
@@ -234,7 +240,7 @@ export function lawPanel(set, nudge) {
 
   plot.follow({
     move: (x) => frame && read(frame.holds(x) ? Math.round((POINTS - 1) * frame.x.share(frame.x.value(x))) : null),
-    pick: (x) => frame && set({ [along]: toSI(along, frame.x.value(x), unit) }),
+    pick: (x) => frame && move(along, toSI(along, frame.x.value(x), unit)),
     step: (right) => right && nudge(along, right),
   });
   $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${along}.csv`));
@@ -246,9 +252,10 @@ export function lawPanel(set, nudge) {
     unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
     $("range").placeholder = chosen;
-    status.set("typed", state.range.fault && `range: ${state.range.fault}.`);
+    const fault = state.stiffness_exponent.fault && along === "Fz" ? `m: ${state.stiffness_exponent.fault}.` : null;
+    status.set("typed", state.range.fault ? `range: ${state.range.fault}.` : fault);
     tell();
-    const request = { ...caseOf(state, [along], true), along, start, stop, points: POINTS, scale: state.scale };
+    const request = { ...caseAround(state, along, true), along, start, stop, points: POINTS, scale: state.scale };
     if (!answer || JSON.stringify(request) === asked) return;
     asked = JSON.stringify(request);
     channel.push(request);

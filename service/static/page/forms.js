@@ -1,8 +1,8 @@
 // The form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
 import { Status } from "./ask.js";
 import {
-  RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
-  readValue, refuse, show, symbolOf, valueOf, within,
+  RIGID, about, attempt, caseAround, caseOf, fromSI, inUnit, inWords, movedAlong, namesOf, powerOf, readPoints,
+  readQuantity, readValue, refuse, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
@@ -46,6 +46,21 @@ export function inputForm(set, setSI, status) {
     }
     $("sketch").setAttribute("aria-label", `The set-up: ${said}`);
   }
+  /** The fields of the exponent of k, each where its question is about Fz, and what holds while they are empty. */
+  function offerExponent({ along, contact, Fz: { low: load, unit }, stiffness_exponent: exponent }) {
+    const usual = about.exponents[contact];
+    const without = usual === "0" ? "it is constant" : `it grows as for a ball, m = ${usual}`;
+    for (const [id, name] of [["law-section", along], ["solve", $("unknown").value]]) {
+      for (const part of $(id).querySelectorAll(".exponent")) part.hidden = name !== "Fz";
+      for (const part of $(id).querySelectorAll(".no-exponent")) part.hidden = name === "Fz";
+      $(id).querySelector(".exponent .usual").textContent =
+        `k holds at Fz = ${inUnit("Fz", load, unit)}. Without m ${without}. Rough surfaces: 0.5 to 1.`;
+      const field = $(id).querySelector("[name=stiffness_exponent]");
+      field.placeholder = usual;
+      fill(field, exponent);
+    }
+  }
+  $("unknown").addEventListener("input", () => offerExponent(state));
   const options = [["along", "symbol"], ["unknown", "label"]].flatMap(([id, word]) => {
     $(id).append(...Object.entries(about.inputs).map(([name, input]) => new Option(input[word], name)));
     return [...$(id).options];
@@ -71,6 +86,7 @@ export function inputForm(set, setSI, status) {
     fill($("range"), state.range);
     for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
     if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
+    offerExponent(state);
     for (const { name, symbol, row, input, slider, fault } of rows) {
       const [quantity, size] = [state[name], valueOf(state, name)];
       row.hidden = !namesOf(state).includes(name);
@@ -123,19 +139,21 @@ const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...g
   return make("li", {}, text, given.length > 0 && button);
 }));
 
-/** Which value of an input gives a wanted friction.  `use({ name: value [SI] }, digits, more)` takes it. */
+/** Which value of an input gives a wanted friction.  `use(changed)` takes it into the state. */
 export function solver(use) {
   return panel("solve", "v1/solve-for", (state) => {
     const { unknown, quantity, target: text } = Object.fromEntries(new FormData($("solve-form")));
     const { low: target } = within("target", () => readQuantity("mu0", text, "-"));
-    return { ...caseOf(state, [unknown]), unknown, quantity, target, include: powerOf(state) };
+    const { fault } = state.stiffness_exponent;
+    if (fault && unknown === "Fz") refuse(`m: ${fault}`);
+    return { ...caseAround(state, unknown), unknown, quantity, target, include: powerOf(state) };
   }, ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
     const { unit } = state[unknown];
     const none = min === max ? reason : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
     const lines = roots.map(({ value, mu_macro: mu, regime, power }) => {
       const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
       const shaker = power ? `, shaker ${inUnit("power", power.oscillation)}` : "";
-      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`, { [unknown]: value }, 15];
+      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`, movedAlong(state, unknown, value, 15)];
     });
     list("solve-result", lines.length ? lines : [[none]], use);
   });

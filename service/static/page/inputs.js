@@ -2,8 +2,8 @@
 // Nothing here needs a browser; tests/service/page tests it with node.
 
 /** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
- *  slider's decimal exponents (SI), start value; beside them the choices with their words, geometries
- *  and their arguments, and whether there is a guide. */
+ *  slider's decimal exponents (SI), start value; beside them the choices with their words, of each contact
+ *  the exponent of k over Fz as text, geometries and their arguments, and whether there is a guide. */
 export const about = {};
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
@@ -136,6 +136,18 @@ export function readInterval(name, text, unit) {
   return { text: `${first}..${high.text}`, unit: high.unit, low: low.low, high: high.low };
 }
 
+/** A typed exponent of k over Fz: { text, value }, such as 0.5 or 1/3; its bounds are the service's. */
+export function readExponent(text) {
+  if (text.trim() === "") return ANY;
+  const parts = text.split("/").map(readNumber);
+  const [, unit] = parts.find(([, one]) => one !== "") ?? [];
+  if (unit) refuse(`“${unit}” is too much: m has no unit`);
+  if (parts.length > 2) refuse(`“${text.trim()}” is not a number`);
+  const [[over], [under] = [1]] = parts;
+  if (under === 0) refuse(`“${text.trim()}” is not a number`);
+  return { text: text.trim(), value: over / under };
+}
+
 const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval(name, text, unit));
 
 /** A value of an input [SI], or "rigid", as a quantity with so many digits. */
@@ -197,12 +209,16 @@ export const ANY = { text: "" };
 export const startState = () => ({
   ...Object.fromEntries(Object.entries(about.inputs).map(([name, { start }]) => [name, readValue(name, start)])),
   contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: ANY,
+  stiffness_exponent: ANY,
 });
 
-/** What is typed for an input or the range; if it cannot be used, what was there, with `typed` and its `fault`. */
+/** What is typed for an input, the range or the exponent; if it cannot be used, what was there, with `typed` and its `fault`. */
 export function readTyped(state, name, text) {
-  const [input, read] = name === "range" ? [state.along, readRange] : [name, readValue];
-  const { found, fault } = attempt(() => read(input, text, state[input].unit));
+  const read = {
+    range: () => readRange(state.along, text, state[state.along].unit),
+    stiffness_exponent: () => readExponent(text),
+  };
+  const { found, fault } = attempt(read[name] ?? (() => readValue(name, text, state[name].unit)));
   return fault ? { ...state[name], typed: text, fault } : found;
 }
 
@@ -226,10 +242,37 @@ export function caseOf(state, without = [], whole = false) {
   ]);
 }
 
-/** The inputs in one line, without one of them. */
-export function caption(state, without) {
-  const names = namesOf(state).filter((name) => name !== without);
-  return names.map((name) => `${symbolOf(name, state[name].unit)} = ${state[name].text}`).join(", ");
+/** The exponent m in k = k_given (Fz/Fz_given)^m: what is typed, else that of the contact. */
+export const exponentOf = (state) =>
+  state.stiffness_exponent.value ?? readExponent(about.exponents[state.contact]).value;
+
+/** Whether k grows with the input that is swept or solved for. */
+export const stiffens = (state, name) => name === "Fz" && exponentOf(state) !== 0;
+
+/** The case of a question about one input, which is left out; where k grows with it, it stays: the load at which k
+ *  holds. */
+export function caseAround(state, name, whole = false) {
+  if (!stiffens(state, name)) return caseOf(state, [name], whole);
+  return { ...caseOf(state, [], whole), stiffness_exponent: exponentOf(state) };
+}
+
+/** What changes when one input gets another value [SI], with so many digits: itself, and k where it grows with it. */
+export function movedAlong(state, name, value, digits) {
+  const { unit, low, high } = state.k;
+  const moved = { [name]: rounded(name, value, state[name].unit, digits) };
+  if (!stiffens(state, name) || state.k === RIGID) return moved;
+  const growth = (moved.Fz.low / state.Fz.low) ** exponentOf(state);
+  const ends = [low, high].map((end) => Number(fromSI("k", growth * end, unit).toPrecision(Math.max(digits, 6))));
+  return { ...moved, k: readValue("k", low === high ? String(ends[0]) : ends.join(".."), unit) };
+}
+
+/** The inputs in one line, without the one that the law goes along. */
+export function caption(state, along) {
+  const names = namesOf(state).filter((name) => name !== along);
+  const parts = names.map((name) => `${symbolOf(name, state[name].unit)} = ${state[name].text}`);
+  const exponent = state.stiffness_exponent.text || about.exponents[state.contact];
+  if (stiffens(state, along)) parts.push(`k at Fz = ${state.Fz.text}, growing as Fz^(${exponent})`);
+  return parts.join(", ");
 }
 
 /** The power, where it is known: not for a normal force that oscillates. */
@@ -255,7 +298,9 @@ export function toAddress(state) {
   const keyOf = (name) => (symbolOf(name, state[name].unit) === "f" ? "f" : name);
   const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state[name])}`);
   parts.push(...Object.keys(WORDS).filter((key) => state[key] !== usual[key]).map((key) => `${key}=${state[key]}`));
-  if (state.range.text) parts.push(`range=${inAddress(state.range)}`);
+  for (const name of ["range", "stiffness_exponent"]) {
+    if (state[name].text) parts.push(`${name}=${inAddress(state[name])}`);
+  }
   return `#${parts.join("&")}`;
 }
 
@@ -281,6 +326,7 @@ export function fromAddress(hash) {
   for (const name of namesOf(state)) take(name, (text) => readValue(name, text, about.inputs[name].unit));
   take("f", (text) => readValue("omega", text, "Hz"), "omega");
   take("range", (text) => readInterval(state.along, text, about.inputs[state.along].unit));
+  take("stiffness_exponent", readExponent);
   for (const key of [...texts.keys()]) take(key, () => refuse("unknown"));
   return { state, faults };
 }

@@ -3,7 +3,7 @@ import { Status } from "./ask.js";
 import { lawPanel, mapPanel } from "./figures.js";
 import { fit, inputForm, solver, stiffness } from "./forms.js";
 import {
-  ANY, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
+  ANY, about, attempt, friction, fromAddress, inUnit, inWords, movedAlong, namesOf, question, readTyped,
   rounded, show, startState, toAddress, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
@@ -55,10 +55,16 @@ function setSI(values, digits = 4, more = {}) {
   if (found) change({ ...Object.fromEntries(found), ...more });
 }
 
+/** Gives one input another value [SI]; k follows where it grows with it. */
+function move(name, value, digits = 4) {
+  const { found } = attempt(() => movedAlong(state, name, value, digits));
+  if (found) change(found);
+}
+
 /** Makes an input larger or smaller by steps of 5 %; true. */
 function nudge(name, steps) {
   const from = state[name].low || 10 ** about.inputs[name].range[0];
-  if (from !== Infinity) setSI({ [name]: from * 1.05 ** steps }, 6);
+  if (from !== Infinity) move(name, from * 1.05 ** steps, 6);
   return true;
 }
 
@@ -132,8 +138,8 @@ function start(names) {
   Object.assign(about, names);
   $("version").textContent = about.version;
   for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
-  parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge),
-    solver(setSI), stiffness(setSI), fit(setSI, (words) => change(fromAddress(`#${words}`).state))];
+  parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(move, nudge),
+    solver(change), stiffness(setSI), fit(setSI, (words) => change(fromAddress(`#${words}`).state))];
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
   addEventListener("change", take);

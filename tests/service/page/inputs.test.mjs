@@ -3,8 +3,8 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import {
-  RIGID, about, attempt, caseOf, friction, fromAddress, inUnit, question, readInterval, readPoints, readQuantity, readValue,
-  show, startState, toAddress, valueOf,
+  RIGID, about, attempt, caption, caseAround, caseOf, friction, fromAddress, inUnit, movedAlong, question, readExponent,
+  readInterval, readPoints, readQuantity, readValue, show, startState, toAddress, valueOf,
 } from "../../../service/static/page/inputs.js";
 
 const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
@@ -146,4 +146,44 @@ test("the question says what was chosen, and nothing else", () => {
   const normal = question(fromAddress("#direction=normal&k=rigid").state);
   assert.deepEqual([normal.Fz_amplitude, normal.k, "y0" in normal], [5, "rigid", false]);
   assert.deepEqual([plain, normal].map(({ include }) => include.includes("power")), [true, false]);
+});
+
+test("an exponent of the stiffness is a number or a fraction, or is left out", () => {
+  for (const [text, value] of [["0.5", 0.5], [" 1/3 ", 1 / 3], ["1 / 2", 0.5], ["0", 0], ["1,5", 1.5], ["", undefined]]) {
+    assert.equal(readExponent(text).value, value);
+  }
+  for (const [text, reason] of [
+    ["x", "is not a number"], ["1/x", "is not a number"], ["1/0", "is not a number"], ["1/2/3", "is not a number"],
+    ["1/", "give a number"], ["0.5 N", "m has no unit"],
+  ]) assert.ok(attempt(() => readExponent(text)).fault.includes(reason), text);
+});
+
+test("a question about Fz holds the load at which k holds where k grows with it", () => {
+  const state = { ...startState(), stiffness_exponent: readExponent("1/2") };
+  const { Fz, stiffness_exponent: exponent } = caseAround(state, "Fz");
+  assert.deepEqual([Fz, exponent], [10, 0.5]);
+  assert.equal(caseAround({ ...startState(), contact: "ball" }, "Fz").stiffness_exponent, 1 / 3);
+  for (const [constant, name] of [[startState(), "Fz"], [state, "v0"], [{ ...state, stiffness_exponent: readExponent("0") }, "Fz"]]) {
+    const asked = caseAround(constant, name);
+    assert.deepEqual([name in asked, "stiffness_exponent" in asked], [false, false]);
+  }
+  assert.ok(caption(state, "Fz").endsWith("k at Fz = 10 N, growing as Fz^(1/2)"));
+  assert.ok(!caption(state, "v0").includes("growing"));
+});
+
+test("a move along Fz takes k along", () => {
+  const state = { ...startState(), stiffness_exponent: readExponent("1/2"), k: readValue("k", "0.8..1.2 N/um") };
+  const { Fz, k } = movedAlong(state, "Fz", 40, 4);
+  assert.deepEqual([Fz.text, k.text], ["40 N", "1.6..2.4 N/µm"]);
+  assert.deepEqual(Object.keys(movedAlong(state, "v0", 1, 4)), ["v0"]);
+  for (const without of [{ stiffness_exponent: readExponent("") }, { k: RIGID }]) {
+    assert.deepEqual(Object.keys(movedAlong({ ...state, ...without }, "Fz", 40, 4)), ["Fz"]);
+  }
+});
+
+test("the exponent is a part of the address", () => {
+  const address = toAddress({ ...startState(), stiffness_exponent: readExponent("1/2") });
+  assert.ok(address.endsWith("&stiffness_exponent=1/2"));
+  assert.equal(fromAddress(address).state.stiffness_exponent.value, 0.5);
+  assert.deepEqual(fromAddress("#stiffness_exponent=x").faults, ["stiffness_exponent = x (“x” is not a number)"]);
 });
