@@ -32,7 +32,7 @@ _COLOURS = {
     "color-brand-primary": "accent",
     "color-brand-content": "accent",
 }
-_PAGE = (ROOT / "service" / "static" / "page" / "page.css").read_text("utf-8")
+_PAGE = (ROOT / "service" / "static" / "page" / "colours.css").read_text("utf-8")
 _PAIRS = {
     name: (light, dark)
     for name, light, dark in re.findall(r"--(\w+): light-dark\((#\w+), (#\w+)\)", _PAGE)

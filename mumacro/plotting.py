@@ -52,6 +52,7 @@ _LINES = {"border of reverse slip": "-.", "border of continuous sliding": "--"}
 _REGIMES = {"continuous": "continuous sliding", "stick_slip": "stick and slip"}
 _MARKS = "osD^vPX"  # of groups of cases: they differ without colour, too
 _MOST_LABELS = 8  # of curves in a legend
+_TO_BORDER = 0.4  # weight of a label's distance to the border beside that to another line
 _SIDE = 0.05  # of the map, where no label stands
 #: places where the map names the regime, in shares of its width and height
 AREAS = ((0.14, 0.735), (0.8, 0.12))
@@ -275,16 +276,20 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
         if not inside.any():
             continue
         x, y = across[inside], lines[level][inside]
-        others = [line for other, line in lines.items() if other != level] + [border]
-        apart = np.min(
-            [np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1) for line in others],
-            axis=0,
-        )
+        others = [line for other, line in lines.items() if other != level]
+        apart = np.min([_distances(x, y, across, line) for line in others], axis=0)
+        # the border is drawn thicker than a line, and a number beside it is hard to read
+        apart = np.minimum(apart, _TO_BORDER * _distances(x, y, across, border))
         for u, w in [*words, *(at[1:] for at in placed)]:
             apart = np.minimum(apart, 0.5 * np.hypot(x - u, y - w))
         best = int(apart.argmax())
         placed.append((level, float(x[best]), float(y[best])))
     return placed
+
+
+def _distances(x: Array, y: Array, across: Array, line: Array) -> Array:
+    """How far points (m,) are from a line of heights (n,) at ``across`` (n,); (m,)."""
+    return np.asarray(np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1))
 
 
 def plot_map(

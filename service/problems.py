@@ -295,9 +295,18 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
     return RequestError(kind, detail, headers=error.headers)
 
 
+_NO_GUIDE = (
+    "the documentation is not installed here: in the source, python3 dev.py docs builds it, and "
+    "MUMACRO_GUIDE=build/docs python3 dev.py serve serves it"
+)
+
+
 def _no_such_path(scope: Scope) -> str:
     """What to do about a path that is not there; its case, and "_" for "-", do not matter."""
     path = path_in(scope)[:_MAX_TEXT].lower().replace("_", "-").rstrip("/")
+    guide = scope["app"].state.settings.guide
+    if guide is None and (path == "/guide" or path.startswith("/guide/")):
+        return _NO_GUIDE
     paths = [each for each in scope["app"].state.methods if "{" not in each]
     # a path without its version, such as /mu-macro, is nearer to /v1/mu-macro than it looks
     for candidate in (path, f"/v{API_VERSION}{path}"):

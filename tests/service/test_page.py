@@ -129,7 +129,9 @@ def test_built_documentation_is_served_if_named(
         for path in ("/guide/none.html", "/guide/..%2Fsecret"):
             problem(guided.get(path), 404)
         problem(guided.post("/guide/", headers={"X-API-Key": "open-sesame"}), 405)
-    problem(client.get("/guide/"), 404)
+    for path in ("/guide", "/guide/", "/guide/tutorial.html"):  # says how to get it
+        assert "python3 dev.py docs builds it" in problem(client.get(path), 404)["detail"]
+    assert "no such path" in problem(client.get("/guided"), 404)["detail"]
 
 
 def test_a_wheel_holds_the_built_documents_where_there_are_any(

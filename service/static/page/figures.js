@@ -6,6 +6,7 @@ import {
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
 
+const NARROW = 280; // of a map: there the name of a regime takes two lines
 const FINE = 1000; // steps from the foot of the map to its top
 const kindOf = ({ contact, direction }) => `contact=${contact}&direction=${direction}`;
 
@@ -106,8 +107,9 @@ export function mapPanel(set, nudge, status) {
       return path;
     };
     const areas = data.areas.map(([x, up, text]) => {
-      const [[px, py], half] = [at(x, up), 4.2 * text.length + 8];
-      return [text, Math.min(Math.max(px, left + half), left + wide - half), py, half];
+      const lines = wide < NARROW ? text.split(/ (?=\S+$)/) : [text];
+      const [[px, py], half] = [at(x, up), 4.2 * Math.max(...lines.map((line) => line.length)) + 8];
+      return [lines, Math.min(Math.max(px, left + half), left + wide - half), py, half];
     });
     const numbers = []; // those that have room
     for (const one of data.labels) {
@@ -127,7 +129,7 @@ export function mapPanel(set, nudge, status) {
     };
     return [
       frame.inside(data.shades.map(shade)), frame.axes(false),
-      frame.inside(border, numbers.map(number), areas.map(([text, ...place]) => label(text, ...place.slice(0, 2), "tag area"))),
+      frame.inside(border, numbers.map(number), areas.map(([lines, x, y]) => lines.map((line, i) => label(line, x, y + 15 * i, "tag area")))),
       point && frame.point(...point),
     ];
   }

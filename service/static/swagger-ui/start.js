@@ -32,7 +32,7 @@ new MutationObserver(tidy).observe($("swagger-ui"), { childList: true, subtree: 
 function show(spec) {
   // validatorUrl: null keeps the page from sending the description to a public validator.
   window.SwaggerUIBundle({
-    spec,
+    spec: { ...spec, info: { ...spec.info, title: "Version" } }, // the name stands above it
     dom_id: "#swagger-ui",
     deepLinking: true,
     defaultModelsExpandDepth: 0, // fifty models are folded until somebody opens them
