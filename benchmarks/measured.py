@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Fit, Surrogate, fit, solve_for
+from mumacro.plotting import BLUE, GREY, INK, RED, finish
 
 Array = NDArray[np.float64]
 POINTS = ROOT / "tests" / "data" / "luo-2024.csv"
@@ -25,7 +26,6 @@ FZ = 1.1 * 9.80665  # N, of the slider's weight; the article does not state the 
 RIG: dict[str, Any] = {"Fz": FZ, "y0": 0.35e-6, "f": 26e3}
 ALONG: dict[str, Any] = {"direction": "along"}
 CONTACTS = ("spring", "ball")
-INK, GREY, BLUE, RED = "#222222", "#8c959f", "#1f6fb4", "#c1272d"
 
 
 class Points(NamedTuple):
@@ -242,16 +242,21 @@ def _draw() -> None:
         axes.set_xticks(1e3 * p.v0, [f"{1e3 * x:g}" for x in p.v0], minor=False)
         axes.set_xticks([], minor=True)
         axes.set_xlabel(r"$v_0$ [mm/s]")
-        axes.spines[["top", "right"]].set_visible(False)
     rigid = force("spring", "rigid", mu0, v0)
     left.plot(1e3 * v0, rigid, color=GREY, lw=2.0, label="rigid contact")
     left.plot(1e3 * p.v0, p.without, "o", mfc="white", color=INK, label="measured, not shaken")
     left.plot(1e3 * p.v0, p.shaken, "o", color=INK, label="measured, shaken")
-    left.set(yscale="log", ylabel="friction [N]", ylim=(1e-3, 6.0), title="not shaken, and shaken")
+    left.set(yscale="log", ylabel="friction [N]", ylim=(1e-3, 6.0))
     left.set_yticks([0.001, 0.01, 0.1, 1.0], ["0.001", "0.01", "0.1", "1"])
     right.plot(1e3 * v0, one, color=RED, lw=1.6, ls=":", label=r"one spring, one $\mu_0$")
     right.plot(1e3 * p.v0, p.shaken, "o", color=INK)
-    right.set(ylabel="friction [N]", ylim=(0.0, 0.65), title="shaken alone")
+    right.set(ylabel="friction [N]", ylim=(0.0, 0.65))
+    finish(left, "not shaken, and shaken", legend=False)
+    finish(right, "shaken alone", legend=False)
+    figure.suptitle(
+        f"Steel on steel, shaken along: $f$ = 26 kHz, $x_0$ = 0.35 µm, $F_z$ = {FZ:.4g} N",
+        fontsize="medium",
+    )
     handles = dict(zip(*reversed(left.get_legend_handles_labels()), strict=True))
     handles |= dict(zip(*reversed(right.get_legend_handles_labels()), strict=True))
     figure.legend(

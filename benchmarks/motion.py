@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate, motion
+from mumacro.plotting import BLUE, GREY, INK, RED, finish
 
 Array = NDArray[np.float64]
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5}
@@ -208,6 +209,7 @@ def times(share: float = 1.0) -> str:
 
 PHASES = np.linspace(0.0, 360.0, 73)
 SPEEDS = (0.02, 0.1, 0.5)  # m/s
+LOOKS = ((BLUE, "-"), (RED, "--"), (INK, "-."))  # of their curves
 
 
 def phase_sweep(v0: float) -> Array:
@@ -227,9 +229,9 @@ def pictures(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
     rows = []
-    for v0 in SPEEDS:
+    for v0, (color, dashes) in zip(SPEEDS, LOOKS, strict=True):
         ratio = phase_sweep(v0)
-        axes.plot(PHASES, ratio, label=f"$v_0$ = {v0:g} m/s")
+        axes.plot(PHASES, ratio, color=color, ls=dashes, lw=2.0, label=f"$v_0$ = {v0:g} m/s")
         low, high = int(ratio.argmin()), int(ratio.argmax())
         rows.append(
             [
@@ -240,13 +242,15 @@ def pictures(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
                 f"{PHASES[high]:.0f}",
             ]
         )
-    axes.axhline(0.0, lw=0.8, color="grey")
+    axes.axhline(0.0, lw=0.8, color=GREY)
     axes.set(
         xlabel="phase of the load [degrees]",
         ylabel=r"$\mu_\mathrm{macro}/\mu_0$ [-]",
         xticks=np.arange(0, 361, 45),
     )
-    axes.legend()
+    finish(
+        axes, r"$\mu_0$ = 0.3, $F_z$ = 10 ± 5 N, $k$ = 1 N/µm, $x_0$ = 4 µm, $f$ = 20 kHz; spring"
+    )
     figure.savefig(IMAGES / "motion-phase.png", dpi=110)
     header = ("v0 [m/s]", "least mu_macro/mu0", "at [degrees]", "most", "at [degrees]")
     return markdown(header, rows)

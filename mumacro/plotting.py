@@ -165,7 +165,7 @@ def plot_law(
         axes.set_xscale("log")
     axes.set(xlabel=_axis(along), ylabel=r"$\mu_\mathrm{macro}$ [-]", xlim=(x[0], x[-1]))
     axes.set_ylim(bottom=0.0)
-    _finish(axes, title)
+    finish(axes, title)
     return axes
 
 
@@ -192,7 +192,7 @@ def plot_fit(along: str, curves: Sequence[Curve], title: str, axes: Any = None) 
             axes.set_xscale("log")
     axes.set(xlabel=_axis(along), ylabel=r"$\mu_\mathrm{macro}$ [-]")
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    _finish(axes, title, legend=len(curves) <= _MOST_LABELS)
+    finish(axes, title, legend=len(curves) <= _MOST_LABELS)
     return axes
 
 
@@ -200,7 +200,7 @@ def _axis(name: str) -> str:
     return f"{_SYMBOLS[name]} [{unit_of(name)}]"
 
 
-def _finish(axes: Any, title: str, legend: bool = True) -> None:
+def finish(axes: Any, title: str, legend: bool = True) -> None:
     """What all curves share.  The legend stands above the axes: it covers no curve."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(visible=True, color="0.92")
@@ -362,7 +362,7 @@ def plot_cases(
     ends = (0.5 * float(inside.min()), 2.0 * float(inside.max())) if inside.size else Y_RANGE
     places = np.geomspace(*ends, 201)
     _plane(axes, np.full(201, np.nan) if border is None else border(places), places)
-    _finish(axes, "")
+    finish(axes, "")
     return axes
 
 
@@ -402,7 +402,7 @@ def plot_cycle(
     mean = float(np.sum((Fx[1:] + Fx[:-1]) * np.diff(share)) / 2.0)
     forces.axhline(mean, lw=0.8, color=BLUE, ls="--", label="mean of $F_x$")
     forces.set(xlabel="share of the period [-]", ylabel="force [N]")
-    _finish(forces, title)
+    finish(forces, title)
     micro = 1e6
     path.plot(micro * x, micro * y, color=INK, label="upper point")
     path.plot(micro * x[0], micro * y[0], "o", color=BLUE, label="start of the period")
@@ -419,5 +419,5 @@ def plot_cycle(
     )
     path.margins(0.15)
     path.set(xlabel=r"$x$ [µm]", ylabel=r"$y$ [µm]", aspect="equal", adjustable="datalim")
-    _finish(path, "")
+    finish(path, "")
     return axes
