@@ -63,11 +63,17 @@ class OneLineParser(argparse.ArgumentParser):
         super().__init__(formatter_class=_Lines, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """End the program with code 2 and the fault, with the choice that may have been meant."""
+        """End the program with code 2 and the fault, with the choice that may have been meant, or
+        with the example of the help where something is missing."""
         if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
             choices = [word.strip(" '") for word in wrong[3].split(",")]
             near = difflib.get_close_matches(wrong[2].lower(), choices, n=1)
             message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
+        message = message.replace("the following arguments are required", "missing")
+        lines = (self.epilog or "").splitlines()
+        example = next((line.strip() for line in lines if line.startswith("  mumacro ")), None)
+        if example and re.match(r"missing: |argument .*: expected ", message):
+            message += f", as in {example}"
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
 
 
@@ -273,7 +279,9 @@ def _faults_of_names(
     frequencies = {"f", "omega"}
     left_out = {*without} | (frequencies if frequencies & {*without} else set())
     faults = [
-        f"leave {name} out: it varies here or is computed" for name in case if name in left_out
+        f"leave {name} out of the case: this command varies or computes it"
+        for name in case
+        if name in left_out
     ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")

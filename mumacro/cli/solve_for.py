@@ -1,5 +1,6 @@
 """``mumacro solve-for``: the values of one input that give a mu_macro."""
 
+import argparse
 from collections.abc import Sequence
 
 from mumacro.analysis.law import law as friction_law
@@ -21,13 +22,24 @@ from mumacro.inputs.kind import AMPLITUDE
 EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s' --target 0.15"
 
 
+def _target(text: str) -> float:
+    """A number; argparse says the fault of another text."""
+    try:
+        return float(text)
+    except ValueError:
+        fault = (
+            f"{text!r} is not a number: give mu_macro, such as 0.15, or with --ratio mu_macro/mu0"
+        )
+        raise argparse.ArgumentTypeError(fault) from None
+
+
 def run(words: Sequence[str]) -> str:
     """``mumacro solve-for``."""
     description = "Every value of one input at which mu_macro is the target."
     epilog = f"{common.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {EXAMPLE}"
     first = "unknown", {"choices": (*NAMES, AMPLITUDE), "help": "the unknown input"}
     parser = common.question("solve-for", description, epilog, "the other five inputs", first=first)
-    parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
+    parser.add_argument("--target", type=_target, required=True, help="wanted mu_macro [-]")
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)

@@ -785,3 +785,22 @@ def test_headings_and_numbers_are_read_as_they_are_written() -> None:
     with pytest.raises(ValueError, match="plain number"):
         read_number("y0", "0x10")
     assert all(scale.si(1.0) > 0.0 for units in UNITS_OF.values() for scale in units.values())
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (("law", CASE), "missing: --along, as in mumacro law '"),
+        (("law", CASE, "--along", "v0"), "expected 3 arguments, as in mumacro law '"),
+        (("solve-for", "y0", CASE), "missing: --target, as in mumacro solve-for y0 '"),
+        (("stiffness",), "missing: GEOMETRY, as in mumacro stiffness ball"),
+        (("solve-for", "y0", CASE, "--target", "50%"), "'50%' is not a number: give mu_macro"),
+    ],
+)
+def test_a_fault_of_the_words_says_what_to_write(capsys: Any, words: Any, fault: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert fault in lines[0]
