@@ -292,8 +292,8 @@ def test_a_ball_under_another_load_is_stiffer_unless_it_is_said_otherwise(
 def test_the_exponent_appears_without_a_jump(open_page: Any, width: int) -> None:
     page = open_page(width=width)
     places = (
-        "return ['field-v0', 'along', 'scale', 'range', 'law-image', 'solve', 'readout'].map((id) =>"
-        " document.getElementById(id).getBoundingClientRect().y + scrollY);"
+        "return ['field-v0', 'along', 'scale', 'range', 'law-image', 'solve', 'readout']"
+        ".map((id) => document.getElementById(id).getBoundingClientRect().y + scrollY);"
     )
     before = page.run(places)
     page.choose("#along", "Fz")

@@ -1,7 +1,8 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
 import {
-  RIGID, about, caption, caseAround, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
+  RIGID, about, caption, caseAround, fromSI, inUnit, inWords, readInterval, readValue, sentence, show, symbolOf, toSI,
+  valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
@@ -254,8 +255,8 @@ export function lawPanel(move, nudge) {
     unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
     $("range").placeholder = chosen;
-    const fault = state.stiffness_exponent.fault && along === "Fz" ? `m: ${state.stiffness_exponent.fault}.` : null;
-    status.set("typed", state.range.fault ? `range: ${state.range.fault}.` : fault);
+    const fault = state.stiffness_exponent.fault && along === "Fz" ? `m: ${sentence(state.stiffness_exponent.fault)}` : null;
+    status.set("typed", state.range.fault ? `range: ${sentence(state.range.fault)}` : fault);
     tell();
     const request = { ...caseAround(state, along, true), along, start, stop, points: POINTS, scale: state.scale };
     if (!answer || JSON.stringify(request) === asked) return;

@@ -2,7 +2,7 @@
 import { Status } from "./ask.js";
 import {
   RIGID, about, attempt, caseAround, caseOf, fromSI, inUnit, inWords, movedAlong, namesOf, powerOf, readPoints,
-  readQuantity, readValue, refuse, show, symbolOf, valueOf, within,
+  readQuantity, readValue, refuse, sentence, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
@@ -66,14 +66,14 @@ export function inputForm(set, setSI, status) {
     return [...$(id).options];
   });
   $("unknown").value = "y0";
-  const rows = Object.entries(about.inputs).map(([name, { label, symbol, note, range: [low, high] }]) => {
+  const rows = Object.entries(about.inputs).map(([name, { label, note, range: [low, high] }]) => {
     const fault = make("p", { id: `fault-${name}`, class: "fault" });
     const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
     const steps = { min: low * STEPS, max: high * STEPS, step: 1 };
     const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...steps });
     slider.addEventListener("input", () => setSI({ [name]: 10 ** (slider.value / STEPS) }));
     const words = make("label", { for: input.id }, label, note && make("small", {}, note));
-    return { name, symbol, row: make("div", { class: "field" }, words, input, slider), input, slider, fault };
+    return { name, row: make("div", { class: "field" }, words, input, slider), input, slider, fault };
   });
   $("messages").append(...rows.map(({ fault }) => fault));
   $("form").append(...rows.map(({ row }) => row));
@@ -87,14 +87,14 @@ export function inputForm(set, setSI, status) {
     for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
     if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
     offerExponent(state);
-    for (const { name, symbol, row, input, slider, fault } of rows) {
+    for (const { name, row, input, slider, fault } of rows) {
       const [quantity, size] = [state[name], valueOf(state, name)];
       row.hidden = !namesOf(state).includes(name);
       input.disabled = slider.disabled = quantity === RIGID;
       fill(input, quantity);
       slider.value = size > 0 ? Math.round(STEPS * Math.log10(size)) : slider.min;
       slider.setAttribute("aria-valuetext", `${symbolOf(name, quantity.unit)} = ${quantity.text}`);
-      fault.textContent = quantity.fault && !row.hidden ? `${symbol}: ${quantity.fault}.` : "";
+      fault.textContent = quantity.fault && !row.hidden ? `${symbolOf(name, quantity.unit)}: ${sentence(quantity.fault)}` : "";
       fault.classList.toggle("bad", input.ariaInvalid === "true");
       status.set(`typed ${name}`, row.hidden ? "" : fault.textContent, input.ariaInvalid === "false");
     }
@@ -122,7 +122,7 @@ function panel(name, path, read, show) {
   $(`${name}-form`).addEventListener("submit", (event) => {
     event.preventDefault();
     const { found: asked, fault } = attempt(() => read(state));
-    status.set("typed", fault && `${fault}.`);
+    status.set("typed", fault && sentence(fault));
     if (!fault) channel.push(asked);
   });
   $(`${name}-form`).addEventListener("input", compare);

@@ -53,6 +53,9 @@ export function friction(value, uncertainty = 0, usual = 4) {
   return value.toPrecision(Math.min(Math.max(places, 1), 15));
 }
 
+/** A reason as a sentence. */
+export const sentence = (text) => (/[.?!]$/.test(text) ? text : `${text}.`);
+
 class Fault extends Error {}
 export const refuse = (why) => { throw new Fault(why); };
 
@@ -118,6 +121,8 @@ export function readQuantity(name, text, unit) {
 export function readValue(name, text, unit = about.inputs[name].offered[0]) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return RIGID;
   if (name === "k" && text.includes("..")) return readInterval(name, text, unit);
+  const dashed = /^\s*([\d.]+)\s*[-–]\s*(\d.*)$/.exec(text);
+  if (name === "k" && dashed) refuse(`write an interval as ${dashed[1]}..${dashed[2].trim()}`);
   const read = readQuantity(name, text, unit);
   const { positive, bound } = about.inputs[name];
   if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0)) refuse(`must be ${bound}`);

@@ -32,6 +32,7 @@ const READ = [ // input, unit of its field, text: SI value, or part of the reaso
   ["y0", "µm", "constructor", "is not a number"], ["y0", "µm", "5 constructor", "is not a unit"],
   ["k", "N/m", "1..2 mm", "“mm” is not a unit of k"], ["k", "N/m", "2..1", "must go up"], ["k", "N/m", "1..1", "must go up"],
   ["k", "N/m", "1..rigid", "two numbers"], ["k", "N/m", "1..2..3", "not an interval"], ["k", "N/m", "..2", "give a number"],
+  ["k", "N/µm", "0.8-1.2", "write an interval as 0.8..1.2"], ["k", "N/µm", "0.8 – 1.2 N/um", "0.8..1.2 N/um"],
   ["Fz", "N", "1..2", "is not a number"],
 ];
 for (const [name, unit, text, expected] of READ) {
