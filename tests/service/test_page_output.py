@@ -257,6 +257,7 @@ def test_k_grows_with_the_load_along_fz(open_page: Any, surrogate: Surrogate) ->
     page.wait_for("#solve-result", r"^Fz = \S+ N: µ = 0.15, stick slip")
     page.click("#solve-result button")
     assert page.number() == 0.15
+    assert not page.is_old("#solve")  # the same growth, from another load
     # the service says what it refuses, beside both fields
     page.type(M_OF["law"], "1.5")
     page.click("#solve-form button")

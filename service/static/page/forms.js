@@ -101,6 +101,13 @@ export function inputForm(set, setSI, status) {
   };
 }
 
+/** A question as text.  Where k grows with Fz, it is the same question at every load along that growth. */
+function textOf(question) {
+  const { Fz, k, stiffness_exponent: exponent, ...others } = question;
+  if (exponent === undefined) return JSON.stringify(question);
+  return JSON.stringify({ ...others, exponent, k: (k / Fz ** exponent).toPrecision(9) });
+}
+
 /** A form that asks `path` for what `read(state)` says; what it `show`s is grey while it would ask something else. */
 function panel(name, path, read, show) {
   const status = new Status(`${name}-status`, name);
@@ -108,12 +115,12 @@ function panel(name, path, read, show) {
   const compare = () => {
     const { found: now } = attempt(() => read(state));
     if (now) status.set("typed", null);
-    const same = !answered || JSON.stringify(now) === answered;
+    const same = !answered || (now && textOf(now) === answered);
     if (same) status.set(name, null);
     status.set("changed", same ? null : "This was asked with other values.", true);
   };
   const channel = status.channel(name, (asked) => post(path, asked), (found, asked) => {
-    answered = JSON.stringify(asked);
+    answered = textOf(asked);
     status.answered = true;
     compare();
     $(`${name}-result`).hidden = false;
