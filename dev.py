@@ -197,6 +197,9 @@ def demo() -> int:
 def serve(*arguments: str) -> int:
     ensure("service")
     os.chdir(ROOT)
+    guide = ROOT / "build" / "docs"
+    if (guide / "index.html").is_file():
+        os.environ.setdefault("MUMACRO_GUIDE", str(guide))
     if os.name != "nt":  # the service receives the signals itself
         os.execve(PYTHON, [PYTHON, "-m", "service", *arguments], environment())  # noqa: S606
     return run(PYTHON, "-m", "service", *arguments)

@@ -18,6 +18,8 @@ if __name__ == "__main__" and "healthcheck" not in sys.argv:
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
 
 import argparse
+import errno
+import socket
 import threading
 import time
 import urllib.request
@@ -92,6 +94,21 @@ def _announce(settings: Settings) -> None:
             return
 
 
+def _is_taken(settings: Settings) -> bool:
+    """Whether another program listens at the address."""
+    if not settings.port:  # any free one
+        return False
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    with socket.socket(family) as probe:
+        if os.name != "nt":  # there it would share the address
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((settings.host, settings.port))
+        except OSError as error:
+            return error.errno == errno.EADDRINUSE
+    return False
+
+
 def _check(settings: Settings) -> int:
     """Ask /readyz.  A container needs no other program for its health check."""
     url = f"{_address(settings)}/readyz"
@@ -106,6 +123,14 @@ def _check(settings: Settings) -> int:
 def _serve(settings: Settings) -> int:
     # Also from the command mumacro, which has not set it.
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+
+    if _is_taken(settings):
+        print(
+            f"port {settings.port} is taken by another program: stop it, or choose another port, "
+            f"as in --port {settings.port + 1 if settings.port < 65535 else 8001}",
+            file=sys.stderr,
+        )
+        return 1
 
     # Imported here: a health check must not load the server.
     import uvicorn

@@ -5,6 +5,7 @@ The service serves it; the page itself is in ``service/static/page``.
 """
 
 from collections.abc import Mapping
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
@@ -99,13 +100,13 @@ def names(guide: bool) -> dict[str, Any]:
     return {
         "inputs": inputs,
         "choices": _CHOICES,
-        "exponents": {contact: springs.exponent for contact, springs in SPRINGS_OF.items()},
         "impossible": {
             f"{contact} {direction}": reason
             for contact in CONTACTS
             for direction in DIRECTIONS
             if (reason := _impossible(contact, direction))
         },
+        "exponents": {name: _fraction(springs.exponent) for name, springs in SPRINGS_OF.items()},
         "geometries": geometries,
         "arguments": arguments,
         "example": _EXAMPLE,
@@ -138,6 +139,11 @@ def map_of(
         "labels": plotting.label_places(ratio, on_map),
         "areas": [[*place, plotting.regime_words(name)] for place, name in regimes],
     }
+
+
+def _fraction(exponent: float) -> str:
+    """An exponent as a person writes it, such as 1/3."""
+    return str(Fraction(exponent).limit_denominator(9))
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:

@@ -297,7 +297,7 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
 
 _NO_GUIDE = (
     "the documentation is not installed here: in the source, python3 dev.py docs builds it, and "
-    "MUMACRO_GUIDE=build/docs python3 dev.py serve serves it"
+    "python3 dev.py serve has it then"
 )
 
 

@@ -91,8 +91,8 @@ def stiffening_of(
     power = SPRINGS_OF[CONTACTS[kind.contact]].exponent if exponent is None else float(exponent)
     if exponent is None and not power:
         bound = (
-            "left out, because Fz is the unknown; beside a stiffness exponent it is the load at "
-            "which k holds"
+            "left out, because Fz is the unknown or swept; beside a stiffness exponent it is the "
+            "load at which k holds"
         )
         raise InputError("Fz", load, bound)
     loads = real("Fz", load)

@@ -35,6 +35,7 @@ K_UNCERTAINTY = (
     0.1  # relative uncertainty of k by default: materials and geometry give no better one
 )
 _FAR = 1e4  # y~ that no contact has
+_LARGEST_AMPLITUDE, _LARGEST_STIFFNESS = 1e-3, 1e10  # m, N/m: of contacts that are shaken
 _RATE = 0.01  # a of mu0 + a ln(slip speed), rock, polymers and metals (docs/validity.md)
 _TILT, _NORMAL = 0.01, 1.21  # misalignment; normal over tangential stiffness of steel on steel
 # slip paths [m] around the micrometres after which friction has adapted to a new speed
@@ -49,6 +50,15 @@ class Row(TypedDict):
     row: str
     text: str
     effect: float | None
+
+
+def _doubtful(six: Mapping[str, float]) -> str:
+    """The input whose unit explains an amplitude y~ that no contact has."""
+    if six["y0"] > _LARGEST_AMPLITUDE:
+        return f"y0 = {six['y0']:.3g} in metres"
+    if six["k"] > _LARGEST_STIFFNESS:
+        return f"k = {six['k']:.3g} in N/m"
+    return f"Fz = {six['Fz']:.3g} in newtons"
 
 
 def model_rows(
@@ -81,7 +91,7 @@ def model_rows(
         return []
     y = 0.0 if kind.normal else answer.y_tilde
     if y > _FAR:
-        text = f"y~ = {y:.3g}; contacts have 0.1 to 100: is y0 = {six['y0']:.3g} in metres?"
+        text = f"y~ = {y:.3g}; contacts have 0.1 to 100: is {_doubtful(six)}?"
         return [{"row": "units", "text": text, "effect": None}]
     rows = [
         _other_contact(surrogate, case, mu, contact, direction),

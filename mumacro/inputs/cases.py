@@ -225,7 +225,7 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
         name: value for name, value in case.items() if value is not None or name == "k" != unknown
     }
     for name in inputs.keys() & ({"omega", "f"} if unknown == "omega" else {unknown}):
-        raise InputError(name, inputs[name], f"left out, because {unknown} is the unknown")
+        raise InputError(name, inputs[name], f"left out, because {unknown} is the unknown or swept")
     columns = columns_of(by_name(None, {**inputs, unknown: 1.0}, kind), kind)
     for name, column in columns.items():
         if np.size(column) != 1:

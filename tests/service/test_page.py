@@ -257,7 +257,8 @@ def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) ->
     page = open_page("#bad=1&v0=1e6&digits=all", width=width)
     page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
     assert inaccessible(page, repository) == {}
-    page = open_page("#contact=ball&direction=along&k=0.8..1.2N/um", width=width)
+    page = open_page("#contact=ball&direction=along&k=0.8..1.2N/um&along=Fz", width=width)
+    page.choose("#unknown", "Fz", "input")
     for name, text in (("radius", "5 mm"), ("E", "210 GPa"), ("nu", "0.3")):
         page.type(f"#argument-{name}", text, commit=False)
     page.choose("#points", "0.001 0.1\n0.1 0.2", "input")

@@ -1,7 +1,6 @@
 """The page in a browser: the numbers, the map, the friction law, the panels, downloads."""
 
 import csv
-import math
 import re
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-import mumacro
 from benchmarks.support.browser import RECORDED, START
 from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import contact_of
@@ -225,47 +223,97 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(
     assert float(page.value("#field-omega").removesuffix(" kHz")) == close(at, rel=0.05)
 
 
-def test_k_grows_with_the_load_along_the_law_and_to_a_root(
-    open_page: Any, surrogate: Surrogate
-) -> None:
+M_OF = {
+    "law": "#law-section [name=stiffness_exponent]",
+    "solve": "#solve [name=stiffness_exponent]",
+}
+
+
+def test_k_grows_with_the_load_along_fz(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page(new=True)
-    assert not page.find("#exponent").is_displayed()
+    fields = [page.find(selector) for selector in M_OF.values()]
+    assert [field.is_displayed() for field in fields] == [False, False]
     page.choose("#along", "Fz")
     page.choose("#unknown", "Fz", "input")
-    assert page.find("#exponent").get_attribute("placeholder") == "0"
-    page.type("#exponent", "1/2")
-    assert page.value("#exponent-to-solve") == "1/2"
-    law = mumacro.law(
-        surrogate, "Fz", start=1e-1, stop=1e3, points=3, stiffness_exponent=0.5, **START
-    )
-    words = page.find("#law").get_attribute("aria-label")
-    ends = re.search(r"from (\S+) at Fz = 0.1 N to (\S+) at Fz = 1000 N", words)
-    assert ends
-    assert [float(end) for end in ends.groups()] == close(law.answer.mu_macro[[0, 2]], rel=1e-3)
-    # a place on the law, with the k of its load
-    page.touched("#law", 0.5, 0.5, click=True)
-    load, k = (float(page.value(f"#field-{name}").split()[0]) for name in ("Fz", "k"))
-    assert k * 1e6 == close(1e6 * math.sqrt(load / 10.0), rel=1e-3)
+    assert [field.is_displayed() for field in fields] == [True, True]
+    assert [field.get_attribute("placeholder") for field in fields] == ["0", "0"]
+    page.type(M_OF["law"], "1/2")
+    assert page.value(M_OF["solve"]) == "1/2"
+    page.touched("#law", 0.7, 0.5)
+    read = page.wait_for("#law-read", r"Fz = (\S+) N: µ = (\S+),")
+    load = float(read[1])
+    grown = {**START, "Fz": load, "k": START["k"] * (load / 10.0) ** 0.5}
+    assert float(read[2]) == close(surrogate.evaluate(**grown).mu_macro, rel=1e-2)
+    # the point moves along the law, and k with it
+    page.touched("#law", 0.7, 0.5, click=True)
+    load = float(page.value("#field-Fz").removesuffix(" N"))
+    k = START["k"] * (load / 10.0) ** 0.5
+    assert 1e6 * float(page.value("#field-k").removesuffix(" N/µm")) == close(k, rel=1e-5)
+    page.click("#reset")
+    page.choose("#along", "Fz")
+    page.choose("#unknown", "Fz", "input")
+    page.type(M_OF["solve"], "0.5")
     page.click("#solve-form button")
-    page.wait_for("#solve-result", r"Fz = \S+ N: µ = 0\.15, .*, k = \S+ N/µm")
+    page.wait_for("#solve-result", r"^Fz = \S+ N: µ = 0.15, stick slip")
     page.click("#solve-result button")
-    assert page.shown()["µ/µ₀"] == "0.5"
-    for text, fault in (("2", "power: must be from 0 to 1"), ("a", "power: “a” is not a number")):
-        page.type("#exponent", text)
-        page.wait_for("#law-status", fault)
-    page.type("#exponent", "")
-    assert page.text("#law-status") == ""
-    page.click("#rigid")
-    assert not page.find("#exponent").is_displayed()
+    assert page.number() == 0.15
+    assert not page.is_old("#solve")  # the same growth, from another load
+    # the service says what it refuses, beside both fields
+    page.type(M_OF["law"], "1.5")
+    page.click("#solve-form button")
+    for status in ("#law-status", "#solve-status"):
+        page.wait_for(status, "stiffness_exponent: must be less than or equal to 1")
+    page.type(M_OF["law"], "half")
+    page.wait_for("#law-status", "^m: “half” is not a number")
+    page.press(M_OF["law"], "ESCAPE")
+    assert page.value(M_OF["law"]) == "1.5"
+    page.choose("#along", "v0")
+    assert (fields[0].is_displayed(), page.text("#law-status")) == (False, "")
+
+
+def test_a_ball_under_another_load_is_stiffer_unless_it_is_said_otherwise(
+    open_page: Any, tmp_path: Path
+) -> None:
+    with open_page.faked(RECORDED, "#contact=ball&along=Fz") as page:
+        asked = page.asked("v1/law")
+        assert (asked["Fz"], asked["stiffness_exponent"]) == (10, close(1.0 / 3.0, rel=1e-15))
+        assert page.find(M_OF["law"]).get_attribute("placeholder") == "1/3"
+        rows = [
+            *csv.DictReader(page.download("#csv", tmp_path, "friction-law-Fz.csv").splitlines())
+        ]
+        for row in rows[:: len(rows) // 5]:
+            assert float(row["k [N/m]"]) == close(
+                1e6 * (float(row["Fz [N]"]) / 10) ** (1 / 3), rel=1e-9
+            )
+        page.type(M_OF["law"], "0")
+        assert "Fz" not in page.asked("v1/law")
+
+
+@pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
+def test_the_exponent_appears_without_a_jump(open_page: Any, width: int) -> None:
+    page = open_page(width=width)
+    places = (
+        "return ['field-v0', 'along', 'scale', 'range', 'law-image', 'solve', 'readout']"
+        ".map((id) => document.getElementById(id).getBoundingClientRect().y + scrollY);"
+    )
+    before = page.run(places)
+    page.choose("#along", "Fz")
+    assert page.run(places) == before
+    assert page.find(M_OF["law"]).is_displayed()
+    page.choose("#unknown", "Fz", "input")
+    assert page.run(places) == before
+    assert page.run("return document.documentElement.scrollWidth;") <= width
 
 
 ENDS = {
+    "#direction=normal&along=Fz": "Fz [N]",
+    "#direction=normal&along=Fz_amplitude&scale=linear": "ΔFz [N]",
+    "#direction=normal&along=Fz_amplitude": "ΔFz [N]",
+    "#contact=ball&along=Fz": "Fz [N]",
+    "#k=0.8..1.2N/um&along=Fz&stiffness_exponent=1": "Fz [N]",
+    "#k=rigid&along=Fz&contact=ball": "Fz [N]",
     "#along=mu0": "µ₀",
     "#along=Fz": "Fz [N]",
-    "#along=Fz&contact=ball&k=0.8..1.2": "Fz [N]",
-    "#along=Fz&exponent=1&scale=linear": "Fz [N]",
-    "#along=Fz&exponent=1/2&direction=normal": "Fz [N]",
-    "#along=Fz_amplitude&scale=linear&direction=normal": "ΔFz [N]",
     "#along=k&scale=linear": "k [N/µm]",
     "#along=omega": "f [kHz]",
     "#along=y0&scale=linear": "y₀ [µm]",

@@ -196,6 +196,8 @@ def test_the_health_check_and_a_port_that_is_taken(
     failed = command(repository, "--tables", str(surrogate.path), "--port", str(live_server.port))
     assert failed.returncode == 1
     assert "Traceback" not in failed.stdout + failed.stderr
+    assert f"port {live_server.port} is taken by another program" in failed.stderr
+    assert f"--port {live_server.port + 1}" in failed.stderr
 
 
 def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(

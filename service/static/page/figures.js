@@ -1,8 +1,8 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
 import {
-  RIGID, about, caption, caseOf, fromSI, inUnit, inWords, loadOf, readInterval, readValue, show, stiffens, symbolOf,
-  toSI, valueOf,
+  RIGID, about, caption, caseAround, fromSI, inUnit, inWords, readInterval, readValue, sentence, show, symbolOf, toSI,
+  valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
@@ -152,15 +152,8 @@ export function mapPanel(set, nudge, status) {
 const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 
-/** Between which values [SI] of an input an oscillating force, which stays as it is, does not lift the contact off. */
-function withoutLiftOff(along, state) {
-  if (state.direction !== "normal") return [0, Infinity];
-  const just = (name, share) => Number((share * valueOf(state, name)).toPrecision(4));
-  if (along === "Fz") return [just("Fz_amplitude", 1.001), Infinity];
-  return [0, along === "Fz_amplitude" ? just("Fz", 0.999) : Infinity];
-}
-
-/** The interval of the swept input: what was chosen, else whole decades around the point and its border. */
+/** The interval of the swept input: what was chosen, else whole decades around the point and its border, as far as the
+ *  contact does not lift off. */
 function lawRange({ along, scale, range, ...state }, border) {
   if (range.text) return range;
   const { unit, low, high } = state[along];
@@ -170,9 +163,11 @@ function lawRange({ along, scale, range, ...state }, border) {
   const [least, most] = [Math.min(...shown), Math.max(...shown)];
   const linear = [about.inputs[along].positive ? (least / 100).toPrecision(1) : 0, (4 * most).toPrecision(1)];
   const decades = [`1e${Math.floor(Math.log10(least)) - 2}`, `1e${Math.ceil(Math.log10(most)) + 2}`];
-  const [start, stop] = (scale === "linear" ? linear : decades).map(Number);
-  const [lift, load] = withoutLiftOff(along, state).map((end) => fromSI(along, end, unit));
-  return readInterval(along, `${Math.max(start, lift)}..${Math.min(stop, load)}`, unit);
+  const ends = (scale === "linear" ? linear : decades).map(Number);
+  const near = (name, share) => Number((share * fromSI(name, state[name].low, unit)).toPrecision(3));
+  if (along === "Fz" && state.direction === "normal") ends[0] = Math.max(ends[0], near("Fz_amplitude", 1.01));
+  if (along === "Fz_amplitude") ends[1] = Math.min(ends[1], near("Fz", 0.99));
+  return readInterval(along, ends.join(".."), unit);
 }
 
 /** The law: `move(name, value [SI])`, `nudge(name, steps)`. */
@@ -236,11 +231,11 @@ export function lawPanel(move, nudge) {
 
   /** All that is drawn, as CSV (RFC 4180), in the units that are shown. */
   function csv() {
-    const { values, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high, k } = law;
+    const { values, k, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high } = law;
     const columns = {
-      [heading()]: values.map((value) => Number(shown(value).toPrecision(15))), "mu_macro [-]": mu_macro,
+      [heading()]: values.map((value) => Number(shown(value).toPrecision(15))), ...(k && { "k [N/m]": k }),
+      "mu_macro [-]": mu_macro,
       "mu_static [-]": mu_static, regime, ...(low && { "mu_macro_low [-]": low, "mu_macro_high [-]": high }),
-      ...(k && { "k [N/m]": k }),
     };
     const rows = values.map((_, i) => Object.values(columns).map((column) => column[i]));
     return [Object.keys(columns), ...rows].map((cells) => `${cells.join(",")}\r\n`).join(""); // no cell holds a comma
@@ -260,13 +255,10 @@ export function lawPanel(move, nudge) {
     unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
     $("range").placeholder = chosen;
-    const grows = stiffens(state, along);
-    $("exponent-of-law").hidden = !grows;
-    const faults = [["range", state.range.fault], ["power", grows && state.exponent.fault]].filter(([, fault]) => fault);
-    status.set("typed", faults.map(([name, fault]) => `${name}: ${fault}.`).join(" ") || null);
+    const fault = state.stiffness_exponent.fault && along === "Fz" ? `m: ${sentence(state.stiffness_exponent.fault)}` : null;
+    status.set("typed", state.range.fault ? `range: ${sentence(state.range.fault)}` : fault);
     tell();
-    const asking = { ...caseOf(state, [along], true), ...loadOf(state, along) };
-    const request = { ...asking, along, start, stop, points: POINTS, scale: state.scale };
+    const request = { ...caseAround(state, along, true), along, start, stop, points: POINTS, scale: state.scale };
     if (!answer || JSON.stringify(request) === asked) return;
     asked = JSON.stringify(request);
     channel.push(request);

@@ -1,8 +1,8 @@
 // The form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
 import { Status } from "./ask.js";
 import {
-  RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, loadOf, namesOf, powerOf, readPoints, readQuantity,
-  readValue, refuse, show, stiffens, symbolOf, valueOf, within,
+  RIGID, about, attempt, caseAround, caseOf, fromSI, inUnit, inWords, movedAlong, namesOf, powerOf, readPoints,
+  readQuantity, readValue, refuse, sentence, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
@@ -10,9 +10,6 @@ import { post } from "./service.js";
 const STEPS = 1000; // of a slider, a decade
 /** What a field of materials can hold, while it is empty: a ball of steel. */
 const SUCH_AS = { radius: "such as 5 mm", length: "such as 10 mm", E: "steel: 210 GPa", nu: "steel: 0.3" };
-
-/** The exponents of k over Fz that contacts have, as they are written. */
-const OWN_EXPONENTS = { spring: "0", ball: "1/3" };
 
 /** Shows a quantity in its field; what is typed and cannot be used stays, and is marked unless it is empty. */
 function fill(input, { text, fault, typed = text }) {
@@ -49,19 +46,34 @@ export function inputForm(set, setSI, status) {
     }
     $("sketch").setAttribute("aria-label", `The set-up: ${said}`);
   }
+  /** The fields of the exponent of k, each where its question is about Fz, and what holds while they are empty. */
+  function offerExponent({ along, contact, Fz: { low: load, unit }, stiffness_exponent: exponent }) {
+    const usual = about.exponents[contact];
+    const without = usual === "0" ? "it is constant" : `it grows as for a ball, m = ${usual}`;
+    for (const [id, name] of [["law-section", along], ["solve", $("unknown").value]]) {
+      for (const part of $(id).querySelectorAll(".exponent")) part.hidden = name !== "Fz";
+      for (const part of $(id).querySelectorAll(".no-exponent")) part.hidden = name === "Fz";
+      $(id).querySelector(".exponent .usual").textContent =
+        `k holds at Fz = ${inUnit("Fz", load, unit)}. Without m ${without}. Rough surfaces: 0.5 to 1.`;
+      const field = $(id).querySelector("[name=stiffness_exponent]");
+      field.placeholder = usual;
+      fill(field, exponent);
+    }
+  }
+  $("unknown").addEventListener("input", () => offerExponent(state));
   const options = [["along", "symbol"], ["unknown", "label"]].flatMap(([id, word]) => {
     $(id).append(...Object.entries(about.inputs).map(([name, input]) => new Option(input[word], name)));
     return [...$(id).options];
   });
   $("unknown").value = "y0";
-  const rows = Object.entries(about.inputs).map(([name, { label, symbol, note, range: [low, high] }]) => {
+  const rows = Object.entries(about.inputs).map(([name, { label, note, range: [low, high] }]) => {
     const fault = make("p", { id: `fault-${name}`, class: "fault" });
     const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
     const steps = { min: low * STEPS, max: high * STEPS, step: 1 };
     const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...steps });
     slider.addEventListener("input", () => setSI({ [name]: 10 ** (slider.value / STEPS) }));
     const words = make("label", { for: input.id }, label, note && make("small", {}, note));
-    return { name, symbol, row: make("div", { class: "field" }, words, input, slider), input, slider, fault };
+    return { name, row: make("div", { class: "field" }, words, input, slider), input, slider, fault };
   });
   $("messages").append(...rows.map(({ fault }) => fault));
   $("form").append(...rows.map(({ row }) => row));
@@ -72,24 +84,28 @@ export function inputForm(set, setSI, status) {
     rigid.checked = state.k === RIGID;
     if (!rigid.checked) elastic = state.k.text;
     fill($("range"), state.range);
-    for (const id of ["exponent", "exponent-to-solve"]) {
-      fill($(id), state.exponent);
-      $(id).placeholder = OWN_EXPONENTS[state.contact];
-    }
     for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
     if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
-    for (const { name, symbol, row, input, slider, fault } of rows) {
+    offerExponent(state);
+    for (const { name, row, input, slider, fault } of rows) {
       const [quantity, size] = [state[name], valueOf(state, name)];
       row.hidden = !namesOf(state).includes(name);
       input.disabled = slider.disabled = quantity === RIGID;
       fill(input, quantity);
       slider.value = size > 0 ? Math.round(STEPS * Math.log10(size)) : slider.min;
       slider.setAttribute("aria-valuetext", `${symbolOf(name, quantity.unit)} = ${quantity.text}`);
-      fault.textContent = quantity.fault && !row.hidden ? `${symbol}: ${quantity.fault}.` : "";
+      fault.textContent = quantity.fault && !row.hidden ? `${symbolOf(name, quantity.unit)}: ${sentence(quantity.fault)}` : "";
       fault.classList.toggle("bad", input.ariaInvalid === "true");
       status.set(`typed ${name}`, row.hidden ? "" : fault.textContent, input.ariaInvalid === "false");
     }
   };
+}
+
+/** A question as text.  Where k grows with Fz, it is the same question at every load along that growth. */
+function textOf(question) {
+  const { Fz, k, stiffness_exponent: exponent, ...others } = question;
+  if (exponent === undefined) return JSON.stringify(question);
+  return JSON.stringify({ ...others, exponent, k: (k / Fz ** exponent).toPrecision(9) });
 }
 
 /** A form that asks `path` for what `read(state)` says; what it `show`s is grey while it would ask something else. */
@@ -99,12 +115,12 @@ function panel(name, path, read, show) {
   const compare = () => {
     const { found: now } = attempt(() => read(state));
     if (now) status.set("typed", null);
-    const same = !answered || JSON.stringify(now) === answered;
+    const same = !answered || (now && textOf(now) === answered);
     if (same) status.set(name, null);
     status.set("changed", same ? null : "This was asked with other values.", true);
   };
   const channel = status.channel(name, (asked) => post(path, asked), (found, asked) => {
-    answered = JSON.stringify(asked);
+    answered = textOf(asked);
     status.answered = true;
     compare();
     $(`${name}-result`).hidden = false;
@@ -113,7 +129,7 @@ function panel(name, path, read, show) {
   $(`${name}-form`).addEventListener("submit", (event) => {
     event.preventDefault();
     const { found: asked, fault } = attempt(() => read(state));
-    status.set("typed", fault && `${fault}.`);
+    status.set("typed", fault && sentence(fault));
     if (!fault) channel.push(asked);
   });
   $(`${name}-form`).addEventListener("input", compare);
@@ -130,25 +146,21 @@ const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...g
   return make("li", {}, text, given.length > 0 && button);
 }));
 
-/** Which value of an input gives a wanted friction.  `use(name, value [SI], digits)` takes it. */
+/** Which value of an input gives a wanted friction.  `use(changed)` takes it into the state. */
 export function solver(use) {
-  const offer = () => { $("exponent-of-solve").hidden = $("unknown").value !== "Fz"; };
-  $("solve-form").addEventListener("input", offer);
   return panel("solve", "v1/solve-for", (state) => {
     const { unknown, quantity, target: text } = Object.fromEntries(new FormData($("solve-form")));
     const { low: target } = within("target", () => readQuantity("mu0", text, "-"));
-    if (stiffens(state, unknown) && state.exponent.fault) refuse(`power: ${state.exponent.fault}`);
-    const asked = { ...caseOf(state, [unknown]), ...loadOf(state, unknown) };
-    return { ...asked, unknown, quantity, target, include: powerOf(state) };
+    const { fault } = state.stiffness_exponent;
+    if (fault && unknown === "Fz") refuse(`m: ${fault}`);
+    return { ...caseAround(state, unknown), unknown, quantity, target, include: powerOf(state) };
   }, ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
     const { unit } = state[unknown];
     const none = min === max ? reason : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
     const lines = roots.map(({ value, mu_macro: mu, regime, power }) => {
       const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
-      const { k, Fz, stiffness_exponent: exponent } = asked;
-      const grown = exponent ? `, k = ${inUnit("k", k * (value / Fz) ** exponent, state.k.unit)}` : "";
       const shaker = power ? `, shaker ${inUnit("power", power.oscillation)}` : "";
-      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${grown}${shaker}`, unknown, value, 15];
+      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`, movedAlong(state, unknown, value, 15)];
     });
     list("solve-result", lines.length ? lines : [[none]], use);
   });

@@ -2,8 +2,8 @@
 // Nothing here needs a browser; tests/service/page tests it with node.
 
 /** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
- *  slider's decimal exponents (SI), start value; beside them the choices with their words, geometries
- *  and their arguments, and whether there is a guide. */
+ *  slider's decimal exponents (SI), start value; beside them the choices with their words, of each contact
+ *  the exponent of k over Fz as text, geometries and their arguments, and whether there is a guide. */
 export const about = {};
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
@@ -52,6 +52,9 @@ export function friction(value, uncertainty = 0, usual = 4) {
   const places = uncertainty > 0 ? Math.floor(Math.log10(value)) - Math.floor(Math.log10(uncertainty)) + 2 : usual;
   return value.toPrecision(Math.min(Math.max(places, 1), 15));
 }
+
+/** A reason as a sentence. */
+export const sentence = (text) => (/[.?!]$/.test(text) ? text : `${text}.`);
 
 class Fault extends Error {}
 export const refuse = (why) => { throw new Fault(why); };
@@ -118,6 +121,8 @@ export function readQuantity(name, text, unit) {
 export function readValue(name, text, unit = about.inputs[name].offered[0]) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return RIGID;
   if (name === "k" && text.includes("..")) return readInterval(name, text, unit);
+  const dashed = /^\s*([\d.]+)\s*[-–]\s*(\d.*)$/.exec(text);
+  if (name === "k" && dashed) refuse(`write an interval as ${dashed[1]}..${dashed[2].trim()}`);
   const read = readQuantity(name, text, unit);
   const { positive, bound } = about.inputs[name];
   if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0)) refuse(`must be ${bound}`);
@@ -134,6 +139,18 @@ export function readInterval(name, text, unit) {
   if (!(low.low < high.low)) refuse("must go up: write low..high");
   const first = low.unit === high.unit ? low.text.split(" ")[0] : fromSI(name, low.low, high.unit);
   return { text: `${first}..${high.text}`, unit: high.unit, low: low.low, high: high.low };
+}
+
+/** A typed exponent of k over Fz: { text, value }, such as 0.5 or 1/3; its bounds are the service's. */
+export function readExponent(text) {
+  if (text.trim() === "") return ANY;
+  const parts = text.split("/").map(readNumber);
+  const [, unit] = parts.find(([, one]) => one !== "") ?? [];
+  if (unit) refuse(`“${unit}” is too much: m has no unit`);
+  if (parts.length > 2) refuse(`“${text.trim()}” is not a number`);
+  const [[over], [under] = [1]] = parts;
+  if (under === 0) refuse(`“${text.trim()}” is not a number`);
+  return { text: text.trim(), value: over / under };
 }
 
 const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval(name, text, unit));
@@ -193,56 +210,20 @@ export function readPoints(text) {
 /** The range of a law over which nobody chose one. */
 export const ANY = { text: "" };
 
-/** The exponent of a contact's own stiffness, where nobody chose another. */
-export const ITS_OWN = { text: "" };
-
-/** A typed exponent of k over Fz: a number or a fraction, from 0 to 1. */
-export function readExponent(text) {
-  if (text.trim() === "") return ITS_OWN;
-  const parts = text.split("/");
-  if (parts.length > 2) refuse(`“${text.trim()}” is not a number`);
-  const [over, under] = [...parts, "1"].map((part) => readQuantity("mu0", part, "-").low);
-  const value = over / under;
-  if (!(value >= 0 && value <= 1)) refuse("must be from 0 to 1, such as 1/3");
-  return { text: text.trim(), value };
-}
-
-/** Whether k may grow where an input changes. */
-export const stiffens = (state, name) => name === "Fz" && state.k !== RIGID;
-
-/** The exponent with which it does; 0 where it does not. */
-const exponentAlong = (state, name) =>
-  (stiffens(state, name) ? state.exponent.value ?? about.exponents[state.contact] : 0);
-
-/** What a question along an input says of the load at which k holds: nothing where k is constant. */
-export function loadOf(state, name) {
-  const exponent = exponentAlong(state, name);
-  return exponent ? { Fz: valueOf(state, "Fz"), stiffness_exponent: exponent } : {};
-}
-
-/** k at another value [SI] of an input, as a part of the state: nothing where k is constant. */
-export function stiffened(state, name, value, digits) {
-  const exponent = exponentAlong(state, name);
-  if (!exponent) return {};
-  const { low, high, unit } = state.k;
-  const factor = (value / valueOf(state, "Fz")) ** exponent;
-  const text = (end) => Number(fromSI("k", end * factor, unit).toPrecision(digits));
-  return { k: readValue("k", low < high ? `${text(low)}..${text(high)}` : `${text(low)}`, unit) };
-}
-
-/** A quantity for each input, for the `range` of the one that the law goes along, the `exponent` of k over Fz, and what
- *  is chosen. */
+/** A quantity for each input and for the `range` of the one that the law goes along, and what is chosen. */
 export const startState = () => ({
   ...Object.fromEntries(Object.entries(about.inputs).map(([name, { start }]) => [name, readValue(name, start)])),
   contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: ANY,
-  exponent: ITS_OWN,
+  stiffness_exponent: ANY,
 });
 
 /** What is typed for an input, the range or the exponent; if it cannot be used, what was there, with `typed` and its `fault`. */
 export function readTyped(state, name, text) {
-  const [input, read] = name === "range" ? [state.along, readRange] : [name, readValue];
-  const { found, fault } = attempt(() =>
-    (name === "exponent" ? readExponent(text) : read(input, text, state[input].unit)));
+  const read = {
+    range: () => readRange(state.along, text, state[state.along].unit),
+    stiffness_exponent: () => readExponent(text),
+  };
+  const { found, fault } = attempt(read[name] ?? (() => readValue(name, text, state[name].unit)));
   return fault ? { ...state[name], typed: text, fault } : found;
 }
 
@@ -266,10 +247,37 @@ export function caseOf(state, without = [], whole = false) {
   ]);
 }
 
-/** The inputs in one line, without one of them. */
-export function caption(state, without) {
-  const names = namesOf(state).filter((name) => name !== without);
-  return names.map((name) => `${symbolOf(name, state[name].unit)} = ${state[name].text}`).join(", ");
+/** The exponent m in k = k_given (Fz/Fz_given)^m: what is typed, else that of the contact. */
+export const exponentOf = (state) =>
+  state.stiffness_exponent.value ?? readExponent(about.exponents[state.contact]).value;
+
+/** Whether k grows with the input that is swept or solved for. */
+export const stiffens = (state, name) => name === "Fz" && exponentOf(state) !== 0;
+
+/** The case of a question about one input, which is left out; where k grows with it, it stays: the load at which k
+ *  holds. */
+export function caseAround(state, name, whole = false) {
+  if (!stiffens(state, name)) return caseOf(state, [name], whole);
+  return { ...caseOf(state, [], whole), stiffness_exponent: exponentOf(state) };
+}
+
+/** What changes when one input gets another value [SI], with so many digits: itself, and k where it grows with it. */
+export function movedAlong(state, name, value, digits) {
+  const { unit, low, high } = state.k;
+  const moved = { [name]: rounded(name, value, state[name].unit, digits) };
+  if (!stiffens(state, name) || state.k === RIGID) return moved;
+  const growth = (moved.Fz.low / state.Fz.low) ** exponentOf(state);
+  const ends = [low, high].map((end) => Number(fromSI("k", growth * end, unit).toPrecision(Math.max(digits, 6))));
+  return { ...moved, k: readValue("k", low === high ? String(ends[0]) : ends.join(".."), unit) };
+}
+
+/** The inputs in one line, without the one that the law goes along. */
+export function caption(state, along) {
+  const names = namesOf(state).filter((name) => name !== along);
+  const parts = names.map((name) => `${symbolOf(name, state[name].unit)} = ${state[name].text}`);
+  const exponent = state.stiffness_exponent.text || about.exponents[state.contact];
+  if (stiffens(state, along)) parts.push(`k at Fz = ${state.Fz.text}, growing as Fz^(${exponent})`);
+  return parts.join(", ");
 }
 
 /** The power, where it is known: not for a normal force that oscillates. */
@@ -295,8 +303,9 @@ export function toAddress(state) {
   const keyOf = (name) => (symbolOf(name, state[name].unit) === "f" ? "f" : name);
   const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state[name])}`);
   parts.push(...Object.keys(WORDS).filter((key) => state[key] !== usual[key]).map((key) => `${key}=${state[key]}`));
-  if (state.range.text) parts.push(`range=${inAddress(state.range)}`);
-  if (state.exponent.text) parts.push(`exponent=${inAddress(state.exponent)}`);
+  for (const name of ["range", "stiffness_exponent"]) {
+    if (state[name].text) parts.push(`${name}=${inAddress(state[name])}`);
+  }
   return `#${parts.join("&")}`;
 }
 
@@ -321,8 +330,8 @@ export function fromAddress(hash) {
   if (texts.has("omega")) take("f", () => refuse("omega is given, too"));
   for (const name of namesOf(state)) take(name, (text) => readValue(name, text, about.inputs[name].unit));
   take("f", (text) => readValue("omega", text, "Hz"), "omega");
-  take("exponent", readExponent);
   take("range", (text) => readInterval(state.along, text, about.inputs[state.along].unit));
+  take("stiffness_exponent", readExponent);
   for (const key of [...texts.keys()]) take(key, () => refuse("unknown"));
   return { state, faults };
 }

@@ -3,8 +3,8 @@ import { Status } from "./ask.js";
 import { lawPanel, mapPanel } from "./figures.js";
 import { fit, inputForm, solver, stiffness } from "./forms.js";
 import {
-  ANY, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
-  rounded, show, startState, stiffened, toAddress, valueOf,
+  ANY, about, attempt, friction, fromAddress, inUnit, inWords, movedAlong, namesOf, question, readTyped,
+  rounded, show, startState, toAddress, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
 import { get, post } from "./service.js";
@@ -55,12 +55,9 @@ function setSI(values, digits = 4, more = {}) {
   if (found) change({ ...Object.fromEntries(found), ...more });
 }
 
-/** Moves the point along an input; where that is Fz, k grows with it. */
+/** Gives one input another value [SI]; k follows where it grows with it. */
 function move(name, value, digits = 4) {
-  const { found } = attempt(() => {
-    const quantity = rounded(name, value, state[name].unit, digits);
-    return { [name]: quantity, ...stiffened(state, name, quantity.low, Math.max(digits, 6)) };
-  });
+  const { found } = attempt(() => movedAlong(state, name, value, digits));
   if (found) change(found);
 }
 
@@ -142,7 +139,7 @@ function start(names) {
   $("version").textContent = about.version;
   for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
   parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(move, nudge),
-    solver(move), stiffness(setSI), fit(setSI, (words) => change(fromAddress(`#${words}`).state))];
+    solver(change), stiffness(setSI), fit(setSI, (words) => change(fromAddress(`#${words}`).state))];
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
   addEventListener("change", take);

@@ -3,11 +3,14 @@ import { withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
 
-/** All faults of a question, where it has several; names that share a reason stand together: "E, nu: is required". */
+/** All faults of a question, where it has several; names that share a reason stand together: "E, nu: are required". */
 function faults(errors = []) {
   if (errors.length < 2) return null;
   const names = Map.groupBy(errors, ({ reason }) => reason);
-  return [...names].map(([reason, all]) => `${all.map(({ field }) => field).join(", ")}: ${reason}`).join("; ");
+  return [...names].map(([reason, all]) => {
+    const verb = all.length > 1 ? reason.replace(/^is /, "are ") : reason;
+    return `${all.map(({ field }) => field).join(", ")}: ${verb}`;
+  }).join("; ");
 }
 
 async function ask(path, options) {

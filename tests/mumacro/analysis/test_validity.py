@@ -54,10 +54,12 @@ def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) ->
     assert k_effect(surrogate, {**CASE, "y0": 3.1e-6, "v0": 0.0}) == math.inf
 
 
-def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate: Surrogate) -> None:
+def test_amplitudes_beyond_those_of_contacts_ask_for_the_unit(surrogate: Surrogate) -> None:
     result = rows(surrogate, y0=2.0)
     assert list(result) == ["units"]
     assert "is y0 = 2 in metres?" in result["units"][0]
+    assert "is k = 1e+12 in N/m?" in rows(surrogate, k=1e12)["units"][0]
+    assert "is Fz = 1e-05 in newtons?" in rows(surrogate, Fz=1e-5)["units"][0]
     assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
 
 

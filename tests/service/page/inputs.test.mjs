@@ -3,8 +3,8 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import {
-  RIGID, about, attempt, caseOf, friction, fromAddress, inUnit, loadOf, question, readInterval, readPoints, readQuantity,
-  readValue, show, startState, stiffened, toAddress, valueOf,
+  RIGID, about, attempt, caption, caseAround, caseOf, friction, fromAddress, inUnit, movedAlong, question, readExponent,
+  readInterval, readPoints, readQuantity, readValue, show, startState, toAddress, valueOf,
 } from "../../../service/static/page/inputs.js";
 
 const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
@@ -32,6 +32,7 @@ const READ = [ // input, unit of its field, text: SI value, or part of the reaso
   ["y0", "µm", "constructor", "is not a number"], ["y0", "µm", "5 constructor", "is not a unit"],
   ["k", "N/m", "1..2 mm", "“mm” is not a unit of k"], ["k", "N/m", "2..1", "must go up"], ["k", "N/m", "1..1", "must go up"],
   ["k", "N/m", "1..rigid", "two numbers"], ["k", "N/m", "1..2..3", "not an interval"], ["k", "N/m", "..2", "give a number"],
+  ["k", "N/µm", "0.8-1.2", "write an interval as 0.8..1.2"], ["k", "N/µm", "0.8 – 1.2 N/um", "0.8..1.2 N/um"],
   ["Fz", "N", "1..2", "is not a number"],
 ];
 for (const [name, unit, text, expected] of READ) {
@@ -108,7 +109,6 @@ test("an address in the words of the command line gives the same state back", ()
   assert.equal(toAddress(startState()), "#mu0=0.3&Fz=10N&k=1N/um&y0=2um&f=20kHz&v0=10mm/s");
   for (const address of [
     "#mu0=0.3&Fz=10N&k=0.8..1.2N/um&y0=1e-7m&omega=130000rad/s&v0=1e-310m/s&contact=ball&digits=all&along=y0&scale=linear&range=1..2000nm",
-    "#mu0=0.3&Fz=10N&k=1N/um&y0=2um&f=20kHz&v0=10mm/s&along=Fz&exponent=2/3",
     "#mu0=0.3&Fz=10N&k=rigid&Fz_amplitude=5N&f=20kHz&v0=10mm/s&direction=normal",
   ]) {
     const { state, faults } = fromAddress(address);
@@ -124,8 +124,6 @@ for (const [address, said] of [
   ["v0=5 mm", "v0 = 5 mm (“mm” is not a unit of v₀"], ["along=constructor", "along = constructor (must be one of"],
   ["scale=<script>", "scale = <script> (must be one of log, linear)"], ["omega=1&f=1", "f = 1 (omega is given, too)"],
   ["std_mu0=1&range=z", "range = z (“z” is not an interval: write low..high); std_mu0 = 1 (unknown)"],
-  ["exponent=1.5", "exponent = 1.5 (must be from 0 to 1, such as 1/3)"], ["exponent=1/0", "must be from 0 to 1"],
-  ["exponent=1/2/3", "“1/2/3” is not a number"], ["exponent=0.5 N", "“N” is not a unit of"],
   ["along=k&range=1..rigid", "range = 1..rigid (must be an interval of two numbers)"], ["direction=normal&y0=1um", "y0 = 1um (unknown)"],
   ["contact=box", "contact = box (must be one of spring, ball)"],
   ["contact=ball&direction=normal", "direction = normal (not for a ball)"],
@@ -136,18 +134,6 @@ for (const [address, said] of [
     assert.ok(Number.isFinite(caseOf(state).mu0));
   });
 }
-
-test("k grows with the load as the contact does, or as it was typed", () => {
-  const exponent = (address, name = "Fz") => loadOf(fromAddress(`#${address}`).state, name).stiffness_exponent;
-  ["", "contact=ball&k=rigid", "contact=ball&exponent=0"].forEach((address) => assert.equal(exponent(address), undefined));
-  assert.equal(exponent("contact=ball", "v0"), undefined);
-  [["contact=ball", 1 / 3], ["exponent=1/3", 1 / 3], ["exponent=0,7", 0.7], ["exponent=50 %25", 0.5], ["exponent=1", 1]]
-    .forEach(([address, expected]) => near(exponent(address), expected));
-  const { state } = fromAddress("#contact=ball&Fz=8N&k=0.8..1.2N/um");
-  assert.deepEqual(loadOf(state, "Fz"), { Fz: 8, stiffness_exponent: 1 / 3 });
-  assert.equal(stiffened(state, "Fz", 1, 6).k.text, "0.4..0.6 N/µm");
-  assert.deepEqual(stiffened(state, "y0", 1e-6, 6), {});
-});
 
 test("the question says what was chosen, and nothing else", () => {
   const plain = question(startState());
@@ -161,4 +147,44 @@ test("the question says what was chosen, and nothing else", () => {
   const normal = question(fromAddress("#direction=normal&k=rigid").state);
   assert.deepEqual([normal.Fz_amplitude, normal.k, "y0" in normal], [5, "rigid", false]);
   assert.deepEqual([plain, normal].map(({ include }) => include.includes("power")), [true, false]);
+});
+
+test("an exponent of the stiffness is a number or a fraction, or is left out", () => {
+  for (const [text, value] of [["0.5", 0.5], [" 1/3 ", 1 / 3], ["1 / 2", 0.5], ["0", 0], ["1,5", 1.5], ["", undefined]]) {
+    assert.equal(readExponent(text).value, value);
+  }
+  for (const [text, reason] of [
+    ["x", "is not a number"], ["1/x", "is not a number"], ["1/0", "is not a number"], ["1/2/3", "is not a number"],
+    ["1/", "give a number"], ["0.5 N", "m has no unit"],
+  ]) assert.ok(attempt(() => readExponent(text)).fault.includes(reason), text);
+});
+
+test("a question about Fz holds the load at which k holds where k grows with it", () => {
+  const state = { ...startState(), stiffness_exponent: readExponent("1/2") };
+  const { Fz, stiffness_exponent: exponent } = caseAround(state, "Fz");
+  assert.deepEqual([Fz, exponent], [10, 0.5]);
+  assert.equal(caseAround({ ...startState(), contact: "ball" }, "Fz").stiffness_exponent, 1 / 3);
+  for (const [constant, name] of [[startState(), "Fz"], [state, "v0"], [{ ...state, stiffness_exponent: readExponent("0") }, "Fz"]]) {
+    const asked = caseAround(constant, name);
+    assert.deepEqual([name in asked, "stiffness_exponent" in asked], [false, false]);
+  }
+  assert.ok(caption(state, "Fz").endsWith("k at Fz = 10 N, growing as Fz^(1/2)"));
+  assert.ok(!caption(state, "v0").includes("growing"));
+});
+
+test("a move along Fz takes k along", () => {
+  const state = { ...startState(), stiffness_exponent: readExponent("1/2"), k: readValue("k", "0.8..1.2 N/um") };
+  const { Fz, k } = movedAlong(state, "Fz", 40, 4);
+  assert.deepEqual([Fz.text, k.text], ["40 N", "1.6..2.4 N/µm"]);
+  assert.deepEqual(Object.keys(movedAlong(state, "v0", 1, 4)), ["v0"]);
+  for (const without of [{ stiffness_exponent: readExponent("") }, { k: RIGID }]) {
+    assert.deepEqual(Object.keys(movedAlong({ ...state, ...without }, "Fz", 40, 4)), ["Fz"]);
+  }
+});
+
+test("the exponent is a part of the address", () => {
+  const address = toAddress({ ...startState(), stiffness_exponent: readExponent("1/2") });
+  assert.ok(address.endsWith("&stiffness_exponent=1/2"));
+  assert.equal(fromAddress(address).state.stiffness_exponent.value, 0.5);
+  assert.deepEqual(fromAddress("#stiffness_exponent=x").faults, ["stiffness_exponent = x (“x” is not a number)"]);
 });
