@@ -169,7 +169,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("verify x.nc --points 1", "verify x.nc --points 99999999"), ("--points",)),
     "verify x.nc --seed -1": ("--seed",),
     "verify x.nc --workers 0": ("--workers",),
-    "verify": ("required: table",),
+    "verify": ("missing: table",),
     "verify no-such-table.nc": ("no-such-table.nc",),
     "verify README.md": ("README.md",),
     "bake": ("bake",),
