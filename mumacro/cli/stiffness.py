@@ -7,7 +7,15 @@ from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
 
-EXAMPLE = "mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3"
+
+def _example(geometry: str) -> str:
+    """A command that answers."""
+    required = (*GEOMETRIES[geometry].arguments, *BODIES[:2])
+    options = (f"--{name} {ARGUMENTS[name].example}" for name in required)
+    return " ".join(("mumacro stiffness", geometry, *options))
+
+
+EXAMPLE = _example("ball")
 _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
 
 
@@ -22,7 +30,10 @@ def run(words: Sequence[str]) -> str:
     parts = parser.add_subparsers(dest="geometry", required=True, metavar="GEOMETRY")
     for name, geometry in GEOMETRIES.items():
         part = parts.add_parser(
-            name, help=geometry.meaning, description=f"k of {geometry.meaning}."
+            name,
+            help=geometry.meaning,
+            description=f"k of {geometry.meaning}.",
+            epilog=f"example:\n  {_example(name)}",
         )
         for argument in (*geometry.arguments, *BODIES):
             about, needed = ARGUMENTS[argument], argument in (*geometry.arguments, *BODIES[:2])

@@ -20,12 +20,13 @@ from mumacro.inputs.units import UNITS_OF, Scale, read_quantity, unknown_name
 
 
 class Argument(NamedTuple):
-    """One argument: SI unit, units that a person may write, meaning; its only values, for a
-    choice."""
+    """One argument: SI unit, units that a person may write, meaning, a value as a person writes it;
+    its only values, for a choice."""
 
     unit: str
     units: Mapping[str, Scale]
     meaning: str
+    example: str
     choices: tuple[str, ...] = ()
 
 
@@ -48,21 +49,22 @@ _PASCAL = {
 _NUMBER = {"": Scale(), "-": Scale()}
 ARGUMENTS = {
     "radius": Argument(
-        "m", UNITS_OF["y0"], "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)"
+        "m", UNITS_OF["y0"], "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)", "5mm"
     ),
-    "length": Argument("m", UNITS_OF["y0"], "length of the cylinder"),
-    "Fz": Argument("N", UNITS_OF["Fz"], "normal force"),
+    "length": Argument("m", UNITS_OF["y0"], "length of the cylinder", "10mm"),
+    "Fz": Argument("N", UNITS_OF["Fz"], "normal force", "10N"),
     "oscillation": Argument(
-        "", {}, "how the contact oscillates beside the axis of the cylinder", AXES
+        "", {}, "how the contact oscillates beside the axis of the cylinder", AXES[0], AXES
     ),
-    "E": Argument("Pa", _PASCAL, "Young's modulus of the first body; rigid, or a number"),
-    "nu": Argument("-", _NUMBER, "its Poisson's ratio"),
+    "E": Argument("Pa", _PASCAL, "Young's modulus of the first body; rigid, or a number", "210GPa"),
+    "nu": Argument("-", _NUMBER, "its Poisson's ratio", "0.3"),
     "E2": Argument(
         "Pa",
         _PASCAL,
         "Young's modulus of the second body; left out, the bodies are of one material",
+        "70GPa",
     ),
-    "nu2": Argument("-", _NUMBER, "its Poisson's ratio; left out, that of the first body"),
+    "nu2": Argument("-", _NUMBER, "its Poisson's ratio; left out, that of the first body", "0.33"),
 }
 #: arguments of every geometry; the first two are required
 BODIES = ("E", "nu", "E2", "nu2")

@@ -673,6 +673,13 @@ def test_what_stiffness_prints_goes_into_a_command(
     assert answer["inputs"]["k"] == close(expected.k, rel=1e-3)
 
 
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_the_example_of_a_geometry_answers(capsys: Capture, geometry: str) -> None:
+    message = ended(capsys, 2, "stiffness", geometry)
+    example = message.partition("as in mumacro ")[2].partition(" (")[0]
+    assert "paste  " in output_of(capsys, 0, *example.split())
+
+
 def test_a_wide_contact_is_told_below_its_stiffness(capsys: Capture) -> None:
     words = "stiffness", "ball", "--radius", "5mm", "--Fz", "10N", "--nu", "0.3", "--E"
     assert (
