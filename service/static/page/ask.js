@@ -9,11 +9,13 @@ const wakeAll = () => channels.forEach((one) => one.wake());
 addEventListener("online", wakeAll);
 
 /**
- * One question in flight; while it is, only the newest of those that come is kept.  Where there is no answer it is
- * asked again until there is one: after a while, when the network is back, or when a key is entered.
+ * One question in flight; while it is, only the newest of those that come is kept.  Where there is
+ * no answer it is asked again until there is one: after a while, when the network is back, or when
+ * a key is entered.
  *
- * `ask(question)` -> { found }, or why not: { refused }, { later, seconds to wait if told } or { key: true };
- * `use(found, question)`; `tell(reason, calm)`, reason null if there is none, calm if it mends itself.
+ * `ask(question)` -> { found }, or why not: { refused }, { later, seconds } or { key: true };
+ * `use(found, question)`; `tell(reason, calm)`: null where there is no reason, calm where it mends
+ * itself.
  */
 export class Channel {
   constructor(ask, use, tell) {
@@ -63,20 +65,27 @@ export class Channel {
   }
 }
 
-/** One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is one. */
+/**
+ * One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is
+ * one.
+ */
 export class Status {
   constructor(place, shown) {
     Object.assign(this, { place: $(place), shown: $(shown), reasons: new Map(), answered: false });
   }
 
-  /** Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not typed yet. */
+  /**
+   * Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not
+   * typed yet.
+   */
   set(topic, text, calm = false) {
     const old = this.answered ? " Grey results belong to earlier values." : "";
     this.reasons.delete(topic);
     if (text) this.reasons.set(topic, { text: text + old, calm });
     // one reason is enough: what was typed, else the newest
     const all = [...this.reasons];
-    const [, first = { text: "" }] = all.find(([name]) => name.startsWith("typed")) ?? all.at(-1) ?? [];
+    const [, first = { text: "" }] =
+      all.find(([name]) => name.startsWith("typed")) ?? all.at(-1) ?? [];
     if (this.place.textContent !== first.text) this.place.textContent = first.text;
     this.place.classList.toggle("bad", first.calm === false);
     this.shown.classList.toggle("old", this.reasons.size > 0);
@@ -90,7 +99,10 @@ export class Status {
 
 // The API key is kept for this tab, sent as a header, never part of an address.
 const NAME = "mumacro-api-key";
-/** What `use(storage)` is; null where storage is switched off: there the key lives as long as the page. */
+/**
+ * What `use(storage)` is; null where storage is switched off: there the key lives as long as the
+ * page.
+ */
 function stored(use) {
   try {
     return use(sessionStorage);
@@ -107,11 +119,14 @@ function setKey(key) {
 
 /** The options of a request, with the key where there is one; its answer is then kept by nobody. */
 export const withKey = (headers = {}) =>
-  (apiKey === null ? { headers } : { headers: { ...headers, "X-API-Key": apiKey }, cache: "no-store" });
+  apiKey === null
+    ? { headers }
+    : { headers: { ...headers, "X-API-Key": apiKey }, cache: "no-store" };
 
 /** Asks for the key, and says so when the one that was sent is not it; or does not ask. */
 function showKeyForm(wanted) {
-  if (wanted && apiKey !== null) $("key-status").textContent = "That is not the key of this service.";
+  if (wanted && apiKey !== null)
+    $("key-status").textContent = "That is not the key of this service.";
   if (wanted) setKey(null);
   if ($("forget")) $("forget").hidden = apiKey === null;
   if ($("key-form").hidden === !wanted) return;
@@ -123,7 +138,9 @@ $("key-form").addEventListener("submit", (event) => {
   event.preventDefault();
   const key = $("key").value.trim();
   const usable = /^[!-~]{1,512}$/.test(key);
-  $("key-status").textContent = usable ? "" : "A key has 1 to 512 characters: letters, digits, signs, no spaces.";
+  $("key-status").textContent = usable
+    ? ""
+    : "A key has 1 to 512 characters: letters, digits, signs, no spaces.";
   if (!usable) return;
   $("key").value = "";
   setKey(key);
