@@ -1,5 +1,5 @@
-// Asking and its failures: one question in flight, what is told of it, the API key and its field.
-// Who answers is said in service.js.
+// Asking and its failures: one question in flight, what is reported of it, the API key and its field.
+// The questions themselves are in service.js.
 import { $ } from "./plots.js";
 
 const SLOW_MS = 1_500; // after which the old answer is marked as old
@@ -13,13 +13,13 @@ addEventListener("online", wakeAll);
  * no answer it is asked again until there is one: after a while, when the network is back, or when
  * a key is entered.
  *
- * `ask(question)` -> { found }, or why not: { refused }, { later, seconds } or { key: true };
- * `use(found, question)`; `tell(reason, calm)`: null where there is no reason, calm where it mends
+ * `ask(question)` -> { answer }, or why not: { refused }, { later, seconds } or { key: true };
+ * `use(answer, question)`; `report(reason, calm)`: null where there is no reason, calm where it mends
  * itself.
  */
 export class Channel {
-  constructor(ask, use, tell) {
-    Object.assign(this, { ask, use, tell, next: null, busy: false, wake: () => {} });
+  constructor(ask, use, report) {
+    Object.assign(this, { ask, use, report, next: null, busy: false, wake: () => {} });
     channels.push(this);
   }
 
@@ -32,25 +32,25 @@ export class Channel {
   async run() {
     this.mark(true);
     while (this.next !== null) {
-      const asked = this.next;
+      const pending = this.next;
       this.next = null;
-      const slow = setTimeout(() => this.tell("Waiting for the service.", true), SLOW_MS);
-      const answer = await this.ask(asked.question);
+      const slow = setTimeout(() => this.report("Waiting for the service.", true), SLOW_MS);
+      const reply = await this.ask(pending.question);
       clearTimeout(slow);
       if (this.next !== null) continue;
-      if (answer.later || answer.key) await this.again(asked, answer);
+      if (reply.later || reply.key) await this.again(pending, reply);
       else {
-        showKeyForm(false); // the key was taken, or none is wanted
-        this.tell(answer.refused ?? null);
-        if (!answer.refused) this.use(answer.found, asked.question);
+        showKeyForm(false); // the key was taken, or none is needed
+        this.report(reply.refused ?? null);
+        if (!reply.refused) this.use(reply.answer, pending.question);
       }
     }
     this.mark(false);
   }
 
-  again(asked, { later, seconds, key }) {
-    this.next = asked;
-    this.tell(later ? `${later} Asking again by itself.` : null, true);
+  again(pending, { later, seconds, key }) {
+    this.next = pending;
+    this.report(later ? `${later} Asking again by itself.` : null, true);
     if (key) showKeyForm(true);
     return new Promise((wake) => {
       this.wake = wake;
@@ -91,7 +91,7 @@ export class Status {
     this.shown.classList.toggle("old", this.reasons.size > 0);
   }
 
-  /** A channel whose failures are told here. */
+  /** A channel whose failures are reported here. */
   channel(topic, ask, use) {
     return new Channel(ask, use, (text, calm = false) => this.set(topic, text, calm));
   }
@@ -124,14 +124,14 @@ export const withKey = (headers = {}) =>
     : { headers: { ...headers, "X-API-Key": apiKey }, cache: "no-store" };
 
 /** Asks for the key, and says so when the one that was sent is not it; or does not ask. */
-function showKeyForm(wanted) {
-  if (wanted && apiKey !== null)
+function showKeyForm(needed) {
+  if (needed && apiKey !== null)
     $("key-status").textContent = "That is not the key of this service.";
-  if (wanted) setKey(null);
+  if (needed) setKey(null);
   if ($("forget")) $("forget").hidden = apiKey === null;
-  if ($("key-form").hidden === !wanted) return;
-  $("key-form").hidden = !wanted;
-  if (wanted) $("key").focus();
+  if ($("key-form").hidden === !needed) return;
+  $("key-form").hidden = !needed;
+  if (needed) $("key").focus();
 }
 
 $("key-form").addEventListener("submit", (event) => {

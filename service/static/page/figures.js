@@ -35,30 +35,30 @@ function interpolated({ v_tilde: { n: columns }, y_tilde: { n: rows }, mu_ratio,
 
 /**
  * The map of the chosen contact: `set({ name: value [SI] })`, `nudge(name, steps)`; that it cannot
- * be had is told to `status`.
+ * be had is reported to `status`.
  */
 export function mapPanel(set, nudge, status) {
-  let state, answer, asked, data, frame, point;
+  let state, answer, latest, data, frame, point;
   const maps = new Map(); // by kind of contact
   const plot = new Plot($("map"), paint);
   const channel = status.channel(
     "map",
     (kind) => get(`static/page/map.json?${kind}`),
-    (found, kind) => {
-      maps.set(kind, prepared(found));
+    (grid, kind) => {
+      maps.set(kind, prepared(grid));
       mark();
     },
   );
 
   /** The data of a map with its areas of one colour: how high each ends above a place along v~. */
-  function prepared(found) {
-    const ratio = interpolated(found);
-    const shares = Array.from({ length: found.v_tilde.n }, (_, i) => i / (found.v_tilde.n - 1));
-    const shades = [Infinity, ...found.levels.toReversed()].map((level, i) => ({
-      colour: found.colours.at(-1 - i),
+  function prepared(grid) {
+    const ratio = interpolated(grid);
+    const shares = Array.from({ length: grid.v_tilde.n }, (_, i) => i / (grid.v_tilde.n - 1));
+    const shades = [Infinity, ...grid.levels.toReversed()].map((level, i) => ({
+      colour: grid.colours.at(-1 - i),
       heights: shares.map((x) => crossing(ratio, x, level)),
     }));
-    return { ...found, ratio, shades };
+    return { ...grid, ratio, shades };
   }
 
   /** How high the ratio falls below a level; in shares of the axes. */
@@ -94,7 +94,7 @@ export function mapPanel(set, nudge, status) {
     if (!answer) return;
     const {
       groups: { v_tilde, y_tilde },
-      asked: { k, v0, ...kind },
+      inputs: { k, v0, ...kind },
       mu_ratio,
       regime,
     } = answer;
@@ -190,8 +190,8 @@ export function mapPanel(set, nudge, status) {
   $("map-image").addEventListener("click", () => plot.save(caption(state), "friction-map.svg"));
   return (...now) => {
     [state, answer] = now;
-    if (asked !== kindOf(state) && !maps.has(kindOf(state))) channel.push(kindOf(state));
-    asked = kindOf(state);
+    if (latest !== kindOf(state) && !maps.has(kindOf(state))) channel.push(kindOf(state));
+    latest = kindOf(state);
     mark();
   };
 }
@@ -231,16 +231,16 @@ function lawRange({ along, scale, range, ...state }, border) {
 
 /** The law: `move(name, value [SI])`, `nudge(name, steps)`. */
 export function lawPanel(move, nudge) {
-  let state, answer, asked, law, frame, along, unit;
+  let state, answer, latest, law, frame, along, unit;
   let cursor = null;
   const status = new Status("law-status", "law-section");
   const channel = status.channel(
     "law",
     (request) => post("v1/law", request),
-    (found, { scale }) => {
-      law = { ...found, scale };
+    (reply, { scale }) => {
+      law = { ...reply, scale };
       status.answered = true;
-      tell();
+      describe();
     },
   );
   const plot = new Plot($("law"), paint);
@@ -249,7 +249,7 @@ export function lawPanel(move, nudge) {
   const heading = () => `${symbolOf(along, unit)}${unit === "-" ? "" : ` [${unit}]`}`;
 
   /** Says what the law is, in words. */
-  function tell() {
+  function describe() {
     if (law?.along !== along) return;
     read(null);
     const at = (i) => `${show(law.mu_macro.at(i), 4)} at ${text(law.values.at(i))}`;
@@ -263,9 +263,9 @@ export function lawPanel(move, nudge) {
   function read(i) {
     cursor = i;
     plot.redraw();
-    const told = () =>
+    const reading = () =>
       `${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ${inWords(law.regime[i])}`;
-    $("law-read").textContent = i === null ? "" : told();
+    $("law-read").textContent = i === null ? "" : reading();
   }
 
   function paint(width, height) {
@@ -325,7 +325,7 @@ export function lawPanel(move, nudge) {
         upright("grid strong", places[cursor]),
         frame.dot(values[cursor], mu[cursor], 4, "dot"),
       ],
-      answer && frame.point(shown(valueOf(answer.asked, along)), answer.mu_macro),
+      answer && frame.point(shown(valueOf(answer.inputs, along)), answer.mu_macro),
     ];
   }
 
@@ -372,7 +372,7 @@ export function lawPanel(move, nudge) {
         ? `m: ${sentence(state.stiffness_exponent.fault)}`
         : null;
     status.set("typed", state.range.fault ? `range: ${sentence(state.range.fault)}` : fault);
-    tell();
+    describe();
     const request = {
       ...caseAround(state, along, true),
       along,
@@ -381,8 +381,8 @@ export function lawPanel(move, nudge) {
       points: POINTS,
       scale: state.scale,
     };
-    if (!answer || JSON.stringify(request) === asked) return;
-    asked = JSON.stringify(request);
+    if (!answer || JSON.stringify(request) === latest) return;
+    latest = JSON.stringify(request);
     channel.push(request);
   };
 }

@@ -44,7 +44,7 @@ function fill(input, { text, fault, typed = text }) {
   input.setAttribute("aria-invalid", String(fault !== undefined && typed.trim() !== ""));
 }
 
-/** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are told to `status`. */
+/** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are reported to `status`. */
 export function inputForm(set, setSI, status) {
   let state;
   let elastic = about.inputs.k.start; // which the switch of a rigid contact brings back
@@ -74,15 +74,15 @@ export function inputForm(set, setSI, status) {
       }
     }
     const body = k === RIGID ? "rigid contact" : about.choices.contact[contact];
-    const said = `${body}, ${about.choices.direction[direction]}`;
-    $("chosen").textContent = reasons[0] ?? `${said[0].toUpperCase()}${said.slice(1)}.`;
+    const setUp = `${body}, ${about.choices.direction[direction]}`;
+    $("chosen").textContent = reasons[0] ?? `${setUp[0].toUpperCase()}${setUp.slice(1)}.`;
     for (const part of $("sketch").querySelectorAll(".body, .motion")) {
       part.toggleAttribute(
         "hidden",
         !part.matches(`.body.${k === RIGID ? "rigid" : contact}, .motion.${direction}`),
       );
     }
-    $("sketch").setAttribute("aria-label", `The set-up: ${said}`);
+    $("sketch").setAttribute("aria-label", `The set-up: ${setUp}`);
   }
   /**
    * The fields of the exponent of k, each where its question is about Fz, and what holds while they
@@ -208,7 +208,7 @@ function panel(name, path, read, show) {
   const status = new Status(`${name}-status`, name);
   let state, answered; // the question that the result belongs to, as text
   const compare = () => {
-    const { found: now } = attempt(() => read(state));
+    const { result: now } = attempt(() => read(state));
     if (now) status.set("typed", null);
     const same = !answered || (now && textOf(now) === answered);
     if (same) status.set(name, null);
@@ -216,20 +216,20 @@ function panel(name, path, read, show) {
   };
   const channel = status.channel(
     name,
-    (asked) => post(path, asked),
-    (found, asked) => {
-      answered = textOf(asked);
+    (question) => post(path, question),
+    (answer, question) => {
+      answered = textOf(question);
       status.answered = true;
       compare();
       $(`${name}-result`).hidden = false;
-      show(found, asked, state);
+      show(answer, question, state);
     },
   );
   $(`${name}-form`).addEventListener("submit", (event) => {
     event.preventDefault();
-    const { found: asked, fault } = attempt(() => read(state));
+    const { result: question, fault } = attempt(() => read(state));
     status.set("typed", fault && sentence(fault));
-    if (!fault) channel.push(asked);
+    if (!fault) channel.push(question);
   });
   $(`${name}-form`).addEventListener("input", compare);
   return (now) => {
@@ -238,17 +238,17 @@ function panel(name, path, read, show) {
   };
 }
 
-/** Shows lines: [text], or [text, ...given] with a button for `use(...given)`. */
+/** Shows lines: [text], or [text, ...values] with a button for `use(...values)`. */
 const list = (id, lines, use) =>
   $(id).replaceChildren(
-    ...lines.map(([text, ...given]) => {
+    ...lines.map(([text, ...values]) => {
       const button = make("button", { class: "use", "aria-label": `use ${text}` }, "Use");
-      button.addEventListener("click", () => use(...given));
-      return make("li", {}, text, given.length > 0 && button);
+      button.addEventListener("click", () => use(...values));
+      return make("li", {}, text, values.length > 0 && button);
     }),
   );
 
-/** Which value of an input gives a wanted friction.  `use(changed)` takes it into the state. */
+/** Which value of an input gives a target friction.  `use(changed)` takes it into the state. */
 export function solver(use) {
   return panel(
     "solve",
@@ -260,17 +260,17 @@ export function solver(use) {
       if (fault && unknown === "Fz") refuse(`m: ${fault}`);
       return { ...caseAround(state, unknown), unknown, quantity, target, include: powerOf(state) };
     },
-    ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
+    ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, question, state) => {
       const { unit } = state[unknown];
       const none =
         min === max
           ? reason
           : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
       const lines = roots.map(({ value, mu_macro: mu, regime, power }) => {
-        const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
+        const root = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
         const shaker = power ? `, shaker ${inUnit("power", power.oscillation)}` : "";
         return [
-          `${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`,
+          `${root}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`,
           movedAlong(state, unknown, value, 15),
         ];
       });
@@ -288,7 +288,7 @@ export function stiffness(use) {
   const shown = Object.entries(about.arguments).filter(([name]) => name !== "Fz");
   $("arguments").append(
     ...shown.map(([name, { unit, meaning, choices }]) => {
-      const given = {
+      const attributes = {
         name,
         id: `argument-${name}`,
         "aria-describedby": `about-${name}`,
@@ -297,19 +297,23 @@ export function stiffness(use) {
       const input = choices.length
         ? make(
             "select",
-            given,
+            attributes,
             choices.map((one) => new Option(one)),
           )
-        : make("input", { spellcheck: "false", placeholder: SUCH_AS[name] ?? "", ...given });
-      const label = make("label", { for: given.id }, /\w/.test(unit) ? `${name} [${unit}]` : name);
-      const told = make("span", { id: `about-${name}`, class: "hint wide" }, meaning);
-      return make("fieldset", { class: "field", name }, label, input, told);
+        : make("input", { spellcheck: "false", placeholder: SUCH_AS[name] ?? "", ...attributes });
+      const label = make(
+        "label",
+        { for: attributes.id },
+        /\w/.test(unit) ? `${name} [${unit}]` : name,
+      );
+      const hint = make("span", { id: `about-${name}`, class: "hint wide" }, meaning);
+      return make("fieldset", { class: "field", name }, label, input, hint);
     }),
   );
   function choose() {
-    const known = about.geometries[$("geometry").value].arguments;
+    const names = about.geometries[$("geometry").value].arguments;
     for (const row of $("arguments").children)
-      row.disabled = row.hidden = !known.includes(row.name);
+      row.disabled = row.hidden = !names.includes(row.name);
   }
   $("geometry").addEventListener("input", choose); // before the form compares
   choose();
@@ -335,9 +339,9 @@ export function stiffness(use) {
     },
     ({ k, contact, warnings }, { Fz }) => {
       const model = contact === "ball" ? "ball (Hertz)" : "one spring";
-      const said = (warnings ?? []).map((text) => `. Warning: ${text}`).join("");
-      const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}${said}`;
-      list("stiffness-result", [[told, { k }, 6, { contact }]], use);
+      const warned = (warnings ?? []).map((text) => `. Warning: ${text}`).join("");
+      const line = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}${warned}`;
+      list("stiffness-result", [[line, { k }, 6, { contact }]], use);
     },
   );
 }
@@ -348,7 +352,7 @@ export function stiffness(use) {
  */
 export function fit(use, load) {
   let paint = () => [];
-  let told;
+  let caption;
   const plot = new Plot($("fit-plot"), (...size) => paint(...size));
   $("example").title = about.example.label;
   $("example").addEventListener("click", () => {
@@ -356,7 +360,7 @@ export function fit(use, load) {
     $("unknowns").value = "k"; // mu0 is one of its columns
     load(about.example.case);
   });
-  $("fit-image").addEventListener("click", () => plot.save(told, "friction-fit.svg"));
+  $("fit-image").addEventListener("click", () => plot.save(caption, "friction-fit.svg"));
   return panel(
     "fit",
     "v1/fit",
@@ -364,13 +368,13 @@ export function fit(use, load) {
       const points = readPoints($("points").value);
       const unknowns = $("unknowns")
         .value.split(" ")
-        .filter((name) => !(name in points)); // a column mu0 is known
+        .filter((name) => !(name in points)); // a column mu0 needs no fit
       if (!unknowns.length) refuse("µ₀ is a column of the points: choose k as the unknown");
       return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...points };
     },
     (
       { values, std, interval, solutions, warnings, reduced_chi2: scatter, residuals, curve },
-      asked,
+      question,
       state,
     ) => {
       /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
@@ -387,21 +391,21 @@ export function fit(use, load) {
       });
       const lines = [[best.join("; "), values, 6]];
       for (const other of solutions.slice(1)) {
-        const given = Object.fromEntries(names.map((name) => [name, other[name]]));
+        const solution = Object.fromEntries(names.map((name) => [name, other[name]]));
         lines.push([
           `the points allow as well: ${names.map((name) => equals(name, other)).join(", ")}`,
-          given,
+          solution,
           6,
         ]);
       }
-      if (asked.std && scatter !== null) lines.push([`reduced χ² = ${show(scatter, 3)}`]);
-      told = lines.map(([line]) => line).join("; ");
-      list("fit-found", lines, use);
+      if (question.std && scatter !== null) lines.push([`reduced χ² = ${show(scatter, 3)}`]);
+      caption = lines.map(([line]) => line).join("; ");
+      list("fit-lines", lines, use);
       list(
         "fit-warnings",
         warnings.map((line) => [line]),
       );
-      paint = (width, height) => picture(width, height, asked, curve, residuals, state.v0.unit);
+      paint = (width, height) => picture(width, height, question, curve, residuals, state.v0.unit);
       plot.redraw();
     },
   );

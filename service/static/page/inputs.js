@@ -14,7 +14,7 @@ const POWER = { units: { kW: [1e3, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9]
 
 export const RIGID = { text: "rigid", unit: "N/µm", low: Infinity, high: Infinity };
 
-/** What is known of a quantity: an input, an argument of a geometry, or a power. */
+/** What there is about a quantity: an input, an argument of a geometry, or a power. */
 const kindOf = (name) => about.inputs[name] ?? about.arguments[name] ?? POWER;
 
 /** The inputs of a case: an oscillating normal force has its amplitude in the place of y0. */
@@ -58,7 +58,7 @@ export function inUnit(name, value, unit = null, digits = 4) {
 }
 
 /**
- * A friction coefficient to the second digit of its uncertainty; where none is told, with `usual`
+ * A friction coefficient to the second digit of its uncertainty; where none is stated, with `usual`
  * digits.
  */
 export function friction(value, uncertainty = 0, usual = 4) {
@@ -78,20 +78,20 @@ export const refuse = (why) => {
   throw new Fault(why);
 };
 
-/** { found } of what reads a text, or { fault }: why it cannot be used. */
+/** { result } of what reads a text, or { fault }: why it cannot be used. */
 export function attempt(read) {
   try {
-    return { found: read() };
+    return { result: read() };
   } catch (error) {
     if (error instanceof Fault) return { fault: error.message };
     throw error;
   }
 }
 
-/** What `read` finds; a fault says where it was. */
+/** The result of `read`; a fault says where it was. */
 export function within(where, read) {
-  const { found, fault } = attempt(read);
-  return fault ? refuse(`${where}: ${fault}`) : found;
+  const { result, fault } = attempt(read);
+  return fault ? refuse(`${where}: ${fault}`) : result;
 }
 
 const NUMBER = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?![\d.,])(.*)$/is;
@@ -122,22 +122,22 @@ function readUnit(name, text) {
   const { units, offered = Object.keys(units), symbol = name } = kindOf(name);
   const tidy = text.replace(/[\s·[\]()]/g, "");
   const spellings = [tidy.replace(/[uμ](?=m)/g, "µ"), tidy];
-  const found = spellings.find((unit) => Object.hasOwn(units, unit));
-  if (found !== undefined && units[found] !== null) return found;
-  if (found !== undefined) refuse(`“${text}” can be Hz or rad/s: write one of them`);
+  const unit = spellings.find((one) => Object.hasOwn(units, one));
+  if (unit !== undefined && units[unit] !== null) return unit;
+  if (unit !== undefined) refuse(`“${text}” can be Hz or rad/s: write one of them`);
   const near = Object.keys(units).filter((unit) => unit.toLowerCase() === tidy.toLowerCase());
   if (near.length) refuse(`“${text}” is not a unit: did you mean ${near.join(" or ")}?`);
-  const known = offered.includes("-") ? "leave it out" : `give ${offered.join(", ")}`;
-  return refuse(`“${text}” is not a unit of ${symbol}: ${known}`);
+  const remedy = offered.includes("-") ? "leave it out" : `give ${offered.join(", ")}`;
+  return refuse(`“${text}” is not a unit of ${symbol}: ${remedy}`);
 }
 
 /** A typed quantity, in `unit` where none is typed: { text, unit, low, high }, low = high in SI. */
 export function readQuantity(name, text, unit) {
   const [value, typed] = readNumber(text);
-  const known = typed === "" ? unit : readUnit(name, typed);
-  const found = toSI(name, value, known);
-  if (found === 0 && value !== 0) refuse("is too small");
-  return { text: withUnit(String(value), known), unit: known, low: found, high: found };
+  const own = typed === "" ? unit : readUnit(name, typed);
+  const si = toSI(name, value, own);
+  if (si === 0 && value !== 0) refuse("is too small");
+  return { text: withUnit(String(value), own), unit: own, low: si, high: si };
 }
 
 /** A typed value of an input: a number, or for k "rigid" or "low..high". */
@@ -291,8 +291,8 @@ export function readTyped(state, name, text) {
     range: () => readRange(state.along, text, state[state.along].unit),
     stiffness_exponent: () => readExponent(text),
   };
-  const { found, fault } = attempt(read[name] ?? (() => readValue(name, text, state[name].unit)));
-  return fault ? { ...state[name], typed: text, fault } : found;
+  const { result, fault } = attempt(read[name] ?? (() => readValue(name, text, state[name].unit)));
+  return fault ? { ...state[name], typed: text, fault } : result;
 }
 
 /** An input of the state [SI]: of an interval its geometric middle, of a rigid contact Infinity. */
@@ -407,15 +407,15 @@ export function fromAddress(hash) {
   /** Sets a part of the state to what `read` makes of a text of the address, if it has that key. */
   const take = (key, read, name = key) => {
     if (!texts.has(key)) return;
-    const { found, fault } = attempt(() => read(texts.get(key)));
+    const { result, fault } = attempt(() => read(texts.get(key)));
     if (fault) faults.push(`${key} = ${texts.get(key) || "nothing"} (${fault})`);
-    else state[name] = found;
+    else state[name] = result;
     texts.delete(key);
   };
   for (const [key, words] of Object.entries(WORDS)) {
-    const known = words(state);
+    const choices = words(state);
     take(key, (word) => {
-      if (!known.includes(word)) refuse(`must be one of ${known.join(", ")}`);
+      if (!choices.includes(word)) refuse(`must be one of ${choices.join(", ")}`);
       return about.impossible[key === "direction" ? `${state.contact} ${word}` : ""]
         ? refuse("not for a ball")
         : word;

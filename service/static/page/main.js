@@ -25,15 +25,15 @@ import { get, post } from "./service.js";
 
 let state;
 let parts = []; // functions that follow the state and the last answer
-let answer = null; // with the state that asked for it
+let answer = null; // with the state that it belongs to
 
 const status = new Status("status", "main");
 const askPoint = status.channel(
   "point",
-  (asked) => post("v1/mu-macro", question(asked)),
-  (found, asked) => {
+  (inputs) => post("v1/mu-macro", question(inputs)),
+  (reply, inputs) => {
     status.answered = true;
-    answer = { ...found, asked };
+    answer = { ...reply, inputs };
     showAnswer(answer);
     follow();
   },
@@ -75,14 +75,14 @@ function takeBack({ key, target: { name } }) {
  */
 function setSI(values, digits = 4, more = {}) {
   const read = ([name, value]) => [name, rounded(name, value, state[name].unit, digits)];
-  const { found } = attempt(() => Object.entries(values).map(read));
-  if (found) change({ ...Object.fromEntries(found), ...more });
+  const { result } = attempt(() => Object.entries(values).map(read));
+  if (result) change({ ...Object.fromEntries(result), ...more });
 }
 
 /** Gives one input another value [SI]; k follows where it grows with it. */
 function move(name, value, digits = 4) {
-  const { found } = attempt(() => movedAlong(state, name, value, digits));
-  if (found) change(found);
+  const { result } = attempt(() => movedAlong(state, name, value, digits));
+  if (result) change(result);
 }
 
 /** Makes an input larger or smaller by steps of 5 %; true. */
@@ -114,7 +114,7 @@ const prose = (text) =>
     .replace(/(\d) (?=%|µm)/g, "$1\u00a0");
 
 /** Shows an answer; with the digits that k supports, or with all that the table supports. */
-function showAnswer({ asked, ...found }) {
+function showAnswer({ inputs, ...reply }) {
   const {
     mu_macro: mu,
     mu_macro_low: low,
@@ -123,40 +123,40 @@ function showAnswer({ asked, ...found }) {
     limits,
     groups,
     power,
-  } = found;
-  const { k, contact, direction } = asked;
-  const [normal, wide, all] = [direction === "normal", k.low < k.high, asked.digits === "all"];
+  } = reply;
+  const { k, contact, direction } = inputs;
+  const [normal, wide, all] = [direction === "normal", k.low < k.high, inputs.digits === "all"];
   const width = wide ? high - low : 0;
   const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
   const kind = k.low === Infinity ? "rigid contact" : about.choices.contact[contact];
-  $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
-  $("regime").textContent = inWords(found.regime);
+  $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, reply.digits);
+  $("regime").textContent = inWords(reply.regime);
   $("interval").textContent = wide
     ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}`
     : "";
   $("model").textContent =
     `One model: ${kind}, ${about.choices.direction[direction]}. ` +
     "It was compared with one published set of measured points, shaken along.";
-  const rows = found.model ?? [];
-  const [units, known] = ["units", "k is known"].map((name) =>
+  const rows = reply.model ?? [];
+  const [units, spread] = ["units", "k is known"].map((name) =>
     rows.find(({ row }) => row === name),
   ); // beside the number
   $("units").textContent = units ? `Check the units: ${prose(units.text)}` : "";
-  $("known").textContent = known ? `${prose(known.text)}.` : "";
+  $("known").textContent = spread ? `${prose(spread.text)}.` : "";
   $("rows").replaceChildren(
     ...rows
-      .filter((one) => one !== units && one !== known)
+      .filter((one) => one !== units && one !== spread)
       .map(({ row, text }) => make("li", {}, make("b", {}, `${row}: `), `${prose(text)}.`)),
   );
   list("values", {
     "µ/µ₀": all
-      ? friction(found.mu_ratio, bound / valueOf(asked, "mu0"), 15)
-      : show(found.mu_ratio, 4),
+      ? friction(reply.mu_ratio, bound / valueOf(inputs, "mu0"), 15)
+      : show(reply.mu_ratio, 4),
     "static µ (v₀ → 0)": show(limits.mu_static, 4),
     "border at v₀": inUnit("v0", limits.v0_crit),
-    "peak speed y₀ω": normal ? "–" : inUnit("v0", valueOf(asked, "y0") * valueOf(asked, "omega")),
+    "peak speed y₀ω": normal ? "–" : inUnit("v0", valueOf(inputs, "y0") * valueOf(inputs, "omega")),
     "stick fraction":
-      found.stick_fraction === null ? "–" : `${show(100 * found.stick_fraction, 4)} %`,
+      reply.stick_fraction === null ? "–" : `${show(100 * reply.stick_fraction, 4)} %`,
     "shaker power": k.low === Infinity ? "– (rigid)" : inUnit("power", power?.oscillation ?? null),
     "power saved": inUnit("power", power?.saved ?? null),
     "ṽ = v₀/(l₀ω)": group(groups.v_tilde),
@@ -164,10 +164,10 @@ function showAnswer({ asked, ...found }) {
   });
   list("origin", {
     "numerical error of µ": bound === null ? "not known" : `≤ ${show(bound, 2)}`,
-    "answered by block": found.source,
-    "of table": `${found.table.id}, tolerance ${show(found.table.tolerance)}`,
+    "answered by block": reply.source,
+    "of table": `${reply.table.id}, tolerance ${show(reply.table.tolerance)}`,
   });
-  showBars(found, asked);
+  showBars(reply, inputs);
 }
 
 const list = (id, texts) =>
@@ -178,10 +178,10 @@ const list = (id, texts) =>
   );
 
 /** Per cent that mu_macro changes when an input grows by 1 %. */
-function showBars({ gradient, mu_macro: mu }, asked) {
+function showBars({ gradient, mu_macro: mu }, inputs) {
   const share = (name) =>
-    gradient[name] === null || !mu ? null : (gradient[name] * valueOf(asked, name)) / mu;
-  const shares = namesOf(asked).map((name) => [name, share(name)]);
+    gradient[name] === null || !mu ? null : (gradient[name] * valueOf(inputs, name)) / mu;
+  const shares = namesOf(inputs).map((name) => [name, share(name)]);
   const most = Math.max(1, ...shares.map(([, share]) => Math.abs(share)));
   $("bars").replaceChildren(
     ...shares.map(([name, share]) => {

@@ -28,7 +28,7 @@ async function ask(path, options) {
       return { later: "The service does not answer." };
     return { later: `The response of the service cannot be read (status ${response.status}).` };
   }
-  if (response.ok) return { found: body };
+  if (response.ok) return { answer: body };
   const { status, headers } = response;
   if (status === 401) return { key: true };
   const why = faults(body.errors) ?? body.detail ?? `status ${status}`;

@@ -26,8 +26,8 @@ import {
   valueOf,
 } from "../../../service/static/page/inputs.js";
 
-const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
-Object.assign(about, told);
+const names = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
+Object.assign(about, names);
 
 const near = (value, expected) =>
   assert.ok(Math.abs(value - expected) <= 1e-15 * Math.abs(expected), `${value}, not ${expected}`);
@@ -89,9 +89,9 @@ const READ = [
 ];
 for (const [name, unit, text, expected] of READ) {
   test(`${name}: “${text}”`, () => {
-    const { found, fault } = attempt(() => readValue(name, text, unit));
+    const { result, fault } = attempt(() => readValue(name, text, unit));
     if (typeof expected === "string") assert.ok(fault.includes(expected), fault);
-    else near(found.low, expected);
+    else near(result.low, expected);
   });
 }
 
@@ -155,12 +155,12 @@ for (const [text, expected] of [
   ["mu;std\n1;2", "two or three columns"],
 ]) {
   test(`points: ${JSON.stringify(text)}`, () => {
-    const { found, fault } = attempt(() => readPoints(text));
-    if (typeof expected === "string") assert.ok(fault?.includes(expected), JSON.stringify(found));
+    const { result, fault } = attempt(() => readPoints(text));
+    if (typeof expected === "string") assert.ok(fault?.includes(expected), JSON.stringify(result));
     else {
-      assert.deepEqual(Object.keys(found), Object.keys(expected));
+      assert.deepEqual(Object.keys(result), Object.keys(expected));
       for (const [name, column] of Object.entries(expected))
-        column.forEach((value, i) => near(found[name][i], value));
+        column.forEach((value, i) => near(result[name][i], value));
     }
   });
 }
@@ -203,7 +203,7 @@ test("an address in the words of the command line gives the same state back", ()
   );
 });
 
-for (const [address, said] of [
+for (const [address, reason] of [
   ["mu0=-1", "mu0 = -1 (must be finite and > 0)"],
   ["k=", "k = nothing (give a number)"],
   ["v0=5 mm", "v0 = 5 mm (“mm” is not a unit of v₀"],
@@ -223,7 +223,7 @@ for (const [address, said] of [
     const { state, faults } = fromAddress(
       `#${encodeURIComponent(address).replace(/%(3D|26)/g, decodeURIComponent)}`,
     );
-    assert.ok(faults.join("; ").includes(said), faults.join("; "));
+    assert.ok(faults.join("; ").includes(reason), faults.join("; "));
     assert.ok(Number.isFinite(caseOf(state).mu0));
   });
 }
@@ -232,9 +232,9 @@ test("the question says what was chosen, and nothing else", () => {
   const plain = question(startState());
   assert.deepEqual(Object.keys(plain), ["mu0", "Fz", "k", "y0", "omega", "v0", "include"]);
   const { state } = fromAddress("#k=0.8..1.2N/um&contact=ball&direction=along");
-  const asked = question(state);
-  assert.deepEqual([asked.contact, asked.direction, "k" in asked], ["ball", "along", false]);
-  asked.k_range.forEach((value, i) => near(value, [8e5, 1.2e6][i]));
+  const inputs = question(state);
+  assert.deepEqual([inputs.contact, inputs.direction, "k" in inputs], ["ball", "along", false]);
+  inputs.k_range.forEach((value, i) => near(value, [8e5, 1.2e6][i]));
   near(caseOf(state).k, Math.sqrt(8e5) * Math.sqrt(1.2e6));
   near(valueOf(state, "k"), caseOf(state).k);
   const normal = question(fromAddress("#direction=normal&k=rigid").state);
@@ -277,8 +277,8 @@ test("a question about Fz holds the load at which k holds where k grows with it"
     [state, "v0"],
     [{ ...state, stiffness_exponent: readExponent("0") }, "Fz"],
   ]) {
-    const asked = caseAround(constant, name);
-    assert.deepEqual([name in asked, "stiffness_exponent" in asked], [false, false]);
+    const inputs = caseAround(constant, name);
+    assert.deepEqual([name in inputs, "stiffness_exponent" in inputs], [false, false]);
   }
   assert.ok(caption(state, "Fz").endsWith("k at Fz = 10 N, growing as Fz^(1/2)"));
   assert.ok(!caption(state, "v0").includes("growing"));
