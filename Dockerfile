@@ -1,5 +1,5 @@
-# The service and the packages that it needs: no solver, no tests, no compiler, no pip.  The build stage compiles the
-# kernel with its own compiler, or with zig, which runs on every image.
+# The service and the packages that it needs: no solver, no tests, no compiler, no pip.  The build
+# stage compiles the kernel with its own compiler, or with zig, which runs on every image.
 #
 #   docker build -t mumacro .
 #   docker run --read-only --cap-drop=all -p 127.0.0.1:8000:8000 mumacro
@@ -7,37 +7,44 @@
 # These two are not run by the checks as they stand: deploy/container.sh does the same by docker or
 # podman, under names and a port of its own.
 #
-# BASE may be any image with a `python3` of 3.11 or newer.  BUILD_BASE, if it is another image, must have the same
-# Python at the same path and the same C library: the environment made in it has the path of its interpreter.
-# BUILD_BASE must be able to make a virtual environment; BASE needs neither that nor a shell.
+# BASE may be any image with a `python3` of 3.11 or newer.  BUILD_BASE, if it is another image, must
+# have the same Python at the same path and the same C library: the environment made in it has the
+# path of its interpreter. BUILD_BASE must be able to make a virtual environment; BASE needs neither
+# that nor a shell.
 ARG BASE=python:3.11-slim
 ARG BUILD_BASE=${BASE}
 
 FROM ${BUILD_BASE} AS build
 WORKDIR /app
-# A virtual environment, because a distribution's own Python may refuse installs (PEP 668), and because it is
-# copied to the next stage as one folder.
+# A virtual environment, because a distribution's own Python may refuse installs (PEP 668), and
+# because it is copied to the next stage as one folder.
 RUN python3 -m venv venv && python3 -m venv /build/venv
 COPY requirements/service.txt requirements/build.txt requirements/zig.txt /build/
-# A network with its own certificate authority or package index passes them as the two secrets.  They are
-# optional, and neither is stored in a layer.
+# A network with its own certificate authority or package index passes them as the two secrets.
+# They are optional, and neither is stored in a layer.
 RUN --mount=type=secret,id=pip.conf,target=/etc/pip.conf \
     --mount=type=secret,id=ca.pem,target=/etc/pip-ca.pem \
-    venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r /build/service.txt \
-    && /build/venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes \
-        -r /build/build.txt -r /build/zig.txt
+    install="-m pip install --no-cache-dir --disable-pip-version-check --require-hashes" \
+    && venv/bin/python $install -r /build/service.txt \
+    && /build/venv/bin/python $install -r /build/build.txt -r /build/zig.txt
 # The tests of other projects are a tenth of the environment.
-RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' -prune -exec rm -rf {} + \
+RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' \
+        -prune -exec rm -rf {} + \
 # Sources and headers for compilers, and stubs for type checkers.
-    && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' -o -name '*.p[xy][xdi]' \) -delete \
+    && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' \
+        -o -name '*.p[xy][xdi]' \) -delete \
 # Builders of Fortran and C extensions, which nothing here calls.
-    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/lib/python3*/site-packages/numpy/distutils venv/bin/f2py \
-# Of Arrow what reads and writes streams and CSV: no network, no clouds, no Parquet, no datasets, no second name of a library.
+    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/bin/f2py \
+        venv/lib/python3*/site-packages/numpy/distutils \
+# Of Arrow what reads and writes streams and CSV: no network, no clouds, no Parquet, no datasets, no
+# second name of a library.
     && cd venv/lib/python3*/site-packages/pyarrow \
-    && rm -rf include libarrow_flight* libarrow_python_flight* libarrow_python_parquet* libarrow_s3* libarrow_python.so \
-        libarrow_python.so.*.*.* _flight* _s3fs* _gcsfs* _azurefs* _hdfs* _orc* _substrait* _dataset* _parquet* _feather* \
+    && rm -rf include libarrow_flight* libarrow_python_flight* libarrow_python_parquet* \
+        libarrow_s3* libarrow_python.so libarrow_python.so.*.*.* _flight* _s3fs* _gcsfs* \
+        _azurefs* _hdfs* _orc* _substrait* _dataset* _parquet* _feather* \
     && cd /app \
-# Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after linking.
+# Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after
+# linking.
     && if command -v strip >/dev/null; then \
         find venv -name '*.so' -not -path '*.libs/*' -exec strip --strip-unneeded {} +; fi \
 # pip has no business in a running image.
@@ -53,13 +60,14 @@ COPY mumacro/kernel /build/mumacro/kernel
 # headers that the library reads.  Every user of the container may read all files, whatever the
 # umask of the checkout; no user may write them.
 RUN /build/venv/bin/python /build/hatch_build.py mumacro \
-    && find mumacro/kernel -name '*.[ch]' -not -name data.h -not -name records.h -not -name library.h -delete \
+    && find mumacro/kernel -name '*.[ch]' -not -name data.h -not -name records.h \
+        -not -name library.h -delete \
     && venv/bin/python -m compileall -q mumacro service \
     && chmod -R a+rX,go-w .
 
 FROM ${BASE}
 LABEL org.opencontainers.image.title="mumacro" \
-      org.opencontainers.image.description="Macroscopic friction under transverse oscillation: REST service on a verified table" \
+      org.opencontainers.image.description="Friction under oscillation: REST service" \
       org.opencontainers.image.licenses="Apache-2.0" \
       org.opencontainers.image.version="0.1.0" \
       org.opencontainers.image.vendor="The mumacro developers"
@@ -71,7 +79,8 @@ ENV PATH=/app/venv/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/nonexistent \
     MUMACRO_HOST=0.0.0.0
-# A number, not a name: Kubernetes can then check runAsNonRoot, and no entry in /etc/passwd is needed.
+# A number, not a name: Kubernetes can then check runAsNonRoot, and no entry in /etc/passwd is
+# needed.
 USER 10001:10001
 EXPOSE 8000
 STOPSIGNAL SIGTERM

@@ -35,8 +35,9 @@ path, circle, ellipse {{ fill: none; stroke: {INK}; stroke-width: 1.5; stroke-li
 
 def parts() -> dict[str, str]:
     """The base of the sketch, and its groups by their names."""
-    drawn = PAGE.read_text("utf-8").partition('<svg id="sketch"')[2].partition("</svg>")[0]
-    inside = drawn.partition(">")[2].replace(" hidden", "")
+    drawn = PAGE.read_text("utf-8").partition('id="sketch"')[2].partition("</svg>")[0]
+    lines = drawn.partition(">")[2].replace(" hidden", "").splitlines()
+    inside = "\n".join(line.strip() for line in lines)
     starts = [group.start() for group in re.finditer(r'<g class="(?:body|motion)', inside)]
     groups = [inside[i:j] for i, j in zip(starts, [*starts[1:], len(inside)], strict=True)]
     names = {group.split('"')[1].split()[1]: group.strip() for group in groups}

@@ -175,7 +175,8 @@ for workers in 1 4; do
     sending=()
     for i in 1 2 3; do
         curl --silent --max-time 60 --header 'Content-Type: application/json' \
-            --data-binary "@$work/batch.json" --output "$work/answer-$i" --write-out '%{http_code}' \
+            --data-binary "@$work/batch.json" \
+            --output "$work/answer-$i" --write-out '%{http_code}' \
             "$url/v1/mu-macro/batch?include=gradient,power" >"$work/status-$i" &
         sending+=($!)
     done
@@ -251,7 +252,8 @@ fi
 if [[ $engine == podman ]]; then
     sed --expression="s|image: mumacro:.*|image: $IMAGE|" \
         --expression='/- {name: http, containerPort: 8000}/d' \
-        --expression='s/^          ports:$/          ports: []/' deploy/kubernetes.yaml >"$work/kube.yaml"
+        --expression='s/^          ports:$/          ports: []/' \
+        deploy/kubernetes.yaml >"$work/kube.yaml"
     pod=yes
     podman play kube --network podman "$work/kube.yaml" >"$work/log" 2>&1 \
         || { tail -n 5 "$work/log" >&2; fail "play kube"; }

@@ -11,7 +11,8 @@ answer = jsondecode (text);
 printf ("mu_macro = %.6f, %s\n", answer.mu_macro, answer.regime);
 
 % A friction law: a table of numbers after one row of names
-[text, ok] = urlread ([base "/v1/law.csv?along=v0&start=1e-4&stop=10&points=41&mu0=0.3&Fz=10&k=1e6&y0=2e-6&f=20e3"]);
+sweep = "along=v0&start=1e-4&stop=10&points=41";
+[text, ok] = urlread ([base "/v1/law.csv?" sweep "&mu0=0.3&Fz=10&k=1e6&y0=2e-6&f=20e3"]);
 assert (ok);
 columns = textscan (text, "%f %f %f %f %f %s %s", "Delimiter", ",", "HeaderLines", 1);
 v0 = columns{1};

@@ -1,12 +1,13 @@
-c     Abaqus/Standard: the whole shear stress of a contact that is oscillated transversely, with its derivatives.
-c     Link with mumacro.f90, mumacro.c and mumacro_table.c.
+c     Abaqus/Standard: the whole shear stress of a contact that is oscillated transversely, with its
+c     derivatives. Link with mumacro.f90, mumacro.c and mumacro_table.c.
 c
 c     *Friction, user, properties=5
 c     mu0 [-], k [N/m^3], y0 [m], omega [rad/s], v_rest [m/s]
 c
-c     k is the tangential stiffness per area: a pressure stands for the force.  The slip rate that the model sees must be
-c     the mean over a period of the oscillation.  Below v_rest the stress rises with the slip rate (mumacro_force): take
-c     v_rest well below the speeds that matter.  fric_coef.f gives the coefficient alone, from release 2020 on.
+c     k is the tangential stiffness per area: a pressure stands for the force.  The slip rate that
+c     the model sees must be the mean over a period of the oscillation.  Below v_rest the stress
+c     rises with the slip rate (mumacro_force): take v_rest well below the speeds that matter.
+c     fric_coef.f gives the coefficient alone, from release 2020 on.
       subroutine fric(lm, tau, ddtddg, ddtddp, dslip, sed, sfd, ddtddt,
      &     pnewdt, statev, dgam, taulm, press, dpress, ddpddh, slip,
      &     kstep, kinc, time, dtime, noel, ciname, slname, msname, npt,

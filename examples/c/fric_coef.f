@@ -1,13 +1,15 @@
-c     Abaqus/Standard: mu_macro of a contact that is oscillated transversely, with its derivatives by slip rate and
-c     pressure.  Interface of the releases from 2020 on; link with mumacro.f90, mumacro.c and mumacro_table.c.
+c     Abaqus/Standard: mu_macro of a contact that is oscillated transversely, with its derivatives
+c     by slip rate and pressure.  Interface of the releases from 2020 on; link with mumacro.f90,
+c     mumacro.c and mumacro_table.c.
 c
 c     *Friction, user=COEFFICIENT, properties=4
 c     mu0 [-], k [N/m^3], y0 [m], omega [rad/s]
 c
-c     k is the tangential stiffness per area of the contact: a pressure stands for the force, so y~ = y0 k/(mu0 p).
-c     The first field variable, where there is one, scales y0; the second scales omega: the oscillation's amplitude and
-c     frequency in place and time.  The slip rate that the model sees must be the mean over a period of the
-c     oscillation: do not resolve the oscillation itself in the same analysis.
+c     k is the tangential stiffness per area of the contact: a pressure stands for the force, so
+c     y~ = y0 k/(mu0 p).  The first field variable, where there is one, scales y0; the second scales
+c     omega: the oscillation's amplitude and frequency in place and time.  The slip rate that the
+c     model sees must be the mean over a period of the oscillation: do not resolve the oscillation
+c     itself in the same analysis.
       subroutine fric_coef(fCoef, fCoefDeriv, nBlock, nProps, nTemp,
      &     nFields, iData, rData, surfInt, surfSec, surfMain, props,
      &     slipData, pressure, tempAvg, fieldAvg)

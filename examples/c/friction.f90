@@ -1,4 +1,5 @@
-!> Six numbers a line in (mu0 Fz k y0 omega v0, SI), mu_macro, its bound, the gradient, power and stick fraction out.
+!> Six numbers a line in (mu0 Fz k y0 omega v0, SI), mu_macro, its bound, the gradient, power and
+!! stick fraction out.
 program friction
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: error_unit

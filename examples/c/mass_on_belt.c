@@ -2,7 +2,7 @@
  * and slip; the shaker stops that.
  *
  *     mumacro export --format c --out friction
- *     cc -O2 -Ifriction mass_on_belt.c friction/mumacro.c friction/mumacro_table.c -lm -o mass_on_belt
+ *     cc -O2 -Ifriction -o mass_on_belt mass_on_belt.c friction/mumacro*.c -lm
  *     ./mass_on_belt
  *
  * Prints, without and with the shaker, how far the mass swings from peak to peak

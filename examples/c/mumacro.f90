@@ -1,11 +1,13 @@
-!> Macroscopic friction of an oscillated sliding contact: the functions of mumacro.h for Fortran 2003.
-!! Link with mumacro.c and mumacro_table.c; every function and its units are explained in mumacro.h.
+!> Macroscopic friction of an oscillated sliding contact: the functions of mumacro.h.
+!! Fortran 2003.  Link with mumacro.c and mumacro_table.c; mumacro.h explains every function and
+!! its units.
 module mumacro
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   implicit none
   private
-  public :: mumacro_answer, mumacro_cycle, mumacro_evaluate, mumacro_evaluate_cycle, mumacro_mu_macro
-  public :: mumacro_mu_ratio, mumacro_v_tilde_crit, mumacro_power, mumacro_stick_fraction, mumacro_force
+  public :: mumacro_answer, mumacro_cycle, mumacro_evaluate, mumacro_evaluate_cycle
+  public :: mumacro_mu_macro, mumacro_mu_ratio, mumacro_v_tilde_crit, mumacro_power
+  public :: mumacro_stick_fraction, mumacro_force
   public :: mumacro_evaluate_force
 
   !> Answer to a case; the gradient is in the order mu0, Fz, k, y0, omega, v0.
@@ -67,8 +69,10 @@ module mumacro
       real(c_double) :: force
     end function mumacro_force
 
-    !> The same for a contact and a direction, 0 and 0 for one spring across, with its gradient; 0, or an error.
-    function mumacro_evaluate_force(contact, direction, v0, v_rest, mu0, Fz, k, y0, omega, force, gradient) &
+    !> The same for a contact and a direction, 0 and 0 for one spring across, with its gradient; 0,
+    !! or an error.
+    function mumacro_evaluate_force( &
+        contact, direction, v0, v_rest, mu0, Fz, k, y0, omega, force, gradient) &
         result(error) bind(c)
       import :: c_double, c_int
       integer(c_int), value :: contact, direction

@@ -1,11 +1,12 @@
-c     Abaqus/Explicit, contact pairs: the friction force of a contact that is oscillated transversely.
-c     Link with mumacro.f90, mumacro.c and mumacro_table.c.
+c     Abaqus/Explicit, contact pairs: the friction force of a contact that is oscillated
+c     transversely. Link with mumacro.f90, mumacro.c and mumacro_table.c.
 c
 c     *Friction, user, properties=4
 c     mu0 [-], k [N/m^3], y0 [m], omega [rad/s]
 c
-c     k is the tangential stiffness per area: the force and the area of a node give its pressure.  The slip rate that the
-c     model sees must be the mean over a period of the oscillation.  The force is never above what makes the node stick.
+c     k is the tangential stiffness per area: the force and the area of a node give its pressure.
+c     The slip rate that the model sees must be the mean over a period of the oscillation.  The
+c     force is never above what makes the node stick.
       subroutine vfric(fTangential, statev, kStep, kInc, nContact,
      &     nFacNod, nSecNod, nMainNod, nFricDir, nDir, nStateVar,
      &     nProps, nTemp, nPred, numDefTfv, jSecUid, jMainUid,

@@ -20,11 +20,11 @@
 #define MU_Y_TAIL 131072.0 /* 2^17 */
 #define MU_S_CUT 0.3
 #define MU_SIGMA_CUT 0.45399049973954675 /* sin(pi/2 MU_S_CUT): MU_S_CUT as sqrt(v~/v~crit) */
-#define MU_R_MAX 1.25     /* covers s <= MU_S_CUT for every y~ in [MU_Y_STICK_LO, MU_Y_STICK_HI] */
+#define MU_R_MAX 1.25 /* covers s <= MU_S_CUT for every y~ in [MU_Y_STICK_LO, MU_Y_STICK_HI] */
 /* v~/v~crit from which two terms hold to 1e-14; ln(v~ / sqrt y~) is 3.95 to 4.11 there */
 #define MU_RHO_MAX 128.0
-#define MU_L_MAX 4.0      /* ln(v~ / sqrt y~) from which they do in the tail */
-#define MU_FAST_KAPPA 54.598150033144236  /* exp(MU_L_MAX) */
+#define MU_L_MAX 4.0                     /* ln(v~ / sqrt y~) from which they do in the tail */
+#define MU_FAST_KAPPA 54.598150033144236 /* exp(MU_L_MAX) */
 /* ln 0.47: below the border for y~ >= MU_Y_HIGH, ln 0.4754 */
 #define MU_L_HIGH (-0.7550225842780328)
 #define MU_LN_Y_CONT 0.4054651081081644
@@ -38,10 +38,31 @@ enum { MU_CONTINUOUS, MU_STICK_SLIP, MU_STATIC, MU_PARTIAL_SLIP, MU_REVERSE_SLIP
 /* Sources: first the blocks, those of a regime in the order of y~;
  * then what is known in closed form. */
 enum {
-    MU_C_LOW, MU_C_MID_1, MU_C_MID_2, MU_C_HIGH, MU_C_TAIL, MU_S_LOW, MU_S_MID, MU_CORNER,
-    MU_S_MID_1, MU_S_MID_2, MU_S_HIGH, MU_S_TAIL, MU_CHARTS, MU_FAST = MU_CHARTS, MU_NO_OSCILLATION,
-    MU_STATIC_LIMIT, MU_RIGID, MU_BALL_SLIDES, MU_BALL_PARTLY, MU_ALONG_SLIDES, MU_ALONG_STICKS,
-    MU_ALONG_REVERSES, MU_NORMAL_SLIDES, MU_NORMAL_STICKS, MU_SOURCES,
+    MU_C_LOW,
+    MU_C_MID_1,
+    MU_C_MID_2,
+    MU_C_HIGH,
+    MU_C_TAIL,
+    MU_S_LOW,
+    MU_S_MID,
+    MU_CORNER,
+    MU_S_MID_1,
+    MU_S_MID_2,
+    MU_S_HIGH,
+    MU_S_TAIL,
+    MU_CHARTS,
+    MU_FAST = MU_CHARTS,
+    MU_NO_OSCILLATION,
+    MU_STATIC_LIMIT,
+    MU_RIGID,
+    MU_BALL_SLIDES,
+    MU_BALL_PARTLY,
+    MU_ALONG_SLIDES,
+    MU_ALONG_STICKS,
+    MU_ALONG_REVERSES,
+    MU_NORMAL_SLIDES,
+    MU_NORMAL_STICKS,
+    MU_SOURCES,
     MU_OTHER = MU_SOURCES /* not placed yet: zero, extreme or illegal inputs, and y~ > MU_Y_TAIL */
 };
 enum { MU_MU_RATIO, MU_POWER, MU_STICK, MU_QUANTITIES };
@@ -49,7 +70,7 @@ enum { MU_BORDER_LOW, MU_BORDER_MID, MU_BORDER_HIGH, MU_PIECES };
 
 #define MU_HYPOTENUSE "mu_ratio sqrt(1 + y_tilde^2/v_tilde^2)"
 #define MU_SLOPE "mu_ratio y_tilde/v_tilde"
-#define MU_LAYER                                                                                   \
+#define MU_LAYER \
     "(mu_ratio - outer) y_tilde/v_tilde, outer = 1/AGM(1, sqrt(1 + y_tilde^2/v_tilde^2))"
 
 /* Each with coordinates a and b; s stands for sigma in evaluation and the angle
@@ -58,63 +79,124 @@ MU_LISTED mumacro_chart MU_CHART[MU_CHARTS] = {
     /* Continuous sliding, y~ <= 1.5.  a = y~^2, b = v~^2/(1 + v~^2): the orbit is analytic in both
      * squares, and b brings v~ = infinity to 1.  q is the deficit 1 - mu~ over that of eq. (31), 1
      * at y~ = 0: no digits are lost. */
-    {"continuous_low", MU_CONTINUOUS, {"y_squared", 0.0, MU_Y_CONT *MU_Y_CONT},
-     {"v_squared_share", 0.0, 1.0}, "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2", MU_ROUNDING, 0.0},
+    {"continuous_low",
+     MU_CONTINUOUS,
+     {"y_squared", 0.0, MU_Y_CONT * MU_Y_CONT},
+     {"v_squared_share", 0.0, 1.0},
+     "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2",
+     MU_ROUNDING,
+     0.0},
     /* Continuous sliding, 1.5 < y~ <= 2^17.  a = ln y~, b = ln(v~/v~crit) from the border to
      * rho = 128, where two terms take over.  q is mu~ over the cosine v~/sqrt(v~^2 + y~^2): it
      * grows from 1 as slowly as a logarithm.  Three blocks, each with its own number of cells. */
-    {"continuous_mid_1", MU_CONTINUOUS, {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID},
-     {"ln_rho", 0.0, MU_LN_RHO_MAX}, MU_HYPOTENUSE, 0.0, 6.0 * MU_ROUNDING},
-    {"continuous_mid_2", MU_CONTINUOUS, {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH},
-     {"ln_rho", 0.0, MU_LN_RHO_MAX}, MU_HYPOTENUSE, 0.0, 6.0 * MU_ROUNDING},
-    {"continuous_high", MU_CONTINUOUS, {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL},
-     {"ln_rho", 0.0, MU_LN_RHO_MAX}, MU_HYPOTENUSE, 0.0, 6.0 * MU_ROUNDING},
+    {"continuous_mid_1",
+     MU_CONTINUOUS,
+     {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID},
+     {"ln_rho", 0.0, MU_LN_RHO_MAX},
+     MU_HYPOTENUSE,
+     0.0,
+     6.0 * MU_ROUNDING},
+    {"continuous_mid_2",
+     MU_CONTINUOUS,
+     {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH},
+     {"ln_rho", 0.0, MU_LN_RHO_MAX},
+     MU_HYPOTENUSE,
+     0.0,
+     6.0 * MU_ROUNDING},
+    {"continuous_high",
+     MU_CONTINUOUS,
+     {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL},
+     {"ln_rho", 0.0, MU_LN_RHO_MAX},
+     MU_HYPOTENUSE,
+     0.0,
+     6.0 * MU_ROUNDING},
     /* Continuous sliding, y~ > 2^17.  a = 1/y~, b = ln(v~/sqrt y~): the border is at a fixed
      * kappa = v~/sqrt(y~) there.  What the layers at the turning points add to the outer solution,
      * eq. (35), is v~/y~ times q, linear in a. */
-    {"continuous_tail", MU_CONTINUOUS, {"inverse_y", 0.0, 1.0 / MU_Y_TAIL},
-     {"ln_kappa", MU_L_HIGH, MU_L_MAX}, MU_LAYER, 0.0, 0.0},
+    {"continuous_tail",
+     MU_CONTINUOUS,
+     {"inverse_y", 0.0, 1.0 / MU_Y_TAIL},
+     {"ln_kappa", MU_L_HIGH, MU_L_MAX},
+     MU_LAYER,
+     0.0,
+     0.0},
     /* Stick-slip, y~ <= 0.75.  a = y~^2, b = s with v~ = v~crit sin^2(pi s/2): square roots
      * at the static limit (s = 0) and at the border (s = 1) become analytic.
      * q = (1 - mu~)/y~^2, which has a limit at y~ = 0. */
-    {"stick_slip_low", MU_STICK_SLIP, {"y_squared", 0.0, MU_Y_STICK_LO *MU_Y_STICK_LO},
-     {"s", 0.0, 1.0}, "(1 - mu_ratio)/y_tilde^2", MU_ROUNDING, 0.0},
+    {"stick_slip_low",
+     MU_STICK_SLIP,
+     {"y_squared", 0.0, MU_Y_STICK_LO * MU_Y_STICK_LO},
+     {"s", 0.0, 1.0},
+     "(1 - mu_ratio)/y_tilde^2",
+     MU_ROUNDING,
+     0.0},
     /* Stick-slip beside the corner, 0.75 < y~ <= 1.5.  a = y~, b = s above 0.3; mu~
      * is of order 1 and is tabulated. */
-    {"stick_slip_mid", MU_STICK_SLIP, {"y", MU_Y_STICK_LO, MU_Y_STICK_HI}, {"s", MU_S_CUT, 1.0},
-     "mu_ratio", MU_ROUNDING, 0.0},
+    {"stick_slip_mid",
+     MU_STICK_SLIP,
+     {"y", MU_Y_STICK_LO, MU_Y_STICK_HI},
+     {"s", MU_S_CUT, 1.0},
+     "mu_ratio",
+     MU_ROUNDING,
+     0.0},
     /* The corner y~ = 1, v~ = 0, where sqrt(1 - y~^2), a cube root in v~ and a line in v~ meet.
      * All three are the root phi of the normal form; a and b are polar coordinates of phi and
      * sqrt(v~/phi), in which mu~/phi is analytic. */
-    {"corner", MU_STICK_SLIP, {"radius", 0.0, MU_R_MAX}, {"angle", 0.0, 1.0},
-     "mu_ratio/phi, phi^3 + 2 (y_tilde - 1) phi = pi v_tilde", 0.0, 0.0},
+    {"corner",
+     MU_STICK_SLIP,
+     {"radius", 0.0, MU_R_MAX},
+     {"angle", 0.0, 1.0},
+     "mu_ratio/phi, phi^3 + 2 (y_tilde - 1) phi = pi v_tilde",
+     0.0,
+     0.0},
     /* Stick-slip, 1.5 < y~ <= 2^17.  a = ln y~, b = s.  mu~ is proportional to v~
      * for v~ -> 0, eq. (16) gives 0: q is the slope mu~ y~/v~, which keeps its
      * digits down to the smallest speed. */
-    {"stick_slip_mid_1", MU_STICK_SLIP, {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID}, {"s", 0.0, 1.0},
-     MU_SLOPE, MU_DENORMAL, 16.0 * MU_ROUNDING},
-    {"stick_slip_mid_2", MU_STICK_SLIP, {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH}, {"s", 0.0, 1.0},
-     MU_SLOPE, MU_DENORMAL, 16.0 * MU_ROUNDING},
-    {"stick_slip_high", MU_STICK_SLIP, {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL}, {"s", 0.0, 1.0},
-     MU_SLOPE, MU_DENORMAL, 16.0 * MU_ROUNDING},
+    {"stick_slip_mid_1",
+     MU_STICK_SLIP,
+     {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID},
+     {"s", 0.0, 1.0},
+     MU_SLOPE,
+     MU_DENORMAL,
+     16.0 * MU_ROUNDING},
+    {"stick_slip_mid_2",
+     MU_STICK_SLIP,
+     {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH},
+     {"s", 0.0, 1.0},
+     MU_SLOPE,
+     MU_DENORMAL,
+     16.0 * MU_ROUNDING},
+    {"stick_slip_high",
+     MU_STICK_SLIP,
+     {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL},
+     {"s", 0.0, 1.0},
+     MU_SLOPE,
+     MU_DENORMAL,
+     16.0 * MU_ROUNDING},
     /* Stick-slip, y~ > 2^17.  a = 1/y~, b = s.  As in the tail of continuous sliding,
      * without the logarithm (2/pi) ln(v~/sqrt y~) that the layers have for v~ -> 0, where
      * the outer solution's cancels it. */
-    {"stick_slip_tail", MU_STICK_SLIP, {"inverse_y", 0.0, 1.0 / MU_Y_TAIL}, {"s", 0.0, 1.0},
-     MU_LAYER ", minus (2/pi) ln(v_tilde/sqrt(y_tilde))", 0.0, 0.0},
+    {"stick_slip_tail",
+     MU_STICK_SLIP,
+     {"inverse_y", 0.0, 1.0 / MU_Y_TAIL},
+     {"s", 0.0, 1.0},
+     MU_LAYER ", minus (2/pi) ln(v_tilde/sqrt(y_tilde))",
+     0.0,
+     0.0},
 };
 
 MU_LISTED mumacro_piece MU_PIECE[MU_PIECES] = {
-    {"low", {"y_squared", 0.0, MU_Y_CONT *MU_Y_CONT}, "2 v_tilde_crit / y_tilde^2"},
+    {"low", {"y_squared", 0.0, MU_Y_CONT * MU_Y_CONT}, "2 v_tilde_crit / y_tilde^2"},
     {"mid", {"ln_y", MU_LN_Y_CONT, MU_LN_Y_TAIL}, "v_tilde_crit / sqrt(y_tilde)"},
     {"high", {"inverse_y", 0.0, 1.0 / MU_Y_TAIL}, "v_tilde_crit / sqrt(y_tilde)"},
 };
 
 static const char *const MU_SOURCE_NAME[MU_SOURCES] = {
-    "continuous_low", "continuous_mid_1", "continuous_mid_2", "continuous_high", "continuous_tail",
-    "stick_slip_low", "stick_slip_mid", "corner", "stick_slip_mid_1", "stick_slip_mid_2",
-    "stick_slip_high", "stick_slip_tail", "tail_fast", "no_oscillation", "static_limit", "rigid",
-    "ball_continuous", "ball_partial_slip", "along_continuous", "along_stick_slip",
+    "continuous_low",     "continuous_mid_1",  "continuous_mid_2",  "continuous_high",
+    "continuous_tail",    "stick_slip_low",    "stick_slip_mid",    "corner",
+    "stick_slip_mid_1",   "stick_slip_mid_2",  "stick_slip_high",   "stick_slip_tail",
+    "tail_fast",          "no_oscillation",    "static_limit",      "rigid",
+    "ball_continuous",    "ball_partial_slip", "along_continuous",  "along_stick_slip",
     "along_reverse_slip", "normal_continuous", "normal_stick_slip",
 };
 static const char *const MU_REGIME_NAME[MU_REGIMES] = {

@@ -1,8 +1,8 @@
 /* The charts of a ball: which block a point (V, Y) belongs to, and its coordinates there. */
 
-/* y~ at which the ray V/Y = MU_STEEPEST t enters stick-slip, over t: polynomials in t below 1/2, in sqrt(1 - t) above,
- * whose argument u goes from -1 to 1.  It is part of the coordinates: its digits beyond 1e-12 need not be those of the
- * border. */
+/* y~ at which the ray V/Y = MU_STEEPEST t enters stick-slip, over t: polynomials in t below 1/2, in
+ * sqrt(1 - t) above, whose argument u goes from -1 to 1.  It is part of the coordinates: its digits
+ * beyond 1e-12 need not be those of the border. */
 #define MU_ENTRY_TERMS 16
 static const double MU_ENTRY[2][MU_ENTRY_TERMS] = {
     {7.529899464123383e-10, 2.4142285702696728e-09, 4.948493741907489e-09, 1.6879631649285973e-08,
@@ -27,7 +27,8 @@ MU_INLINE mu_lanes mu_entry(mu_lanes t, mu_mask half, mu_lanes root) {
 
 /* d ln entry / d ln t at 0 < t < 1; and d ln entry / d sqrt(1 - t), which stays finite. */
 static double mu_entry_slope(double t, double root, double *of_root) {
-    const double *c = MU_ENTRY[t < 0.5 ? 0 : 1], u = t < 0.5 ? 4.0 * t - 1.0 : 2.0 * MU_SQRT2 * root - 1.0;
+    const double *c = MU_ENTRY[t < 0.5 ? 0 : 1],
+                 u = t < 0.5 ? 4.0 * t - 1.0 : 2.0 * MU_SQRT2 * root - 1.0;
     double sum = c[0], slope = 0.0;
     for (int i = 1; i < MU_ENTRY_TERMS; ++i) {
         slope = mu_fma1(slope, u, sum);
@@ -43,18 +44,21 @@ static double mu_entry_slope(double t, double root, double *of_root) {
     return root > 0.0 ? -0.5 * t / root * *of_root : HUGE_VAL;
 }
 
-/* x^(1/6), then 2 MU_FOLD_KNOT - MU_FOLD_SCALE sqrt(1 - x) from x = 1/2 on: from the root of x or of 1 - x. */
+/* x^(1/6), then 2 MU_FOLD_KNOT - MU_FOLD_SCALE sqrt(1 - x) from x = 1/2 on: from the root of x or
+ * of 1 - x. */
 MU_INLINE mu_lanes mu_folded(mu_mask half, mu_lanes root) {
     return mu_select(half, mu_cube_root(root), 2.0 * MU_FOLD_KNOT - MU_FOLD_SCALE * root);
 }
 
-/* The steepest ray as the table's border has it: where the two touch, a digit of one is the root of a digit in Y. */
+/* The steepest ray as the table's border has it: where the two touch, a digit of one is the root of
+ * a digit in Y. */
 static double mu_steepest_of(const mumacro_data *data) {
     return mu_border(data, MU_STEEPEST_Y, NULL, NULL) / MU_STEEPEST_Y;
 }
 
 /* As mu_place_common, of a ball. */
-MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_lanes crit, mu_lanes ln_y) {
+MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_lanes crit,
+                                  mu_lanes ln_y) {
     const mu_lanes rho = v / crit, t = v / (steepest * y), one = mu_all(1.0), zero = mu_all(0.0);
     const mu_mask above = MU_WHERE(rho >= 1.0), low = MU_WHERE(y <= MU_STEEPEST_Y);
     const mu_mask slides = above & (~low | MU_WHERE(t >= 1.0)), ring = above & ~slides;
@@ -65,23 +69,29 @@ MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_la
     const mu_mask half = ~ring | MU_WHERE(x < 0.5);
     const mu_lanes root = mu_sqrt(mu_select(half, x, 1.0 - x));
     const mu_lanes first = mu_folded(half, root);
-    const mu_lanes entry = mu_entry(mu_select(ring, t, one), half & ring, mu_select(ring, root, zero));
+    const mu_lanes entry =
+        mu_entry(mu_select(ring, t, one), half & ring, mu_select(ring, root, zero));
     /* second ones */
     const mu_lanes way = mu_lower(y / entry, one), z = mu_select(ring, way, rho);
     const mu_mask half_z = MU_WHERE(z < 0.5);
     const mu_lanes root_z = mu_sqrt(mu_select(slides, one, mu_select(half_z, z, 1.0 - z)));
-    const mu_lanes second = mu_folded(half_z, root_z), sigma = mu_select(half_z, root_z, MU_SQRT2 - root_z);
-    const mu_lanes share = mu_share(v, y, slides, low), log = mu_log(mu_select(low, v, rho)), squared = y * y;
+    const mu_lanes second = mu_folded(half_z, root_z),
+                   sigma = mu_select(half_z, root_z, MU_SQRT2 - root_z);
+    const mu_lanes share = mu_share(v, y, slides, low), log = mu_log(mu_select(low, v, rho)),
+                   squared = y * y;
     const mu_lanes hypotenuse = mu_sqrt(v * v * share);
-    const mu_lanes level = mu_select(lowest, 0.375 * ln_y, 0.1875 * log); /* the logarithm of small amplitudes */
+    const mu_lanes level =
+        mu_select(lowest, 0.375 * ln_y, 0.1875 * log); /* the logarithm of small amplitudes */
     const mu_mask deep = slow | ring | lowest;
-    const mu_mask of_low = mu_select_whole(fast_low, mu_all_whole(MU_B_LOW), mu_all_whole(MU_B_SLOW));
+    const mu_mask of_low =
+        mu_select_whole(fast_low, mu_all_whole(MU_B_LOW), mu_all_whole(MU_B_SLOW));
     const mu_mask corner = MU_WHERE(sigma < MU_SIGMA_CUT);
     const mu_mask of_small = mu_select_whole(
         lowest, mu_all_whole(MU_B_S_LOW),
         mu_select_whole(corner, mu_all_whole(MU_B_CORNER), mu_all_whole(MU_B_S_MID)));
-    const mu_mask of_high = mu_select_whole(above, mu_all_whole(MU_B_MID_1), mu_all_whole(MU_B_S_MID_1)) -
-                            MU_WHERE(y > MU_Y_MID) - MU_WHERE(y > MU_Y_HIGH);
+    const mu_mask of_high =
+        mu_select_whole(above, mu_all_whole(MU_B_MID_1), mu_all_whole(MU_B_S_MID_1)) -
+        MU_WHERE(y > MU_Y_MID) - MU_WHERE(y > MU_Y_HIGH);
     const mu_mask far = ~low & MU_WHERE(rho > MU_RHO_MAX);
     mu_places out;
     out.a = mu_select(low, mu_select(deep, first, mu_select(fast_low, squared, y)), ln_y);
@@ -92,14 +102,17 @@ MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_la
                            mu_select(low, mu_select(fast_low, -0.25 * squared * share, one),
                                      mu_select(slides, hypotenuse, v * share)));
     out.block = mu_select_whole(
-        low, mu_select_whole(slides, of_low, mu_select_whole(ring, mu_all_whole(MU_B_RING), of_small)), of_high);
+        low,
+        mu_select_whole(slides, of_low, mu_select_whole(ring, mu_all_whole(MU_B_RING), of_small)),
+        of_high);
     out.block = mu_select_whole(far, mu_all_whole(MU_B_FAST), out.block);
     return out;
 }
 
 /* Corner coordinates: R as of one spring, and the cube root of tan((pi/2 - psi)/2). */
 static void mu_place_ball_corner(mu_place *at) {
-    const double phi = mu_normal_form_root(at->v, at->y - 1.0), root = sqrt(2.0 * MU_PI * at->v / phi);
+    const double phi = mu_normal_form_root(at->v, at->y - 1.0),
+                 root = sqrt(2.0 * MU_PI * at->v / phi);
     at->phi = phi;
     at->a = sqrt(0.5 * root * root + 2.0 * phi * phi);
     at->b = mu_first(mu_cube_root(mu_all(root / (MU_SQRT2 * at->a + 2.0 * phi))));
@@ -119,8 +132,8 @@ static mu_place mu_locate_ball(const mumacro_data *data, double v, double y) {
         at.block = rho >= 1.0 ? MU_B_TAIL : MU_B_S_TAIL;
         at.b = rho >= 1.0 ? mu_log1(rho) : rho < 0.5 ? sqrt(rho) : MU_SQRT2 - sqrt(1.0 - rho);
     } else {
-        const mu_places found = mu_place_ball(mu_steepest_of(data), mu_all(v), mu_all(y), mu_all(at.crit),
-                                              mu_all(ln_y));
+        const mu_places found = mu_place_ball(mu_steepest_of(data), mu_all(v), mu_all(y),
+                                              mu_all(at.crit), mu_all(ln_y));
         at.block = (int)mu_first_whole(found.block);
         at.a = mu_first(found.a);
         at.b = mu_first(found.b);
@@ -144,17 +157,20 @@ static mu_turn mu_turn_of_ring(const mu_place *at) {
     const double t = at->a < MU_FOLD_KNOT ? cube * cube : 1.0 - left * left;
     const double root = at->a < MU_FOLD_KNOT ? sqrt(1.0 - t) : mu_max(left, 1e-9);
     double of_root;
-    const double tilt = mu_entry_slope(t, root, &of_root), a = mu_fold_slope(at->a), b = mu_fold_slope(at->b);
-    const mu_turn out = {a, -a, -tilt * b, (1.0 + tilt) * b, 0.0, 0.0, -tilt, 1.0 + tilt,
-                         2.0 * MU_FOLD_KNOT, MU_FOLD_SCALE};
+    const double tilt = mu_entry_slope(t, root, &of_root), a = mu_fold_slope(at->a),
+                 b = mu_fold_slope(at->b);
+    const mu_turn out = {a,   -a,    -tilt * b,  (1.0 + tilt) * b,   0.0,
+                         0.0, -tilt, 1.0 + tilt, 2.0 * MU_FOLD_KNOT, MU_FOLD_SCALE};
     return out;
 }
 
 static mu_turn mu_turn_of_ball_corner(const mu_place *at) {
-    mu_turn out = mu_turn_corner(at); /* whose b is that of one spring at b = 0; only R and phi are taken */
+    mu_turn out =
+        mu_turn_corner(at); /* whose b is that of one spring at b = 0; only R and phi are taken */
     const double phi = at->phi, root = sqrt(2.0 * MU_PI * at->v / phi);
     /* tan((pi/2 - psi)/2) = p^3: its slope is -(1 + p^6)/2 d psi, with tan psi = 2 phi / s0 */
-    const double cube = root / (MU_SQRT2 * at->a + 2.0 * phi), share = 0.5 * phi * root / (at->a * at->a);
+    const double cube = root / (MU_SQRT2 * at->a + 2.0 * phi),
+                 share = 0.5 * phi * root / (at->a * at->a);
     const double turn_v = share * (1.5 * out.phi_v - 0.5), turn_y = share * 1.5 * out.phi_y;
     const double of_b = -(1.0 + cube * cube) / (6.0 * at->b * at->b);
     out.b_v = of_b * 2.0 * turn_v;
@@ -165,37 +181,37 @@ static mu_turn mu_turn_of_ball_corner(const mu_place *at) {
 MU_INLINE mu_turn mu_turn_of_ball(const mu_place *at) {
     mu_turn out = {0.0, 1.0, 1.0, -at->tilt, 0.0, 0.0, 1.0, -at->tilt, MU_SQRT2, 1.0};
     switch (at->block) {
-    case MU_B_RING:
-        return mu_turn_of_ring(at);
-    case MU_B_CORNER:
-        return mu_turn_of_ball_corner(at);
-    case MU_B_LOW:
-        out.a_y = 2.0 * at->a;
-        out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);
-        out.b_y = 0.0;
-        return out;
-    case MU_B_SLOW:
-        out.a_v = at->a / 6.0;
-        out.a_y = 0.0;
-        out.b_v = -2.0 * at->b;
-        out.b_y = 2.0 * at->b;
-        return out;
-    case MU_B_S_LOW:
-        out.a_y = at->a / 6.0;
-        out.end = 2.0 * MU_FOLD_KNOT;
-        out.scale = MU_FOLD_SCALE;
-        out.b_v = mu_fold_slope(at->b);
-        out.b_y = -at->tilt * out.b_v;
-        return out;
-    case MU_B_S_MID:
-        out.a_y = at->a;
-        break;
-    case MU_B_TAIL:
-    case MU_B_S_TAIL:
-        out.a_y = -at->a;
-        break;
-    default:
-        break;
+        case MU_B_RING:
+            return mu_turn_of_ring(at);
+        case MU_B_CORNER:
+            return mu_turn_of_ball_corner(at);
+        case MU_B_LOW:
+            out.a_y = 2.0 * at->a;
+            out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);
+            out.b_y = 0.0;
+            return out;
+        case MU_B_SLOW:
+            out.a_v = at->a / 6.0;
+            out.a_y = 0.0;
+            out.b_v = -2.0 * at->b;
+            out.b_y = 2.0 * at->b;
+            return out;
+        case MU_B_S_LOW:
+            out.a_y = at->a / 6.0;
+            out.end = 2.0 * MU_FOLD_KNOT;
+            out.scale = MU_FOLD_SCALE;
+            out.b_v = mu_fold_slope(at->b);
+            out.b_y = -at->tilt * out.b_v;
+            return out;
+        case MU_B_S_MID:
+            out.a_y = at->a;
+            break;
+        case MU_B_TAIL:
+        case MU_B_S_TAIL:
+            out.a_y = -at->a;
+            break;
+        default:
+            break;
     }
     if (!mu_is_sliding_block(at->block)) {
         const double root = mu_max(MU_SQRT2 - at->b, 1e-9);

@@ -136,7 +136,7 @@ static mu_place mu_locate(const mumacro_data *data, double v, double y) {
 /* Derivatives of a chart's coordinates along ln v~ and ln y~. */
 typedef struct {
     double a_v, a_y, b_v, b_y;
-    double phi_v, phi_y; /* of ln phi, in the corner */
+    double phi_v, phi_y;   /* of ln phi, in the corner */
     double edge_v, edge_y; /* of ln x, where b = end - scale sqrt(1 - x) below the border x = 1 */
     double end, scale;
 } mu_turn;
@@ -178,6 +178,7 @@ MU_INLINE mu_turn mu_turn_of_spring(const mu_place *at) {
     } else if (at->block == MU_C_LOW) {
         out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);
         out.b_y = 0.0;
-    } else if (at->block == MU_C_TAIL) out.b_y = -0.5;
+    } else if (at->block == MU_C_TAIL)
+        out.b_y = -0.5;
     return out;
 }

@@ -5,8 +5,8 @@
 #define MU_ROUNDING 2e-15
 /* what a value may lose where it leaves the normal range of double precision */
 #define MU_DENORMAL 1e-306
-#define MU_FAST_ROUNDING 1.5e-15   /* of mu~ at large speed, relative */
-#define MU_RIGID_ROUNDING 1e-15    /* of mu~ of rigid contact, relative */
+#define MU_FAST_ROUNDING 1.5e-15 /* of mu~ at large speed, relative */
+#define MU_RIGID_ROUNDING 1e-15  /* of mu~ of rigid contact, relative */
 /* of y~ = y0 k/(mu0 Fz) in the static limit: three roundings, relative */
 #define MU_STATIC_ROUNDING 4.5e-16
 #define MU_POWER_ROUNDING (8.0 * MU_ROUNDING)
@@ -112,9 +112,17 @@ static mu_power_terms mu_power_expansion(double v, double y) {
     /* <cos^2 / sqrt(1 + n cos^2)> = sum of (-1)^k c_k c_(k+1) n^k, c_k = (2k
      * choose k) / 4^k; highest power first */
     static const double series[11] = {
-        0.02963424653717084, -0.032679369614925236, 0.03642282681539655, -0.04113636910915375,
-        0.047254085540771484, -0.055515289306640625, 0.067291259765625, -0.08544921875,
-        0.1171875, -0.1875, 0.5,
+        0.02963424653717084,
+        -0.032679369614925236,
+        0.03642282681539655,
+        -0.04113636910915375,
+        0.047254085540771484,
+        -0.055515289306640625,
+        0.067291259765625,
+        -0.08544921875,
+        0.1171875,
+        -0.1875,
+        0.5,
     };
     const double r = y / v, n = r * r;
     const mu_outer outer = mu_outer_expansion(r);

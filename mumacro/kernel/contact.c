@@ -9,7 +9,7 @@
  * over closed forms, taken here. */
 
 #define MU_DRIVEN_COLUMNS 5 /* of a node of the rule of oscillation along */
-#define MU_HUGE 1e280 /* groups beyond which all springs are as the middle one to rounding */
+#define MU_HUGE 1e280       /* groups beyond which all springs are as the middle one to rounding */
 
 /* 1 - xi of the spring with the load s. */
 MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s)) : 1.0; }
@@ -307,7 +307,7 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
 
 static mu_slopes mu_slopes_of_driven(const mu_driven *driven) {
     const mu_line *line = &driven->line;
-    const mu_slopes out = {line->mu,       line->along_v,  line->along_y,
+    const mu_slopes out = {line->mu,        line->along_v,   line->along_y,
                            driven->bound_v, driven->bound_y, driven->bound};
     return out;
 }

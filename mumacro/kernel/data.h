@@ -70,7 +70,7 @@ enum mumacro_row {
     MU_ROW_ERROR_BOUND,
     MU_ROW_V_TILDE,
     MU_ROW_Y_TILDE,
-    MU_ROW_LENGTH_SCALE,                         /* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact */
+    MU_ROW_LENGTH_SCALE, /* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact */
     /* d mu_macro / d input, one row for each of the six */
     MU_ROW_GRADIENT,
     MU_ROW_GRADIENT_BOUND = MU_ROW_GRADIENT + 6, /* bounds of the errors of these six */

@@ -98,7 +98,7 @@ static void mu_chain_row(int n, double sign, const double *mu0, const double *sl
 static void mu_chain_rule(int direction, int n, double in[6][MU_CHUNK],
                           double terms[MU_TERMS][MU_CHUNK], double *out, int64_t stride) {
     for (int bounds = 0; bounds < 2; ++bounds, out += 6 * stride) {
-        double(*of)[MU_CHUNK] = terms + (bounds ? MU_OF_BOUND : MU_OF_MU), both[MU_CHUNK];
+        double (*of)[MU_CHUNK] = terms + (bounds ? MU_OF_BOUND : MU_OF_MU), both[MU_CHUNK];
         /* z = Fz_amplitude / Fz has neither mu0 nor k */
         const double *stiff = direction == MU_NORMAL ? of[MU_OF_V] : both,
                      sign = bounds ? 1.0 : -1.0;
@@ -268,7 +268,8 @@ static void mu_cases(const mumacro_data *data, int contact, int64_t n, const dou
                      int8_t *source) {
     if (contact == MU_BALL)
         mu_cases_of(data, MU_BALL, n, columns, strides, rows, out, stride, source);
-    else mu_cases_of(data, MU_SPRING, n, columns, strides, rows, out, stride, source);
+    else
+        mu_cases_of(data, MU_SPRING, n, columns, strides, rows, out, stride, source);
 }
 
 /* As mu_cases, of any contact and direction; where the normal force oscillates,

@@ -71,10 +71,10 @@ static mu_arc mu_arc_of(double m) {
 MU_INLINE mu_lanes mu_arcsines(mu_lanes x) {
     /* arcsin(x)/x in x^2 up to 1/4: interpolated at 16 Chebyshev points, highest power first */
     static const double series[16] = {
-        0.03485960124195166, -0.03164232760578032, 0.028856087526518862, -0.002711145590491113,
+        0.03485960124195166,  -0.03164232760578032, 0.028856087526518862, -0.002711145590491113,
         0.009796130641150287, 0.007910687786082768, 0.009828794225546476, 0.011544945401300811,
-        0.013965349878854743, 0.01735273787150877, 0.022372160049880758, 0.03038194442177626,
-        0.04464285714318035, 0.07499999999999758, 0.16666666666666669, 1.0,
+        0.013965349878854743, 0.01735273787150877,  0.022372160049880758, 0.03038194442177626,
+        0.04464285714318035,  0.07499999999999758,  0.16666666666666669,  1.0,
     };
     const mu_mask far = MU_WHERE(x > 0.5);
     const mu_lanes q = mu_select(far, 0.5 * (1.0 - x), x * x), root = mu_select(far, mu_sqrt(q), x);
@@ -284,6 +284,7 @@ static mu_line mu_line_of_sliding(int direction, double v, double y) {
     if (!(v >= 0.0 && y >= 0.0 && y < (direction == MU_NORMAL ? 1.0 : HUGE_VAL))) {
         out.mu = out.along_v = out.along_y = out.stick = out.power = NAN;
         out.source = -1;
-    } else if (y == 0.0) out.source = MU_NO_OSCILLATION;
+    } else if (y == 0.0)
+        out.source = MU_NO_OSCILLATION;
     return out;
 }

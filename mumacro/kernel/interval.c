@@ -26,7 +26,7 @@ typedef struct {
 typedef struct {
     const mumacro_data *data;
     int contact, direction;
-    mu_inputs in; /* but for k */
+    mu_inputs in;              /* but for k */
     double least, most, bound; /* of the samples so far */
     mu_sample last;
 } mu_interval;

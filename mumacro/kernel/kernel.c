@@ -7,9 +7,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) ||             \
+#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || \
     defined _M_FP_FAST
-#error                                                                                             \
+#error \
     "mumacro needs infinities and NaN: compile without -ffast-math, -ffinite-math-only and /fp:fast"
 #endif
 

@@ -1,7 +1,8 @@
-/* Many points.  The choice of a point's block is a chain of branches that a processor cannot predict.  So MU_CHUNK
- * points go together through passes that select instead: amplitudes and the border's cell, v~crit, blocks and
- * coordinates, cells, values.  What the passes do not handle (the corner, closed forms, zero and extreme inputs) is
- * marked and answered one by one.  A single point is a chunk of one, so it has the same bits as in any array. */
+/* Many points.  The choice of a point's block is a chain of branches that a processor cannot
+ * predict.  So MU_CHUNK points go together through passes that select instead: amplitudes and the
+ * border's cell, v~crit, blocks and coordinates, cells, values.  What the passes do not handle (the
+ * corner, closed forms, zero and extreme inputs) is marked and answered one by one.  A single point
+ * is a chunk of one, so it has the same bits as in any array. */
 
 #define MU_CHUNK 256 /* the scratch of the passes stays in the fastest cache */
 
@@ -10,16 +11,17 @@ MU_INLINE int mu_few(int64_t n) { return n < MU_CHUNK ? (int)n : MU_CHUNK; }
 
 typedef struct {
     double v[MU_CHUNK], y[MU_CHUNK]; /* of a ball V, Y; 1 where a point is not common */
-    double crit[MU_CHUNK], ln_y[MU_CHUNK], a[MU_CHUNK], b[MU_CHUNK], base[MU_CHUNK], factor[MU_CHUNK];
-    double local[MU_CHUNK]; /* coordinate in the border's cell */
+    double crit[MU_CHUNK], ln_y[MU_CHUNK], a[MU_CHUNK], b[MU_CHUNK], base[MU_CHUNK],
+        factor[MU_CHUNK];
+    double local[MU_CHUNK];          /* coordinate in the border's cell */
     double u[MU_CHUNK], w[MU_CHUNK]; /* coordinates in the cell */
     int64_t block[MU_CHUNK];
     int32_t border[MU_CHUNK + MU_LANES], cell[MU_CHUNK];
 } mu_chunk;
 
 /* Points into the chunk, the border's cell, v~crit. */
-MU_INLINE void mu_pass_borders(const mumacro_data *data, int contact, int n, const double *v, const double *y,
-                               mu_chunk *c) {
+MU_INLINE void mu_pass_borders(const mumacro_data *data, int contact, int n, const double *v,
+                               const double *y, mu_chunk *c) {
     const int rest = n % MU_LANES;
     for (int i = 0; i < n; i += MU_LANES) {
         double few[2][MU_LANES];
@@ -51,12 +53,15 @@ MU_INLINE void mu_pass_borders(const mumacro_data *data, int contact, int n, con
         mu_store(c->crit + i, found.scale);
         mu_store(c->local + i, found.u);
         memcpy(c->border + i, &found.cell, sizeof found.cell);
-        mu_store_whole(c->block + i, mu_select_whole(common, mu_all_whole(0), mu_all_whole(MU_OTHER)));
+        mu_store_whole(c->block + i,
+                       mu_select_whole(common, mu_all_whole(0), mu_all_whole(MU_OTHER)));
     }
-    for (int i = 0; i < n; ++i) c->crit[i] *= mu_border_value(data->border + 8 * c->border[i], c->local[i]);
+    for (int i = 0; i < n; ++i)
+        c->crit[i] *= mu_border_value(data->border + 8 * c->border[i], c->local[i]);
 }
 
-/* Blocks, coordinates and forms of mu~; returns how many points are left to be answered one by one. */
+/* Blocks, coordinates and forms of mu~; returns how many points are left to be answered one by one.
+ */
 MU_INLINE int mu_pass_places(const mumacro_data *data, int contact, int n, mu_chunk *c) {
     const double steepest = contact == MU_BALL ? mu_steepest_of(data) : 0.0;
     mu_mask left = mu_all_whole(0);
@@ -66,13 +71,15 @@ MU_INLINE int mu_pass_places(const mumacro_data *data, int contact, int n, mu_ch
         mu_mask known, block;
         const mu_lanes v = mu_load(c->v + i), y = mu_load(c->y + i);
         const mu_lanes crit = mu_load(c->crit + i), ln_y = mu_load(c->ln_y + i);
-        const mu_places found =
-            contact == MU_BALL ? mu_place_ball(steepest, v, y, crit, ln_y) : mu_place_common(v, y, crit, ln_y);
+        const mu_places found = contact == MU_BALL ? mu_place_ball(steepest, v, y, crit, ln_y)
+                                                   : mu_place_common(v, y, crit, ln_y);
         memcpy(&known, c->block + i, sizeof known);
         block = mu_select_whole(MU_WHERE(known == 0), found.block, known);
-        left |= MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_CORNER : (int)MU_CORNER)) |
-                MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_FAST : (int)MU_FAST)) |
-                MU_WHERE(block == mu_all_whole(MU_OTHER));
+        left |=
+            MU_WHERE(block ==
+                     mu_all_whole(contact == MU_BALL ? (int)MU_B_CORNER : (int)MU_CORNER)) |
+            MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_FAST : (int)MU_FAST)) |
+            MU_WHERE(block == mu_all_whole(MU_OTHER));
         mu_store(c->a + i, found.a);
         mu_store(c->b + i, found.b);
         mu_store(c->base + i, found.base);
@@ -125,13 +132,15 @@ MU_INLINE mu_lanes mu_wholes_of(mu_lanes x) {
     return MU_AS(mu_lanes, MU_AS(mu_whole, mu_select(MU_WHERE(x < 1e9), x, mu_all(1e9))));
 }
 
-/* Cells of mu~: mu_find, several points at once.  A point without a cell gets one that means nothing. */
+/* Cells of mu~: mu_find, several points at once.  A point without a cell gets one that means
+ * nothing. */
 MU_INLINE void mu_pass_cells(const mumacro_data *data, int n, mu_chunk *c) {
     const int64_t cells = data->quantities[MU_MU_RATIO].cells;
     const mu_lanes last = mu_all((double)(cells - 1)), zero = mu_all(0.0);
     mu_column column[MU_STEP_B + 1];
     int done = 0;
-    const int together = n < 2 * MU_LANES ? 0 : n - n % MU_LANES; /* not for few: the columns have to be fetched */
+    const int together =
+        n < 2 * MU_LANES ? 0 : n - n % MU_LANES; /* not for few: the columns have to be fetched */
     for (int i = 0; together && i <= MU_STEP_B; ++i) column[i] = mu_column_of(data->blocks, i);
     for (; done < together; done += MU_LANES) {
         const mu_lanes a = mu_load(c->a + done), b = mu_load(c->b + done);
@@ -139,11 +148,14 @@ MU_INLINE void mu_pass_cells(const mumacro_data *data, int n, mu_chunk *c) {
         mu_lanes x, z, i, j, cell;
         mu_whole index;
         memcpy(&block, c->block + done, sizeof block);
-        x = mu_fma(a, mu_look_up(column + MU_STEP_A, block), mu_look_up(column + MU_OFFSET_A, block));
-        z = mu_fma(b, mu_look_up(column + MU_STEP_B, block), mu_look_up(column + MU_OFFSET_B, block));
+        x = mu_fma(a, mu_look_up(column + MU_STEP_A, block),
+                   mu_look_up(column + MU_OFFSET_A, block));
+        z = mu_fma(b, mu_look_up(column + MU_STEP_B, block),
+                   mu_look_up(column + MU_OFFSET_B, block));
         i = mu_wholes_of(x);
         j = mu_wholes_of(z);
-        cell = mu_look_up(column + MU_FIRST, block) + i * mu_look_up(column + MU_CELLS_B, block) + j;
+        cell =
+            mu_look_up(column + MU_FIRST, block) + i * mu_look_up(column + MU_CELLS_B, block) + j;
         cell = mu_select(MU_WHERE(cell > 0.0), cell, zero);
         index = MU_AS(mu_whole, mu_select(MU_WHERE(cell < last), cell, last));
         memcpy(c->cell + done, &index, sizeof index);
@@ -151,17 +163,20 @@ MU_INLINE void mu_pass_cells(const mumacro_data *data, int n, mu_chunk *c) {
         mu_store(c->w + done, 2.0 * (z - j) - 1.0);
     }
     for (; done < n; ++done) {
-        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[done]), 0, cells, c->a[done], c->b[done]);
+        const mu_spot spot =
+            mu_find(mu_block_of(data, (int)c->block[done]), 0, cells, c->a[done], c->b[done]);
         c->cell[done] = (int32_t)spot.cell;
         c->u[done] = spot.u;
         c->w[done] = spot.w;
     }
 }
 
-/* q and its derivatives in the cells: apart from what is made of them, so that the sums of several points overlap. */
+/* q and its derivatives in the cells: apart from what is made of them, so that the sums of several
+ * points overlap. */
 MU_INLINE void mu_pass_slopes(const mumacro_data *data, int n, const mu_chunk *c, mu_slope *slope) {
     const double *polynomials = data->quantities[MU_MU_RATIO].polynomials;
-    for (int i = 0; i < n; ++i) slope[i] = mu_cell_slopes(polynomials + 64 * (int64_t)c->cell[i], c->u[i], c->w[i]);
+    for (int i = 0; i < n; ++i)
+        slope[i] = mu_cell_slopes(polynomials + 64 * (int64_t)c->cell[i], c->u[i], c->w[i]);
 }
 
 /* mu~, from q in its cells or from slopes that are known already. */
@@ -179,26 +194,32 @@ MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c
 /* A point of the chunk in its block. */
 MU_INLINE mu_place mu_place_of(const mumacro_data *data, const mu_chunk *c, int i, int slope) {
     mu_place at = {(int)c->block[i], c->v[i], c->y[i], c->a[i], c->b[i], 0.0, c->crit[i], 0.0};
-    if (at.block == MU_CORNER) mu_place_corner(&at);
-    else if (at.block == MU_B_CORNER) mu_place_ball_corner(&at);
-    else if (slope) at.tilt = mu_border_slope(data->pieces, data->border + 8 * c->border[i], c->local[i], c->y[i]);
+    if (at.block == MU_CORNER)
+        mu_place_corner(&at);
+    else if (at.block == MU_B_CORNER)
+        mu_place_ball_corner(&at);
+    else if (slope)
+        at.tilt =
+            mu_border_slope(data->pieces, data->border + 8 * c->border[i], c->local[i], c->y[i]);
     return at;
 }
 
 /* What the passes leave: the corner, closed forms, zero and extreme inputs. */
 MU_INLINE int mu_is_left(int64_t block) {
-    return mu_is_ball(block) ? block == MU_B_FAST || block == MU_B_CORNER : block >= MU_FAST || block == MU_CORNER;
+    return mu_is_ball(block) ? block == MU_B_FAST || block == MU_B_CORNER
+                             : block >= MU_FAST || block == MU_CORNER;
 }
 
 /* What is told of where a ball's answer comes from. */
 static int mu_ball_source(int source) {
     if (source == -1 || source == MU_NO_OSCILLATION || source == MU_STATIC_LIMIT) return source;
-    if (mu_is_ball(source)) return source == MU_B_FAST || mu_is_sliding_block(source) ? MU_BALL_SLIDES : MU_BALL_PARTLY;
+    if (mu_is_ball(source))
+        return source == MU_B_FAST || mu_is_sliding_block(source) ? MU_BALL_SLIDES : MU_BALL_PARTLY;
     return source == MU_FAST ? MU_BALL_SLIDES : MU_BALL_PARTLY;
 }
 
-static mu_answer mu_answer_left(const mumacro_data *data, int contact, int quantity, const mu_chunk *c, int i, double v,
-                                double y) {
+static mu_answer mu_answer_left(const mumacro_data *data, int contact, int quantity,
+                                const mu_chunk *c, int i, double v, double y) {
     mu_answer out;
     if (contact == MU_BALL) {
         if (c->block[i] == MU_B_CORNER) {
@@ -218,9 +239,11 @@ static mu_answer mu_answer_left(const mumacro_data *data, int contact, int quant
                                   : mu_answer_at(data, MU_SPRING, quantity, v, y);
 }
 
-/* mu~ at up to MU_CHUNK points, and where slope is not NULL, q and its derivatives; returns as mu_pass_places. */
-MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, const double *v, const double *y,
-                                 mu_chunk *c, mu_slope *slope, double *value, double *bound, int8_t *source) {
+/* mu~ at up to MU_CHUNK points, and where slope is not NULL, q and its derivatives; returns as
+ * mu_pass_places. */
+MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, const double *v,
+                                 const double *y, mu_chunk *c, mu_slope *slope, double *value,
+                                 double *bound, int8_t *source) {
     const double *errors = data->quantities[MU_MU_RATIO].errors;
     int left;
     mu_pass_borders(data, contact, n, v, y, c);
@@ -233,7 +256,8 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, c
         bound[i] = fabs(c->factor[i]) * error[0] + error[1];
     }
     for (int i = 0; source && i < n; ++i)
-        source[i] = (int8_t)(contact == MU_BALL ? mu_ball_source((int)c->block[i]) : (int)c->block[i]);
+        source[i] =
+            (int8_t)(contact == MU_BALL ? mu_ball_source((int)c->block[i]) : (int)c->block[i]);
     for (int i = 0; left && i < n; ++i) {
         if (mu_is_left(c->block[i])) {
             const mu_answer found = mu_answer_left(data, contact, MU_MU_RATIO, c, i, v[i], y[i]);
@@ -246,13 +270,15 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, c
 }
 
 /* Another quantity at up to MU_CHUNK points. */
-MU_INLINE void mu_chunk_of_others(const mumacro_data *data, int contact, int quantity, int n, const double *v,
-                                  const double *y, mu_chunk *c, double *value, double *bound, int8_t *source) {
+MU_INLINE void mu_chunk_of_others(const mumacro_data *data, int contact, int quantity, int n,
+                                  const double *v, const double *y, mu_chunk *c, double *value,
+                                  double *bound, int8_t *source) {
     mu_pass_borders(data, contact, n, v, y, c);
     mu_pass_places(data, contact, n, c);
     for (int i = 0; i < n; ++i) {
         mu_answer found;
-        if (mu_is_left(c->block[i])) found = mu_answer_left(data, contact, quantity, c, i, v[i], y[i]);
+        if (mu_is_left(c->block[i]))
+            found = mu_answer_left(data, contact, quantity, c, i, v[i], y[i]);
         else {
             const mu_place at = mu_place_of(data, c, i, 0);
             found = mu_in_block(data, quantity, &at);
@@ -264,8 +290,9 @@ MU_INLINE void mu_chunk_of_others(const mumacro_data *data, int contact, int qua
     }
 }
 
-MU_INLINE void mu_values_of(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
-                            const double *y, double *value, double *bound, int8_t *source) {
+MU_INLINE void mu_values_of(const mumacro_data *data, int contact, int quantity, int64_t n,
+                            const double *v, const double *y, double *value, double *bound,
+                            int8_t *source) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const int few = mu_few(n - i);
         double *error = bound ? bound + i : NULL;
@@ -273,15 +300,20 @@ MU_INLINE void mu_values_of(const mumacro_data *data, int contact, int quantity,
         mu_chunk c;
         if (quantity == MU_MU_RATIO)
             mu_chunk_of_ratios(data, contact, few, v + i, y + i, &c, NULL, value + i, error, from);
-        else mu_chunk_of_others(data, contact, quantity, few, v + i, y + i, &c, value + i, error, from);
+        else
+            mu_chunk_of_others(data, contact, quantity, few, v + i, y + i, &c, value + i, error,
+                               from);
     }
 }
 
 /* The passes once for each contact, so that no point has to ask for it. */
-static void mu_values(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v, const double *y,
-                      double *value, double *bound, int8_t *source) {
-    if (contact == MU_BALL) mu_values_of(data, MU_BALL, quantity, n, v, y, value, bound, source);
-    else mu_values_of(data, MU_SPRING, quantity, n, v, y, value, bound, source);
+static void mu_values(const mumacro_data *data, int contact, int quantity, int64_t n,
+                      const double *v, const double *y, double *value, double *bound,
+                      int8_t *source) {
+    if (contact == MU_BALL)
+        mu_values_of(data, MU_BALL, quantity, n, v, y, value, bound, source);
+    else
+        mu_values_of(data, MU_SPRING, quantity, n, v, y, value, bound, source);
 }
 
 static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
@@ -291,15 +323,17 @@ static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
 }
 
 /* Slopes at a point of the chunk; slope: of mu_pass_slopes for mu~, NULL for other quantities. */
-MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quantity, const mu_chunk *c,
-                                 const mu_slope *slope, int i, double v, double y) {
+MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quantity,
+                                 const mu_chunk *c, const mu_slope *slope, int i, double v,
+                                 double y) {
     const int charted = contact == MU_BALL ? c->block[i] >= MU_B_LOW && c->block[i] < MU_B_END
                                            : c->block[i] < MU_CHARTS;
     if (charted && mu_form_in((int)c->block[i], quantity).factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
         if (slope != NULL && !mu_is_corner(at.block)) {
             const mu_spot spot = {c->cell[i], c->u[i], c->w[i]};
-            return mu_slopes_in_block(data, quantity, &at, spot, slope[i], c->base[i], c->factor[i]);
+            return mu_slopes_in_block(data, quantity, &at, spot, slope[i], c->base[i],
+                                      c->factor[i]);
         }
         return mu_slopes_at_place(data, quantity, &at);
     }
@@ -307,8 +341,8 @@ MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quan
                               : mu_slopes_at(data, MU_SPRING, quantity, v, y);
 }
 
-MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
-                                    const double *y, double *out, int64_t stride) {
+MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int quantity, int64_t n,
+                                    const double *v, const double *y, double *out, int64_t stride) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const int few = mu_few(n - i);
         mu_chunk c;
@@ -322,7 +356,8 @@ MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int q
             known = slope;
         }
         for (int j = 0; j < few; ++j) {
-            const mu_slopes found = mu_slopes_of(data, contact, quantity, &c, known, j, v[i + j], y[i + j]);
+            const mu_slopes found =
+                mu_slopes_of(data, contact, quantity, &c, known, j, v[i + j], y[i + j]);
             out[MU_SLOPE_VALUE * stride + i + j] = found.value;
             out[MU_SLOPE_V * stride + i + j] = found.along_v;
             out[MU_SLOPE_Y * stride + i + j] = found.along_y;
@@ -332,11 +367,13 @@ MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int q
     }
 }
 
-static void mu_slopes_of_points(const mumacro_data *data, int contact, int quantity, int64_t n, const double *v,
-                                const double *y, double *out, int64_t stride) {
+static void mu_slopes_of_points(const mumacro_data *data, int contact, int quantity, int64_t n,
+                                const double *v, const double *y, double *out, int64_t stride) {
     if (contact == MU_BALL && quantity != MU_MU_RATIO) { /* a table has no errors of these */
         for (int row = 0; row < MU_SLOPE_ROWS; ++row)
             for (int64_t i = 0; i < n; ++i) out[row * stride + i] = NAN;
-    } else if (contact == MU_BALL) mu_slopes_of_contact(data, MU_BALL, quantity, n, v, y, out, stride);
-    else mu_slopes_of_contact(data, MU_SPRING, quantity, n, v, y, out, stride);
+    } else if (contact == MU_BALL)
+        mu_slopes_of_contact(data, MU_BALL, quantity, n, v, y, out, stride);
+    else
+        mu_slopes_of_contact(data, MU_SPRING, quantity, n, v, y, out, stride);
 }

@@ -1,12 +1,15 @@
 /* One point: the value of a quantity, its slopes, and their bounds. */
 
-#define MU_CREEP 1e-60 /* v~ that stands for the limit v~ -> 0: below any speed of interest, far above underflow */
+#define MU_CREEP                                                                          \
+    1e-60 /* v~ that stands for the limit v~ -> 0: below any speed of interest, far above \
+             underflow */
 
 MU_INLINE const double *mu_block_of(const mumacro_data *data, int block) {
     return data->blocks + MU_PLACE_OF(block) * MU_BLOCK_COLUMNS;
 }
 
-/* Value and bound in a block: the table's error of q times the factor, an absolute part, and the quantity's slack. */
+/* Value and bound in a block: the table's error of q times the factor, an absolute part, and the
+ * quantity's slack. */
 static mu_answer mu_in_block(const mumacro_data *data, int quantity, const mu_place *at) {
     const mu_quantity *about = mu_quantity_in(at->block, quantity);
     const mumacro_cells *cells = &data->quantities[quantity];
@@ -16,18 +19,23 @@ static mu_answer mu_in_block(const mumacro_data *data, int quantity, const mu_pl
     double error = errors[0];
     mu_answer out = {0.0, 0.0, at->block};
     if (form.factor != MU_NOTHING) {
-        const mu_spot spot = mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
-        out.value = mu_fma1(factor, mu_cell_value(cells->polynomials + 64 * spot.cell, spot.u, spot.w), base);
+        const mu_spot spot =
+            mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
+        out.value = mu_fma1(
+            factor, mu_cell_value(cells->polynomials + 64 * spot.cell, spot.u, spot.w), base);
         out.value = mu_min(mu_max(out.value, 0.0), about->most);
         /* those of a ball err by orders more beside its border than in the rest of a block */
-        if (mu_is_ball(at->block) && quantity != MU_MU_RATIO) error = cells->cell_errors[3 * spot.cell];
+        if (mu_is_ball(at->block) && quantity != MU_MU_RATIO)
+            error = cells->cell_errors[3 * spot.cell];
     }
     out.bound = fabs(factor) * error + errors[1] + about->slack(data, at, out.value, factor);
     return out;
 }
 
-/* (value, bound of its absolute error, source or block) at any v~, y~, of a ball V, Y; NaN and -1 where illegal. */
-static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantity, double v, double y) {
+/* (value, bound of its absolute error, source or block) at any v~, y~, of a ball V, Y; NaN and -1
+ * where illegal. */
+static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantity, double v,
+                              double y) {
     const mu_quantity *about = mu_quantity_of(contact, quantity);
     mu_answer out = {NAN, NAN, MU_OTHER};
     mu_place at;
@@ -42,14 +50,16 @@ static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantit
     return out;
 }
 
-/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what interpolation leaves
- * out, is 64 at both edges and up to 8 between them. */
+/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what
+ * interpolation leaves out, is 64 at both edges and up to 8 between them. */
 MU_INLINE double mu_edge_share(double u) { return 1.0 / (1.0 + 7.0 * (1.0 - u * u)); }
 
-/* The same in the last cell below the border of (T_8' at w - T_8' at the border) / (1 - w): from 1344 to 64. */
+/* The same in the last cell below the border of (T_8' at w - T_8' at the border) / (1 - w): from
+ * 1344 to 64. */
 MU_INLINE double mu_border_share(double w) { return 1.0 / (1.0 + 10.0 * (1.0 - w)); }
 
-/* What errors of q and of its derivatives along a and b move a logarithmic slope by, per |factor|. */
+/* What errors of q and of its derivatives along a and b move a logarithmic slope by, per |factor|.
+ */
 MU_INLINE double mu_slope_error(const double *errors, double of_factor, double of_a, double of_b) {
     return errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b);
 }
@@ -57,24 +67,28 @@ MU_INLINE double mu_slope_error(const double *errors, double of_factor, double o
 /* Whether b ends at the border with a square root. */
 MU_INLINE int mu_has_edge(int block) { return !mu_is_sliding_block(block) && !mu_is_corner(block); }
 
-/* d q / d ln x along b in the last cell below the border x = 1, without what is linear in root = sqrt(1 - x); left is
- * the way in b to the border. */
-MU_INLINE double mu_without_edge(const double *cell, mu_spot spot, double left, double step, const mu_turn *turn) {
+/* d q / d ln x along b in the last cell below the border x = 1, without what is linear in root =
+ * sqrt(1 - x); left is the way in b to the border. */
+MU_INLINE double mu_without_edge(const double *cell, mu_spot spot, double left, double step,
+                                 const mu_turn *turn) {
     const double root = left / turn->scale;
-    return -2.0 * step * step * (1.0 - root * root) * mu_cell_bend(cell, spot.u, spot.w) * (turn->scale * turn->scale);
+    return -2.0 * step * step * (1.0 - root * root) * mu_cell_bend(cell, spot.u, spot.w) *
+           (turn->scale * turn->scale);
 }
 
-/* A slope of q along ln v~ at fixed y~, across the rays, and what errors along a and b are multiplied by. */
+/* A slope of q along ln v~ at fixed y~, across the rays, and what errors along a and b are
+ * multiplied by. */
 typedef struct {
     double slope, reach_a, reach_b;
 } mu_across;
 
-/* In the ring next to the steepest ray: q is smooth in root = sqrt(1 - t) without a linear term at fixed y~, so the
- * derivative along root at the steepest ray, which the interpolant has by its error, is taken out, as at the border.
- * per_z: d q / d ln z. */
-static mu_across mu_across_rays(const mumacro_cells *cells, const double *block, const mu_place *at, double q_a,
-                                double per_z) {
-    const double end = 2.0 * MU_FOLD_KNOT, root = mu_max((end - at->a) / MU_FOLD_SCALE, 1e-9), t = 1.0 - root * root;
+/* In the ring next to the steepest ray: q is smooth in root = sqrt(1 - t) without a linear term at
+ * fixed y~, so the derivative along root at the steepest ray, which the interpolant has by its
+ * error, is taken out, as at the border. per_z: d q / d ln z. */
+static mu_across mu_across_rays(const mumacro_cells *cells, const double *block, const mu_place *at,
+                                double q_a, double per_z) {
+    const double end = 2.0 * MU_FOLD_KNOT, root = mu_max((end - at->a) / MU_FOLD_SCALE, 1e-9),
+                 t = 1.0 - root * root;
     const double z = mu_min(at->y / MU_STEEPEST_Y, 1.0);
     const mu_mask half = z < 0.5 ? mu_all_whole(-1) : mu_all_whole(0);
     const double b = mu_first(mu_folded(half, mu_all(sqrt(z < 0.5 ? z : 1.0 - z))));
@@ -91,16 +105,18 @@ static mu_across mu_across_rays(const mumacro_cells *cells, const double *block,
     mu_across out;
     (void)mu_entry_slope(t, root, &of_root);
     (void)mu_entry_slope(1.0, 0.0, &of_edge);
-    out.slope = 0.5 * t / root * (MU_FOLD_SCALE * (q_a - q_a_edge) + of_root * per_z - of_edge * at_edge);
-    /* both ends have an error, and the way to the steepest ray goes through cells along b, too: four times either */
+    out.slope =
+        0.5 * t / root * (MU_FOLD_SCALE * (q_a - q_a_edge) + of_root * per_z - of_edge * at_edge);
+    /* both ends have an error, and the way to the steepest ray goes through cells along b, too:
+     * four times either */
     out.reach_a = 4.0 * mu_min(0.5 * MU_FOLD_SCALE * t / root, 0.5 * block[MU_STEP_A]);
     out.reach_b = 8.0 * fabs(of_root) * mu_min(0.5 * t / root, block[MU_STEP_A]);
     return out;
 }
 
 /* The slopes in a block, from the place, its spot in a cell, q there, and base and factor. */
-MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, const mu_place *at, mu_spot spot,
-                                       mu_slope slope, double base, double factor) {
+MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, const mu_place *at,
+                                       mu_spot spot, mu_slope slope, double base, double factor) {
     const mu_quantity *about = mu_quantity_in(at->block, quantity);
     const mumacro_cells *cells = &data->quantities[quantity];
     const double *block = mu_block_of(data, at->block);
@@ -108,22 +124,28 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     const mu_form_slopes form = mu_slopes_of_form(mu_form_in(at->block, quantity), at, &turn);
     /* d b / d ln x where b is folded */
     const double fold = turn.edge_v == 1.0 ? fabs(turn.b_v) : fabs(turn.b_v / turn.edge_v);
-    const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->cell_errors + 3 * spot.cell;
+    const double *cell = cells->polynomials + 64 * spot.cell,
+                 *errors = cells->cell_errors + 3 * spot.cell;
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
     const double q_b = slope.q_b * 2.0 * block[MU_STEP_B];
     double reach = fold, ratio, noise, along_a, along_a_y, more = 0.0;
     double share_a = mu_edge_share(spot.u), share_b = mu_edge_share(spot.w);
-    /* that near to the border a point may lie beyond it, where a slope changes with the distance in another way */
+    /* that near to the border a point may lie beyond it, where a slope changes with the distance in
+     * another way */
     const double inside = 1.0 - at->v / at->crit, off = mu_border_error(data);
     const double unknown = MU_ROUNDING + (fabs(inside) <= off ? off : 0.0);
     mu_slopes out;
     double along_b = turn.b_v * q_b, along_b_y = turn.b_y * q_b;
     if (about->about.smooth_at_border && mu_has_edge(at->block)) {
-        /* At the border the quantity is smooth in v~, so q has no linear term in root = sqrt(1 - v~/v~crit); the
-         * interpolant has one of the size of its error, which the chain rule would divide by root.  Taken out of the
-         * last cell, where 1 - w = 2 step root, it leaves the slope bounded. */
-        const double step = block[MU_STEP_B], last = (double)mu_whole_of(mu_fma1(turn.end, step, block[MU_OFFSET_B]));
-        reach = mu_min(reach, 0.5 * step * (turn.scale * turn.scale)); /* what it is one cell from the border */
+        /* At the border the quantity is smooth in v~, so q has no linear term in root = sqrt(1 -
+         * v~/v~crit); the interpolant has one of the size of its error, which the chain rule would
+         * divide by root.  Taken out of the last cell, where 1 - w = 2 step root, it leaves the
+         * slope bounded. */
+        const double step = block[MU_STEP_B],
+                     last = (double)mu_whole_of(mu_fma1(turn.end, step, block[MU_OFFSET_B]));
+        reach =
+            mu_min(reach, 0.5 * step *
+                              (turn.scale * turn.scale)); /* what it is one cell from the border */
         if (mu_fma1(at->b, step, block[MU_OFFSET_B]) >= last) {
             along_b = mu_without_edge(cell, spot, turn.end - at->b, step, &turn);
             along_b_y = turn.edge_y * along_b;
@@ -134,8 +156,9 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     along_a = turn.a_v * q_a;
     along_a_y = turn.a_y * q_a;
     if (at->block == MU_B_RING) {
-        const double per_z = along_b_y / turn.edge_y, last = (double)mu_whole_of(
-            mu_fma1(turn.end, block[MU_STEP_A], block[MU_OFFSET_A]));
+        const double per_z = along_b_y / turn.edge_y,
+                     last = (double)mu_whole_of(
+                         mu_fma1(turn.end, block[MU_STEP_A], block[MU_OFFSET_A]));
         if (mu_fma1(at->a, block[MU_STEP_A], block[MU_OFFSET_A]) >= last) {
             const mu_across found = mu_across_rays(cells, block, at, q_a, per_z);
             along_a = found.slope;
@@ -143,7 +166,8 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
             along_b = 0.0;
             along_b_y = per_z;
             share_a = mu_border_share(spot.u);
-            more = scale * (errors[1] * share_a * found.reach_a + errors[2] * share_b * reach * found.reach_b);
+            more = scale * (errors[1] * share_a * found.reach_a +
+                            errors[2] * share_b * reach * found.reach_b);
         }
     }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
@@ -153,12 +177,16 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
             8.0 * unknown * scale * (1.0 + fabs(form.factor_v) + fabs(form.factor_y) + reach);
     out.bound_v = more > 0.0 ? scale * errors[0] * fabs(form.factor_v) + more + noise
                              : scale * mu_slope_error(errors, form.factor_v, share_a * turn.a_v,
-                                                      share_b * reach * turn.edge_v) + noise;
+                                                      share_b * reach * turn.edge_v) +
+                                   noise;
     /* along y~ what is removed from the last cell also depends on the border's slope */
     ratio = fold != 0.0 ? reach / fold : 1.0;
-    out.bound_y = more > 0.0 ? scale * (errors[0] * fabs(form.factor_y) + errors[2] * share_b * reach) + more + noise
-                             : scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y,
-                                                      share_b * turn.b_y * ratio) + noise;
+    out.bound_y =
+        more > 0.0
+            ? scale * (errors[0] * fabs(form.factor_y) + errors[2] * share_b * reach) + more + noise
+            : scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y,
+                                     share_b * turn.b_y * ratio) +
+                  noise;
     if (at->block == MU_B_RING) {
         /* beside the ridge it is not T_8 that interpolation leaves out: shares are less sure */
         const double unsure = mu_is_ridge(at) ? 8.0 : 2.0;
@@ -167,7 +195,8 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     }
     out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (!about->about.smooth_at_border && mu_has_edge(at->block)) {
-        /* a root of the distance to the border: |1/sqrt(1 - d) - 1| <= d / (1 - d) for the error d of that distance */
+        /* a root of the distance to the border: |1/sqrt(1 - d) - 1| <= d / (1 - d) for the error d
+         * of that distance */
         const double share = inside > off ? fabs(factor * q_b) * off / (inside - off) : HUGE_VAL;
         out.bound_v += share * fabs(turn.b_v);
         out.bound_y += share * fabs(turn.b_y);
@@ -185,19 +214,24 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
 static mu_slopes mu_slopes_at_place(const mumacro_data *data, int quantity, const mu_place *at) {
     const mumacro_cells *cells = &data->quantities[quantity];
     const mu_form form = mu_form_in(at->block, quantity);
-    const mu_spot spot = mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
+    const mu_spot spot =
+        mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
     const mu_slope slope = mu_cell_slopes(cells->polynomials + 64 * spot.cell, spot.u, spot.w);
-    return mu_slopes_in_block(data, quantity, at, spot, slope, mu_base(form.base, at), mu_factor(form.factor, at));
+    return mu_slopes_in_block(data, quantity, at, spot, slope, mu_base(form.base, at),
+                              mu_factor(form.factor, at));
 }
 
-/* The same of a ball, where mu_limit_slopes is that of one spring: at rest along ln Y, which jumps at Y = 1. */
+/* The same of a ball, where mu_limit_slopes is that of one spring: at rest along ln Y, which jumps
+ * at Y = 1. */
 static mu_slopes mu_ball_limit_slopes(double y, mu_answer known) {
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, HUGE_VAL};
     out.value = known.value;
-    if (known.source == -1) out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
+    if (known.source == -1)
+        out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
     else if (known.source == MU_STATIC_LIMIT) {
         mu_ball_at_rest(y, &out.along_y);
-        out.bound_y = 8.0 * MU_ROUNDING * fabs(out.along_y) + (fabs(y - 1.0) < 2.0 * MU_ROUNDING ? 1.7 : 0.0);
+        out.bound_y =
+            8.0 * MU_ROUNDING * fabs(out.along_y) + (fabs(y - 1.0) < 2.0 * MU_ROUNDING ? 1.7 : 0.0);
     }
     return out;
 }
@@ -206,28 +240,32 @@ static mu_slopes mu_ball_limit_slopes(double y, mu_answer known) {
 static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     out.value = known.value;
-    if (known.source == -1) out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
+    if (known.source == -1)
+        out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
     else if (quantity == MU_MU_RATIO && known.source == MU_STATIC_LIMIT && y < 1.0) {
         const double mu = known.value;
         out.along_y = -y * y / mu;
         /* the slope of the square root, whose argument is uncertain by the last digit of y~ */
-        out.bound_y = fabs(out.along_y) * mu_min(2.0 * MU_ROUNDING / (mu * mu) + MU_ROUNDING, 1e300);
+        out.bound_y =
+            fabs(out.along_y) * mu_min(2.0 * MU_ROUNDING / (mu * mu) + MU_ROUNDING, 1e300);
     }
     return out;
 }
 
 /* (value, v~ d/d v~, y~ d/d y~, bounds of both slopes) at any point.
  *
- * The logarithmic slopes are the natural ones: bounded everywhere but on the line v~ -> 0 at y~ = 1, where mu~ has the
- * infinite slope of a cube root in v~ (and a finite logarithmic one). */
-static mu_slopes mu_slopes_at(const mumacro_data *data, int contact, int quantity, double v, double y) {
+ * The logarithmic slopes are the natural ones: bounded everywhere but on the line v~ -> 0 at y~ =
+ * 1, where mu~ has the infinite slope of a cube root in v~ (and a finite logarithmic one). */
+static mu_slopes mu_slopes_at(const mumacro_data *data, int contact, int quantity, double v,
+                              double y) {
     const mu_quantity *about = mu_quantity_of(contact, quantity);
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_place at;
     if (!(0.0 < v && v < HUGE_VAL && 0.0 < y && y < HUGE_VAL)) {
         const mu_answer known = about->limit(v, y);
         if (known.source != MU_OTHER)
-            return contact == MU_BALL ? mu_ball_limit_slopes(y, known) : mu_limit_slopes(quantity, y, known);
+            return contact == MU_BALL ? mu_ball_limit_slopes(y, known)
+                                      : mu_limit_slopes(quantity, y, known);
     }
     at = mu_locate_as(data, contact, v == 0.0 ? MU_CREEP : v, y);
     if (at.block == MU_FAST || at.block == MU_B_FAST) return about->fast_slopes(data, v, y);
@@ -241,8 +279,9 @@ static mu_slopes mu_slopes_at(const mumacro_data *data, int contact, int quantit
     return out;
 }
 
-/* d mu~/d v~ at v~ = 0 and its bound: pi/(2 (1 - y~^2)) below y~ = 1, C(y~) above, infinite on y~ = 1; 0 at y~ = 0 or
- * infinity.  C(y~) = lim mu~/v~ is read off the table at a speed that stands for the limit. */
+/* d mu~/d v~ at v~ = 0 and its bound: pi/(2 (1 - y~^2)) below y~ = 1, C(y~) above, infinite on y~ =
+ * 1; 0 at y~ = 0 or infinity.  C(y~) = lim mu~/v~ is read off the table at a speed that stands for
+ * the limit. */
 static double mu_speed_slope_at_zero(const mumacro_data *data, double y, double *bound) {
     double v;
     mu_answer found;

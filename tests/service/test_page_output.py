@@ -449,7 +449,7 @@ def test_the_measured_example_is_loaded_and_fitted(open_page: Any) -> None:
     assert page.value("#field-Fz") == "10.79 N"
     assert page.find("[value=along]").is_selected()
     page.run("[...document.querySelectorAll('#fit-form button')].at(-1).click();")
-    page.wait_for("#fit-found", r"^k = 9.974 N/µm ± 0.076 N/µm")  # docs/how-to/fit.md
+    page.wait_for("#fit-lines", r"^k = 9.974 N/µm ± 0.076 N/µm")  # docs/how-to/fit.md
     assert len(page.texts("#fit-plot :is(circle.measured, path.curve)")) == 6
 
 
@@ -494,14 +494,14 @@ def test_the_panels_ask_and_fill_the_form(
         asked = page.asked("v1/fit")
         assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
         assert (asked["contact"], asked["unknowns"], "k" in asked) == ("ball", ["k", "mu0"], False)
-        lines = page.texts("#fit-found li")
+        lines = page.texts("#fit-lines li")
         for line, pattern in zip(
             lines, ("k = 1.3 N/µm ± .*; µ₀ = 0.3 ± .*Use", "reduced χ² = .*"), strict=True
         ):
             assert re.fullmatch(pattern, line)
         assert len(page.texts("#fit-plot :is(circle.measured, .band, .curve)")) == 11
         assert "k = 1.3 N/µm" in page.download("#fit-image", tmp_path, "friction-fit.svg")
-        page.click("#fit-found button")
+        page.click("#fit-lines button")
         assert float(page.value("#field-k").removesuffix(" N/µm")) == close(1.3, rel=1e-5)
         assert not page.is_old("#fit")
         page.choose("#points", "1 2 3 4", "input")
@@ -526,7 +526,7 @@ def test_the_fit_takes_decimal_commas_and_a_column_mu0(
         asked = page.asked("v1/fit")
         assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
         assert (asked["mu0"], asked["unknowns"]) == (mu0.tolist(), ["k"])
-        (line,) = page.texts("#fit-found li")
+        (line,) = page.texts("#fit-lines li")
         assert re.fullmatch("k = 1.3 N/µm ± .*Use", line)
         assert page.text("#fit-status") == ""
         page.choose("#unknowns", "mu0", "input")

@@ -106,7 +106,8 @@ static Status answered(ME) {
         const double *x = s->x, moved = x[amplitude(m) - 1];
         const int error = mumacro_evaluate_as(s->contact, s->direction, x[0], x[1], x[2], moved,
                                               x[4], fabs(x[V0 - 1]), &s->answer);
-        if (error) say(m->logger, m->environment, m->name, DISCARD, mumacro_error_text(error));
+        if (error)
+            say(m->logger, m->environment, m->name, DISCARD, mumacro_error_text(error));
         else
             mumacro_evaluate_force(s->contact, s->direction, x[V0 - 1], s->v_rest, x[0], x[1], x[2],
                                    moved, x[4], &s->force, s->force_slopes);
@@ -232,16 +233,16 @@ EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **state) { re
 
 /* --- values and time -------------------------------------------------------------------------- */
 
-#define EACH(i, n, call) \
-    for (size_t i = 0; i < n; ++i) { \
-        const Status status = call; \
+#define EACH(i, n, call)                 \
+    for (size_t i = 0; i < n; ++i) {     \
+        const Status status = call;      \
         if (status != OK) return status; \
     }
-#define FOR_ALL(name, type, call) \
+#define FOR_ALL(name, type, call)                           \
     EXPORT Status name(ME, AT, type value[] SIZE(values)) { \
-        if (SHORTER(values, n)) return ERROR; \
-        EACH(i, n, call) \
-        return OK; \
+        if (SHORTER(values, n)) return ERROR;               \
+        EACH(i, n, call)                                    \
+        return OK;                                          \
     }
 FOR_ALL(GET_NUMBERS, double, get_number(m, at[i], value + i))
 FOR_ALL(SET_NUMBERS, const double, set_number(m, at[i], value[i]))
@@ -268,7 +269,7 @@ RETURNS(OK, ExitInitializationMode, ME)
 RETURNS(OK, EnterEventMode, ME)
 RETURNS(OK, EnterContinuousTimeMode, ME)
 RETURNS(OK, Terminate, ME)
-#define NO_VALUES(name, type) \
+#define NO_VALUES(name, type)                                   \
     RETURNS(NONE, Get##name, ME, AT, type value[] SIZE(values)) \
     RETURNS(NONE, Set##name, ME, AT, type const value[] SIZE(values))
 NO_VALUES(Boolean, Boolean)

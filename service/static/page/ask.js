@@ -1,5 +1,5 @@
-// Asking and its failures: one question in flight, what is told of it, the API key and its field.
-// Who answers is said in service.js.
+// Asking and its failures: one question in flight, what is reported of it, the API key and its field.
+// The questions themselves are in service.js.
 import { $ } from "./plots.js";
 
 const SLOW_MS = 1_500; // after which the old answer is marked as old
@@ -9,15 +9,17 @@ const wakeAll = () => channels.forEach((one) => one.wake());
 addEventListener("online", wakeAll);
 
 /**
- * One question in flight; while it is, only the newest of those that come is kept.  Where there is no answer it is
- * asked again until there is one: after a while, when the network is back, or when a key is entered.
+ * One question in flight; while it is, only the newest of those that come is kept.  Where there is
+ * no answer it is asked again until there is one: after a while, when the network is back, or when
+ * a key is entered.
  *
- * `ask(question)` -> { found }, or why not: { refused }, { later, seconds to wait if told } or { key: true };
- * `use(found, question)`; `tell(reason, calm)`, reason null if there is none, calm if it mends itself.
+ * `ask(question)` -> { answer }, or why not: { refused }, { later, seconds } or { key: true };
+ * `use(answer, question)`; `report(reason, calm)`: null where there is no reason, calm where it mends
+ * itself.
  */
 export class Channel {
-  constructor(ask, use, tell) {
-    Object.assign(this, { ask, use, tell, next: null, busy: false, wake: () => {} });
+  constructor(ask, use, report) {
+    Object.assign(this, { ask, use, report, next: null, busy: false, wake: () => {} });
     channels.push(this);
   }
 
@@ -30,25 +32,25 @@ export class Channel {
   async run() {
     this.mark(true);
     while (this.next !== null) {
-      const asked = this.next;
+      const pending = this.next;
       this.next = null;
-      const slow = setTimeout(() => this.tell("Waiting for the service.", true), SLOW_MS);
-      const answer = await this.ask(asked.question);
+      const slow = setTimeout(() => this.report("Waiting for the service.", true), SLOW_MS);
+      const reply = await this.ask(pending.question);
       clearTimeout(slow);
       if (this.next !== null) continue;
-      if (answer.later || answer.key) await this.again(asked, answer);
+      if (reply.later || reply.key) await this.again(pending, reply);
       else {
-        showKeyForm(false); // the key was taken, or none is wanted
-        this.tell(answer.refused ?? null);
-        if (!answer.refused) this.use(answer.found, asked.question);
+        showKeyForm(false); // the key was taken, or none is needed
+        this.report(reply.refused ?? null);
+        if (!reply.refused) this.use(reply.answer, pending.question);
       }
     }
     this.mark(false);
   }
 
-  again(asked, { later, seconds, key }) {
-    this.next = asked;
-    this.tell(later ? `${later} Asking again by itself.` : null, true);
+  again(pending, { later, seconds, key }) {
+    this.next = pending;
+    this.report(later ? `${later} Asking again by itself.` : null, true);
     if (key) showKeyForm(true);
     return new Promise((wake) => {
       this.wake = wake;
@@ -63,26 +65,33 @@ export class Channel {
   }
 }
 
-/** One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is one. */
+/**
+ * One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is
+ * one.
+ */
 export class Status {
   constructor(place, shown) {
     Object.assign(this, { place: $(place), shown: $(shown), reasons: new Map(), answered: false });
   }
 
-  /** Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not typed yet. */
+  /**
+   * Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not
+   * typed yet.
+   */
   set(topic, text, calm = false) {
     const old = this.answered ? " Grey results belong to earlier values." : "";
     this.reasons.delete(topic);
     if (text) this.reasons.set(topic, { text: text + old, calm });
     // one reason is enough: what was typed, else the newest
     const all = [...this.reasons];
-    const [, first = { text: "" }] = all.find(([name]) => name.startsWith("typed")) ?? all.at(-1) ?? [];
+    const [, first = { text: "" }] =
+      all.find(([name]) => name.startsWith("typed")) ?? all.at(-1) ?? [];
     if (this.place.textContent !== first.text) this.place.textContent = first.text;
     this.place.classList.toggle("bad", first.calm === false);
     this.shown.classList.toggle("old", this.reasons.size > 0);
   }
 
-  /** A channel whose failures are told here. */
+  /** A channel whose failures are reported here. */
   channel(topic, ask, use) {
     return new Channel(ask, use, (text, calm = false) => this.set(topic, text, calm));
   }
@@ -90,7 +99,10 @@ export class Status {
 
 // The API key is kept for this tab, sent as a header, never part of an address.
 const NAME = "mumacro-api-key";
-/** What `use(storage)` is; null where storage is switched off: there the key lives as long as the page. */
+/**
+ * What `use(storage)` is; null where storage is switched off: there the key lives as long as the
+ * page.
+ */
 function stored(use) {
   try {
     return use(sessionStorage);
@@ -107,23 +119,28 @@ function setKey(key) {
 
 /** The options of a request, with the key where there is one; its answer is then kept by nobody. */
 export const withKey = (headers = {}) =>
-  (apiKey === null ? { headers } : { headers: { ...headers, "X-API-Key": apiKey }, cache: "no-store" });
+  apiKey === null
+    ? { headers }
+    : { headers: { ...headers, "X-API-Key": apiKey }, cache: "no-store" };
 
 /** Asks for the key, and says so when the one that was sent is not it; or does not ask. */
-function showKeyForm(wanted) {
-  if (wanted && apiKey !== null) $("key-status").textContent = "That is not the key of this service.";
-  if (wanted) setKey(null);
+function showKeyForm(needed) {
+  if (needed && apiKey !== null)
+    $("key-status").textContent = "That is not the key of this service.";
+  if (needed) setKey(null);
   if ($("forget")) $("forget").hidden = apiKey === null;
-  if ($("key-form").hidden === !wanted) return;
-  $("key-form").hidden = !wanted;
-  if (wanted) $("key").focus();
+  if ($("key-form").hidden === !needed) return;
+  $("key-form").hidden = !needed;
+  if (needed) $("key").focus();
 }
 
 $("key-form").addEventListener("submit", (event) => {
   event.preventDefault();
   const key = $("key").value.trim();
   const usable = /^[!-~]{1,512}$/.test(key);
-  $("key-status").textContent = usable ? "" : "A key has 1 to 512 characters: letters, digits, signs, no spaces.";
+  $("key-status").textContent = usable
+    ? ""
+    : "A key has 1 to 512 characters: letters, digits, signs, no spaces.";
   if (!usable) return;
   $("key").value = "";
   setKey(key);

@@ -1,9 +1,12 @@
-// The inputs: units and bounds, what a person types, numbers as text, the state of the page, its case and its address.
-// Nothing here needs a browser; tests/service/page tests it with node.
+// The inputs: units and bounds, what a person types, numbers as text, the state of the page, its
+// case and its address. Nothing here needs a browser; tests/service/page tests it with node.
 
-/** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
- *  slider's decimal exponents (SI), start value; beside them the choices with their words, of each contact
- *  the exponent of k over Fz as text, geometries and their arguments, and whether there is a guide. */
+/**
+ * What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound,
+ * offered units, the slider's decimal exponents (SI), start value; beside them the choices with
+ * their words, of each contact the exponent of k over Fz as text, geometries and their arguments,
+ * and whether there is a guide.
+ */
 export const about = {};
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
@@ -11,22 +14,30 @@ const POWER = { units: { kW: [1e3, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9]
 
 export const RIGID = { text: "rigid", unit: "N/µm", low: Infinity, high: Infinity };
 
-/** What is known of a quantity: an input, an argument of a geometry, or a power. */
+/** What there is about a quantity: an input, an argument of a geometry, or a power. */
 const kindOf = (name) => about.inputs[name] ?? about.arguments[name] ?? POWER;
 
 /** The inputs of a case: an oscillating normal force has its amplitude in the place of y0. */
 export const namesOf = ({ direction }) =>
-  Object.keys(about.inputs).filter((name) => name !== (direction === "normal" ? "y0" : "Fz_amplitude"));
+  Object.keys(about.inputs).filter(
+    (name) => name !== (direction === "normal" ? "y0" : "Fz_amplitude"),
+  );
 
-export const toSI = (name, value, unit) => (value * kindOf(name).units[unit][0]) / kindOf(name).units[unit][1];
-export const fromSI = (name, value, unit) => (value * kindOf(name).units[unit][1]) / kindOf(name).units[unit][0];
+export const toSI = (name, value, unit) =>
+  (value * kindOf(name).units[unit][0]) / kindOf(name).units[unit][1];
+export const fromSI = (name, value, unit) =>
+  (value * kindOf(name).units[unit][1]) / kindOf(name).units[unit][0];
 
 /** The symbol that goes with a unit: a frequency in Hz is f. */
-export const symbolOf = (name, unit) => (name === "omega" && unit.endsWith("Hz") ? "f" : about.inputs[name].symbol);
+export const symbolOf = (name, unit) =>
+  name === "omega" && unit.endsWith("Hz") ? "f" : about.inputs[name].symbol;
 
 const withUnit = (text, unit) => (unit === "-" ? text : `${text} ${unit}`);
 
-/** A number with so many significant digits, without trailing zeros, with an exponent only where it is shorter. */
+/**
+ * A number with so many significant digits, without trailing zeros, with an exponent only where it
+ * is shorter.
+ */
 export function show(value, digits = 6) {
   if (value === null || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return "∞";
@@ -46,10 +57,16 @@ export function inUnit(name, value, unit = null, digits = 4) {
   return withUnit(show(fromSI(name, value, unit ?? suits), digits), unit ?? suits);
 }
 
-/** A friction coefficient to the second digit of its uncertainty; where none is told, with `usual` digits. */
+/**
+ * A friction coefficient to the second digit of its uncertainty; where none is stated, with `usual`
+ * digits.
+ */
 export function friction(value, uncertainty = 0, usual = 4) {
   if (!value) return show(value);
-  const places = uncertainty > 0 ? Math.floor(Math.log10(value)) - Math.floor(Math.log10(uncertainty)) + 2 : usual;
+  const places =
+    uncertainty > 0
+      ? Math.floor(Math.log10(value)) - Math.floor(Math.log10(uncertainty)) + 2
+      : usual;
   return value.toPrecision(Math.min(Math.max(places, 1), 15));
 }
 
@@ -57,35 +74,40 @@ export function friction(value, uncertainty = 0, usual = 4) {
 export const sentence = (text) => (/[.?!]$/.test(text) ? text : `${text}.`);
 
 class Fault extends Error {}
-export const refuse = (why) => { throw new Fault(why); };
+export const refuse = (why) => {
+  throw new Fault(why);
+};
 
-/** { found } of what reads a text, or { fault }: why it cannot be used. */
+/** { result } of what reads a text, or { fault }: why it cannot be used. */
 export function attempt(read) {
   try {
-    return { found: read() };
+    return { result: read() };
   } catch (error) {
     if (error instanceof Fault) return { fault: error.message };
     throw error;
   }
 }
 
-/** What `read` finds; a fault says where it was. */
+/** The result of `read`; a fault says where it was. */
 export function within(where, read) {
-  const { found, fault } = attempt(read);
-  return fault ? refuse(`${where}: ${fault}`) : found;
+  const { result, fault } = attempt(read);
+  return fault ? refuse(`${where}: ${fault}`) : result;
 }
 
 const NUMBER = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?![\d.,])(.*)$/is;
 
-/** [number, unit] of a typed text, unit "" where there is none; a comma is a decimal sign where it is no sign of
- *  thousands. */
+/**
+ * [number, unit] of a typed text, unit "" where there is none; a comma is a decimal sign where it
+ * is no sign of thousands.
+ */
 function readNumber(text) {
   const tidy = text.trim().replace("−", "-");
   const [, digits, unit] = NUMBER.exec(tidy) ?? [];
   if (digits === undefined) {
     const point = tidy.replace(",", ".");
     if (NUMBER.test(point) && !/^[+-]?[1-9]\d*,\d{3}(?!\d)/.test(tidy)) return readNumber(point);
-    const why = NUMBER.test(point) ? `“${tidy}” can be ${point} or ${tidy.replace(",", "")}: write one of them`
+    const why = NUMBER.test(point)
+      ? `“${tidy}” can be ${point} or ${tidy.replace(",", "")}: write one of them`
       : `“${tidy}” is not a number`;
     refuse(tidy === "" ? "give a number" : why);
   }
@@ -99,22 +121,23 @@ function readNumber(text) {
 function readUnit(name, text) {
   const { units, offered = Object.keys(units), symbol = name } = kindOf(name);
   const tidy = text.replace(/[\s·[\]()]/g, "");
-  const found = [tidy.replace(/[uμ](?=m)/g, "µ"), tidy].find((unit) => Object.hasOwn(units, unit));
-  if (found !== undefined && units[found] !== null) return found;
-  if (found !== undefined) refuse(`“${text}” can be Hz or rad/s: write one of them`);
+  const spellings = [tidy.replace(/[uμ](?=m)/g, "µ"), tidy];
+  const unit = spellings.find((one) => Object.hasOwn(units, one));
+  if (unit !== undefined && units[unit] !== null) return unit;
+  if (unit !== undefined) refuse(`“${text}” can be Hz or rad/s: write one of them`);
   const near = Object.keys(units).filter((unit) => unit.toLowerCase() === tidy.toLowerCase());
   if (near.length) refuse(`“${text}” is not a unit: did you mean ${near.join(" or ")}?`);
-  const known = offered.includes("-") ? "leave it out" : `give ${offered.join(", ")}`;
-  return refuse(`“${text}” is not a unit of ${symbol}: ${known}`);
+  const remedy = offered.includes("-") ? "leave it out" : `give ${offered.join(", ")}`;
+  return refuse(`“${text}” is not a unit of ${symbol}: ${remedy}`);
 }
 
 /** A typed quantity, in `unit` where none is typed: { text, unit, low, high }, low = high in SI. */
 export function readQuantity(name, text, unit) {
   const [value, typed] = readNumber(text);
-  const known = typed === "" ? unit : readUnit(name, typed);
-  const found = toSI(name, value, known);
-  if (found === 0 && value !== 0) refuse("is too small");
-  return { text: withUnit(String(value), known), unit: known, low: found, high: found };
+  const own = typed === "" ? unit : readUnit(name, typed);
+  const si = toSI(name, value, own);
+  if (si === 0 && value !== 0) refuse("is too small");
+  return { text: withUnit(String(value), own), unit: own, low: si, high: si };
 }
 
 /** A typed value of an input: a number, or for k "rigid" or "low..high". */
@@ -125,7 +148,8 @@ export function readValue(name, text, unit = about.inputs[name].offered[0]) {
   if (name === "k" && dashed) refuse(`write an interval as ${dashed[1]}..${dashed[2].trim()}`);
   const read = readQuantity(name, text, unit);
   const { positive, bound } = about.inputs[name];
-  if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0)) refuse(`must be ${bound}`);
+  if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0))
+    refuse(`must be ${bound}`);
   return read;
 }
 
@@ -141,7 +165,9 @@ export function readInterval(name, text, unit) {
   return { text: `${first}..${high.text}`, unit: high.unit, low: low.low, high: high.low };
 }
 
-/** A typed exponent of k over Fz: { text, value }, such as 0.5 or 1/3; its bounds are the service's. */
+/**
+ * A typed exponent of k over Fz: { text, value }, such as 0.5 or 1/3; its bounds are the service's.
+ */
 export function readExponent(text) {
   if (text.trim() === "") return ANY;
   const parts = text.split("/").map(readNumber);
@@ -157,74 +183,116 @@ const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval
 
 /** A value of an input [SI], or "rigid", as a quantity with so many digits. */
 export const rounded = (name, value, unit, digits) =>
-  readValue(name, String(value === "rigid" ? value : Number(fromSI(name, value, unit).toPrecision(digits))), unit);
+  readValue(
+    name,
+    String(value === "rigid" ? value : Number(fromSI(name, value, unit).toPrecision(digits))),
+    unit,
+  );
 
 const COLUMNS = [
-  ["v0", /^(v|speed)/i], ["mu_macro", /^(mu|µ|μ|friction)(?!_?[0₀])/i], ["std", /^(std|±|sigma|s$|u$)/i],
+  ["v0", /^(v|speed)/i],
+  ["mu_macro", /^(mu|µ|μ|friction)(?!_?[0₀])/i],
+  ["std", /^(std|±|sigma|s$|u$)/i],
   ["mu0", /^(mu|µ|μ)_?[0₀]/i],
 ];
 const WITH_COMMA = /^[+−-]?\d*,\d+(?:e[+-]?\d+)?(?![\d.,])/i;
 
-/** What stands between the columns: a comma may also be the decimal sign of columns between spaces. */
+/**
+ * What stands between the columns: a comma may also be the decimal sign of columns between spaces.
+ */
 function separatorOf(text, lines) {
   const sign = ["\t", ";", ","].find((one) => text.includes(one));
   if (sign !== ",") return sign ?? /\s+/;
   const cells = lines.filter((line) => /^[\d,+−-]/.test(line)).map((line) => line.split(/\s+/));
-  const decimal = cells.every((row) => row.length > 1 && row.every((cell) => /^[^,]+$/.test(cell) || WITH_COMMA.test(cell)));
+  const decimal = cells.every(
+    (row) => row.length > 1 && row.every((cell) => /^[^,]+$/.test(cell) || WITH_COMMA.test(cell)),
+  );
   return cells.length && decimal ? /\s+/ : sign;
 }
 
-/** Cells with a decimal point; the decimal sign is a comma where a cell has one, and then it is so in every cell. */
+/**
+ * Cells with a decimal point; the decimal sign is a comma where a cell has one, and then it is so
+ * in every cell.
+ */
 function withPoints(rows) {
   const comma = rows.flat().find((cell) => WITH_COMMA.test(cell));
   if (comma === undefined) return rows;
   const point = rows.flat().find((cell) => /^[+−-]?\d*\./.test(cell));
-  if (point !== undefined) refuse(`“${comma}” has a decimal comma, “${point}” a decimal point: use one of them`);
+  if (point !== undefined)
+    refuse(`“${comma}” has a decimal comma, “${point}” a decimal point: use one of them`);
   return rows.map((row) => row.map((cell) => cell.replace(",", ".")));
 }
 
-/** { v0 [m/s], mu_macro, std, mu0 } of points, one a line.  A first line of words names the columns. */
+/**
+ * { v0 [m/s], mu_macro, std, mu0 } of points, one a line.  A first line of words names the columns.
+ */
 export function readPoints(text) {
-  const lines = text.split("\n").map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
+  const lines = text
+    .split("\n")
+    .map((line) => line.trim())
+    .filter((line) => line && !line.startsWith("#"));
   const between = separatorOf(text, lines);
   let rows = lines.map((line) => line.split(between).map((cell) => cell.trim()));
   if (!rows.length) refuse("paste points: v₀ and µ, one point a line");
   const headed = /^[^\d.,+−-]/.test(rows[0][0]);
-  const head = headed ? rows.shift() : COLUMNS.map(([name]) => name).slice(0, Math.min(3, rows[0].length));
+  const head = headed
+    ? rows.shift()
+    : COLUMNS.map(([name]) => name).slice(0, Math.min(3, rows[0].length));
   const names = head.map((cell) => COLUMNS.find(([, sign]) => sign.test(cell))?.[0]);
   const strange = names.findIndex((name, i) => name === undefined || names.indexOf(name) < i);
-  if (strange >= 0) refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, mu0, each once`);
-  const complete = names.includes("v0") && names.includes("mu_macro") && (headed || rows[0].length <= 3);
+  if (strange >= 0)
+    refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, mu0, each once`);
+  const complete =
+    names.includes("v0") && names.includes("mu_macro") && (headed || rows[0].length <= 3);
   if (!complete) refuse("needs two or three columns: v0, mu_macro, std; with mu0 also their names");
   if (!rows.length) refuse("paste points below the names of the columns");
   rows = withPoints(rows);
   const unit = readUnit("v0", /[[(](.*)[\])]/.exec(head[names.indexOf("v0")])?.[1] ?? "m/s");
-  return Object.fromEntries(names.map((name, j) => [name, rows.map((row, i) => {
-    const line = `line ${i + 1 + headed}`;
-    if (row.length !== names.length) refuse(`${line} has ${row.length} values, not ${names.length}`);
-    const [kind, usual] = name === "v0" ? ["v0", unit] : ["mu0", "-"];
-    return within(`${line}, ${name}`, () => readQuantity(kind, row[j], usual)).low;
-  })]));
+  return Object.fromEntries(
+    names.map((name, j) => [
+      name,
+      rows.map((row, i) => {
+        const line = `line ${i + 1 + headed}`;
+        if (row.length !== names.length)
+          refuse(`${line} has ${row.length} values, not ${names.length}`);
+        const [kind, usual] = name === "v0" ? ["v0", unit] : ["mu0", "-"];
+        return within(`${line}, ${name}`, () => readQuantity(kind, row[j], usual)).low;
+      }),
+    ]),
+  );
 }
 
 /** The range of a law over which nobody chose one. */
 export const ANY = { text: "" };
 
-/** A quantity for each input and for the `range` of the one that the law goes along, and what is chosen. */
+/**
+ * A quantity for each input and for the `range` of the one that the law goes along, and what is
+ * chosen.
+ */
 export const startState = () => ({
-  ...Object.fromEntries(Object.entries(about.inputs).map(([name, { start }]) => [name, readValue(name, start)])),
-  contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: ANY,
+  ...Object.fromEntries(
+    Object.entries(about.inputs).map(([name, { start }]) => [name, readValue(name, start)]),
+  ),
+  contact: "spring",
+  direction: "across",
+  digits: "few",
+  along: "v0",
+  scale: "log",
+  range: ANY,
   stiffness_exponent: ANY,
 });
 
-/** What is typed for an input, the range or the exponent; if it cannot be used, what was there, with `typed` and its `fault`. */
+/**
+ * What is typed for an input, the range or the exponent; if it cannot be used, what was there, with
+ * `typed` and its `fault`.
+ */
 export function readTyped(state, name, text) {
   const read = {
     range: () => readRange(state.along, text, state[state.along].unit),
     stiffness_exponent: () => readExponent(text),
   };
-  const { found, fault } = attempt(read[name] ?? (() => readValue(name, text, state[name].unit)));
-  return fault ? { ...state[name], typed: text, fault } : found;
+  const { result, fault } = attempt(read[name] ?? (() => readValue(name, text, state[name].unit)));
+  return fault ? { ...state[name], typed: text, fault } : result;
 }
 
 /** An input of the state [SI]: of an interval its geometric middle, of a rigid contact Infinity. */
@@ -233,16 +301,23 @@ export function valueOf(state, name) {
   return low === high ? low : Math.sqrt(low) * Math.sqrt(high);
 }
 
-/** The inputs as the service takes them, without some of them; with `whole` an interval of k as such. */
+/**
+ * The inputs as the service takes them, without some of them; with `whole` an interval of k as
+ * such.
+ */
 export function caseOf(state, without = [], whole = false) {
   const entry = (name) => {
     const { low, high } = state[name];
     if (whole && low < high) return ["k_range", [low, high]];
     return [name, low === Infinity ? "rigid" : valueOf(state, name)];
   };
-  const chosen = Object.entries(about.choices).filter(([name, all]) => state[name] !== Object.keys(all)[0]);
+  const chosen = Object.entries(about.choices).filter(
+    ([name, all]) => state[name] !== Object.keys(all)[0],
+  );
   return Object.fromEntries([
-    ...namesOf(state).filter((name) => !without.includes(name)).map(entry),
+    ...namesOf(state)
+      .filter((name) => !without.includes(name))
+      .map(entry),
     ...chosen.map(([name]) => [name, state[name]]),
   ]);
 }
@@ -254,20 +329,27 @@ export const exponentOf = (state) =>
 /** Whether k grows with the input that is swept or solved for. */
 export const stiffens = (state, name) => name === "Fz" && exponentOf(state) !== 0;
 
-/** The case of a question about one input, which is left out; where k grows with it, it stays: the load at which k
- *  holds. */
+/**
+ * The case of a question about one input, which is left out; where k grows with it, it stays: the
+ * load at which k holds.
+ */
 export function caseAround(state, name, whole = false) {
   if (!stiffens(state, name)) return caseOf(state, [name], whole);
   return { ...caseOf(state, [], whole), stiffness_exponent: exponentOf(state) };
 }
 
-/** What changes when one input gets another value [SI], with so many digits: itself, and k where it grows with it. */
+/**
+ * What changes when one input gets another value [SI], with so many digits: itself, and k where it
+ * grows with it.
+ */
 export function movedAlong(state, name, value, digits) {
   const { unit, low, high } = state.k;
   const moved = { [name]: rounded(name, value, state[name].unit, digits) };
   if (!stiffens(state, name) || state.k === RIGID) return moved;
   const growth = (moved.Fz.low / state.Fz.low) ** exponentOf(state);
-  const ends = [low, high].map((end) => Number(fromSI("k", growth * end, unit).toPrecision(Math.max(digits, 6))));
+  const ends = [low, high].map((end) =>
+    Number(fromSI("k", growth * end, unit).toPrecision(Math.max(digits, 6))),
+  );
   return { ...moved, k: readValue("k", low === high ? String(ends[0]) : ends.join(".."), unit) };
 }
 
@@ -293,8 +375,11 @@ const inAddress = ({ text }) =>
   encodeURIComponent(text.replaceAll(" ", "").replaceAll("µ", "u")).replaceAll("%2F", "/");
 /** The words that a part of the state may be, in the order in which an address is read. */
 const WORDS = {
-  contact: () => Object.keys(about.choices.contact), direction: () => Object.keys(about.choices.direction),
-  digits: () => ["few", "all"], along: namesOf, scale: () => ["log", "linear"],
+  contact: () => Object.keys(about.choices.contact),
+  direction: () => Object.keys(about.choices.direction),
+  digits: () => ["few", "all"],
+  along: namesOf,
+  scale: () => ["log", "linear"],
 };
 
 /** The state as the part of an address behind "#". */
@@ -302,33 +387,43 @@ export function toAddress(state) {
   const usual = startState();
   const keyOf = (name) => (symbolOf(name, state[name].unit) === "f" ? "f" : name);
   const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state[name])}`);
-  parts.push(...Object.keys(WORDS).filter((key) => state[key] !== usual[key]).map((key) => `${key}=${state[key]}`));
+  parts.push(
+    ...Object.keys(WORDS)
+      .filter((key) => state[key] !== usual[key])
+      .map((key) => `${key}=${state[key]}`),
+  );
   for (const name of ["range", "stiffness_exponent"]) {
     if (state[name].text) parts.push(`${name}=${inAddress(state[name])}`);
   }
   return `#${parts.join("&")}`;
 }
 
-/** { state, faults }: what an address says, start values in place of what cannot be used, and why, in words. */
+/**
+ * { state, faults }: what an address says, start values in place of what cannot be used, and why,
+ * in words.
+ */
 export function fromAddress(hash) {
   const [state, faults, texts] = [startState(), [], new Map(new URLSearchParams(hash.slice(1)))];
   /** Sets a part of the state to what `read` makes of a text of the address, if it has that key. */
   const take = (key, read, name = key) => {
     if (!texts.has(key)) return;
-    const { found, fault } = attempt(() => read(texts.get(key)));
+    const { result, fault } = attempt(() => read(texts.get(key)));
     if (fault) faults.push(`${key} = ${texts.get(key) || "nothing"} (${fault})`);
-    else state[name] = found;
+    else state[name] = result;
     texts.delete(key);
   };
   for (const [key, words] of Object.entries(WORDS)) {
-    const known = words(state);
+    const choices = words(state);
     take(key, (word) => {
-      if (!known.includes(word)) refuse(`must be one of ${known.join(", ")}`);
-      return about.impossible[key === "direction" ? `${state.contact} ${word}` : ""] ? refuse("not for a ball") : word;
+      if (!choices.includes(word)) refuse(`must be one of ${choices.join(", ")}`);
+      return about.impossible[key === "direction" ? `${state.contact} ${word}` : ""]
+        ? refuse("not for a ball")
+        : word;
     });
   }
   if (texts.has("omega")) take("f", () => refuse("omega is given, too"));
-  for (const name of namesOf(state)) take(name, (text) => readValue(name, text, about.inputs[name].unit));
+  for (const name of namesOf(state))
+    take(name, (text) => readValue(name, text, about.inputs[name].unit));
   take("f", (text) => readValue("omega", text, "Hz"), "omega");
   take("range", (text) => readInterval(state.along, text, about.inputs[state.along].unit));
   take("stiffness_exponent", readExponent);

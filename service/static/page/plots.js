@@ -1,11 +1,13 @@
-// Elements, and what the plots share: an SVG that follows its size, axes with ticks, curves, pictures for download.
+// Elements, and what the plots share: an SVG that follows its size, axes with ticks, curves,
+// pictures for download.
 
 export const $ = (id) => document.getElementById(id);
 const SVG = ["svg", "g", "path", "rect", "circle", "text", "tspan"];
 
 /** An element of HTML or SVG with attributes and children; null children are left out. */
 export function make(tag, attributes = {}, ...children) {
-  const element = SVG.includes(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag)
+  const element = SVG.includes(tag)
+    ? document.createElementNS("http://www.w3.org/2000/svg", tag)
     : document.createElement(tag);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   element.append(...children.flat(Infinity).filter(Boolean));
@@ -15,7 +17,9 @@ export function make(tag, attributes = {}, ...children) {
 export const label = (text, x, y, className = "", anchor = "middle") =>
   make("text", { x, y, class: className, "text-anchor": anchor }, text);
 
-const power = (exponent) => `10${String(exponent).replace(/./g, (sign) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(sign)])}`;
+const RAISED = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹";
+const power = (exponent) =>
+  `10${String(exponent).replace(/./g, (sign) => RAISED["-0123456789".indexOf(sign)])}`;
 
 /** A linear or logarithmic axis from `low` to `high`, drawn between the pixels `from` and `to`. */
 class Axis {
@@ -45,12 +49,17 @@ class Axis {
     const nice = [1, 2, 5, 10].find((factor) => factor * unit >= 0.999 * raw);
     const step = this.log ? Math.max(1, Math.ceil(raw)) : unit * nice;
     const [first, last] = [Math.ceil(this.a / step - 1e-9), Math.floor(this.b / step + 1e-9)];
-    return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step)
-      .map((at) => [this.pixel(this.log ? 10 ** at : at), this.log ? power(at) : String(Number(at.toPrecision(6)))]);
+    return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step).map((at) => [
+      this.pixel(this.log ? 10 ** at : at),
+      this.log ? power(at) : String(Number(at.toPrecision(6))),
+    ]);
   }
 }
 
-/** Two axes, { low, high, log, title, words } each, in a plot of this size; what is drawn in them is given by its values. */
+/**
+ * Two axes, { low, high, log, title, words } each, in a plot of this size; what is drawn in them is
+ * given by its values.
+ */
 export class Frame {
   constructor(width, height, x, y) {
     const foot = x.words ? 62 : 46; // words stand below the title of an axis
@@ -65,12 +74,24 @@ export class Frame {
     const { x, y, box } = this;
     const line = (d) => make("path", { d, class: "grid" });
     const upright = (at, text, kind) =>
-      make("text", { class: kind, transform: `translate(${at} ${box.y + box.height / 2}) rotate(-90)` }, text);
+      make(
+        "text",
+        { class: kind, transform: `translate(${at} ${box.y + box.height / 2}) rotate(-90)` },
+        text,
+      );
     return [
-      x.ticks(56).map(([at, text]) => [
-        line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`), label(text, at, y.from + 18, "tick")]),
-      y.ticks(36).map(([at, text]) => [
-        line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`), label(text, x.from - 7, at + 4, "tick", "end")]),
+      x
+        .ticks(56)
+        .map(([at, text]) => [
+          line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`),
+          label(text, at, y.from + 18, "tick"),
+        ]),
+      y
+        .ticks(36)
+        .map(([at, text]) => [
+          line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`),
+          label(text, x.from - 7, at + 4, "tick", "end"),
+        ]),
       x.words && label(x.words, box.x + box.width / 2, y.from + 54, "words"),
       y.words && upright(30, y.words, "upright words"),
       label(x.title, box.x + box.width / 2, y.from + 38),
@@ -86,11 +107,17 @@ export class Frame {
   /** What is drawn inside of both axes; nothing of it leaves them. */
   inside(...children) {
     const { x, y, width, height } = this.box;
-    return make("svg", { ...this.box, viewBox: `${x} ${y} ${width} ${height}`, overflow: "hidden" }, ...children);
+    return make(
+      "svg",
+      { ...this.box, viewBox: `${x} ${y} ${width} ${height}`, overflow: "hidden" },
+      ...children,
+    );
   }
 
   curve(xs, ys, className) {
-    const places = xs.map((x, i) => `${this.x.pixel(x).toFixed(2)} ${this.y.pixel(ys[i]).toFixed(2)}`);
+    const places = xs.map(
+      (x, i) => `${this.x.pixel(x).toFixed(2)} ${this.y.pixel(ys[i]).toFixed(2)}`,
+    );
     return make("path", { d: `M${places.join("L")}`, class: className });
   }
 
@@ -110,15 +137,32 @@ export class Frame {
     const shape = right || up ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z";
     const turn = (Math.atan2(-up, right) * 180) / Math.PI;
     const place = [this.x, this.y].map(({ from, to }, i) => from + inside[i] * (to - from));
-    return make("path", { d: shape, class: "point", transform: `translate(${place}) rotate(${turn})` });
+    return make("path", {
+      d: shape,
+      class: "point",
+      transform: `translate(${place}) rotate(${turn})`,
+    });
   }
 }
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-opacity", "stroke-dasharray", "stroke-linejoin", "font",
-  "text-anchor", "paint-order"];
+const LOOKS = [
+  "fill",
+  "fill-opacity",
+  "stroke",
+  "stroke-width",
+  "stroke-opacity",
+  "stroke-dasharray",
+  "stroke-linejoin",
+  "font",
+  "text-anchor",
+  "paint-order",
+];
 
-/** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */
+/**
+ * An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows
+ * changes.
+ */
 export class Plot {
   constructor(svg, paint) {
     Object.assign(this, { svg, paint });
@@ -135,8 +179,10 @@ export class Plot {
     });
   }
 
-  /** Calls back with the pointer's place: move(x, y), pick(x, y) for click and drag; move() when it leaves; and with
-   *  the arrow keys: step(right, up), larger with Shift, true if it is of use. */
+  /**
+   * Calls back with the pointer's place: move(x, y), pick(x, y) for click and drag; move() when it
+   * leaves; and with the arrow keys: step(right, up), larger with Shift, true if it is of use.
+   */
   follow({ move, pick, step }) {
     const { svg } = this;
     const point = ({ buttons, clientX, clientY }) => {
@@ -160,13 +206,25 @@ export class Plot {
     const { clientWidth: width, clientHeight: height } = this.svg;
     const size = { width, height: height + 24 };
     const { color: fill, backgroundColor } = getComputedStyle(this.svg.closest("section"));
-    const narrow = 7 * text.length > width - 32 ? { textLength: width - 32, lengthAdjust: "spacingAndGlyphs" } : {};
-    const words = { x: 16, y: height + 12, fill, "font-family": "sans-serif", "font-size": 13, ...narrow };
+    const narrow =
+      7 * text.length > width - 32
+        ? { textLength: width - 32, lengthAdjust: "spacingAndGlyphs" }
+        : {};
+    const words = {
+      x: 16,
+      y: height + 12,
+      fill,
+      "font-family": "sans-serif",
+      "font-size": 13,
+      ...narrow,
+    };
     const back = make("rect", { ...size, fill: backgroundColor });
     const drawn = this.svg.cloneNode(true);
     const [copies, originals] = [drawn, this.svg].map((one) => one.querySelectorAll("*"));
-    copies.forEach(({ style }, i) => { // which looks the same without the style sheet
-      for (const look of LOOKS) style.setProperty(look, getComputedStyle(originals[i]).getPropertyValue(look));
+    copies.forEach(({ style }, i) => {
+      // which looks the same without the style sheet
+      for (const look of LOOKS)
+        style.setProperty(look, getComputedStyle(originals[i]).getPropertyValue(look));
     });
     const picture = make("svg", size, back, [...drawn.children], make("text", words, text));
     save(new XMLSerializer().serializeToString(picture), "image/svg+xml", name);

@@ -3,14 +3,19 @@ import { withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
 
-/** All faults of a question, where it has several; names that share a reason stand together: "E, nu: are required". */
+/**
+ * All faults of a question, where it has several; names that share a reason stand together: "E, nu:
+ * are required".
+ */
 function faults(errors = []) {
   if (errors.length < 2) return null;
   const names = Map.groupBy(errors, ({ reason }) => reason);
-  return [...names].map(([reason, all]) => {
-    const verb = all.length > 1 ? reason.replace(/^is /, "are ") : reason;
-    return `${all.map(({ field }) => field).join(", ")}: ${verb}`;
-  }).join("; ");
+  return [...names]
+    .map(([reason, all]) => {
+      const verb = all.length > 1 ? reason.replace(/^is /, "are ") : reason;
+      return `${all.map(({ field }) => field).join(", ")}: ${verb}`;
+    })
+    .join("; ");
 }
 
 async function ask(path, options) {
@@ -19,17 +24,26 @@ async function ask(path, options) {
     response = await fetch(path, { ...options, signal: AbortSignal.timeout(WAIT_MS) });
     body = await response.json();
   } catch (error) {
-    if (!response || error.name === "TimeoutError") return { later: "The service does not answer." };
+    if (!response || error.name === "TimeoutError")
+      return { later: "The service does not answer." };
     return { later: `The response of the service cannot be read (status ${response.status}).` };
   }
-  if (response.ok) return { found: body };
+  if (response.ok) return { answer: body };
   const { status, headers } = response;
   if (status === 401) return { key: true };
   const why = faults(body.errors) ?? body.detail ?? `status ${status}`;
-  if (status < 500 && ![408, 429].includes(status)) return { refused: `The service refuses this: ${why}.` };
-  return { later: `The service cannot answer now: ${why}.`, seconds: Number(headers.get("Retry-After")) || null };
+  if (status < 500 && ![408, 429].includes(status))
+    return { refused: `The service refuses this: ${why}.` };
+  return {
+    later: `The service cannot answer now: ${why}.`,
+    seconds: Number(headers.get("Retry-After")) || null,
+  };
 }
 
 export const get = (path) => ask(path, withKey());
 export const post = (path, body) =>
-  ask(path, { method: "POST", ...withKey({ "Content-Type": "application/json" }), body: JSON.stringify(body) });
+  ask(path, {
+    method: "POST",
+    ...withKey({ "Content-Type": "application/json" }),
+    body: JSON.stringify(body),
+  });

@@ -96,8 +96,10 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
     mumacro_columns in;
     memset(&in, 0, sizeof in);
     for (int i = 0; i < 6; ++i) {
-        if (i == single) in.constant[i] = columns[i][0];
-        else in.array[i] = columns[i];
+        if (i == single)
+            in.constant[i] = columns[i][0];
+        else
+            in.array[i] = columns[i];
     }
     for (int i = 0; i < 3; ++i) {
         rows[i] = numbers((size_t)ends[i] * size);
@@ -263,8 +265,10 @@ static double ordinary(int input) {
 /* Every combination of nasty numbers, one after the other. */
 static double combined(int input) {
     static uint64_t code, rest;
-    if (input == 0) rest = (code += 17); /* shares no divisor with 12; 172,800 steps cover 12^6 */
-    else rest /= NASTY;
+    if (input == 0)
+        rest = (code += 17); /* shares no divisor with 12; 172,800 steps cover 12^6 */
+    else
+        rest /= NASTY;
     return nasty[rest % NASTY];
 }
 
