@@ -129,3 +129,24 @@ def test_rigid_and_other_limits(table: Surrogate) -> None:
     ):
         still = table.evaluate(**{**CASE, "y0": y0, "v0": 0.0}, **BALL, gradient=True)
         assert (still.regime, still.gradient["v0"]) == ("static", slope)
+
+
+#: amplitudes at which blocks of a ball meet or its middle spring is at the corner
+MIDDLE_SEAMS = (0.75, 1.0, 1.29079076185, 2.0, 131_072.0)
+
+
+@pytest.mark.parametrize("name", QUANTITY_NAMES)
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10, 1e-12])
+def test_one_digit_beside_a_seam_changes_an_answer_by_its_bounds_at_most(
+    tolerance: float, name: str
+) -> None:
+    """Y = y~/1.5 rounds to a seam from both sides."""
+    v = np.concatenate([[0.0], np.geomspace(1e-300, 1e300, 300), np.geomspace(1e-18, 1e3, 400)])
+    steps = np.arange(-6, 7)
+    y = 1.5 * np.array(MIDDLE_SEAMS)[:, None] * (1.0 + 2.3e-16 * steps)
+    value, bound, source = Surrogate.open(tolerance).quantity(name, v, y[..., None], **BALL)
+    assert np.isfinite(value).all()
+    assert np.isfinite(bound).all()
+    assert (source >= 0).all()
+    allowed = bound[:, 1:] + bound[:, :-1] + 1e-14 * np.abs(value[:, 1:])
+    assert np.all(np.abs(np.diff(value, axis=1)) <= allowed)
