@@ -50,27 +50,27 @@ def part(full: int, share: float) -> int:
 
 def answers(s: Surrogate, v: Array, y: Array, contact: Any, direction: Any) -> Rows:
     """Values and bounds of every quantity of a contact."""
-    found, normal = {}, direction == "normal"
+    rows, normal = {}, direction == "normal"
     for name in QUANTITY_NAMES:
         if not (normal and name == "power"):  # the force does no work along the contact
             value, bound, _ = s.quantity(name, v, y, contact=contact, direction=direction)
-            found[name] = value, bound
+            rows[name] = value, bound
     amplitude = "Fz_amplitude" if normal else "y0"
     case: Any = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": v, amplitude: y}
     answer = s.evaluate(**case, contact=contact, direction=direction, gradient=True)
     for name, field in zip(SLOPES, ("v0", amplitude), strict=True):
-        found[name] = (
+        rows[name] = (
             answer.gradient[field] * case[field],
             answer.gradient_bound[field] * case[field],
         )
-    return found
+    return rows
 
 
-def compared(found: Rows, truth: Rows, ball: bool) -> Iterator[tuple[str, dict[str, list[float]]]]:
+def compared(rows: Rows, truth: Rows, ball: bool) -> Iterator[tuple[str, dict[str, list[float]]]]:
     """The distribution of the errors of every quantity; of the power of a spring relative to it, as
     tables have it."""
     for name, (exact, noise) in truth.items():
-        value, bound = found[name]
+        value, bound = rows[name]
         difference = np.abs(value - exact).astype(float)
         least = np.maximum(noise, LAST_DIGIT * np.abs(exact).astype(float))
         relative = not ball and name in SOLVED and SOLVED[name].relative
@@ -182,9 +182,9 @@ def ball_across(share: float) -> Iterator[list[str]]:
         truth = summed(sweep, table, v, y)
         slopes = summed_slopes(sweep, table, v[few], y[few])
     for tolerance in TOLERANCES:
-        found = answers(Surrogate.open(tolerance), v, y, "ball", "across")
-        some = {name: (row[0][few], row[1][few]) for name, row in found.items()}
-        for name, spread in (*compared(found, truth, True), *compared(some, slopes, True)):
+        rows = answers(Surrogate.open(tolerance), v, y, "ball", "across")
+        some = {name: (row[0][few], row[1][few]) for name, row in rows.items()}
+        for name, spread in (*compared(rows, truth, True), *compared(some, slopes, True)):
             yield line("ball across", name, f"{tolerance:.0e}", spread)
 
 
@@ -205,10 +205,10 @@ def driven(contact: str, direction: str, share: float) -> Iterator[list[str]]:
     normal, ball = direction == "normal", contact == "ball"
     v, y = driven_points(part(BALLS if ball else SPRINGS, share), 32, normal)
     exact = extended.ball(v, y, 48) if ball else extended.spring(v, y, not normal)
-    found = answers(Surrogate.open(TOLERANCES[0]), v, y, contact, direction)
+    rows = answers(Surrogate.open(TOLERANCES[0]), v, y, contact, direction)
     nothing = np.zeros(v.size)
-    truth = {name: (row, nothing) for name, row in zip(NAMES, exact, strict=True) if name in found}
-    for name, spread in compared(found, truth, ball):
+    truth = {name: (row, nothing) for name, row in zip(NAMES, exact, strict=True) if name in rows}
+    for name, spread in compared(rows, truth, ball):
         yield line(f"{contact} {direction}", name, "any", spread)
 
 
@@ -221,8 +221,8 @@ def spring_across() -> Iterator[list[str]]:
         for name, spread in error_distribution(Surrogate.open(tolerance).table).items():
             errors = [spread[f"{share:g}"] for share in QUANTILES]
             ratios = [spread[word] for word in RATIOS]
-            told = {"error_quantiles": errors, "bound_over_error": ratios}
-            yield line("spring across", name, f"{tolerance:.0e}", told)
+            stated = {"error_quantiles": errors, "bound_over_error": ratios}
+            yield line("spring across", name, f"{tolerance:.0e}", stated)
 
 
 def errors(share: float) -> str:
@@ -234,11 +234,11 @@ def errors(share: float) -> str:
     rows.sort(key=lambda row: order.index((row[0], row[1])))
     points = int(Surrogate.open().attributes["verified_points"])  # type: ignore[call-overload]
     across, slopes, single, balls = (f"{part(full, share):,}" for full in POINTS)
-    said = (
+    points_drawn = (
         f"Points: spring across {points:,}; ball across {across}, of slopes {slopes}; spring along "
         f"and normal {single}, ball along {balls}. Seeds 2018, 31, 32."
     )
-    return f"{said}\n\n{markdown(HEADER, rows, 3)}"
+    return f"{points_drawn}\n\n{markdown(HEADER, rows, 3)}"
 
 
 if __name__ == "__main__":

@@ -232,7 +232,7 @@ class Page:
         log = self.browser.get_log("browser")
         return [entry["message"] for entry in log if entry["level"] in ("SEVERE", "WARNING")]
 
-    def asked(self, path: Any) -> Any:
+    def question(self, path: Any) -> Any:
         """The last question to a path, of a page with :data:`RECORDED`."""
         return self.run(f"return window.asked.filter(([path]) => path === '{path}').at(-1)[1];")
 

@@ -275,12 +275,12 @@ def _state_errors(
     """Measure the errors of the blocks and write them into the table; the blocks that miss its
     tolerance."""
     late = []
-    for i, found in enumerate(block_errors(Surrogate(table, out), of, BLOCK_POINTS, seed)):
+    for i, measured in enumerate(block_errors(Surrogate(table, out), of, BLOCK_POINTS, seed)):
         block = of.blocks(table)[i]
-        for name, value in found.values.items():
+        for name, value in measured.values.items():
             slopes = np.zeros(2)
-            if name in found.cells:
-                errors = CELL_SAFETY * found.cells[name]
+            if name in measured.cells:
+                errors = CELL_SAFETY * measured.cells[name]
                 if name not in of.sloped:
                     # they bound values: a rough quadrature can make the finer interpolant worse
                     # than the table, and some points of cells are in another block
@@ -288,17 +288,17 @@ def _state_errors(
                 errors = to_bits(errors, ERROR_BITS, up=True)
                 block.cell_errors[name], slopes = errors, errors.max(axis=0)[1:]
             block.errors[name] = np.array([SAFETY * value, *slopes])
-        block.max_abs_error, block.max_rel_error = found.absolute, found.relative
-        if found.absolute > 0.8 * tolerance or found.relative > 0.8 * ABS_TO_REL * tolerance:
+        block.max_abs_error, block.max_rel_error = measured.absolute, measured.relative
+        if measured.absolute > 0.8 * tolerance or measured.relative > 0.8 * ABS_TO_REL * tolerance:
             late.append(i)
     return late
 
 
-def _verified(quantity: Quantity, found: dict[str, Any]) -> tuple[str, float]:
+def _verified(quantity: Quantity, report: dict[str, Any]) -> tuple[str, float]:
     """Name and value of the attribute that states the verified error of a quantity."""
     if SOLVED[quantity.name].relative:
-        return f"verified_max_rel_{quantity.variable}_error", found["max_rel_error"]
-    return f"verified_max_{quantity.variable}_error", found["max_abs_error"]
+        return f"verified_max_rel_{quantity.variable}_error", report["max_rel_error"]
+    return f"verified_max_{quantity.variable}_error", report["max_abs_error"]
 
 
 def verified_attributes(report: dict[str, Any], quantities: list[str]) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def block_errors(surrogate: Surrogate, of: SolvedContact, n: int, seed: int) -> 
     """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
     neighbour."""
     stating = tuple(_stating(surrogate, of, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
-    found = []
+    errors_of_blocks = []
     for index, block in enumerate(of.blocks(surrogate.table)):
         errors = _value_errors(
             surrogate, stating, of, index, np.random.default_rng([seed, index]), n
@@ -160,8 +160,8 @@ def block_errors(surrogate: Surrogate, of: SolvedContact, n: int, seed: int) -> 
             for name in of.sloped:
                 bends = _bends(surrogate, of, of.border, index, name)
                 cells[name][:, 1] += bends.max(axis=(1, 3)).ravel()
-        found.append(BlockErrors(*errors, cells))
-    return found
+        errors_of_blocks.append(BlockErrors(*errors, cells))
+    return errors_of_blocks
 
 
 #: coordinates that are a function of v~/v~crit
@@ -303,8 +303,8 @@ def _difference(
         for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
     )
     own = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
-    found = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
-    return found - (a.follow @ exact @ b.follow.T).reshape(found.shape), a, b
+    tabulated = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
+    return tabulated - (a.follow @ exact @ b.follow.T).reshape(tabulated.shape), a, b
 
 
 #: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to
@@ -355,15 +355,15 @@ def cell_errors(
     ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`;
     ``noise`` their rounding.
     """
-    found: dict[str, Array] = {}
+    errors: dict[str, Array] = {}
     for name in QUANTITY_NAMES:
         if name in block.nodes:
             for coefficients in _truths(of, exact[name], noise[name]):
                 largest = _largest(of, index, block, name, coefficients)
-                found[name] = np.maximum(found.get(name, 0.0), largest)
+                errors[name] = np.maximum(errors.get(name, 0.0), largest)
             if name not in of.sloped:
-                found[name][:, 1:] = 0.0
-    return found
+                errors[name][:, 1:] = 0.0
+    return errors
 
 
 def _truths(of: SolvedContact, exact: Array, noise: Array) -> list[Array]:

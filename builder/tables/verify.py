@@ -278,13 +278,13 @@ def _slopes(surrogate: Surrogate, of: SolvedContact, around: Neighbours, name: s
     return _Compared(off, off, bound, over, off > bound, np.tile(source[keep], 2))
 
 
-def _said(found: _Compared, at: Any = slice(None)) -> dict[str, Any]:
+def _summary(compared: _Compared, at: Any = slice(None)) -> dict[str, Any]:
     return {
-        "points": int(found.error[at].size),
-        "max_abs_error": float(found.error[at].max()),
-        "max_rel_error": float(found.relative[at].max()),
-        "max_bound": float(found.bound[at].max()),
-        "not_covered": int(np.count_nonzero(found.missed[at])),
+        "points": int(compared.error[at].size),
+        "max_abs_error": float(compared.error[at].max()),
+        "max_rel_error": float(compared.relative[at].max()),
+        "max_bound": float(compared.bound[at].max()),
+        "not_covered": int(np.count_nonzero(compared.missed[at])),
     }
 
 
@@ -293,19 +293,19 @@ def _report(parts: list[_Compared]) -> dict[str, Any]:
     whole = _Compared(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     names = sorted((SOURCES[code], code) for code in np.unique(whole.source))
     return {
-        **_said(whole),
-        "sources": {name: _said(whole, whole.source == code) for name, code in names},
+        **_summary(whole),
+        "sources": {name: _summary(whole, whole.source == code) for name, code in names},
     }
 
 
 def distribution(error: Array, over: Array) -> dict[str, list[float]]:
     """Errors at :data:`QUANTILES`; least, median and largest bound over error, 0 where no error is
     beyond the solver's own."""
-    known = over[~np.isnan(over)]
+    defined = over[~np.isnan(over)]
     return {
         "error_quantiles": np.quantile(error, QUANTILES).tolist(),
-        "bound_over_error": np.quantile(known, (0.0, 0.5, 1.0)).tolist()
-        if known.size
+        "bound_over_error": np.quantile(defined, (0.0, 0.5, 1.0)).tolist()
+        if defined.size
         else [0.0, 0.0, 0.0],
     }
 
@@ -314,22 +314,22 @@ def _distributions(
     values: dict[str, list[_Compared]], slopes: list[_Compared], border: _Compared | None
 ) -> dict[str, dict[str, list[float]]]:
     """By quantity, then of the slopes of mu~ along ln v~ and ln y~, and of v~crit, relative."""
-    found = {}
+    columns = {}
     for name, parts in values.items():
         error = [part.relative if SOLVED[name].relative else part.error for part in parts]
-        found[name] = np.concatenate(error), np.concatenate([part.over for part in parts])
+        columns[name] = np.concatenate(error), np.concatenate([part.over for part in parts])
     for row, name in enumerate(("slope_along_v", "slope_along_y")):
         error, over = (
             [x.reshape(2, -1)[row] for x in column]
             for column in ([part.error for part in slopes], [part.over for part in slopes])
         )
-        found[name] = np.concatenate(error), np.concatenate(over)
+        columns[name] = np.concatenate(error), np.concatenate(over)
     if border is not None:
-        found["border"] = border.relative, border.over
-    return {name: distribution(*both) for name, both in found.items()}
+        columns["border"] = border.relative, border.over
+    return {name: distribution(*both) for name, both in columns.items()}
 
 
-def _border_found(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Compared:
+def _border_compared(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Compared:
     """Errors of v~crit, all relative."""
     error = border_errors(surrogate.border, sweep, rng, BORDER_POINTS)
     bound, noise = (
@@ -350,14 +350,14 @@ def _border_found(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) 
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
     """Of the report of :func:`verify`: how many values and slopes of each quantity, and
     speeds of the border, miss their bound."""
-    found = {
+    missed = {
         name: report.get(name, report)["not_covered"]
         for name in report["distribution"]
         if name in QUANTITY_NAMES
     }
     if "border" in report:
-        found["border"] = report["border"]["not_covered"]
-    return found | {
+        missed["border"] = report["border"]["not_covered"]
+    return missed | {
         f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()
     }
 
@@ -383,7 +383,7 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         the slopes of each along ln v~ and ln y~, absolute, of one point in twenty; in ``border`` of
         v~crit, relative.  ``distribution``: errors at :data:`QUANTILES` and bounds over errors.
     """
-    border = _border_found(surrogate, sweep, np.random.default_rng([seed, len(CASES)]))
+    border = _border_compared(surrogate, sweep, np.random.default_rng([seed, len(CASES)]))
     return _verify(surrogate, spring(sweep), CASES, points, seed, border)
 
 
@@ -417,10 +417,12 @@ def _verify(
             slopes[name].append(_slopes(surrogate, of, around, name))
     return {
         **_report(values["mu_ratio"]),
-        "cases": {case: _said(part) for case, part in zip(cases, values["mu_ratio"], strict=True)},
+        "cases": {
+            case: _summary(part) for case, part in zip(cases, values["mu_ratio"], strict=True)
+        },
         **{name: _report(values[name]) for name in names[1:]},
         "slopes": {name: _report(parts) for name, parts in slopes.items()},
-        **({} if border is None else {"border": _said(border)}),
+        **({} if border is None else {"border": _summary(border)}),
         "distribution": _distributions(values, slopes["mu_ratio"], border),
         "seam_jump": seam_jumps(surrogate, kind=of.kind),
         "seam_slope_jump": seam_slope_jumps(surrogate, kind=of.kind),

@@ -69,15 +69,15 @@ def test_there_is_no_map_of_what_is_not_modelled(client: Any, problem: Any) -> N
         in problem(client.get(f"{path}?contact=ball&direction=normal"), 422)["detail"]
     )
     problem(client.get(f"{path}?contact=box"), 422)
-    told = client.get("/static/page/names.json").json()
-    assert [*told["impossible"]] == ["ball normal"]
+    names = client.get("/static/page/names.json").json()
+    assert [*names["impossible"]] == ["ball normal"]
 
 
 def test_units_and_geometries_are_the_librarys(client: Any) -> None:
     def scales(units: Any) -> Any:
         return {unit: list(scale) for unit, scale in units.items()}
 
-    told = client.get("/static/page/names.json").json()
+    names = client.get("/static/page/names.json").json()
     expected = {
         name: scales(units) for name, units in {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}.items()
     }
@@ -86,14 +86,17 @@ def test_units_and_geometries_are_the_librarys(client: Any) -> None:
     }
     # a unit of both says neither
     expected["omega"] |= cycles | dict.fromkeys(expected["omega"].keys() & cycles)
-    assert {name: one["units"] for name, one in told["inputs"].items()} == expected
-    assert all(set(one["offered"]) <= set(one["units"]) for one in told["inputs"].values())
-    assert [list(words) for words in told["choices"].values()] == [list(CONTACTS), list(DIRECTIONS)]
+    assert {name: one["units"] for name, one in names["inputs"].items()} == expected
+    assert all(set(one["offered"]) <= set(one["units"]) for one in names["inputs"].values())
+    assert [list(words) for words in names["choices"].values()] == [
+        list(CONTACTS),
+        list(DIRECTIONS),
+    ]
     assert {
-        name: (one["meaning"], one["arguments"]) for name, one in told["geometries"].items()
+        name: (one["meaning"], one["arguments"]) for name, one in names["geometries"].items()
     } == {name: (one.meaning, [*one.arguments, *BODIES]) for name, one in GEOMETRIES.items()}
     for name, one in ARGUMENTS.items():
-        assert told["arguments"][name] == {
+        assert names["arguments"][name] == {
             **one._asdict(),
             "units": scales(one.units),
             "choices": list(one.choices),
@@ -101,9 +104,9 @@ def test_units_and_geometries_are_the_librarys(client: Any) -> None:
     # what is offered is what a request may hold
     described = client.get("/openapi.json").json()
     fields = described["components"]["schemas"]["CaseRequest"]["properties"]
-    assert {*told["inputs"], *told["choices"], "k_range"} <= fields.keys()
+    assert {*names["inputs"], *names["choices"], "k_range"} <= fields.keys()
     assert {"/v1/solve-for", "/v1/stiffness", "/v1/fit"} <= described["paths"].keys()
-    assert told["guide"] is False
+    assert names["guide"] is False
 
 
 def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, problem: Any) -> None:
@@ -175,12 +178,12 @@ def test_what_is_typed_and_asked_without_a_browser(
         map(int, re.findall(r"\d+", subprocess.check_output([node, "-v"], text=True)))
     ) < (20, 19):
         pytest.skip("node 20.19 or newer is not installed")
-    told = tmp_path / "names.json"
-    told.write_text(json.dumps(client.get("/static/page/names.json").json()))
+    file = tmp_path / "names.json"
+    file.write_text(json.dumps(client.get("/static/page/names.json").json()))
     done = subprocess.run(
         [node, "--test", "tests/service/page"],
         cwd=repository,
-        env={**os.environ, "PAGE_NAMES": str(told)},
+        env={**os.environ, "PAGE_NAMES": str(file)},
         capture_output=True,
         text=True,
         check=False,
@@ -238,7 +241,7 @@ def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
 
 def inaccessible(page: Any, repository: Path) -> Any:
     """Violations found by axe-core, in the light and dark schemes: rules and elements."""
-    found = {}
+    violations = {}
     page.browser.execute_script((repository / AXE).read_text("utf-8"))
     for scheme, rules in (("light", "{}"), ("dark", "{ runOnly: ['color-contrast'] }")):
         page.scheme(scheme)
@@ -247,9 +250,9 @@ def inaccessible(page: Any, repository: Path) -> Any:
             "return found.violations.map((one) => [one.id, one.nodes.map((node) => "
             "node.target.join(' '))]);"
         )
-        found.update({(scheme, rule): places[:5] for rule, places in broken})
+        violations.update({(scheme, rule): places[:5] for rule, places in broken})
     page.scheme("light")
-    return found
+    return violations
 
 
 @pytest.mark.parametrize("width", [1440, 390])
@@ -319,9 +322,9 @@ def test_the_pages_ask_for_the_key_and_use_it(
         page.wait_for("#mu", "^…$")
         page.until(page.find("#key-form").is_displayed, lambda: "#key-form")
         assert page.run("return sessionStorage.length;") == 0
-        for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
+        for wrong, reason in (("two words", "no spaces"), ("nonsense", "not the key")):
             enter(wrong)
-            page.wait_for("#key-status", said)
+            page.wait_for("#key-status", reason)
             assert page.text("#mu") == "…"
         enter("open-sesame")
         page.wait_for("#mu", r"^0\.\d+$")

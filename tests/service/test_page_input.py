@@ -97,7 +97,7 @@ def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) ->
 def test_every_trouble_of_the_service_has_its_own_message(
     open_page: Any, surrogate: Surrogate
 ) -> None:
-    said = (
+    answer = (
         "new Response(JSON.stringify({ detail: 'too many cases' }), { status: %s, headers: { "
         "'Retry-After': '1' } })"
     )
@@ -105,12 +105,12 @@ def test_every_trouble_of_the_service_has_its_own_message(
         before = page.number()
         for reply, message, red in (
             (
-                f"async () => {said % 503}",
+                f"async () => {answer % 503}",
                 "^The service cannot answer now: too many cases. Asking again by its",
                 False,
             ),
             (
-                f"async () => {said % 422}",
+                f"async () => {answer % 422}",
                 "^The service refuses this: too many cases. Grey results belong to e",
                 True,
             ),
@@ -156,11 +156,11 @@ def test_the_start_is_calm_while_the_service_is_not_ready(
         "headers: { 'Retry-After': '1' } }))"
     )
     with open_page.faked(unready, wait=False) as page:
-        said = (
+        message = (
             "^The service cannot answer now: the tables are not loaded yet. Asking again by "
             "itself.$"
         )
-        page.wait_for("#status", said)  # no word of earlier values: there are none
+        page.wait_for("#status", message)  # no word of earlier values: there are none
         assert not page.is_red("#status")
         assert page.text("#law-status") == page.text("#solve-status") == ""
         assert len(page.texts("[aria-invalid=true]")) == 0

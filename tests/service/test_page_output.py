@@ -84,12 +84,12 @@ def test_units_that_no_contact_has_are_told_beside_the_number(open_page: Any) ->
 def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.click("#solve-form button")  # which amplitude halves the friction?
-    found = page.wait_for("#solve-result", r"y₀ = (\S+) µm: µ = 0.15, stick slip, shaker (\S+) mW")
-    assert surrogate.evaluate(**{**START, "y0": float(found[1]) * 1e-6}).mu_ratio == close(
+    match = page.wait_for("#solve-result", r"y₀ = (\S+) µm: µ = 0.15, stick slip, shaker (\S+) mW")
+    assert surrogate.evaluate(**{**START, "y0": float(match[1]) * 1e-6}).mu_ratio == close(
         0.5, abs=1e-5
     )
     page.click("#solve-result button")
-    assert (page.shown()["µ/µ₀"], page.shown()["shaker power"]) == ("0.5", f"{found[2]} mW")
+    assert (page.shown()["µ/µ₀"], page.shown()["shaker power"]) == ("0.5", f"{match[2]} mW")
     assert not page.is_old("#solve")
     page.type("#field-Fz", "12")  # the root was that of another case
     assert page.is_old("#solve")
@@ -99,13 +99,13 @@ def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
     page.wait_for("#solve-result", r"k = \S+ N/µm: µ = 0.29")
     page.type("#target", "2")
     page.wait_for("#solve-result", r"^No value gives that: here it can be \S+ to \S+\.$")
-    for text, said in (
+    for text, message in (
         ("half", "not a number"),
         ("0.5 N", "is not a unit"),
         ("-1", "refuses this: target.*>= 0"),
     ):
         page.type("#target", text)
-        page.wait_for("#solve-status", said)
+        page.wait_for("#solve-status", message)
     page.choose("#target", "2", "input")
     assert not page.is_old("#solve")
 
@@ -141,20 +141,20 @@ OUTSIDE = (
 )
 
 
-@pytest.mark.parametrize(("address", "side", "said"), OUTSIDE)
+@pytest.mark.parametrize(("address", "side", "words"), OUTSIDE)
 def test_a_point_outside_of_the_map_is_marked_on_its_frame(
-    open_page: Any, address: Any, side: Any, said: Any
+    open_page: Any, address: Any, side: Any, words: Any
 ) -> None:
     page = open_page(address)
-    assert re.search(said, page.text("#map-out"))
+    assert re.search(words, page.text("#map-out"))
     x, y = page.run(
         "const [plot, point] = ['#map', '#map .point'].map((one) =>"
         " document.querySelector(one).getBoundingClientRect());"
         "return [(point.x + point.width / 2 - plot.x) / plot.width,"
         " (point.y + point.height / 2 - plot.y) / plot.height];"
     )
-    found = (x > 0.8) - (x < 0.2), (y < 0.1) - (y > 0.8)
-    assert all(one in (0, at) for one, at in zip(side, found, strict=True))
+    sides = (x > 0.8) - (x < 0.2), (y < 0.1) - (y > 0.8)
+    assert all(one in (0, at) for one, at in zip(side, sides, strict=True))
     assert page.text("#status") == ""
 
 
@@ -179,11 +179,16 @@ def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surr
         " top + line + y * (height - 2 * line)).find((one) => "
         "one.matches('.shade')).style.fill);"
     )
-    told = {
+    painted = {
         (band, colour) for band, colour, good in zip(bands[0], colours, clear, strict=True) if good
     }
-    assert len(told) == len({band for band, _ in told}) == len({colour for _, colour in told}) > 10
-    shades = [colour for _, colour in sorted(told)]
+    assert (
+        len(painted)
+        == len({band for band, _ in painted})
+        == len({colour for _, colour in painted})
+        > 10
+    )
+    shades = [colour for _, colour in sorted(painted)]
     written = ["#" + "".join(f"{int(x):02x}" for x in re.findall(r"\d+", one)) for one in shades]
     assert written == plotting.band_colours()
 
@@ -275,8 +280,8 @@ def test_a_ball_under_another_load_is_stiffer_unless_it_is_said_otherwise(
     open_page: Any, tmp_path: Path
 ) -> None:
     with open_page.faked(RECORDED, "#contact=ball&along=Fz") as page:
-        asked = page.asked("v1/law")
-        assert (asked["Fz"], asked["stiffness_exponent"]) == (10, close(1.0 / 3.0, rel=1e-15))
+        question = page.question("v1/law")
+        assert (question["Fz"], question["stiffness_exponent"]) == (10, close(1.0 / 3.0, rel=1e-15))
         assert page.find(M_OF["law"]).get_attribute("placeholder") == "1/3"
         rows = [
             *csv.DictReader(page.download("#csv", tmp_path, "friction-law-Fz.csv").splitlines())
@@ -286,7 +291,7 @@ def test_a_ball_under_another_load_is_stiffer_unless_it_is_said_otherwise(
                 1e6 * (float(row["Fz [N]"]) / 10) ** (1 / 3), rel=1e-9
             )
         page.type(M_OF["law"], "0")
-        assert "Fz" not in page.asked("v1/law")
+        assert "Fz" not in page.question("v1/law")
 
 
 @pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
@@ -386,9 +391,9 @@ def test_all_contacts_and_directions_answer(
         expected = surrogate.evaluate(
             **case, contact=contact, direction=direction, k_range=(8e5, 1.2e6)
         )
-        told = page.wait_for("#interval", r"^(\S+) to (\S+) for k = 0.8..1.2 N/µm$")
+        match = page.wait_for("#interval", r"^(\S+) to (\S+) for k = 0.8..1.2 N/µm$")
         ends = [expected.mu_macro_low, expected.mu_macro_high]
-        assert [float(told[1]), float(told[2])] == close(
+        assert [float(match[1]), float(match[2])] == close(
             ends, abs=0.02 * (ends[1] - ends[0]) + 1e-9
         )
         assert len(page.texts("#law .band")) == 1
@@ -400,14 +405,14 @@ def test_all_contacts_and_directions_answer(
         v, y, ratio = (float(read[i]) for i in (1, 2, 3))
         exact, _, _ = surrogate.quantity("mu_ratio", v, y, contact=contact, direction=direction)
         assert ratio == close(exact, abs=0.02)
-        assert page.asked("v1/law")["k_range"] == close([8e5, 1.2e6], rel=1e-15)
+        assert page.question("v1/law")["k_range"] == close([8e5, 1.2e6], rel=1e-15)
         page.choose("#along", "k")
-        assert "k_range" not in page.asked("v1/law")
+        assert "k_range" not in page.question("v1/law")
         assert not re.search(ODD, page.run(SEEN))
         assert page.text("#status") == page.text("#law-status") == ""
         page.touched("#map", 0.4, 0.7, click=True)
-        found = [float(page.shown()[name]) for name in page.shown() if name[0] in "ṽỹ"]
-        assert found == close([v, y], rel=0.01)
+        groups = [float(page.shown()[name]) for name in page.shown() if name[0] in "ṽỹ"]
+        assert groups == close([v, y], rel=0.01)
         page.click("#reset")
         assert (page.text("#map-out"), page.value("#field-k")) == ("", "1 N/µm")
 
@@ -461,20 +466,26 @@ def test_the_panels_ask_and_fill_the_form(
         for name, text in (("radius", "5 mm"), ("E", "210 GPa"), ("nu", "0.3"), ("E2", "rigid")):
             page.type(f"#argument-{name}", text, commit=False)
         page.click("#stiffness-form button")
-        asked = {"radius": close(5e-3, rel=1e-15), "Fz": 10, "E": 210e9, "nu": 0.3, "E2": "rigid"}
-        assert page.asked("v1/stiffness") == {"geometry": "ball", **asked}
-        found = contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3, E2=np.inf)
+        arguments = {
+            "radius": close(5e-3, rel=1e-15),
+            "Fz": 10,
+            "E": 210e9,
+            "nu": 0.3,
+            "E2": "rigid",
+        }
+        assert page.question("v1/stiffness") == {"geometry": "ball", **arguments}
+        contact = contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3, E2=np.inf)
         assert (
             page.text("#stiffness-result")
-            == f"k = {found.k / 1e6:.4g} N/µm at Fz = 10 N; contact: ball (Hertz)Use"
+            == f"k = {contact.k / 1e6:.4g} N/µm at Fz = 10 N; contact: ball (Hertz)Use"
         )
         page.click("[name=contact][value=spring]")
         page.click("#stiffness-result button")
-        assert page.value("#field-k") == f"{found.k / 1e6:.6g} N/µm"
+        assert page.value("#field-k") == f"{contact.k / 1e6:.6g} N/µm"
         assert page.find("[name=contact][value=ball]").is_selected()
         page.choose("#geometry", "cylinder", "input")
         assert page.value("#argument-radius") == "5 mm"  # what two geometries share stays
-        for text, said in (
+        for text, message in (
             (
                 "10 parsec",
                 "^length: “parsec” is not a unit of length: give m, .*Grey results belong",
@@ -482,7 +493,7 @@ def test_the_panels_ask_and_fill_the_form(
             ("-1 mm", "refuses this: length"),
         ):
             page.type("#argument-length", text)
-            page.wait_for("#stiffness-status", said)
+            page.wait_for("#stiffness-status", message)
         v0 = np.geomspace(1e-3, 1.0, 9)
         mu = surrogate.evaluate(**{**START, "k": 1.3e6, "v0": v0}, contact="ball").mu_macro
         rows = [
@@ -491,9 +502,16 @@ def test_the_panels_ask_and_fill_the_form(
         ]
         page.choose("#points", "\n".join(["v0 [mm/s];mu;std", *rows]), "input")
         page.click("#fit-form button:not([type])")
-        asked = page.asked("v1/fit")
-        assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
-        assert (asked["contact"], asked["unknowns"], "k" in asked) == ("ball", ["k", "mu0"], False)
+        question = page.question("v1/fit")
+        assert (question["v0"], question["mu_macro"]) == (
+            close(v0.tolist(), rel=1e-14),
+            mu.tolist(),
+        )
+        assert (question["contact"], question["unknowns"], "k" in question) == (
+            "ball",
+            ["k", "mu0"],
+            False,
+        )
         lines = page.texts("#fit-lines li")
         for line, pattern in zip(
             lines, ("k = 1.3 N/µm ± .*; µ₀ = 0.3 ± .*Use", "reduced χ² = .*"), strict=True
@@ -523,9 +541,12 @@ def test_the_fit_takes_decimal_commas_and_a_column_mu0(
         page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
         page.choose("#points", "\n".join(["v0 [mm/s];mu_macro;mu0", *rows]), "input")
         page.click("#fit-form button:not([type])")
-        asked = page.asked("v1/fit")
-        assert (asked["v0"], asked["mu_macro"]) == (close(v0.tolist(), rel=1e-14), mu.tolist())
-        assert (asked["mu0"], asked["unknowns"]) == (mu0.tolist(), ["k"])
+        question = page.question("v1/fit")
+        assert (question["v0"], question["mu_macro"]) == (
+            close(v0.tolist(), rel=1e-14),
+            mu.tolist(),
+        )
+        assert (question["mu0"], question["unknowns"]) == (mu0.tolist(), ["k"])
         (line,) = page.texts("#fit-lines li")
         assert re.fullmatch("k = 1.3 N/µm ± .*Use", line)
         assert page.text("#fit-status") == ""

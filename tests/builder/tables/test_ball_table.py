@@ -100,7 +100,7 @@ def test_springs_that_are_solved_one_by_one_give_the_same(springs: Springs, swee
         if ratio[0] < STEEPEST:
             ends += [math.sqrt(max(1.0 - y / at[0], 0.0)) for at in Ball(springs).crossings(ratio)]
         ends = sorted({*ends, math.sqrt(max(1.0 - y, 0.0))})
-        found = dict.fromkeys(QUANTITY_NAMES, 0.0)
+        summed = dict.fromkeys(QUANTITY_NAMES, 0.0)
         for left, right in itertools.pairwise(ends):
             half = 0.5 * (right - left)
             edges = np.concatenate([left + half * share, (right - half * share)[::-1][1:]])
@@ -110,18 +110,18 @@ def test_springs_that_are_solved_one_by_one_give_the_same(springs: Springs, swee
             solved = sweep.solve("full", v / s, y / s)
             for name in QUANTITY_NAMES:
                 load = MIDDLE * s * (MIDDLE * s if name == "power" else 1.0)
-                found[name] += float(((wide * weight).ravel() * load * solved[name]).sum())
+                summed[name] += float(((wide * weight).ravel() * load * solved[name]).sum())
         ours = Ball(springs).solve(np.array([v]), np.array([y]))
         for name in QUANTITY_NAMES:
-            assert ours[name][0] == close(found[name], abs=2e-11), (v, y, name)
+            assert ours[name][0] == close(summed[name], abs=2e-11), (v, y, name)
 
 
 def test_at_rest_it_is_the_closed_form_and_slides_like_a_rigid_contact(springs: Springs) -> None:
     y = np.array([1e-3, 0.1, 0.5, 0.9, 0.999])
     m = (1.0 - y) / (1.0 + y)
     still = np.sqrt(1.0 + y) * (ellipe(m) - y * ellipk(m))
-    found = Ball(springs).solve(np.full(y.size, 1e-17), y)
-    np.testing.assert_allclose(found["mu_ratio"], still, rtol=0.0, atol=3e-13)
+    solved = Ball(springs).solve(np.full(y.size, 1e-17), y)
+    np.testing.assert_allclose(solved["mu_ratio"], still, rtol=0.0, atol=3e-13)
     v = np.array([1e6, 1e7])
     fast = Ball(springs).solve(v, 0.7 * v)["mu_ratio"]
     np.testing.assert_allclose(fast, closed_forms.outer(0.7), rtol=0.0, atol=3e-12)
@@ -255,19 +255,19 @@ def test_seams_are_invisible() -> None:
 @pytest.mark.slow
 def test_the_errors_that_are_measured_are_those_that_the_table_states(of: SolvedContact) -> None:
     table = opened(1e-4)
-    for chart, block, found in zip(
+    for chart, block, measured in zip(
         BALL_CHARTS, table.table.ball, block_errors(table, of, 300, seed=4), strict=True
     ):
-        assert found.cells.keys() == block.nodes.keys()
+        assert measured.cells.keys() == block.nodes.keys()
         for name in block.nodes:
-            cells = found.cells[name]
+            cells = measured.cells[name]
             if name != "mu_ratio":  # some points of cells are in another block
-                cells = np.minimum(cells, found.values[name])
+                cells = np.minimum(cells, measured.values[name])
             assert np.all(cells <= block.cell_errors[name]), (chart.name, name)
-            assert found.values[name] <= block.errors[name][0], (chart.name, name)
+            assert measured.values[name] <= block.errors[name][0], (chart.name, name)
             # where a stick fraction's own noise is larger than what the cells err by, none is left
-            assert found.values[name] > 0.0 or name == "stick_fraction", (chart.name, name)
-        assert found.absolute <= table.ball_tolerance
+            assert measured.values[name] > 0.0 or name == "stick_fraction", (chart.name, name)
+        assert measured.absolute <= table.ball_tolerance
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10, 1e-12])

@@ -124,10 +124,10 @@ def test_the_distribution_of_errors_is_that_of_its_points(sound: Surrogate, swee
 
 def test_shares_of_errors_and_ratios_are_counted() -> None:
     error = np.arange(1.0, 102.0)
-    found = distribution(error, bound_over_error(np.full(101, 201.0), np.full(101, 1.5), error))
-    assert found["error_quantiles"] == [51.0, 96.0, 100.0, 101.0]
+    shares = distribution(error, bound_over_error(np.full(101, 201.0), np.full(101, 1.5), error))
+    assert shares["error_quantiles"] == [51.0, 96.0, 100.0, 101.0]
     # the first error is within the solver's own
-    least, median, most = found["bound_over_error"]
+    least, median, most = shares["bound_over_error"]
     assert (least, most) == close((202.5 / 101.0, 202.5 / 2.0), rel=1e-15)
     assert median == close(202.5 / 51.5, rel=1e-3)
     assert distribution(error, np.full(101, np.nan))["bound_over_error"] == [0.0, 0.0, 0.0]
@@ -137,8 +137,8 @@ def test_a_border_that_is_off_is_found(sweep: Sweep) -> None:
     table = read_table(TABLE)
     for piece in table.border:
         piece.values *= 1.0 + 1e-9
-    found = uncovered(verify(Surrogate(table, TABLE), sweep, 200, seed=3))
-    assert found["border"] > 1000
+    missed = uncovered(verify(Surrogate(table, TABLE), sweep, 200, seed=3))
+    assert missed["border"] > 1000
 
 
 @pytest.mark.parametrize(
@@ -156,11 +156,11 @@ def test_a_block_off_by_a_hundred_thousandth_is_found_and_named(
     sweep: Sweep, key: str, block: str
 ) -> None:
     wrong = damaged(block, 1.0 + 1e-5, key)
-    found = verify(wrong, sweep, 1000, seed=3)
-    part = found.get(key, found)
-    assert part["not_covered"] == uncovered(found)[key] > 0
+    report = verify(wrong, sweep, 1000, seed=3)
+    part = report.get(key, report)
+    assert part["not_covered"] == uncovered(report)[key] > 0
     assert [name for name, source in part["sources"].items() if source["not_covered"]] == [block]
-    assert [name for name in QUANTITY_NAMES if uncovered(found)[name]] == [key]
+    assert [name for name in QUANTITY_NAMES if uncovered(report)[name]] == [key]
     errors = block_errors(wrong, spring(sweep), 200, seed=1)[BLOCK_NAMES.index(block)]
     assert errors.values[key] > 1e-6
     if (key, block) == ("mu_ratio", "corner"):
@@ -213,8 +213,8 @@ def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
 def test_the_errors_that_are_measured_are_those_that_the_table_states(
     sound: Surrogate, sweep: Sweep
 ) -> None:
-    found = block_errors(sound, spring(sweep), 200, seed=1)
-    for chart, block, errors in zip(CHARTS, sound.table.blocks, found, strict=True):
+    measured = block_errors(sound, spring(sweep), 200, seed=1)
+    for chart, block, errors in zip(CHARTS, sound.table.blocks, measured, strict=True):
         assert errors.values.keys() == errors.cells.keys() == block.nodes.keys()
         for name in block.nodes:
             assert 0.0 < errors.values[name] <= block.errors[name][0], chart.name
@@ -246,9 +246,9 @@ def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(
     for seed in range(4):
         drawn = 0.5 * noise["power"] * np.random.default_rng(seed).standard_normal(c.shape)
         other = exact | {"power": to_a @ c @ to_b.T + drawn}
-        found = cell_errors(spring(sweep), index, block, other, noise)["power"]
-        assert np.all(found <= block.cell_errors["power"])
-        assert np.all(found[:, 0] > 0.0)
+        largest = cell_errors(spring(sweep), index, block, other, noise)["power"]
+        assert np.all(largest <= block.cell_errors["power"])
+        assert np.all(largest[:, 0] > 0.0)
 
 
 @pytest.mark.parametrize("block", ["continuous_low", "stick_slip_mid", "stick_slip_high"])
@@ -259,11 +259,11 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
     part = table.blocks[index]
     values = part.nodes["mu_ratio"]
     values += 0.25 * part.errors["mu_ratio"][0] * (-1.0) ** np.arange(values.shape[1])
-    found = block_errors(Surrogate(table, TABLE), spring(sweep), 200, seed=1)[index]
-    assert np.any(found.cells["mu_ratio"][:, 2] > part.cell_errors["mu_ratio"][:, 2])
+    measured = block_errors(Surrogate(table, TABLE), spring(sweep), 200, seed=1)[index]
+    assert np.any(measured.cells["mu_ratio"][:, 2] > part.cell_errors["mu_ratio"][:, 2])
     for name in part.nodes.keys() - {"mu_ratio"}:
-        assert found.values[name] <= part.errors[name][0]
-        assert np.all(found.cells[name] <= part.cell_errors[name])
+        assert measured.values[name] <= part.errors[name][0]
+        assert np.all(measured.cells[name] <= part.cell_errors[name])
 
 
 @pytest.mark.parametrize("block", ["corner", "continuous_mid_1"])
