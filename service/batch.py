@@ -99,7 +99,7 @@ class Batch:
             shown = ", ".join(f"{name}: {length}" for name, length in lengths.items())
             reason = f"lists must have one length; given {shown}"
             refuse([FieldFault.of(name, reason) for name in wrong])
-        if not lengths:
+        if not lengths and "v0" in columns:  # else it is refused below
             columns["v0"] = np.array([columns["v0"]])
         plan = Plan.of(model, columns)
         # relations between inputs are the same for all cases: an empty part shows whether they hold

@@ -43,7 +43,7 @@ CLOSE = {"Connection": "close"}
 _WITHIN = dict.fromkeys(PARTS, ("harmonic", "amplitude", "phase"))
 # how long, and how many bytes of a refused body are read
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
-_PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
+_PAUSE_S = 1.0  # a client that sends nothing for so long has read the answer
 _log = logging.getLogger("mumacro.error")
 
 
@@ -373,28 +373,51 @@ def problem_of(error: RequestError, scope: Scope) -> Response:
     )
 
 
-async def handle(request: Request, error: Exception) -> Response:
+async def handle(request: Request, error: Exception) -> ASGIApp:
     """FastAPI's handler of all of them."""
     request_error = meaning(error, request.scope)
-    await drained(request_error, request)
-    return problem_of(request_error, request.scope)
+    answer = problem_of(request_error, request.scope)
+    late = request_error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)
+    closes = "Connection" in request_error.kind.headers
+    has_body = not {"content-length", "transfer-encoding"}.isdisjoint(request.headers)
+    if closes and has_body and not late and "expect" not in request.headers:
+        return _BeforeRest(answer)
+    return answer
 
 
 #: exception -> its handler: the one table of the application
 HANDLERS: Any = dict.fromkeys(_MEANINGS, handle)
 
 
-async def drained(error: RequestError, request: Request) -> None:
-    """Read and drop the rest of a body that is refused, for a while: else many clients see a reset
-    and no reason."""
-    late = error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)
-    if "Connection" not in error.kind.headers or late or "expect" in request.headers:
-        return
+class _BeforeRest:
+    """An answer whose client may still be sending its body.
+
+    The rest is read and dropped for a while before the connection is closed: else many clients see
+    a reset and no reason.
+    """
+
+    def __init__(self, answer: Response) -> None:
+        self._answer = answer
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the answer, which has a Content-Length, drop the rest of the body, and end."""
+
+        async def send_unended(message: Message) -> None:
+            if message["type"] == "http.response.body":
+                message["more_body"] = True
+            await send(message)
+
+        await self._answer(scope, receive, send_unended)
+        await _drop_body(receive)
+        await send({"type": "http.response.body", "body": b""})
+
+
+async def _drop_body(receive: Receive) -> None:
     count, more = 0, True
     with suppress(TimeoutError):
         async with asyncio.timeout(_LINGER_S):
             while more and count < _LINGER:
-                message = await asyncio.wait_for(request.receive(), _PAUSE_S)
+                message = await asyncio.wait_for(receive(), _PAUSE_S)
                 count += len(message.get("body", b""))
                 more = message.get("more_body", False)
 

@@ -155,7 +155,7 @@ def _pairs(query: bytes) -> list[tuple[str, str]]:
     text = query.decode("latin-1")
     # what urllib would take longer to find
     if not query.translate(None, _PLAIN) and query.count(b"&") < 100:
-        pairs = (pair.partition("=") for pair in text.split("&") if pair)
+        pairs = [pair.partition("=") for pair in text.split("&") if pair]
         return [(name, value) for name, _, value in pairs]
     try:
         return parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)

@@ -140,13 +140,14 @@ def _quick_rows(text: bytearray, at: int, max_batch: int, kind: Kind) -> Body | 
                 names = _names_of(rows[0], kind)
                 values_of = itemgetter(*names)
             members = len(names) * len(rows)
-            # Every row has all names, or values_of fails; one colon for each: nothing more, and
-            # none twice.
-            if _count(piece, b":") != members:
+            # Every row has all names, or values_of fails.  Two quotes for each: no other member,
+            # none twice, and no words.
+            words = _count(piece, b'"') != 2 * members
+            if words and _count(piece, b":") != members:
                 return None
             values: Iterator[Any] = chain.from_iterable(map(values_of, rows))
-            # words, or true and false: no name has one of these letters
-            if _count(piece, b'"') != 2 * members or b"r" in piece or b"s" in piece:
+            # true and false: no name has one of these letters
+            if words or b"r" in piece or b"s" in piece:
                 values = iter(_checked(list(values), names))
             blocks.append(np.fromiter(values, np.float64, members).reshape(len(rows), -1))
         except (ValueError, TypeError, LookupError, InputError):

@@ -41,16 +41,11 @@ _TOLERANCE = "Error of mu_macro/mu0 [-]: the smallest loaded table that meets it
 
 
 class Choice(Strict):
-    """Which contact, which direction, which table."""
+    """Which contact, which direction, which table; a model of these checks its ``kind``."""
 
     contact: ContactName = Field("spring", description=_CONTACT)
     direction: DirectionName = Field("across", description=_DIRECTION)
     tolerance: Positive | None = optional(_TOLERANCE)
-
-    @model_validator(mode="after")
-    def _has_a_kind(self) -> Self:
-        _ = self.kind
-        return self
 
     @cached_property
     def kind(self) -> Kind:
@@ -85,16 +80,19 @@ class InputStd(Strict):
         return values
 
 
-def _check_std(options: Any) -> Any:
-    """Refuse deviations that have no effect, and ``std`` in ``include`` without them."""
+def _check_options(options: Any) -> Any:
+    """Refuse deviations that have no effect, ``std`` in ``include`` without them, and a contact and
+    a direction that do not go together."""
     std, kind = options.std, options.kind
     if (std is None) == ("std" in (options.include or ())):
         bound = "given if include has std"
         if std is not None:
             bound = "left out: no effect unless include has std"
         raise InputError("std", None, bound)
+    if std is None:
+        return options
     other = "y0" if kind.normal else AMPLITUDE
-    if std is not None and getattr(std, other):
+    if getattr(std, other):
         bound = f"without {other}, which direction {kind.names['direction']} does not have"
         raise InputError("std", other, bound)
     return options
@@ -106,7 +104,7 @@ class Options(Choice):
     include: Annotated[list[Include], Field(max_length=16)] | None = optional(_INCLUDE)
     std: InputStd | None = optional("Standard deviations of the inputs, for include=std")
 
-    _std_has_an_effect = model_validator(mode="after")(_check_std)
+    _options_agree = model_validator(mode="after")(_check_options)
 
 
 class CaseRequest(Options, Case):
@@ -162,7 +160,7 @@ class QueryOptions(Deviations, Choice):
         f"{_INCLUDE}; joined by commas"
     )
 
-    _std_has_an_effect = model_validator(mode="after")(_check_std)
+    _options_agree = model_validator(mode="after")(_check_options)
 
 
 class BatchOptions(Deviations):
@@ -175,7 +173,7 @@ class BatchOptions(Deviations):
         f"{_INCLUDE}; joined by commas"
     )
 
-    _std_has_an_effect = model_validator(mode="after")(_check_std)
+    _options_agree = model_validator(mode="after")(_check_options)
 
     @cached_property
     def kind(self) -> Kind:

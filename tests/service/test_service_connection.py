@@ -212,6 +212,18 @@ def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(s
     assert json.loads(content)["max_bytes"] == 65536
 
 
+def test_a_refusal_is_sent_at_once_and_its_sender_may_go_on_sending(strict: Any) -> None:
+    """A sender that pauses within its body must not be reset when it goes on."""
+    with connect(strict) as raw:
+        raw.sendall(head(SINGLE, 3_000_000))
+        refusal = raw.recv(65536)
+        assert refusal.startswith(b"HTTP/1.1 413")
+        for _ in range(30):
+            raw.sendall(b" " * 100_000)
+        _, _, content = (refusal + to_end(raw)).partition(b"\r\n\r\n")
+    assert json.loads(content)["max_bytes"] == 65536
+
+
 def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
     strict: Any,
 ) -> None:

@@ -360,6 +360,14 @@ def test_all_faults_are_reported_at_once_and_their_list_is_bounded(
     problem(client.get(SINGLE + "?" + "&".join(f"a{i}=1" for i in range(200))), 422)
 
 
+@pytest.mark.parametrize("name", [*CASE])
+def test_a_null_in_one_case_sent_as_a_batch_is_refused_by_its_name(
+    client: Any, problem: Any, name: str
+) -> None:
+    (fault,) = problem(client.post(BATCH, json={**CASE, name: None}), 422)["errors"]
+    assert fault["field"] == name
+
+
 TWICE = (
     '{"mu0":0.3,"Fz":10,"k":1e6,"y0":2e-6,"omega":1e5,"v0":%s,"mu0":0.2}',
     '{"mu0":0.3,"Fz":10,"k":null,"y0":2e-6,"f":1e4,"v0":%s,"\\u006du0":0.2}',
