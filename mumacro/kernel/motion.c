@@ -18,11 +18,14 @@
 
 enum {
     MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6,
+    MU_MOTION_SLIDING_PERIODS = 12,
     MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
+#define MU_MOTION_LEAP 0.9 /* of what is left of the way to a cycle, at most */
+#define MU_MOTION_OFF 0.3 /* of Newton's step before it, by which the next one may be off */
 #define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
@@ -72,7 +75,7 @@ typedef struct {
  * many sticks it has, but for brief ones. */
 typedef struct {
     double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error;
-    int sticks, level;
+    int sticks, level, failed;
 } mu_steady;
 
 /* One cycle at equal times, to be drawn: each spring adds its forces with a weight. */
@@ -743,7 +746,7 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
 }
 
 static mu_steady mu_steady_of(const mu_march *march, double distance) {
-    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks, 0};
+    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks, 0, march->failed};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
     if (march->slipped)
@@ -758,7 +761,7 @@ static mu_steady mu_steady_of(const mu_march *march, double distance) {
  * No two forces move apart, so that a step of Newton's method is too long where the force then
  * moves back against it; then the step is cut by the rule of the secant. */
 static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                               double tolerance, double goal, double *f) {
+                               double tolerance, double goal, int periods, double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
     double from[2] = {f[0], f[1]}, share = 1.0;
     mu_residual r, base = {{0.0, 0.0}, {0.0, 0.0}, HUGE_VAL};
@@ -772,7 +775,7 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
         distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_length(r.step[0], r.step[1]));
         if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
         distance = mu_min(distance, 2.0 * limit);
-        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed)
+        if (distance <= goal || period == periods || march.failed)
             return mu_steady_of(&march, distance);
         ahead = base.step[0] * r.moved[0] + base.step[1] * r.moved[1];
         behind = base.step[0] * base.moved[0] + base.step[1] * base.moved[1];
@@ -790,72 +793,109 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
     }
 }
 
-/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only
- * one; of those that stick there are many, and only its way decides between them.
+/* How far a contact at rest is from a cycle that sticks, after a period from f. */
+static double mu_distance_at_rest(const mu_march *march, const mu_residual *r) {
+    const double step = mu_length(r->step[0], r->step[1]);
+    if (march->failed) return 2.0;
+    if (march->mean[MU_MEAN_PATH] < 1e-13) return 0.0;
+    if (r->size < 1e-13) return 1e4 * r->size; /* rounding */
+    return mu_min(2.0 * mu_max(r->size, step), 2.0);
+}
+
+/* Whether Newton's step after a period is near the expected one. */
+static int mu_is_expected(const mu_residual *r, const double *expected, double off) {
+    return mu_length(r->step[0] - expected[0], r->step[1] - expected[1]) <= off;
+}
+
+/* The way of a contact from rest into a cycle that sticks, period by period, where allowed with
+ * leaps.
  *
- * The steps that are left to be halved are then those of the period that slips most: the last one
- * hardly slips, and halves of its steps may be those that the periods before have taken already. */
-static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                                       double tolerance, double goal, double *f) {
-    double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance, curved = 0.0;
-    double most = 0.0, step = 0.0, from[2] = {0.0, 0.0};
+ * A period maps all forces around onto one line, as its derivative has rank one.  A leap along
+ * Newton's step therefore comes back to the line of the way itself, and changes its end by no more
+ * than half of what any later period moves the force.  It stays short of the end of the way: where
+ * nothing slips after it, or the step that is left is not the expected one, it is taken back.
+ *
+ * The steps that are left to be halved are those of the period that slips most: the last one hardly
+ * slips, and halves of its steps may be those that the periods before have taken already. */
+static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                                     double tolerance, double goal, int leaps, double *f) {
+    double most = 0.0, step = 0.0, from[2] = {0.0, 0.0}, expected[2] = {0.0, 0.0};
+    double back[2] = {0.0, 0.0}, share = MU_MOTION_LEAP, size = HUGE_VAL, moved = 0.0;
+    int leapt = 0, any = 0, wait = 1, waited = 0;
     mu_march march;
-    mu_steady out;
-    f[0] = f[1] = 0.0;
-    out = mu_find_cycle(m, grid, steps, tolerance, goal, f);
-    if (out.distance <= goal && out.mean[MU_MEAN_PATH] > 1e3 * goal) return out;
     f[0] = f[1] = 0.0;
     march.step = 0.0;
     march.steps = steps;
     for (int period = 1;; ++period) {
-        double moved[2], rate, leap;
         const double before = march.step;
+        double distance;
+        mu_residual r;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
+        r = mu_residual_of(&march, f, march.at.limit);
         if (march.mean[MU_MEAN_PATH] > most) {
             most = march.mean[MU_MEAN_PATH];
             step = before;
             from[0] = f[0];
             from[1] = f[1];
         }
-        moved[0] = march.f[0] - f[0];
-        moved[1] = march.f[1] - f[1];
-        size[2] = size[1];
-        size[1] = size[0];
-        size[0] = mu_length(moved[0], moved[1]);
-        /* what is left to go, as a geometric series */
-        rate = mu_max(size[0] / size[1], size[1] / size[2]);
-        distance = 2.0;
-        if (march.mean[MU_MEAN_PATH] < 1e-13) {
-            distance = 0.0;
-        } else if (size[0] < 1e-13) { /* rounding */
-            distance = 1e4 * size[0];
-        } else if (period > 2 && rate < 1.0) {
-            distance = mu_min(2.0 * size[0] / (1.0 - rate), 2.0);
+        distance = mu_distance_at_rest(&march, &r);
+        if (leapt && share * size > goal && !march.failed &&
+            (distance == 0.0 || !mu_is_expected(&r, expected, MU_MOTION_OFF * size))) {
+            f[0] = back[0];
+            f[1] = back[1];
+            share = mu_max(0.5 * share, 0.1);
+            wait *= 2;
+            leapt = waited = 0;
+            size = HUGE_VAL;
+            continue;
         }
-        if (march.failed) distance = 2.0;
-        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) {
-            out = mu_steady_of(&march, mu_min(distance + curved, 2.0));
+        if (any) distance += distance == 0.0 ? 0.5 * moved : 0.5 * r.size;
+        if (distance <= goal || march.mean[MU_MEAN_PATH] < 1e-13 ||
+            period >= MU_MOTION_REST_PERIODS || march.failed) {
+            const mu_steady out = mu_steady_of(&march, mu_min(distance, 2.0));
             if (march.mean[MU_MEAN_PATH] < most) {
                 march.step = step;
                 mu_take_period(m, grid, from, tolerance, &march, NULL);
             }
             return out;
         }
-        f[0] = march.f[0];
-        f[1] = march.f[1];
-        /* many equal periods at once: half of what is left, and no more than
-         * a straight way that errs little */
-        leap = size[1] / size[2] > 0.8 && rate < 1.0
-                   ? mu_min(0.5 * size[0] / (1.0 - rate), sqrt(0.2 * goal))
-                   : 0.0;
-        if (leap > 2.0 * size[0] &&
-            fabs(size[0] / size[1] - size[1] / size[2]) < 0.2 * (1.0 - rate)) {
-            f[0] += leap * (moved[0] / size[0]);
-            f[1] += leap * (moved[1] / size[0]);
-            curved += 0.5 * leap * leap;
-            size[0] = size[1] = HUGE_VAL;
+        /* a period as expected from the one before it, with a long way left, allows a leap */
+        waited += !leapt && mu_is_expected(&r, expected, MU_MOTION_OFF * size);
+        size = mu_length(r.step[0], r.step[1]);
+        moved = r.size;
+        leapt = leaps && waited >= wait && share * size > 2.0 * r.size;
+        expected[0] = leapt ? (1.0 - share) * r.step[0] : r.step[0] - r.moved[0];
+        expected[1] = leapt ? (1.0 - share) * r.step[1] : r.step[1] - r.moved[1];
+        back[0] = march.f[0];
+        back[1] = march.f[1];
+        f[0] = leapt ? f[0] + share * r.step[0] : march.f[0];
+        f[1] = leapt ? f[1] + share * r.step[1] : march.f[1];
+        if (leapt) {
+            any = 1;
+            mu_keep_below(march.at.limit, f);
         }
     }
+}
+
+/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only
+ * one; of those that stick there are many, and only its way decides between them. */
+static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                                       double tolerance, double goal, double *f) {
+    mu_steady out;
+    f[0] = f[1] = 0.0;
+    out = mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_SLIDING_PERIODS, f);
+    if (out.failed || (out.distance <= goal && out.mean[MU_MEAN_PATH] > 1e3 * goal)) return out;
+    out = mu_follow_from_rest(m, grid, steps, tolerance, goal, 1, f);
+    if (out.failed || out.distance <= goal) return out;
+    return mu_follow_from_rest(m, grid, steps, tolerance, goal, 0, f);
+}
+
+/* The steady cycle near f, or at rest the one that a contact without force comes to. */
+static mu_steady mu_cycle_of(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                             double tolerance, double goal, double *f) {
+    return m->drag > 0.0
+               ? mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_PERIODS, f)
+               : mu_find_cycle_at_rest(m, grid, steps, tolerance, goal, f);
 }
 
 static double mu_difference(const mu_steady *a, const mu_steady *b, int marks) {
@@ -894,15 +934,13 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
     for (int level = 0;; ++level) { /* at rest, the errors of the whole way to the cycle stay */
         mu_keep_below(limit, f);
-        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, goal,
-                                                                      f);
+        out = mu_cycle_of(m, grid, steps, of_step, goal, f);
         /* steps too large to be followed */
         for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) {
             f[0] = m->drag > 0.0 ? limit : 0.0;
             f[1] = 0.0;
             of_step *= 0.06;
-            out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step,
-                                                                          goal, f);
+            out = mu_cycle_of(m, grid, steps, of_step, goal, f);
         }
         out.level = level;
         out.error = 2.0 * limit;
