@@ -25,7 +25,7 @@ enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
 #define MU_MOTION_LEAP 0.9 /* of what is left of the way to a cycle, at most */
-#define MU_MOTION_OFF 0.3 /* of Newton's step before it, by which the next one may be off */
+#define MU_MOTION_OFF 0.6 /* of a way of the force, by which Newton's step after it may be off */
 #define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
@@ -66,7 +66,7 @@ typedef struct {
     /* of a small disturbance: the direction that survives first, the last one, what is left as a
      * logarithm, as a factor */
     double first[2], last[2], decay, turned;
-    int slipped, failed, sticks;
+    int slipped, failed, sticks, phases; /* the last: how often slip begins */
     mu_grid *steps; /* ends of all its steps */
 } mu_march;
 
@@ -541,6 +541,7 @@ static void mu_begin_slip(mu_march *march) {
     march->last[0] = tx;
     march->last[1] = ty;
     march->slipped = march->slips = 1;
+    ++march->phases;
 }
 
 static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, double end,
@@ -808,20 +809,21 @@ static int mu_is_expected(const mu_residual *r, const double *expected, double o
 }
 
 /* The way of a contact from rest into a cycle that sticks, period by period, where allowed with
- * leaps.
+ * leaps along Newton's step.
  *
- * A period maps all forces around onto one line, as its derivative has rank one.  A leap along
- * Newton's step therefore comes back to the line of the way itself, and changes its end by no more
- * than half of what any later period moves the force.  It stays short of the end of the way: where
- * nothing slips after it, or the step that is left is not the expected one, it is taken back.
+ * A period maps all forces around onto one line, as its derivative has rank one.  So a leap comes
+ * back to the line of the way itself, and changes its end by no more than half of what any later
+ * period moves the force.  Two periods one after another show that Newton's step can be trusted: it
+ * has to shorten by what the first has moved.  A leap stays short of the end of the way: where the
+ * contact does not slip after it as before, it is taken back.
  *
  * The steps that are left to be halved are those of the period that slips most: the last one hardly
  * slips, and halves of its steps may be those that the periods before have taken already. */
 static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
                                      double tolerance, double goal, int leaps, double *f) {
     double most = 0.0, step = 0.0, from[2] = {0.0, 0.0}, expected[2] = {0.0, 0.0};
-    double back[2] = {0.0, 0.0}, share = MU_MOTION_LEAP, size = HUGE_VAL, moved = 0.0;
-    int leapt = 0, any = 0, wait = 1, waited = 0;
+    double back[2] = {0.0, 0.0}, share = MU_MOTION_LEAP, way = 0.0, moved = 0.0;
+    int leapt = 0, any = 0, phases = 0, wait = 1, waited = 0;
     mu_march march;
     f[0] = f[1] = 0.0;
     march.step = 0.0;
@@ -829,6 +831,7 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
     for (int period = 1;; ++period) {
         const double before = march.step;
         double distance;
+        int alike;
         mu_residual r;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
         r = mu_residual_of(&march, f, march.at.limit);
@@ -839,17 +842,16 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
             from[1] = f[1];
         }
         distance = mu_distance_at_rest(&march, &r);
-        if (leapt && share * size > goal && !march.failed &&
-            (distance == 0.0 || !mu_is_expected(&r, expected, MU_MOTION_OFF * size))) {
+        alike = march.phases == phases && mu_is_expected(&r, expected, MU_MOTION_OFF * way);
+        if (leapt && !alike && way > goal && !march.failed) {
             f[0] = back[0];
             f[1] = back[1];
             share = mu_max(0.5 * share, 0.1);
             wait *= 2;
-            leapt = waited = 0;
-            size = HUGE_VAL;
+            leapt = waited = phases = 0;
             continue;
         }
-        if (any) distance += distance == 0.0 ? 0.5 * moved : 0.5 * r.size;
+        if (any) distance += 0.5 * (distance == 0.0 ? moved : r.size);
         if (distance <= goal || march.mean[MU_MEAN_PATH] < 1e-13 ||
             period >= MU_MOTION_REST_PERIODS || march.failed) {
             const mu_steady out = mu_steady_of(&march, mu_min(distance, 2.0));
@@ -859,20 +861,26 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
             }
             return out;
         }
-        /* a period as expected from the one before it, with a long way left, allows a leap */
-        waited += !leapt && mu_is_expected(&r, expected, MU_MOTION_OFF * size);
-        size = mu_length(r.step[0], r.step[1]);
+        waited = leapt ? 0 : alike ? waited + 1 : 0;
+        way = share * mu_length(r.step[0], r.step[1]);
         moved = r.size;
-        leapt = leaps && waited >= wait && share * size > 2.0 * r.size;
-        expected[0] = leapt ? (1.0 - share) * r.step[0] : r.step[0] - r.moved[0];
-        expected[1] = leapt ? (1.0 - share) * r.step[1] : r.step[1] - r.moved[1];
+        phases = march.phases;
+        leapt = leaps && waited >= wait && phases > 1 && moved > 1e-12 && way > 2.0 * moved;
         back[0] = march.f[0];
         back[1] = march.f[1];
-        f[0] = leapt ? f[0] + share * r.step[0] : march.f[0];
-        f[1] = leapt ? f[1] + share * r.step[1] : march.f[1];
         if (leapt) {
             any = 1;
+            f[0] += share * r.step[0];
+            f[1] += share * r.step[1];
             mu_keep_below(march.at.limit, f);
+            expected[0] = (1.0 - share) * r.step[0];
+            expected[1] = (1.0 - share) * r.step[1];
+        } else {
+            f[0] = march.f[0];
+            f[1] = march.f[1];
+            expected[0] = r.step[0] - r.moved[0];
+            expected[1] = r.step[1] - r.moved[1];
+            way = moved;
         }
     }
 }
