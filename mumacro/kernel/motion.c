@@ -25,7 +25,9 @@ enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
 #define MU_MOTION_LEAP 0.9 /* of what is left of the way to a cycle, at most */
-#define MU_MOTION_OFF 0.6 /* of a way of the force, by which Newton's step after it may be off */
+/* of a way of the force, by which Newton's step after it may be off: it shortens by a third of the
+ * way where the force moves by the cube of what is left */
+#define MU_MOTION_OFF 0.85
 #define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
@@ -64,8 +66,8 @@ typedef struct {
     double step, began, slid;
     double mean[MU_MEANS], marked[2 * MU_MARKS];
     /* of a small disturbance: the direction that survives first, the last one, what is left as a
-     * logarithm, as a factor */
-    double first[2], last[2], decay, turned;
+     * logarithm, as a factor; the limit where that direction is the last */
+    double first[2], last[2], decay, turned, last_limit;
     int slipped, failed, sticks, phases; /* the last: how often slip begins */
     mu_grid *steps; /* ends of all its steps */
 } mu_march;
@@ -540,6 +542,7 @@ static void mu_begin_slip(mu_march *march) {
     }
     march->last[0] = tx;
     march->last[1] = ty;
+    march->last_limit = size;
     march->slipped = march->slips = 1;
     ++march->phases;
 }
@@ -601,6 +604,7 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     march->f[1] = march->at.limit * ny;
     march->last[0] = -ny;
     march->last[1] = nx;
+    march->last_limit = march->at.limit;
 }
 
 static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *fresh, int *ends,
@@ -800,7 +804,7 @@ static double mu_distance_at_rest(const mu_march *march, const mu_residual *r) {
     if (march->failed) return 2.0;
     if (march->mean[MU_MEAN_PATH] < 1e-13) return 0.0;
     if (r->size < 1e-13) return 1e4 * r->size; /* rounding */
-    return mu_min(2.0 * mu_max(r->size, step), 2.0);
+    return mu_min(3.0 * mu_max(r->size, step), 2.0);
 }
 
 /* Whether Newton's step after a period is near the expected one. */
@@ -868,10 +872,13 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
         leapt = leaps && waited >= wait && phases > 1 && moved > 1e-12 && way > 2.0 * moved;
         back[0] = march.f[0];
         back[1] = march.f[1];
-        if (leapt) {
+        if (leapt) { /* along the circle of the forces on which the last slip ends */
+            const double *last = march.last;
+            const double along = share * (r.step[0] * last[0] + r.step[1] * last[1]);
+            const double inwards = 0.5 * along * along / march.last_limit;
             any = 1;
-            f[0] += share * r.step[0];
-            f[1] += share * r.step[1];
+            f[0] += share * r.step[0] - inwards * last[1];
+            f[1] += share * r.step[1] + inwards * last[0];
             mu_keep_below(march.at.limit, f);
             expected[0] = (1.0 - share) * r.step[0];
             expected[1] = (1.0 - share) * r.step[1];
@@ -894,7 +901,7 @@ static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, 
     out = mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_SLIDING_PERIODS, f);
     if (out.failed || (out.distance <= goal && out.mean[MU_MEAN_PATH] > 1e3 * goal)) return out;
     out = mu_follow_from_rest(m, grid, steps, tolerance, goal, 1, f);
-    if (out.failed || out.distance <= goal) return out;
+    if (out.failed || out.distance <= goal || out.mean[MU_MEAN_PATH] > 1e-13) return out;
     return mu_follow_from_rest(m, grid, steps, tolerance, goal, 0, f);
 }
 
