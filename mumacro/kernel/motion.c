@@ -74,10 +74,11 @@ typedef struct {
 
 /* A steady cycle: means per period; decay of a disturbance per period as its
  * logarithm; distance to the cycle; the estimate of the error of the mean force; how
- * many sticks it has, but for brief ones. */
+ * many sticks it has, but for brief ones.  From which force, with which first step, the period
+ * starts on the way from rest that slips more. */
 typedef struct {
-    double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error;
-    int sticks, level, failed;
+    double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error, from[2], step;
+    int sticks, level, failed, slips_before;
 } mu_steady;
 
 /* One cycle at equal times, to be drawn: each spring adds its forces with a weight. */
@@ -751,7 +752,8 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
 }
 
 static mu_steady mu_steady_of(const mu_march *march, double distance) {
-    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks, 0, march->failed};
+    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, {0.0, 0.0}, 0.0,
+                     march->sticks, 0, march->failed, 0};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
     if (march->slipped)
@@ -760,13 +762,14 @@ static mu_steady mu_steady_of(const mu_march *march, double distance) {
     return out;
 }
 
-/* The cycle whose distance to the steady one is below goal, or the nearest
- * of many periods; f is its start.
+/* The cycle whose distance to the steady one is below goal, or the nearest of so many periods; f is
+ * its start.  A path of slip below the least ends the search.
  *
  * No two forces move apart, so that a step of Newton's method is too long where the force then
  * moves back against it; then the step is cut by the rule of the secant. */
 static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                               double tolerance, double goal, int periods, double *f) {
+                               double tolerance, double goal, int periods, double least,
+                               double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
     double from[2] = {f[0], f[1]}, share = 1.0;
     mu_residual r, base = {{0.0, 0.0}, {0.0, 0.0}, HUGE_VAL};
@@ -780,7 +783,8 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
         distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_length(r.step[0], r.step[1]));
         if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
         distance = mu_min(distance, 2.0 * limit);
-        if (distance <= goal || period == periods || march.failed)
+        if (distance <= goal || period == periods || march.failed ||
+            march.mean[MU_MEAN_PATH] < least)
             return mu_steady_of(&march, distance);
         ahead = base.step[0] * r.moved[0] + base.step[1] * r.moved[1];
         behind = base.step[0] * base.moved[0] + base.step[1] * base.moved[1];
@@ -812,8 +816,18 @@ static int mu_is_expected(const mu_residual *r, const double *expected, double o
     return mu_length(r->step[0] - expected[0], r->step[1] - expected[1]) <= off;
 }
 
-/* The way of a contact from rest into a cycle that sticks, period by period, where allowed with
- * leaps along Newton's step.
+/* The cycle that slips near f of a contact at rest, which is the only one; returns 0 where none is
+ * found. */
+static int mu_find_sliding(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                           double tolerance, double goal, double *f, mu_steady *cycle) {
+    const double least = 1e3 * goal;
+    *cycle = mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_SLIDING_PERIODS, least, f);
+    return cycle->failed || (cycle->distance <= goal && cycle->mean[MU_MEAN_PATH] > least);
+}
+
+/* The cycle that a contact without force comes to from rest, period by period, where allowed with
+ * leaps along Newton's step.  One that slips is the only one; of those that stick there are many,
+ * and only its way decides between them.
  *
  * A period maps all forces around onto one line, as its derivative has rank one.  So a leap comes
  * back to the line of the way itself, and changes its end by no more than half of what any later
@@ -858,12 +872,21 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
         if (any) distance += 0.5 * (distance == 0.0 ? moved : r.size);
         if (distance <= goal || march.mean[MU_MEAN_PATH] < 1e-13 ||
             period >= MU_MOTION_REST_PERIODS || march.failed) {
-            const mu_steady out = mu_steady_of(&march, mu_min(distance, 2.0));
-            if (march.mean[MU_MEAN_PATH] < most) {
-                march.step = step;
-                mu_take_period(m, grid, from, tolerance, &march, NULL);
-            }
+            mu_steady out = mu_steady_of(&march, mu_min(distance, 2.0));
+            out.from[0] = from[0];
+            out.from[1] = from[1];
+            out.step = step;
+            out.slips_before = march.mean[MU_MEAN_PATH] < most;
             return out;
+        }
+        if (period == 2 && leaps) {
+            double start[2] = {march.f[0], march.f[1]};
+            mu_steady sliding;
+            if (mu_find_sliding(m, grid, steps, tolerance, goal, start, &sliding)) {
+                f[0] = start[0];
+                f[1] = start[1];
+                return sliding;
+            }
         }
         waited = leapt ? 0 : alike ? waited + 1 : 0;
         way = share * mu_length(r.step[0], r.step[1]);
@@ -892,25 +915,17 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
     }
 }
 
-/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only
- * one; of those that stick there are many, and only its way decides between them. */
-static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                                       double tolerance, double goal, double *f) {
+/* The steady cycle near f; at rest the one that a contact without force comes to, which may be near
+ * f only if it slips. */
+static mu_steady mu_cycle_of(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                             double tolerance, double goal, int near, double *f) {
     mu_steady out;
-    f[0] = f[1] = 0.0;
-    out = mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_SLIDING_PERIODS, f);
-    if (out.failed || (out.distance <= goal && out.mean[MU_MEAN_PATH] > 1e3 * goal)) return out;
+    if (m->drag > 0.0)
+        return mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_PERIODS, 0.0, f);
+    if (near && mu_find_sliding(m, grid, steps, tolerance, goal, f, &out)) return out;
     out = mu_follow_from_rest(m, grid, steps, tolerance, goal, 1, f);
     if (out.failed || out.distance <= goal || out.mean[MU_MEAN_PATH] > 1e-13) return out;
     return mu_follow_from_rest(m, grid, steps, tolerance, goal, 0, f);
-}
-
-/* The steady cycle near f, or at rest the one that a contact without force comes to. */
-static mu_steady mu_cycle_of(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                             double tolerance, double goal, double *f) {
-    return m->drag > 0.0
-               ? mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_PERIODS, f)
-               : mu_find_cycle_at_rest(m, grid, steps, tolerance, goal, f);
 }
 
 static double mu_difference(const mu_steady *a, const mu_steady *b, int marks) {
@@ -942,6 +957,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
     double of_step = mu_cube_root_near(mu_min(0.1 * tolerance, 1e-3));
     const double rounding = mu_max(MU_MOTION_ROUNDING, mu_min(0.05 * tolerance, 5e-9));
     const double goal = m->drag > 0.0 ? 0.1 * tolerance : 0.01 * mu_min(tolerance, 1e-5);
+    int near = f[0] != 0.0 || f[1] != 0.0;
     mu_steady last, out;
     of_step *= of_step;
     grid->n = mu_min(m->nodes, (double)grid->room);
@@ -949,13 +965,14 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
     for (int level = 0;; ++level) { /* at rest, the errors of the whole way to the cycle stay */
         mu_keep_below(limit, f);
-        out = mu_cycle_of(m, grid, steps, of_step, goal, f);
+        out = mu_cycle_of(m, grid, steps, of_step, goal, near, f);
         /* steps too large to be followed */
         for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) {
+            near = 0;
             f[0] = m->drag > 0.0 ? limit : 0.0;
             f[1] = 0.0;
             of_step *= 0.06;
-            out = mu_cycle_of(m, grid, steps, of_step, goal, f);
+            out = mu_cycle_of(m, grid, steps, of_step, goal, near, f);
         }
         out.level = level;
         out.error = 2.0 * limit;
@@ -967,7 +984,14 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         if (m->drag == 0.0 &&
             (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error)))
             return out;
+        if (out.slips_before) { /* the steps of the last period are too few */
+            mu_march march;
+            march.step = out.step;
+            march.steps = steps;
+            mu_take_period(m, grid, out.from, of_step, &march, NULL);
+        }
         if (!mu_halve(steps, grid)) return out;
+        near = out.mean[MU_MEAN_PATH] > 1e3 * goal;
         last = out;
         of_step *= 0.06;
     }
@@ -1057,7 +1081,9 @@ static mu_steady mu_spring_at(const mu_shaken *m, double t, double tolerance, in
                               mu_grid *grid, mu_grid *steps, double *f) {
     const double share = mu_share_at(t);
     const mu_shaken one = mu_of_spring(m, share);
-    return mu_spring_motion(&one, tolerance / share, levels, grid, steps, f);
+    const mu_steady out = mu_spring_motion(&one, tolerance / share, levels, grid, steps, f);
+    if (m->drag == 0.0 && out.mean[MU_MEAN_PATH] < 1e-13) f[0] = f[1] = 0.0; /* no start of others */
+    return out;
 }
 
 /* Where between low and high, with different numbers of slips, the cycle changes its kind. */
