@@ -28,6 +28,7 @@ enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS
 /* of a way of the force, by which Newton's step after it may be off: it shortens by a third of the
  * way where the force moves by the cube of what is left */
 #define MU_MOTION_OFF 0.85
+#define MU_MOTION_COARSE 30.0 /* of the tolerance, where only the kind of a cycle is looked for */
 #define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
@@ -1086,13 +1087,19 @@ static mu_steady mu_spring_at(const mu_shaken *m, double t, double tolerance, in
     return out;
 }
 
+/* How many sticks the cycle at t has: longer steps show them. */
+static int mu_sticks_at(const mu_shaken *m, double t, double tolerance, mu_grid *grid,
+                        mu_grid *steps, double *f) {
+    return mu_spring_at(m, t, MU_MOTION_COARSE * tolerance, 0, grid, steps, f).sticks;
+}
+
 /* Where between low and high, with different numbers of slips, the cycle changes its kind. */
 static double mu_kink(const mu_shaken *m, double low, double high, int sticks, double tolerance,
                       mu_grid *grid, mu_grid *steps, double *f) {
     const double close = 0.1 * sqrt(tolerance);
     while (high - low > close) {
         const double t = 0.5 * (low + high);
-        if (mu_spring_at(m, t, tolerance, 0, grid, steps, f).sticks == sticks) {
+        if (mu_sticks_at(m, t, tolerance, grid, steps, f) == sticks) {
             low = t;
         } else {
             high = t;
@@ -1225,7 +1232,7 @@ static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, 
     int n = 0, last = -1;
     for (int i = 0; i < MU_MOTION_SCAN; ++i) {
         const double t = (i + 1.0) / MU_MOTION_SCAN;
-        const int now = mu_spring_at(m, t, tolerance, 0, grid, steps, f).sticks;
+        const int now = mu_sticks_at(m, t, tolerance, grid, steps, f);
         if (i > 0 && now != last)
             edges[++n] = mu_kink(m, before, t, last, tolerance, grid, steps, f);
         last = now;
