@@ -18,7 +18,7 @@
 
 enum {
     MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6,
-    MU_MOTION_SLIDING_PERIODS = 12,
+    MU_MOTION_SLIDING_PERIODS = 12, MU_MOTION_KNOWN = 256,
     MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
@@ -1078,28 +1078,85 @@ static mu_shaken mu_of_spring(const mu_shaken *m, double share) {
  * may behave otherwise than all the rest.  What a spring adds per t is multiplied by 2 t. */
 static double mu_share_at(double t) { return 1.5 * t * t * (2.0 - t * t); }
 
-static mu_steady mu_spring_at(const mu_shaken *m, double t, double tolerance, int levels,
-                              mu_grid *grid, mu_grid *steps, double *f) {
+/* The start of the cycle of the spring at t. */
+typedef struct {
+    double t, f[2];
+} mu_start;
+
+/* A ball whose springs are computed one after another, with what is known of them. */
+typedef struct {
+    const mu_shaken *m;
+    mu_grid *grid, *steps;
+    int known; /* so far; of these the last are kept */
+    mu_start starts[MU_MOTION_KNOWN];
+} mu_ball;
+
+/* The start of the cycle at t by the cubic through the four nearest that are known; that of the
+ * nearest, where t is beyond them. */
+static void mu_predict(const mu_ball *ball, double t, double *f) {
+    const mu_start *near[4] = {NULL, NULL, NULL, NULL};
+    const int n = ball->known < MU_MOTION_KNOWN ? ball->known : MU_MOTION_KNOWN;
+    double low = 1.0, high = 0.0;
+    int count = 0;
+    for (int i = 0; i < n; ++i) {
+        const mu_start *start = &ball->starts[i];
+        int place = count < 4 ? count : 3;
+        int again = 0;
+        for (int j = 0; j < count; ++j) again = again || near[j]->t == start->t;
+        if (again || (count == 4 && fabs(start->t - t) >= fabs(near[3]->t - t))) continue;
+        for (; place > 0 && fabs(start->t - t) < fabs(near[place - 1]->t - t); --place)
+            near[place] = near[place - 1];
+        near[place] = start;
+        if (count < 4) ++count;
+    }
+    f[0] = count ? near[0]->f[0] : ball->m->drag > 0.0 ? 1.0 : 0.0;
+    f[1] = count ? near[0]->f[1] : 0.0;
+    for (int j = 0; j < count; ++j) {
+        low = mu_min(low, near[j]->t);
+        high = mu_max(high, near[j]->t);
+    }
+    if (count < 4 || t < low || t > high) return;
+    f[0] = f[1] = 0.0;
+    for (int j = 0; j < 4; ++j) {
+        double share = 1.0;
+        for (int i = 0; i < 4; ++i)
+            if (i != j) share *= (t - near[i]->t) / (near[j]->t - near[i]->t);
+        f[0] += share * near[j]->f[0];
+        f[1] += share * near[j]->f[1];
+    }
+}
+
+/* The spring at t, which is sought from f. */
+static mu_steady mu_spring_from(mu_ball *ball, double t, double tolerance, int levels, double *f) {
     const double share = mu_share_at(t);
-    const mu_shaken one = mu_of_spring(m, share);
-    const mu_steady out = mu_spring_motion(&one, tolerance / share, levels, grid, steps, f);
-    if (m->drag == 0.0 && out.mean[MU_MEAN_PATH] < 1e-13) f[0] = f[1] = 0.0; /* no start of others */
+    const mu_shaken one = mu_of_spring(ball->m, share);
+    const mu_steady out =
+        mu_spring_motion(&one, tolerance / share, levels, ball->grid, ball->steps, f);
+    /* one that came from rest to stick is no start for others */
+    if (ball->m->drag > 0.0 || out.mean[MU_MEAN_PATH] > 1e-13) {
+        const mu_start start = {t, {f[0], f[1]}};
+        ball->starts[ball->known++ % MU_MOTION_KNOWN] = start;
+    }
     return out;
 }
 
+static mu_steady mu_spring_at(mu_ball *ball, double t, double tolerance, int levels) {
+    double f[2];
+    mu_predict(ball, t, f);
+    return mu_spring_from(ball, t, tolerance, levels, f);
+}
+
 /* How many sticks the cycle at t has: longer steps show them. */
-static int mu_sticks_at(const mu_shaken *m, double t, double tolerance, mu_grid *grid,
-                        mu_grid *steps, double *f) {
-    return mu_spring_at(m, t, MU_MOTION_COARSE * tolerance, 0, grid, steps, f).sticks;
+static int mu_sticks_at(mu_ball *ball, double t, double tolerance) {
+    return mu_spring_at(ball, t, MU_MOTION_COARSE * tolerance, 0).sticks;
 }
 
 /* Where between low and high, with different numbers of slips, the cycle changes its kind. */
-static double mu_kink(const mu_shaken *m, double low, double high, int sticks, double tolerance,
-                      mu_grid *grid, mu_grid *steps, double *f) {
+static double mu_kink(mu_ball *ball, double low, double high, int sticks, double tolerance) {
     const double close = 0.1 * sqrt(tolerance);
     while (high - low > close) {
         const double t = 0.5 * (low + high);
-        if (mu_sticks_at(m, t, tolerance, grid, steps, f) == sticks) {
+        if (mu_sticks_at(ball, t, tolerance) == sticks) {
             low = t;
         } else {
             high = t;
@@ -1127,38 +1184,21 @@ static double mu_place_in(const mu_panel *panel, double u, double *slope) {
     return panel->low + share * width;
 }
 
-/* The start of the cycle at u, by the parabola through the nearest three of n points (u, f);
- * as it is, where there are less. */
-static void mu_predict(double points[15][3], double *f, int n, double u) {
-    int near[3] = {-1, -1, -1};
-    if (n < 3) return;
-    for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < n; ++i)
-            if (i != near[0] && i != near[1] &&
-                (near[j] < 0 || fabs(points[i][0] - u) < fabs(points[near[j]][0] - u)))
-                near[j] = i;
-    f[0] = f[1] = 0.0;
-    /* beyond them */
-    if (fabs(points[near[0]][0] - u) > fabs(points[near[1]][0] - points[near[0]][0])) {
-        f[0] = points[near[0]][1];
-        f[1] = points[near[0]][2];
-        return;
-    }
-    for (int j = 0; j < 3; ++j) {
-        const double *one = points[near[j]], *second = points[near[(j + 1) % 3]],
-                     *third = points[near[(j + 2) % 3]];
-        const double share =
-            (u - second[0]) * (u - third[0]) / ((one[0] - second[0]) * (one[0] - third[0]));
-        f[0] += share * one[1];
-        f[1] += share * one[2];
-    }
+/* The springs of a panel in the order in which they are computed: those with halved steps first, so
+ * that the rest lie between known ones. */
+enum { MU_MOTION_HALVED = 4 };
+static const int MU_PANEL_ORDER[15] = {1, 5, 9, 13, 3, 7, 11, 0, 2, 4, 6, 8, 10, 12, 14};
+
+/* The larger error of the springs with halved steps next to spring i. */
+static double mu_error_beside(const double *errors, int i) {
+    const int before = i < 1 ? 1 : 4 * ((i - 1) / 4) + 1, after = before + 4;
+    return i < 1 ? errors[1] : i > 13 ? errors[13] : mu_max(errors[before], errors[after]);
 }
 
-static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int kink_low,
-                              int kink_high, double tolerance, mu_grid *grid, mu_grid *steps,
-                              double *f) {
+static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_low, int kink_high,
+                              double tolerance) {
     mu_panel out;
-    double values[15][2], sums[15][2], ends[2], at[15][3], errors[15];
+    double values[15][2], sums[15][2], ends[2], errors[15];
     int halvings = 0;
     memset(&out, 0, sizeof out);
     out.low = low;
@@ -1166,29 +1206,21 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int k
     out.kinks[0] = kink_low;
     out.kinks[1] = kink_high;
     out.decay = HUGE_VAL;
-    /* every other point first, so that the rest lie between known ones */
     for (int k = 0; k < 15; ++k) {
-        const int i = k < 7 ? 2 * k + 1 : 2 * (k - 7), single = k >= 7 && halvings < 2;
+        const int i = MU_PANEL_ORDER[k], single = k >= MU_MOTION_HALVED && halvings < 2;
         double weight, slope;
         const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope);
         const double share = mu_share_at(t);
-        mu_steady spring;
-        mu_predict(at, f, k, u);
-        spring = mu_spring_at(m, t, tolerance, single ? 0 : MU_MOTION_LEVELS, grid, steps, f);
+        mu_steady spring = mu_spring_at(ball, t, tolerance, single ? 0 : MU_MOTION_LEVELS);
         errors[i] = share * spring.error;
         if (single)
-            errors[i] = mu_max(errors[i ? i - 1 : 1], errors[i < 14 ? i + 1 : 13]) +
-                        3.0 * share * spring.distance;
+            errors[i] = mu_error_beside(errors, i) + 3.0 * share * spring.distance;
         if (!(errors[i] <= tolerance)) { /* from where the search for the cycle begins else */
-            f[0] = m->drag > 0.0 ? 1.0 : 0.0;
-            f[1] = 0.0;
-            spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
+            double f[2] = {ball->m->drag > 0.0 ? 1.0 : 0.0, 0.0};
+            spring = mu_spring_from(ball, t, tolerance, MU_MOTION_LEVELS, f);
             errors[i] = share * spring.error;
         }
         halvings = spring.level > halvings ? spring.level : halvings;
-        at[k][0] = u;
-        at[k][1] = f[0];
-        at[k][2] = f[1];
         out.at[i] = t;
         out.sticks[i] = spring.sticks;
         for (int j = 0; j < MU_MEANS; ++j) {
@@ -1226,35 +1258,32 @@ static double mu_panel_error(const mu_panel *panels, int n, int i) {
 }
 
 /* Panels of a ball before any is divided: from one kink to the next. */
-static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps,
-                           double *f, mu_panel *panels) {
+static int mu_first_panels(mu_ball *ball, double tolerance, mu_panel *panels) {
     double edges[MU_MOTION_SCAN + 2] = {0.0}, before = 0.0;
     int n = 0, last = -1;
     for (int i = 0; i < MU_MOTION_SCAN; ++i) {
         const double t = (i + 1.0) / MU_MOTION_SCAN;
-        const int now = mu_sticks_at(m, t, tolerance, grid, steps, f);
+        const int now = mu_sticks_at(ball, t, tolerance);
         if (i > 0 && now != last)
-            edges[++n] = mu_kink(m, before, t, last, tolerance, grid, steps, f);
+            edges[++n] = mu_kink(ball, before, t, last, tolerance);
         last = now;
         before = t;
     }
     if (n == 0) {
-        panels[0] = mu_ball_panel(m, 0.0, 0.5, 0, 0, tolerance, grid, steps, f);
-        panels[1] = mu_ball_panel(m, 0.5, 1.0, 0, 0, tolerance, grid, steps, f);
+        panels[0] = mu_ball_panel(ball, 0.0, 0.5, 0, 0, tolerance);
+        panels[1] = mu_ball_panel(ball, 0.5, 1.0, 0, 0, tolerance);
         return 2;
     }
     edges[n + 1] = 1.0;
     for (int i = 0; i <= n; ++i)
-        panels[i] = mu_ball_panel(m, edges[i], edges[i + 1], i > 0, i < n, tolerance, grid, steps,
-                                  f);
+        panels[i] = mu_ball_panel(ball, edges[i], edges[i + 1], i > 0, i < n, tolerance);
     return n + 1;
 }
 
 /* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the
  * middle.  A kink close to an end is left to later divisions: coarse steps may see it where fine
  * ones do not. */
-static double mu_division(const mu_shaken *m, const mu_panel *panel, double tolerance,
-                          mu_grid *grid, mu_grid *steps, double *f, int *kink) {
+static double mu_division(mu_ball *ball, const mu_panel *panel, double tolerance, int *kink) {
     const double middle = 0.5 * (panel->low + panel->high);
     const double near = 0.02 * (panel->high - panel->low);
     int best = -1;
@@ -1266,8 +1295,8 @@ static double mu_division(const mu_shaken *m, const mu_panel *panel, double tole
             best = i, nearest = distance;
     }
     if (best >= 0) {
-        const double at = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best],
-                                  tolerance, grid, steps, f);
+        const double at = mu_kink(ball, panel->at[best], panel->at[best + 1], panel->sticks[best],
+                                  tolerance);
         *kink = at - panel->low > near && panel->high - at > near;
         if (*kink) return at;
     }
@@ -1278,10 +1307,16 @@ static double mu_division(const mu_shaken *m, const mu_panel *panel, double tole
 static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *grid,
                                 mu_grid *steps) {
     mu_panel panels[MU_MOTION_PANELS];
-    double f[2] = {m->drag > 0.0 ? 1.0 : 0.0, 0.0}, error = 0.0;
     const double half = 0.5 * tolerance;
+    double error = 0.0;
+    mu_ball ball;
     mu_steady out;
-    int n = mu_first_panels(m, half, grid, steps, f, panels);
+    int n;
+    ball.m = m;
+    ball.grid = grid;
+    ball.steps = steps;
+    ball.known = 0;
+    n = mu_first_panels(&ball, half, panels);
     memset(&out, 0, sizeof out);
     out.decay = HUGE_VAL;
     for (;; ++n) {
@@ -1300,11 +1335,11 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
         {
             const mu_panel whole = panels[worst];
             int kink;
-            const double middle = mu_division(m, &whole, half, grid, steps, f, &kink);
+            const double middle = mu_division(&ball, &whole, half, &kink);
             panels[worst] =
-                mu_ball_panel(m, whole.low, middle, whole.kinks[0], kink, half, grid, steps, f);
+                mu_ball_panel(&ball, whole.low, middle, whole.kinks[0], kink, half);
             panels[n] =
-                mu_ball_panel(m, middle, whole.high, kink, whole.kinks[1], half, grid, steps, f);
+                mu_ball_panel(&ball, middle, whole.high, kink, whole.kinks[1], half);
         }
     }
     for (int i = 0; i < n; ++i) {
