@@ -19,7 +19,7 @@
 enum {
     MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6,
     MU_MOTION_SLIDING_PERIODS = 12, MU_MOTION_KNOWN = 256,
-    MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
+    MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 10, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
@@ -1153,7 +1153,7 @@ static int mu_sticks_at(mu_ball *ball, double t, double tolerance) {
 
 /* Where between low and high, with different numbers of slips, the cycle changes its kind. */
 static double mu_kink(mu_ball *ball, double low, double high, int sticks, double tolerance) {
-    const double close = 0.1 * sqrt(tolerance);
+    const double close = 0.4 * sqrt(tolerance);
     while (high - low > close) {
         const double t = 0.5 * (low + high);
         if (mu_sticks_at(ball, t, tolerance) == sticks) {
@@ -1322,18 +1322,19 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
     memset(&out, 0, sizeof out);
     out.decay = HUGE_VAL;
     for (;; ++n) {
-        double most = -1.0;
+        double most = -1.0, of_springs = 0.0;
         int worst = 0;
         error = 0.0;
         for (int i = 0; i < n; ++i) {
             const double own = mu_panel_error(panels, n, i);
             error += own;
+            of_springs += panels[i].of_springs;
             if (own > most) {
                 most = own;
                 worst = i;
             }
         }
-        if (error <= half || n == MU_MOTION_PANELS) break;
+        if (error <= mu_max(half, tolerance - of_springs) || n == MU_MOTION_PANELS) break;
         {
             const mu_panel whole = panels[worst];
             int kink;
