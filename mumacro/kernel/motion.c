@@ -870,6 +870,10 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
             leapt = waited = phases = 0;
             continue;
         }
+        if (leapt) {
+            share = mu_min(1.5 * share, MU_MOTION_LEAP);
+            wait = wait > 1 ? wait / 2 : 1;
+        }
         if (any) distance += 0.5 * (distance == 0.0 ? moved : r.size);
         if (distance <= goal || march.mean[MU_MEAN_PATH] < 1e-13 ||
             period >= MU_MOTION_REST_PERIODS || march.failed) {
