@@ -986,7 +986,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
                         3.0 * out.distance + rounding;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
         if (out.error <= tolerance || level == levels) return out;
-        if (m->drag == 0.0 &&
+        if (m->drag == 0.0 && level > 0 &&
             (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error)))
             return out;
         if (out.slips_before) { /* the steps of the last period are too few */
