@@ -922,7 +922,7 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
 
 /* The steady cycle near f; at rest the one that a contact without force comes to, which may be near
  * f only if it slips. */
-static mu_steady mu_cycle_of(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+static mu_steady mu_cycle_near(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
                              double tolerance, double goal, int near, double *f) {
     mu_steady out;
     if (m->drag > 0.0)
@@ -970,14 +970,14 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
     for (int level = 0;; ++level) { /* at rest, the errors of the whole way to the cycle stay */
         mu_keep_below(limit, f);
-        out = mu_cycle_of(m, grid, steps, of_step, goal, near, f);
+        out = mu_cycle_near(m, grid, steps, of_step, goal, near, f);
         /* steps too large to be followed */
         for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) {
             near = 0;
             f[0] = m->drag > 0.0 ? limit : 0.0;
             f[1] = 0.0;
             of_step *= 0.06;
-            out = mu_cycle_of(m, grid, steps, of_step, goal, near, f);
+            out = mu_cycle_near(m, grid, steps, of_step, goal, near, f);
         }
         out.level = level;
         out.error = 2.0 * limit;
