@@ -9,6 +9,7 @@ from 1e-3 to 10 of the amplitude or of mu0 Fz / k, every tenth at rest.
 from benchmarks.measuring import IMAGES, best_of, main, markdown, quantity, sections  # isort: split
 
 import functools
+import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -29,7 +30,8 @@ SEARCHES = (
     ("spring", 1e-6, 10_000, 1e-9),
     ("spring", 1e-7, 5_000, 1e-9),
     ("ball, one harmonic", 1e-4, 10_000, 1e-6),
-    ("ball", 1e-6, 300, 1e-7),
+    ("ball", 1e-6, 2_000, 1e-8),
+    ("ball, v0 = 0", 1e-6, 500, 1e-8),
 )
 AGAINST_TABLES = (
     ("spring", "across", 20_000),
@@ -64,6 +66,12 @@ def random_motions(n: int, ball: bool = False, seed: int = 1) -> Iterator[dict[s
         yield {**CASE, "v0": v0, "x": x or 0.0, "y": y or 0.0, "normal": normal or 0.0}
 
 
+def resting_motions(n: int, ball: bool = False, seed: int = 1) -> Iterator[dict[str, Any]]:
+    """Those of ``random_motions`` without drag."""
+    many = random_motions(100 * n, ball, seed)
+    return itertools.islice((case for case in many if not case["v0"]), n)
+
+
 def single_harmonics(n: int, seed: int = 1) -> Iterator[dict[str, Any]]:
     """Keywords of ``motion`` with one harmonic along or across, log-uniform, dragged."""
     rng = np.random.default_rng(seed)
@@ -84,10 +92,14 @@ class Deviations(NamedTuple):
 
 
 def deviations(kind: str, tolerance: float, finer: float, n: int, seed: int = 1) -> Deviations:
-    """``kind`` is "spring", "ball" or "ball, one harmonic"."""
-    contact = kind.partition(",")[0]
-    single = kind != contact
-    cases = single_harmonics(n, seed) if single else random_motions(n, contact == "ball", seed)
+    """``kind`` is "spring", "ball", "ball, one harmonic" or "ball, v0 = 0"."""
+    contact, _, which = kind.partition(", ")
+    if which == "one harmonic":
+        cases = single_harmonics(n, seed)
+    elif which == "v0 = 0":
+        cases = resting_motions(n, contact == "ball", seed)
+    else:
+        cases = random_motions(n, contact == "ball", seed)
     rows = []
     for case in cases:
         a, b = (motion(**case, contact=contact, tolerance=t) for t in (tolerance, finer))

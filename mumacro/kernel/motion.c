@@ -18,11 +18,17 @@
 
 enum {
     MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6,
-    MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 16, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
+    MU_MOTION_SLIDING_PERIODS = 12, MU_MOTION_KNOWN = 256,
+    MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 10, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
 #define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
+#define MU_MOTION_LEAP 0.9 /* of what is left of the way to a cycle, at most */
+/* of a way of the force, by which Newton's step after it may be off: it shortens by a third of the
+ * way where the force moves by the cube of what is left */
+#define MU_MOTION_OFF 0.85
+#define MU_MOTION_COARSE 30.0 /* of the tolerance, where only the kind of a cycle is looked for */
 #define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
@@ -61,18 +67,19 @@ typedef struct {
     double step, began, slid;
     double mean[MU_MEANS], marked[2 * MU_MARKS];
     /* of a small disturbance: the direction that survives first, the last one, what is left as a
-     * logarithm, as a factor */
-    double first[2], last[2], decay, turned;
-    int slipped, failed, sticks;
+     * logarithm, as a factor; the limit where that direction is the last */
+    double first[2], last[2], decay, turned, last_limit;
+    int slipped, failed, sticks, phases; /* the last: how often slip begins */
     mu_grid *steps; /* ends of all its steps */
 } mu_march;
 
 /* A steady cycle: means per period; decay of a disturbance per period as its
  * logarithm; distance to the cycle; the estimate of the error of the mean force; how
- * many sticks it has, but for brief ones. */
+ * many sticks it has, but for brief ones.  From which force, with which first step, the period
+ * starts on the way from rest that slips more. */
 typedef struct {
-    double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error;
-    int sticks, level;
+    double mean[MU_MEANS], marked[2 * MU_MARKS], decay, distance, error, from[2], step;
+    int sticks, level, failed, slips_before;
 } mu_steady;
 
 /* One cycle at equal times, to be drawn: each spring adds its forces with a weight. */
@@ -537,7 +544,9 @@ static void mu_begin_slip(mu_march *march) {
     }
     march->last[0] = tx;
     march->last[1] = ty;
+    march->last_limit = size;
     march->slipped = march->slips = 1;
+    ++march->phases;
 }
 
 static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, double end,
@@ -597,6 +606,7 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     march->f[1] = march->at.limit * ny;
     march->last[0] = -ny;
     march->last[1] = nx;
+    march->last_limit = march->at.limit;
 }
 
 static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *fresh, int *ends,
@@ -743,7 +753,8 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
 }
 
 static mu_steady mu_steady_of(const mu_march *march, double distance) {
-    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, march->sticks, 0};
+    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, {0.0, 0.0}, 0.0,
+                     march->sticks, 0, march->failed, 0};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
     if (march->slipped)
@@ -752,13 +763,14 @@ static mu_steady mu_steady_of(const mu_march *march, double distance) {
     return out;
 }
 
-/* The cycle whose distance to the steady one is below goal, or the nearest
- * of many periods; f is its start.
+/* The cycle whose distance to the steady one is below goal, or the nearest of so many periods; f is
+ * its start.  A path of slip below the least ends the search.
  *
  * No two forces move apart, so that a step of Newton's method is too long where the force then
  * moves back against it; then the step is cut by the rule of the secant. */
 static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                               double tolerance, double goal, double *f) {
+                               double tolerance, double goal, int periods, double least,
+                               double *f) {
     const double limit = mu_moment_at(m, 0.0).limit;
     double from[2] = {f[0], f[1]}, share = 1.0;
     mu_residual r, base = {{0.0, 0.0}, {0.0, 0.0}, HUGE_VAL};
@@ -772,7 +784,8 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
         distance = march.failed ? HUGE_VAL : mu_max(r.size, mu_length(r.step[0], r.step[1]));
         if (!march.slipped) distance = m->drag > 0.0 ? HUGE_VAL : 0.0;
         distance = mu_min(distance, 2.0 * limit);
-        if (distance <= goal || period == MU_MOTION_PERIODS || march.failed)
+        if (distance <= goal || period == periods || march.failed ||
+            march.mean[MU_MEAN_PATH] < least)
             return mu_steady_of(&march, distance);
         ahead = base.step[0] * r.moved[0] + base.step[1] * r.moved[1];
         behind = base.step[0] * base.moved[0] + base.step[1] * base.moved[1];
@@ -790,72 +803,134 @@ static mu_steady mu_find_cycle(const mu_shaken *m, const mu_grid *grid, mu_grid 
     }
 }
 
-/* The cycle that a contact which is not dragged comes to from rest.  One that slips is the only
- * one; of those that stick there are many, and only its way decides between them.
+/* How far a contact at rest is from a cycle that sticks, after a period from f. */
+static double mu_distance_at_rest(const mu_march *march, const mu_residual *r) {
+    const double step = mu_length(r->step[0], r->step[1]);
+    if (march->failed) return 2.0;
+    if (march->mean[MU_MEAN_PATH] < 1e-13) return 0.0;
+    if (r->size < 1e-13) return 1e4 * r->size; /* rounding */
+    return mu_min(3.0 * mu_max(r->size, step), 2.0);
+}
+
+/* Whether Newton's step after a period is near the expected one. */
+static int mu_is_expected(const mu_residual *r, const double *expected, double off) {
+    return mu_length(r->step[0] - expected[0], r->step[1] - expected[1]) <= off;
+}
+
+/* The cycle that slips near f of a contact at rest, which is the only one; returns 0 where none is
+ * found. */
+static int mu_find_sliding(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                           double tolerance, double goal, double *f, mu_steady *cycle) {
+    const double least = 1e3 * goal;
+    *cycle = mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_SLIDING_PERIODS, least, f);
+    return cycle->failed || (cycle->distance <= goal && cycle->mean[MU_MEAN_PATH] > least);
+}
+
+/* The cycle that a contact without force comes to from rest, period by period, where allowed with
+ * leaps along Newton's step.  One that slips is the only one; of those that stick there are many,
+ * and only its way decides between them.
  *
- * The steps that are left to be halved are then those of the period that slips most: the last one
- * hardly slips, and halves of its steps may be those that the periods before have taken already. */
-static mu_steady mu_find_cycle_at_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                                       double tolerance, double goal, double *f) {
-    double size[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, distance, curved = 0.0;
-    double most = 0.0, step = 0.0, from[2] = {0.0, 0.0};
+ * A period maps all forces around onto one line, as its derivative has rank one.  So a leap comes
+ * back to the line of the way itself, and changes its end by no more than half of what any later
+ * period moves the force.  Two periods one after another show that Newton's step can be trusted: it
+ * has to shorten by what the first has moved.  A leap stays short of the end of the way: where the
+ * contact does not slip after it as before, it is taken back.
+ *
+ * The steps that are left to be halved are those of the period that slips most: the last one hardly
+ * slips, and halves of its steps may be those that the periods before have taken already. */
+static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                                     double tolerance, double goal, int leaps, double *f) {
+    double most = 0.0, step = 0.0, from[2] = {0.0, 0.0}, expected[2] = {0.0, 0.0};
+    double back[2] = {0.0, 0.0}, share = MU_MOTION_LEAP, way = 0.0, moved = 0.0;
+    int leapt = 0, any = 0, phases = 0, wait = 1, waited = 0;
     mu_march march;
-    mu_steady out;
-    f[0] = f[1] = 0.0;
-    out = mu_find_cycle(m, grid, steps, tolerance, goal, f);
-    if (out.distance <= goal && out.mean[MU_MEAN_PATH] > 1e3 * goal) return out;
     f[0] = f[1] = 0.0;
     march.step = 0.0;
     march.steps = steps;
     for (int period = 1;; ++period) {
-        double moved[2], rate, leap;
         const double before = march.step;
+        double distance;
+        int alike;
+        mu_residual r;
         mu_take_period(m, grid, f, tolerance, &march, NULL);
+        r = mu_residual_of(&march, f, march.at.limit);
         if (march.mean[MU_MEAN_PATH] > most) {
             most = march.mean[MU_MEAN_PATH];
             step = before;
             from[0] = f[0];
             from[1] = f[1];
         }
-        moved[0] = march.f[0] - f[0];
-        moved[1] = march.f[1] - f[1];
-        size[2] = size[1];
-        size[1] = size[0];
-        size[0] = mu_length(moved[0], moved[1]);
-        /* what is left to go, as a geometric series */
-        rate = mu_max(size[0] / size[1], size[1] / size[2]);
-        distance = 2.0;
-        if (march.mean[MU_MEAN_PATH] < 1e-13) {
-            distance = 0.0;
-        } else if (size[0] < 1e-13) { /* rounding */
-            distance = 1e4 * size[0];
-        } else if (period > 2 && rate < 1.0) {
-            distance = mu_min(2.0 * size[0] / (1.0 - rate), 2.0);
+        distance = mu_distance_at_rest(&march, &r);
+        alike = march.phases == phases && mu_is_expected(&r, expected, MU_MOTION_OFF * way);
+        if (leapt && !alike && way > goal && !march.failed) {
+            f[0] = back[0];
+            f[1] = back[1];
+            share = mu_max(0.5 * share, 0.1);
+            wait *= 2;
+            leapt = waited = phases = 0;
+            continue;
         }
-        if (march.failed) distance = 2.0;
-        if (distance <= goal || period == MU_MOTION_REST_PERIODS || march.failed) {
-            out = mu_steady_of(&march, mu_min(distance + curved, 2.0));
-            if (march.mean[MU_MEAN_PATH] < most) {
-                march.step = step;
-                mu_take_period(m, grid, from, tolerance, &march, NULL);
-            }
+        if (leapt) {
+            share = mu_min(1.5 * share, MU_MOTION_LEAP);
+            wait = wait > 1 ? wait / 2 : 1;
+        }
+        if (any) distance += 0.5 * (distance == 0.0 ? moved : r.size);
+        if (distance <= goal || march.mean[MU_MEAN_PATH] < 1e-13 ||
+            period >= MU_MOTION_REST_PERIODS || march.failed) {
+            mu_steady out = mu_steady_of(&march, mu_min(distance, 2.0));
+            out.from[0] = from[0];
+            out.from[1] = from[1];
+            out.step = step;
+            out.slips_before = march.mean[MU_MEAN_PATH] < most;
             return out;
         }
-        f[0] = march.f[0];
-        f[1] = march.f[1];
-        /* many equal periods at once: half of what is left, and no more than
-         * a straight way that errs little */
-        leap = size[1] / size[2] > 0.8 && rate < 1.0
-                   ? mu_min(0.5 * size[0] / (1.0 - rate), sqrt(0.2 * goal))
-                   : 0.0;
-        if (leap > 2.0 * size[0] &&
-            fabs(size[0] / size[1] - size[1] / size[2]) < 0.2 * (1.0 - rate)) {
-            f[0] += leap * (moved[0] / size[0]);
-            f[1] += leap * (moved[1] / size[0]);
-            curved += 0.5 * leap * leap;
-            size[0] = size[1] = HUGE_VAL;
+        if (period == 2 && leaps) {
+            double start[2] = {march.f[0], march.f[1]};
+            mu_steady sliding;
+            if (mu_find_sliding(m, grid, steps, tolerance, goal, start, &sliding)) {
+                f[0] = start[0];
+                f[1] = start[1];
+                return sliding;
+            }
+        }
+        waited = leapt ? 0 : alike ? waited + 1 : 0;
+        way = share * mu_length(r.step[0], r.step[1]);
+        moved = r.size;
+        phases = march.phases;
+        leapt = leaps && waited >= wait && phases > 1 && moved > 1e-12 && way > 2.0 * moved;
+        back[0] = march.f[0];
+        back[1] = march.f[1];
+        if (leapt) { /* along the circle of the forces on which the last slip ends */
+            const double *last = march.last;
+            const double along = share * (r.step[0] * last[0] + r.step[1] * last[1]);
+            const double inwards = 0.5 * along * along / march.last_limit;
+            any = 1;
+            f[0] += share * r.step[0] - inwards * last[1];
+            f[1] += share * r.step[1] + inwards * last[0];
+            mu_keep_below(march.at.limit, f);
+            expected[0] = (1.0 - share) * r.step[0];
+            expected[1] = (1.0 - share) * r.step[1];
+        } else {
+            f[0] = march.f[0];
+            f[1] = march.f[1];
+            expected[0] = r.step[0] - r.moved[0];
+            expected[1] = r.step[1] - r.moved[1];
+            way = moved;
         }
     }
+}
+
+/* The steady cycle near f; at rest the one that a contact without force comes to, which may be near
+ * f only if it slips. */
+static mu_steady mu_cycle_near(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
+                             double tolerance, double goal, int near, double *f) {
+    mu_steady out;
+    if (m->drag > 0.0)
+        return mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_PERIODS, 0.0, f);
+    if (near && mu_find_sliding(m, grid, steps, tolerance, goal, f, &out)) return out;
+    out = mu_follow_from_rest(m, grid, steps, tolerance, goal, 1, f);
+    if (out.failed || out.distance <= goal || out.mean[MU_MEAN_PATH] > 1e-13) return out;
+    return mu_follow_from_rest(m, grid, steps, tolerance, goal, 0, f);
 }
 
 static double mu_difference(const mu_steady *a, const mu_steady *b, int marks) {
@@ -887,6 +962,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
     double of_step = mu_cube_root_near(mu_min(0.1 * tolerance, 1e-3));
     const double rounding = mu_max(MU_MOTION_ROUNDING, mu_min(0.05 * tolerance, 5e-9));
     const double goal = m->drag > 0.0 ? 0.1 * tolerance : 0.01 * mu_min(tolerance, 1e-5);
+    int near = f[0] != 0.0 || f[1] != 0.0;
     mu_steady last, out;
     of_step *= of_step;
     grid->n = mu_min(m->nodes, (double)grid->room);
@@ -894,15 +970,14 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         grid->nodes[i] = 2.0 * MU_PI * (double)(i + 1) / (double)grid->n;
     for (int level = 0;; ++level) { /* at rest, the errors of the whole way to the cycle stay */
         mu_keep_below(limit, f);
-        out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step, goal,
-                                                                      f);
+        out = mu_cycle_near(m, grid, steps, of_step, goal, near, f);
         /* steps too large to be followed */
         for (int i = 0; level == 0 && i < 3 && out.distance >= 2.0 * limit; ++i) {
+            near = 0;
             f[0] = m->drag > 0.0 ? limit : 0.0;
             f[1] = 0.0;
             of_step *= 0.06;
-            out = (m->drag > 0.0 ? mu_find_cycle : mu_find_cycle_at_rest)(m, grid, steps, of_step,
-                                                                          goal, f);
+            out = mu_cycle_near(m, grid, steps, of_step, goal, near, f);
         }
         out.level = level;
         out.error = 2.0 * limit;
@@ -911,10 +986,17 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
                         3.0 * out.distance + rounding;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
         if (out.error <= tolerance || level == levels) return out;
-        if (m->drag == 0.0 &&
+        if (m->drag == 0.0 && level > 0 &&
             (out.distance > tolerance || (level > 1 && out.error > 0.5 * last.error)))
             return out;
+        if (out.slips_before) { /* the steps of the last period are too few */
+            mu_march march;
+            march.step = out.step;
+            march.steps = steps;
+            mu_take_period(m, grid, out.from, of_step, &march, NULL);
+        }
         if (!mu_halve(steps, grid)) return out;
+        near = out.mean[MU_MEAN_PATH] > 1e3 * goal;
         last = out;
         of_step *= 0.06;
     }
@@ -1000,20 +1082,85 @@ static mu_shaken mu_of_spring(const mu_shaken *m, double share) {
  * may behave otherwise than all the rest.  What a spring adds per t is multiplied by 2 t. */
 static double mu_share_at(double t) { return 1.5 * t * t * (2.0 - t * t); }
 
-static mu_steady mu_spring_at(const mu_shaken *m, double t, double tolerance, int levels,
-                              mu_grid *grid, mu_grid *steps, double *f) {
+/* The start of the cycle of the spring at t. */
+typedef struct {
+    double t, f[2];
+} mu_start;
+
+/* A ball whose springs are computed one after another, with what is known of them. */
+typedef struct {
+    const mu_shaken *m;
+    mu_grid *grid, *steps;
+    int known; /* so far; of these the last are kept */
+    mu_start starts[MU_MOTION_KNOWN];
+} mu_ball;
+
+/* The start of the cycle at t by the cubic through the four nearest that are known; that of the
+ * nearest, where t is beyond them. */
+static void mu_predict(const mu_ball *ball, double t, double *f) {
+    const mu_start *near[4] = {NULL, NULL, NULL, NULL};
+    const int n = ball->known < MU_MOTION_KNOWN ? ball->known : MU_MOTION_KNOWN;
+    double low = 1.0, high = 0.0;
+    int count = 0;
+    for (int i = 0; i < n; ++i) {
+        const mu_start *start = &ball->starts[i];
+        int place = count < 4 ? count : 3;
+        int again = 0;
+        for (int j = 0; j < count; ++j) again = again || near[j]->t == start->t;
+        if (again || (count == 4 && fabs(start->t - t) >= fabs(near[3]->t - t))) continue;
+        for (; place > 0 && fabs(start->t - t) < fabs(near[place - 1]->t - t); --place)
+            near[place] = near[place - 1];
+        near[place] = start;
+        if (count < 4) ++count;
+    }
+    f[0] = count ? near[0]->f[0] : ball->m->drag > 0.0 ? 1.0 : 0.0;
+    f[1] = count ? near[0]->f[1] : 0.0;
+    for (int j = 0; j < count; ++j) {
+        low = mu_min(low, near[j]->t);
+        high = mu_max(high, near[j]->t);
+    }
+    if (count < 4 || t < low || t > high) return;
+    f[0] = f[1] = 0.0;
+    for (int j = 0; j < 4; ++j) {
+        double share = 1.0;
+        for (int i = 0; i < 4; ++i)
+            if (i != j) share *= (t - near[i]->t) / (near[j]->t - near[i]->t);
+        f[0] += share * near[j]->f[0];
+        f[1] += share * near[j]->f[1];
+    }
+}
+
+/* The spring at t, which is sought from f. */
+static mu_steady mu_spring_from(mu_ball *ball, double t, double tolerance, int levels, double *f) {
     const double share = mu_share_at(t);
-    const mu_shaken one = mu_of_spring(m, share);
-    return mu_spring_motion(&one, tolerance / share, levels, grid, steps, f);
+    const mu_shaken one = mu_of_spring(ball->m, share);
+    const mu_steady out =
+        mu_spring_motion(&one, tolerance / share, levels, ball->grid, ball->steps, f);
+    /* one that came from rest to stick is no start for others */
+    if (ball->m->drag > 0.0 || out.mean[MU_MEAN_PATH] > 1e-13) {
+        const mu_start start = {t, {f[0], f[1]}};
+        ball->starts[ball->known++ % MU_MOTION_KNOWN] = start;
+    }
+    return out;
+}
+
+static mu_steady mu_spring_at(mu_ball *ball, double t, double tolerance, int levels) {
+    double f[2];
+    mu_predict(ball, t, f);
+    return mu_spring_from(ball, t, tolerance, levels, f);
+}
+
+/* How many sticks the cycle at t has: longer steps show them. */
+static int mu_sticks_at(mu_ball *ball, double t, double tolerance) {
+    return mu_spring_at(ball, t, MU_MOTION_COARSE * tolerance, 0).sticks;
 }
 
 /* Where between low and high, with different numbers of slips, the cycle changes its kind. */
-static double mu_kink(const mu_shaken *m, double low, double high, int sticks, double tolerance,
-                      mu_grid *grid, mu_grid *steps, double *f) {
-    const double close = 0.1 * sqrt(tolerance);
+static double mu_kink(mu_ball *ball, double low, double high, int sticks, double tolerance) {
+    const double close = 0.4 * sqrt(tolerance);
     while (high - low > close) {
         const double t = 0.5 * (low + high);
-        if (mu_spring_at(m, t, tolerance, 0, grid, steps, f).sticks == sticks) {
+        if (mu_sticks_at(ball, t, tolerance) == sticks) {
             low = t;
         } else {
             high = t;
@@ -1041,68 +1188,43 @@ static double mu_place_in(const mu_panel *panel, double u, double *slope) {
     return panel->low + share * width;
 }
 
-/* The start of the cycle at u, by the parabola through the nearest three of n points (u, f);
- * as it is, where there are less. */
-static void mu_predict(double points[15][3], double *f, int n, double u) {
-    int near[3] = {-1, -1, -1};
-    if (n < 3) return;
-    for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < n; ++i)
-            if (i != near[0] && i != near[1] &&
-                (near[j] < 0 || fabs(points[i][0] - u) < fabs(points[near[j]][0] - u)))
-                near[j] = i;
-    f[0] = f[1] = 0.0;
-    /* beyond them */
-    if (fabs(points[near[0]][0] - u) > fabs(points[near[1]][0] - points[near[0]][0])) {
-        f[0] = points[near[0]][1];
-        f[1] = points[near[0]][2];
-        return;
-    }
-    for (int j = 0; j < 3; ++j) {
-        const double *one = points[near[j]], *second = points[near[(j + 1) % 3]],
-                     *third = points[near[(j + 2) % 3]];
-        const double share =
-            (u - second[0]) * (u - third[0]) / ((one[0] - second[0]) * (one[0] - third[0]));
-        f[0] += share * one[1];
-        f[1] += share * one[2];
-    }
+/* The springs of a panel in the order in which they are computed: those with halved steps first, so
+ * that the rest lie between known ones. */
+enum { MU_MOTION_HALVED = 4 };
+static const int MU_PANEL_ORDER[15] = {1, 5, 9, 13, 3, 7, 11, 0, 2, 4, 6, 8, 10, 12, 14};
+
+/* The larger error of the springs with halved steps next to spring i. */
+static double mu_error_beside(const double *errors, int i) {
+    const int before = i < 1 ? 1 : 4 * ((i - 1) / 4) + 1, after = before + 4;
+    return i < 1 ? errors[1] : i > 13 ? errors[13] : mu_max(errors[before], errors[after]);
 }
 
-static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int kink_low,
-                              int kink_high, double tolerance, mu_grid *grid, mu_grid *steps,
-                              double *f) {
+static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_low, int kink_high,
+                              double tolerance) {
     mu_panel out;
-    double values[15][2], sums[15][2], ends[2], at[15][3], errors[15];
-    int halvings = 0;
+    double values[15][2], sums[15][2], ends[2], errors[15];
+    int halvings = 0, kinks = 0;
     memset(&out, 0, sizeof out);
     out.low = low;
     out.high = high;
     out.kinks[0] = kink_low;
     out.kinks[1] = kink_high;
     out.decay = HUGE_VAL;
-    /* every other point first, so that the rest lie between known ones */
     for (int k = 0; k < 15; ++k) {
-        const int i = k < 7 ? 2 * k + 1 : 2 * (k - 7), single = k >= 7 && halvings < 2;
+        const int i = MU_PANEL_ORDER[k], single = k >= MU_MOTION_HALVED && halvings < 2;
         double weight, slope;
         const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope);
         const double share = mu_share_at(t);
-        mu_steady spring;
-        mu_predict(at, f, k, u);
-        spring = mu_spring_at(m, t, tolerance, single ? 0 : MU_MOTION_LEVELS, grid, steps, f);
+        mu_steady spring = mu_spring_at(ball, t, tolerance, single ? 0 : MU_MOTION_LEVELS);
         errors[i] = share * spring.error;
         if (single)
-            errors[i] = mu_max(errors[i ? i - 1 : 1], errors[i < 14 ? i + 1 : 13]) +
-                        3.0 * share * spring.distance;
+            errors[i] = mu_error_beside(errors, i) + 3.0 * share * spring.distance;
         if (!(errors[i] <= tolerance)) { /* from where the search for the cycle begins else */
-            f[0] = m->drag > 0.0 ? 1.0 : 0.0;
-            f[1] = 0.0;
-            spring = mu_spring_at(m, t, tolerance, MU_MOTION_LEVELS, grid, steps, f);
+            double f[2] = {ball->m->drag > 0.0 ? 1.0 : 0.0, 0.0};
+            spring = mu_spring_from(ball, t, tolerance, MU_MOTION_LEVELS, f);
             errors[i] = share * spring.error;
         }
         halvings = spring.level > halvings ? spring.level : halvings;
-        at[k][0] = u;
-        at[k][1] = f[0];
-        at[k][2] = f[1];
         out.at[i] = t;
         out.sticks[i] = spring.sticks;
         for (int j = 0; j < MU_MEANS; ++j) {
@@ -1118,7 +1240,9 @@ static mu_panel mu_ball_panel(const mu_shaken *m, double low, double high, int k
         out.decay = mu_min(out.decay, spring.decay);
     }
     (void)mu_roughness(values, out.start, out.end);
-    out.error = 1.5 * mu_roughness(sums, ends, ends);
+    for (int i = 1; i < 15; ++i) kinks += out.sticks[i] != out.sticks[i - 1];
+    /* few of the points see springs at the rim that behave otherwise than the rest */
+    out.error = (low == 0.0 && kinks ? 4.0 : 1.5) * mu_roughness(sums, ends, ends);
     return out;
 }
 
@@ -1140,35 +1264,32 @@ static double mu_panel_error(const mu_panel *panels, int n, int i) {
 }
 
 /* Panels of a ball before any is divided: from one kink to the next. */
-static int mu_first_panels(const mu_shaken *m, double tolerance, mu_grid *grid, mu_grid *steps,
-                           double *f, mu_panel *panels) {
+static int mu_first_panels(mu_ball *ball, double tolerance, mu_panel *panels) {
     double edges[MU_MOTION_SCAN + 2] = {0.0}, before = 0.0;
     int n = 0, last = -1;
     for (int i = 0; i < MU_MOTION_SCAN; ++i) {
         const double t = (i + 1.0) / MU_MOTION_SCAN;
-        const int now = mu_spring_at(m, t, tolerance, 0, grid, steps, f).sticks;
+        const int now = mu_sticks_at(ball, t, tolerance);
         if (i > 0 && now != last)
-            edges[++n] = mu_kink(m, before, t, last, tolerance, grid, steps, f);
+            edges[++n] = mu_kink(ball, before, t, last, tolerance);
         last = now;
         before = t;
     }
     if (n == 0) {
-        panels[0] = mu_ball_panel(m, 0.0, 0.5, 0, 0, tolerance, grid, steps, f);
-        panels[1] = mu_ball_panel(m, 0.5, 1.0, 0, 0, tolerance, grid, steps, f);
+        panels[0] = mu_ball_panel(ball, 0.0, 0.5, 0, 0, tolerance);
+        panels[1] = mu_ball_panel(ball, 0.5, 1.0, 0, 0, tolerance);
         return 2;
     }
     edges[n + 1] = 1.0;
     for (int i = 0; i <= n; ++i)
-        panels[i] = mu_ball_panel(m, edges[i], edges[i + 1], i > 0, i < n, tolerance, grid, steps,
-                                  f);
+        panels[i] = mu_ball_panel(ball, edges[i], edges[i + 1], i > 0, i < n, tolerance);
     return n + 1;
 }
 
 /* Where a panel is divided: at the kink between its points that is nearest to the middle, or in the
  * middle.  A kink close to an end is left to later divisions: coarse steps may see it where fine
  * ones do not. */
-static double mu_division(const mu_shaken *m, const mu_panel *panel, double tolerance,
-                          mu_grid *grid, mu_grid *steps, double *f, int *kink) {
+static double mu_division(mu_ball *ball, const mu_panel *panel, double tolerance, int *kink) {
     const double middle = 0.5 * (panel->low + panel->high);
     const double near = 0.02 * (panel->high - panel->low);
     int best = -1;
@@ -1180,8 +1301,8 @@ static double mu_division(const mu_shaken *m, const mu_panel *panel, double tole
             best = i, nearest = distance;
     }
     if (best >= 0) {
-        const double at = mu_kink(m, panel->at[best], panel->at[best + 1], panel->sticks[best],
-                                  tolerance, grid, steps, f);
+        const double at = mu_kink(ball, panel->at[best], panel->at[best + 1], panel->sticks[best],
+                                  tolerance);
         *kink = at - panel->low > near && panel->high - at > near;
         if (*kink) return at;
     }
@@ -1192,33 +1313,40 @@ static double mu_division(const mu_shaken *m, const mu_panel *panel, double tole
 static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *grid,
                                 mu_grid *steps) {
     mu_panel panels[MU_MOTION_PANELS];
-    double f[2] = {m->drag > 0.0 ? 1.0 : 0.0, 0.0}, error = 0.0;
     const double half = 0.5 * tolerance;
+    double error = 0.0;
+    mu_ball ball;
     mu_steady out;
-    int n = mu_first_panels(m, half, grid, steps, f, panels);
+    int n;
+    ball.m = m;
+    ball.grid = grid;
+    ball.steps = steps;
+    ball.known = 0;
+    n = mu_first_panels(&ball, half, panels);
     memset(&out, 0, sizeof out);
     out.decay = HUGE_VAL;
     for (;; ++n) {
-        double most = -1.0;
+        double most = -1.0, of_springs = 0.0;
         int worst = 0;
         error = 0.0;
         for (int i = 0; i < n; ++i) {
             const double own = mu_panel_error(panels, n, i);
             error += own;
+            of_springs += panels[i].of_springs;
             if (own > most) {
                 most = own;
                 worst = i;
             }
         }
-        if (error <= half || n == MU_MOTION_PANELS) break;
+        if (error <= mu_max(half, tolerance - of_springs) || n == MU_MOTION_PANELS) break;
         {
             const mu_panel whole = panels[worst];
             int kink;
-            const double middle = mu_division(m, &whole, half, grid, steps, f, &kink);
+            const double middle = mu_division(&ball, &whole, half, &kink);
             panels[worst] =
-                mu_ball_panel(m, whole.low, middle, whole.kinks[0], kink, half, grid, steps, f);
+                mu_ball_panel(&ball, whole.low, middle, whole.kinks[0], kink, half);
             panels[n] =
-                mu_ball_panel(m, middle, whole.high, kink, whole.kinks[1], half, grid, steps, f);
+                mu_ball_panel(&ball, middle, whole.high, kink, whole.kinks[1], half);
         }
     }
     for (int i = 0; i < n; ++i) {
