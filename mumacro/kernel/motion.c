@@ -17,19 +17,26 @@
  * element.c. */
 
 enum {
-    MU_MARKS = 256, MU_MOTION_PERIODS = 100, MU_MOTION_REST_PERIODS = 500, MU_MOTION_LEVELS = 6,
-    MU_MOTION_SLIDING_PERIODS = 12, MU_MOTION_KNOWN = 256,
-    MU_MOTION_PANELS = 48, MU_MOTION_SCAN = 10, MU_MOTION_ORDERS = 12, MU_MOMENTS = 4
+    MU_MARKS = 256,
+    MU_MOTION_PERIODS = 100,
+    MU_MOTION_REST_PERIODS = 500,
+    MU_MOTION_LEVELS = 6,
+    MU_MOTION_SLIDING_PERIODS = 12,
+    MU_MOTION_KNOWN = 256,
+    MU_MOTION_PANELS = 48,
+    MU_MOTION_SCAN = 10,
+    MU_MOTION_ORDERS = 12,
+    MU_MOMENTS = 4
 };
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 #define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
-#define MU_MOTION_NEWTON 1e-6 /* a step of Newton's method that leaves its square */
-#define MU_MOTION_LEAP 0.9 /* of what is left of the way to a cycle, at most */
+#define MU_MOTION_NEWTON 1e-6    /* a step of Newton's method that leaves its square */
+#define MU_MOTION_LEAP 0.9       /* of what is left of the way to a cycle, at most */
 /* of a way of the force, by which Newton's step after it may be off: it shortens by a third of the
  * way where the force moves by the cube of what is left */
 #define MU_MOTION_OFF 0.85
 #define MU_MOTION_COARSE 30.0 /* of the tolerance, where only the kind of a cycle is looked for */
-#define MU_MOTION_BRIEF 1e-3 /* of tau; a shorter stick or slip makes no other kind of cycle */
+#define MU_MOTION_BRIEF 1e-3  /* of tau; a shorter stick or slip makes no other kind of cycle */
 #define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding */
 #define MU_SQRT6 2.449489742783178
 
@@ -40,7 +47,7 @@ typedef struct {
     const int32_t *counts;
     const double *orders, *terms;
     double drag, scale, acceleration; /* the last is a bound */
-    int marks, nodes; /* parts of a period whose sums are kept; steps at least */
+    int marks, nodes;                 /* parts of a period whose sums are kept; steps at least */
     /* where no order is above MU_MOTION_ORDERS, else 0: the highest, and of each what sin and cos
      * in x, y and the normal force are multiplied by */
     int highest;
@@ -70,7 +77,7 @@ typedef struct {
      * logarithm, as a factor; the limit where that direction is the last */
     double first[2], last[2], decay, turned, last_limit;
     int slipped, failed, sticks, phases; /* the last: how often slip begins */
-    mu_grid *steps; /* ends of all its steps */
+    mu_grid *steps;                      /* ends of all its steps */
 } mu_march;
 
 /* A steady cycle: means per period; decay of a disturbance per period as its
@@ -588,9 +595,9 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     for (int i = 0; i < 3; ++i) {
         const double share = slip.length * weight[i], limit = slip.stage[i].limit;
         mu_direction(&slip, slip.u[i], &nx, &ny);
-        mu_add(march, m, start.tau + 0.5 * slip.length, share, limit * nx, limit * ny,
-               share * limit *
-                   (nx * (slip.stage[i].wx - m->scale * m->drag) + ny * slip.stage[i].wy));
+        mu_add(
+            march, m, start.tau + 0.5 * slip.length, share, limit * nx, limit * ny,
+            share * limit * (nx * (slip.stage[i].wx - m->scale * m->drag) + ny * slip.stage[i].wy));
         march->mean[MU_MEAN_PATH] += share * slip.speed[i];
         march->decay += share * slip.speed[i] / limit;
     }
@@ -753,8 +760,8 @@ static mu_residual mu_residual_of(const mu_march *march, const double *f, double
 }
 
 static mu_steady mu_steady_of(const mu_march *march, double distance) {
-    mu_steady out = {{0.0}, {0.0}, 0.0, distance, 0.0, {0.0, 0.0}, 0.0,
-                     march->sticks, 0, march->failed, 0};
+    mu_steady out = {{0.0}, {0.0},         0.0, distance,      0.0, {0.0, 0.0},
+                     0.0,   march->sticks, 0,   march->failed, 0};
     memcpy(out.mean, march->mean, sizeof out.mean);
     memcpy(out.marked, march->marked, sizeof out.marked);
     if (march->slipped)
@@ -923,7 +930,7 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
 /* The steady cycle near f; at rest the one that a contact without force comes to, which may be near
  * f only if it slips. */
 static mu_steady mu_cycle_near(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                             double tolerance, double goal, int near, double *f) {
+                               double tolerance, double goal, int near, double *f) {
     mu_steady out;
     if (m->drag > 0.0)
         return mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_PERIODS, 0.0, f);
@@ -1217,8 +1224,7 @@ static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_l
         const double share = mu_share_at(t);
         mu_steady spring = mu_spring_at(ball, t, tolerance, single ? 0 : MU_MOTION_LEVELS);
         errors[i] = share * spring.error;
-        if (single)
-            errors[i] = mu_error_beside(errors, i) + 3.0 * share * spring.distance;
+        if (single) errors[i] = mu_error_beside(errors, i) + 3.0 * share * spring.distance;
         if (!(errors[i] <= tolerance)) { /* from where the search for the cycle begins else */
             double f[2] = {ball->m->drag > 0.0 ? 1.0 : 0.0, 0.0};
             spring = mu_spring_from(ball, t, tolerance, MU_MOTION_LEVELS, f);
@@ -1270,8 +1276,7 @@ static int mu_first_panels(mu_ball *ball, double tolerance, mu_panel *panels) {
     for (int i = 0; i < MU_MOTION_SCAN; ++i) {
         const double t = (i + 1.0) / MU_MOTION_SCAN;
         const int now = mu_sticks_at(ball, t, tolerance);
-        if (i > 0 && now != last)
-            edges[++n] = mu_kink(ball, before, t, last, tolerance);
+        if (i > 0 && now != last) edges[++n] = mu_kink(ball, before, t, last, tolerance);
         last = now;
         before = t;
     }
@@ -1301,8 +1306,8 @@ static double mu_division(mu_ball *ball, const mu_panel *panel, double tolerance
             best = i, nearest = distance;
     }
     if (best >= 0) {
-        const double at = mu_kink(ball, panel->at[best], panel->at[best + 1], panel->sticks[best],
-                                  tolerance);
+        const double at =
+            mu_kink(ball, panel->at[best], panel->at[best + 1], panel->sticks[best], tolerance);
         *kink = at - panel->low > near && panel->high - at > near;
         if (*kink) return at;
     }
@@ -1343,10 +1348,8 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
             const mu_panel whole = panels[worst];
             int kink;
             const double middle = mu_division(&ball, &whole, half, &kink);
-            panels[worst] =
-                mu_ball_panel(&ball, whole.low, middle, whole.kinks[0], kink, half);
-            panels[n] =
-                mu_ball_panel(&ball, middle, whole.high, kink, whole.kinks[1], half);
+            panels[worst] = mu_ball_panel(&ball, whole.low, middle, whole.kinks[0], kink, half);
+            panels[n] = mu_ball_panel(&ball, middle, whole.high, kink, whole.kinks[1], half);
         }
     }
     for (int i = 0; i < n; ++i) {
