@@ -1246,9 +1246,11 @@ static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_l
         out.decay = mu_min(out.decay, spring.decay);
     }
     (void)mu_roughness(values, out.start, out.end);
-    for (int i = 1; i < 15; ++i) kinks += out.sticks[i] != out.sticks[i - 1];
-    /* few of the points see springs at the rim that behave otherwise than the rest */
-    out.error = (low == 0.0 && kinks ? 4.0 : 1.5) * mu_roughness(sums, ends, ends);
+    for (int i = 1; i < 15; ++i)
+        kinks += (low == 0.0 || i < 4 || i > 11) && out.sticks[i] != out.sticks[i - 1];
+    /* few of the points see springs at the rim, or close to an end, that behave otherwise than the
+     * rest */
+    out.error = (kinks ? 4.0 : 1.5) * mu_roughness(sums, ends, ends);
     return out;
 }
 
