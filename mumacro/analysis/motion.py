@@ -227,7 +227,8 @@ def motion(
     ------
     InputError
         A single value out of bounds; in arrays such a case is NaN.  At once for an input that is
-        missing or without a meaning, a ball whose normal force oscillates, shapes that do not broadcast.
+        missing or without a meaning, a ball whose normal force oscillates, shapes that do not
+        broadcast.
 
     Examples
     --------
