@@ -1,4 +1,4 @@
-"""The exported C beside the library: nanoseconds a point, in one run.
+"""The exported C beside the library: nanoseconds a point, in one run; the size of the one header.
 
     python benchmarks/c_header.py [--quick] [--write]
 
@@ -65,5 +65,17 @@ def c_header(quick: bool) -> str:
     return markdown(("evaluator", "ns/point"), rows)
 
 
+def header_sizes(quick: bool) -> str:
+    """The size of the one header with each bundled table."""
+    del quick
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        for tolerance in (1e-4, 1e-7, 1e-10, 1e-12):
+            path = Path(name) / "mumacro.h"
+            write_c(Surrogate.open(tolerance).table, path)
+            rows.append([f"{tolerance:g}", quantity(path.stat().st_size / 1e6)])
+    return markdown(("table", "MB"), rows)
+
+
 if __name__ == "__main__":
-    main(__doc__, {"c_header": c_header}, quick=False)
+    main(__doc__, {"c_header": c_header, "header_sizes": header_sizes}, quick=False)

@@ -152,7 +152,8 @@ class Answer(Generic[Number]):
         return self._by_source("source", _SOURCE_NAMES)
 
     def plot(self, axes: Any = None) -> Any:
-        """The cases over (v~, y~), see ``mumacro.plotting.plot_cases``; needs matplotlib."""
+        """The cases over (v~, y~), see ``mumacro.plotting.plot_cases``; of arrays only where groups
+        or the gradient were requested; needs matplotlib."""
         v, y, code = (
             np.ravel(np.asarray(x)) for x in (self.v_tilde, self.y_tilde, self.regime_code)
         )

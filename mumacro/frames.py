@@ -5,6 +5,7 @@ them.
 """
 
 import importlib
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -196,13 +197,20 @@ def _pandas(
         if not value.index.equals(index):
             raise InputError(name, "a Series", "indexed as the other inputs are: align them first")
     arrays_in = [
-        x.to_numpy() if isinstance(x, (pd.Series, pd.Index)) else x for x in inputs.values()
+        _without_gaps(x).to_numpy() if isinstance(x, (pd.Series, pd.Index)) else x
+        for x in inputs.values()
     ]
     arrays = _call_aligned(lambda: _on_arrays(function, names)(*arrays_in), inputs)
     return _call_aligned(
         lambda: tuple(pd.Series(x, index, name=n) for x, n in zip(arrays, names, strict=True)),
         inputs,
     )
+
+
+def _without_gaps(column: Any) -> Any:
+    """A column of objects, such as numbers beside the word rigid, with NaN for None and NA: a gap
+    rejects its row alone, in a column of objects as in one of numbers."""
+    return column.where(column.notna(), math.nan) if column.dtype == object else column
 
 
 def _categories(entries: Any, code: Any, name: str) -> Any:

@@ -36,6 +36,7 @@ except ModuleNotFoundError as error:
         "(in a checkout: pip install -e '.[service]')"
     ) from None
 
+_COMMANDS = ("serve", "healthcheck")
 _OPTIONS = ("host", "port", "tables", "workers", "log_level")
 
 
@@ -50,7 +51,7 @@ def main(arguments: Sequence[str] | None = None, prog: str = "python -m service"
     parser.add_argument(
         "command",
         nargs="?",
-        choices=("serve", "healthcheck"),
+        metavar="{serve,healthcheck}",
         default="serve",
         help="default: serve",
     )
@@ -58,6 +59,9 @@ def main(arguments: Sequence[str] | None = None, prog: str = "python -m service"
         description = Settings.model_fields[name].description
         parser.add_argument(f"--{name.replace('_', '-')}", metavar=name.upper(), help=description)
     chosen = vars(parser.parse_args(arguments))
+    # After the options: the value of a misspelt one would be refused in place of its name.
+    if chosen["command"] not in _COMMANDS:
+        parser.error(f"{chosen['command']!r} is neither {' nor '.join(_COMMANDS)}")
     # In the environment, so that worker processes get the same settings.
     os.environ |= {
         PREFIX + name.upper(): chosen[name] for name in _OPTIONS if chosen[name] is not None

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from mumacro import plotting
 from mumacro.errors import InputError
-from mumacro.inputs.cases import columns_of, real
+from mumacro.inputs.cases import ABSENT, columns_of, real
 from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
@@ -180,10 +180,10 @@ class Motion:
 
 def motion(
     *,
-    mu0: ArrayLike,
-    Fz: ArrayLike,
-    k: ArrayLike,
-    v0: ArrayLike,
+    mu0: Any = ABSENT,
+    Fz: Any = ABSENT,
+    k: Any = ABSENT,
+    v0: Any = ABSENT,
     omega: ArrayLike | None = None,
     f: ArrayLike | None = None,
     x: Any = 0.0,
@@ -226,8 +226,9 @@ def motion(
     Raises
     ------
     InputError
-        A single value out of bounds; in arrays such a case is NaN.  At once for an input without a
-        meaning, a ball whose normal force oscillates, shapes that do not broadcast.
+        A single value out of bounds; in arrays such a case is NaN.  At once for an input that is
+        missing or without a meaning, a ball whose normal force oscillates, shapes that do not
+        broadcast.
 
     Examples
     --------
@@ -252,7 +253,8 @@ def motion(
     if (omega is None) == (f is None):
         raise InputError("omega", omega, "given [rad/s], or f [Hz], exactly one of them")
     inputs = {"mu0": mu0, "Fz": Fz, "k": k, "y0": 0.0, "omega": omega, "f": f, "v0": v0}
-    columns = {name: np.asarray(x) for name, x in columns_of(inputs).items() if name != "y0"}
+    present = {name: value for name, value in inputs.items() if value is not ABSENT}
+    columns = {name: np.asarray(x) for name, x in columns_of(present).items() if name != "y0"}
     numbers = [number for part in terms for term in part for number in term[1:]]
     try:
         shape = common_shape([*columns.values(), *numbers])

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.errors import InputError
+from mumacro.inputs.cases import ABSENT
 from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import CONTACTS, SPRINGS_OF, kind_of
 from mumacro.surrogate import Surrogate
@@ -56,11 +57,11 @@ class Settling:
 def settling(
     surrogate: Surrogate,
     *,
-    mu0: ArrayLike,
-    Fz: ArrayLike,
-    k: ArrayLike,
-    y0: ArrayLike,
-    v0: ArrayLike,
+    mu0: Any = ABSENT,
+    Fz: Any = ABSENT,
+    k: Any = ABSENT,
+    y0: Any = ABSENT,
+    v0: Any = ABSENT,
     omega: ArrayLike | None = None,
     f: ArrayLike | None = None,
     remaining: float = 0.01,
@@ -108,9 +109,12 @@ def settling(
             "direction", direction, "across: how a disturbance decays is derived for no other"
         )
     case = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "f": f, "v0": v0}
-    answer = surrogate.evaluate(
-        {name: x for name, x in case.items() if x is not None or name == "k"}, groups=True
-    )
+    present = {
+        name: value
+        for name, value in case.items()
+        if value is not ABSENT and (value is not None or name == "k")
+    }
+    answer = surrogate.evaluate(present, groups=True)
     amplitude, speed = (np.asarray(x, dtype=np.float64) for x in (y0, v0))
     frequency = (
         np.asarray(omega, dtype=np.float64)

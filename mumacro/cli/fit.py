@@ -56,6 +56,7 @@ def run(words: Sequence[str]) -> str:
         metavar="NAME",
         help="k, mu0; default: both, k alone beside a column mu0",
     )
+    parser.add_argument("--plot", dest="out", type=Path, metavar="FILE", help="the same as --out")
     common.add_format(parser)
     chosen = parser.parse_intermixed_args(words)
     unknown, more = (

@@ -371,11 +371,11 @@ def _column(name: str, value: Any) -> float | Array:
             raise InputError(name, value, LIFTS_OFF) from error.__cause__
         if name != "k":
             raise
-        array = _stiffness(value)
+        array = stiffness(value)
     return array if array.ndim else float(array)
 
 
-def _stiffness(value: Any) -> Array:
+def stiffness(value: Any) -> Array:
     """A stiffness, or an array of them, with the word ``rigid`` allowed; InputError with the remedy
     for a gap."""
     try:

@@ -153,4 +153,9 @@ def open_image(image: bytes, refuse: Refuse) -> Group:
 
     h5py raises nearly any exception where the bytes are no HDF5.
     """
-    return Group(h5g.open(h5f.open_file_image(image), b"/"), "/", len(image), refuse)
+    try:
+        file = h5f.open_file_image(image)
+    except Exception as error:
+        reason = "damaged, such as by a copy that was cut off, or another kind of file"
+        raise refuse(f"not a readable netCDF-4 table: {reason}") from error
+    return Group(h5g.open(file, b"/"), "/", len(image), refuse)

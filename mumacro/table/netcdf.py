@@ -1,4 +1,4 @@
-"""The table file, format 4: netCDF-4 with CF-1.11 conventions; written atomically, checked on
+"""The table file, format 5: netCDF-4 with CF-1.11 conventions; written atomically, checked on
 reading.
 
 docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
@@ -54,6 +54,8 @@ _PLAIN = {
 BALL = "ball_"  # before the names of attributes at the root that tell of a ball
 #: the statistics of bound over error in the attribute ``verified_bound_over_error``
 RATIOS = ("least", "median", "largest")
+#: of every contact that a table has; others may be missing
+_STATED = ("tolerance", "verified_max_abs_error", "verified_max_rel_error")
 CELL_AXES = ("quantity", "cell", "derivative")
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
 
@@ -323,9 +325,9 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
             f"format version {version}, this program reads {WITHOUT_BALL} and {FORMAT_VERSION}"
         )
     attributes = root.attributes()
+    contacts = ("", BALL) if np.array_equal(version, FORMAT_VERSION) else ("",)
     for name in (
-        "tolerance",
-        *([f"{BALL}tolerance"] if np.array_equal(version, FORMAT_VERSION) else []),
+        *(f"{of}{name}" for of in contacts for name in _STATED),
         *(key for key in attributes if key.removeprefix(BALL).startswith("verified_max_")),
     ):
         if not root.numbers(name, 1)[0] > 0.0:

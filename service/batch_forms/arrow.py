@@ -31,8 +31,7 @@ def _read(text: bytearray, max_batch: int, _options: BatchOptions) -> Body:
                     column.name, f"must be a column of numbers, not of {str(column.type)[:80]}"
                 )
                 for column in reader.schema
-                if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type))
-                and column.name in INPUTS
+                if column.name in INPUTS and not _is_readable(column)
             ]
             if faults := [*faults, *twice(reader.schema.names)]:
                 refuse(faults)
@@ -63,10 +62,26 @@ def twice(names: list[str]) -> list[FieldFault]:
     ]
 
 
+def _is_text(arrow_type: Any) -> bool:
+    """Whether a column is of plain text.  Not of views or dictionaries, in which a small body can
+    repeat a long text many times."""
+    return pa.types.is_string(arrow_type) or pa.types.is_large_string(arrow_type)
+
+
+def _is_readable(column: Any) -> bool:
+    """Whether a column of an input has numbers or, for k, the word rigid."""
+    is_number = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
+    return is_number or (column.name == "k" and _is_text(column.type))
+
+
 def _column(column: Any, name: str) -> Any:
-    """A column as float64; as a list where it has nulls, with the word rigid for an infinite k."""
+    """A column as float64; as a list where it has nulls, with the word rigid for an infinite k;
+    texts in k as they are."""
     if name not in INPUTS:  # which the model refuses by its name
         return []
+    if _is_text(column.type):
+        column.validate(full=True)  # texts that overlap would fill the memory
+        return column.to_pylist()
     column = column.cast(pa.float64(), safe=False)
     if column.null_count:
         return [
@@ -141,7 +156,7 @@ FORM = Form(
     body=text_form(
         "Arrow IPC stream, uncompressed, number columns mu0, Fz, k, y0, omega or f, v0; k_low and "
         "k_high in place of k, Fz_amplitude in place of y0 for direction normal; infinity in k is "
-        "rigid contact, null is refused",
+        "rigid contact, in a text column k the word rigid is; null is refused",
         format="binary",
     ),
     answer=text_form(

@@ -137,6 +137,19 @@ def test_integers_and_missing_values_of_pandas(table: Surrogate) -> None:
         assert answer.mu_macro[0] == table.evaluate(**{**CASE, "v0": 1.0}).mu_macro
 
 
+@pytest.mark.parametrize("gap", [None, pd.NA, math.nan], ids=repr)
+def test_a_gap_in_a_column_of_objects_rejects_its_row_alone(table: Surrogate, gap: Any) -> None:
+    cases = pd.DataFrame({**CASE, "v0": [0.01, 0.02, 0.03, 0.04]})
+    cases["k"] = pd.Series([1e6, gap, "rigid", 1e6], dtype=object)
+    cases["mu0"] = pd.Series([0.3, 0.3, 0.3, gap], dtype=object)
+    answer = table.evaluate(cases)
+    assert answer["mu_macro"].isna().tolist() == [False, True, False, True]
+    assert answer["source"].isna().tolist() == [False, True, False, True]
+    case = {**CASE, "mu0": 0.3}
+    assert answer["mu_macro"][0] == table.evaluate(**{**case, "k": 1e6, "v0": 0.01}).mu_macro
+    assert answer["mu_macro"][2] == table.evaluate(**{**case, "k": "rigid", "v0": 0.03}).mu_macro
+
+
 def test_indexes_that_differ_are_refused(table: Surrogate) -> None:
     one, two = pd.Series([0.01, 0.02]), pd.Series([10.0, 10.0], index=[1, 2])
     with pytest.raises(InputError, match="indexed as the other inputs") as caught:

@@ -317,6 +317,37 @@ def test_a_bad_arrow_case_affects_only_itself(client: Any, case: Case) -> None:
     assert rows[4]["mu_macro"] == one(client, {**case, "k": "rigid", "v0": 0.1})["mu_macro"]
 
 
+@pytest.mark.parametrize("text", [pa.string(), pa.large_string()], ids=str)
+def test_the_word_rigid_in_an_arrow_column_is_a_rigid_contact(
+    client: Any, case: Case, text: Any
+) -> None:
+    words = ["rigid", None, "1e6", "Rigid"]
+    columns = {name: pa.array([value] * len(words)) for name, value in case.items()}
+    batch = pa.record_batch({**columns, "k": pa.array(words, text)})
+    rows = read("arrow", posted(client, "arrow", stream_of(batch)))
+    rigid = answered_rows(client, "ndjson", [{**case, "k": "rigid"}])[0]["mu_macro"]
+    assert [row["mu_macro"] for row in rows] == [rigid, None, None, rigid]
+    assert [row["error"] for row in rows] == [
+        None,
+        "k: is missing; write rigid or a number",
+        "k: must be a number, not a text: leave out the quotes",
+        None,
+    ]
+
+
+def test_arrow_texts_that_overlap_are_refused(client: Any, case: Case, problem: Any) -> None:
+    """Such offsets would make many long texts of a short one."""
+    n = 1000
+    offsets = np.tile(np.array([0, 100_000], np.int32), n // 2 + 1)[: n + 1]
+    offsets[0], offsets[-1] = 0, 100_000
+    overlapping = pa.Array.from_buffers(
+        pa.string(), n, [None, pa.py_buffer(offsets), pa.py_buffer(b"x" * 100_000)]
+    )
+    columns = {name: pa.array([value] * n) for name, value in case.items()}
+    batch = pa.record_batch({**columns, "k": overlapping})
+    problem(posted(client, "arrow", stream_of(batch)), 400)
+
+
 def test_arrow_numbers_of_other_types_are_numbers(client: Any, case: Case) -> None:
     record_batch = pa.record_batch(
         {name: pa.array([value], type=pa.float32()) for name, value in case.items()}

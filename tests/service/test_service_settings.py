@@ -129,3 +129,9 @@ def test_a_bad_argument_ends_the_process_without_a_traceback(
     assert (process.returncode, process.stdout) == (2, "")
     assert process.stderr.startswith(message)
     assert "Traceback" not in process.stderr
+
+
+def test_a_misspelt_option_is_named_and_not_its_value(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["--prt", "1"])
+    assert capsys.readouterr().err.endswith("error: unrecognized arguments: --prt\n")

@@ -512,6 +512,14 @@ def test_what_has_no_answer_is_refused_with_advice(
     assert text in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["mu0", "Fz", "k", "v0"])
+def test_a_missing_input_is_named(name: str) -> None:
+    scene = {key: value for key, value in SCENE.items() if key != name}
+    with pytest.raises(InputError, match=f"{name} must be given") as caught:
+        motion(**scene, y=2e-6)
+    assert caught.value.field == name
+
+
 @pytest.mark.parametrize(
     ("change", "name", "text"), [bad for bad in BAD if bad[0] != {"k": "rigid"}]
 )

@@ -172,6 +172,14 @@ def test_bad_input_is_named_with_the_reason(
         settling(surrogate, **{**CASE, **changed})
 
 
+@pytest.mark.parametrize("name", ["mu0", "Fz", "k", "y0", "v0"])
+def test_a_missing_input_is_named(surrogate: Surrogate, name: str) -> None:
+    case = {key: value for key, value in CASE.items() if key != name}
+    with pytest.raises(InputError, match=f"{name} must be given") as caught:
+        settling(surrogate, **case)
+    assert caught.value.field == name
+
+
 def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:
     decay = settling(
         surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.full(3, 0.3)}

@@ -415,6 +415,9 @@ def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, meas
     with (tmp_path / "fit.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["v0 [m/s]"]) for row in rows] == close(points["v0"].tolist(), rel=1e-15)
+    same = tmp_path / "same.csv"
+    output_of(capsys, 0, "fit", str(path), *RIG, "--contact", "ball", "--plot", str(same))
+    assert same.read_bytes() == (tmp_path / "fit.csv").read_bytes()
     fitted = fit(points, contact="ball", Fz=10.0, y0=2e-6, f=20e3)
     curve = (points["mu_macro"] - fitted.residuals).tolist()
     assert [float(row["mu_macro fitted"]) for row in rows] == close(curve, rel=1e-9)

@@ -270,6 +270,8 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
             "Fz at index 1 must be finite and > 0, got nan",
         ),
         (lambda: Element(0.3, 10.0, math.inf), "k must be finite: a rigid contact"),
+        (lambda: Element(0.3, 10.0, "rigid"), "k must be finite: a rigid contact"),
+        (lambda: Element(0.3, 10.0, None), "k must be a number > 0"),
         (
             lambda: Element(1e200, 1e200, 1.0),
             "Fz at index 0 must be finite and >= 0, with mu0 Fz below",

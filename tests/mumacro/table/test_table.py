@@ -143,6 +143,18 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda root: root.delncattr("verified_quantiles"),
         "'verified_quantiles' of / is missing",
     ),
+    **{
+        f"no {name}": (
+            lambda root, name=name: root.delncattr(name),
+            f"attribute '{name}' of / is missing",
+        )
+        for name in (
+            "verified_max_abs_error",
+            "verified_max_rel_error",
+            "ball_verified_max_abs_error",
+            "ball_tolerance",
+        )
+    },
     "no version": (lambda root: root.delncattr("format_version"), "not a mumacro table"),
     "a changed value": (lambda root: root[f"{BLOCK}/value"].__setitem__((0, 0), 0.5), "checksum"),
     "a smaller tolerance": (put("tolerance", 1e-15, ""), "checksum"),
@@ -276,11 +288,14 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
     for name, kind in kinds:
         with netCDF4.Dataset(str(tmp_path / name), "w", format=kind) as root:
             root.createDimension("x", 2)
+    whole = (ROOT / "tables" / "mumacro-1e-4.nc").read_bytes()
+    (tmp_path / "cut.nc").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "text.nc").write_text("mu_macro,0.3\n")
     with (tmp_path / "large.nc").open("wb") as stream:
         stream.truncate(MOST_BYTES + 1)
     for name, reason in (
-        ("text.nc", "not a readable"),
+        ("text.nc", "not a readable netCDF-4 table: .* another kind of file"),
+        ("cut.nc", "not a readable netCDF-4 table: damaged, such as by a copy that was cut off"),
         ("foreign.nc", "not a mumacro table"),
         ("no.nc", "no such file"),
         ("", "no such file"),
