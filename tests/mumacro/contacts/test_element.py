@@ -2,7 +2,7 @@
 
 import math
 from copy import deepcopy
-from typing import Any
+from typing import Any, cast
 
 import mpmath
 import numpy as np
@@ -271,7 +271,7 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
         ),
         (lambda: Element(0.3, 10.0, math.inf), "k must be finite: a rigid contact"),
         (lambda: Element(0.3, 10.0, "rigid"), "k must be finite: a rigid contact"),
-        (lambda: Element(0.3, 10.0, None), "k must be a number > 0"),
+        (lambda: Element(0.3, 10.0, cast(Any, None)), "k must be a number > 0"),
         (
             lambda: Element(1e200, 1e200, 1.0),
             "Fz at index 0 must be finite and >= 0, with mu0 Fz below",
