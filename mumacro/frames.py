@@ -208,9 +208,11 @@ def _pandas(
 
 
 def _without_gaps(column: Any) -> Any:
-    """A column of objects, such as numbers beside the word rigid, with NaN for None and NA: a gap
-    rejects its row alone, in a column of objects as in one of numbers."""
-    return column.where(column.notna(), math.nan) if column.dtype == object else column
+    """A column of objects or texts, such as numbers beside the word rigid, with NaN for None and
+    NA: a gap rejects its row alone, in such a column as in one of numbers."""
+    if column.dtype.kind != "O":
+        return column
+    return column.astype(object).where(column.notna(), math.nan)
 
 
 def _categories(entries: Any, code: Any, name: str) -> Any:

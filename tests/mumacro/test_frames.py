@@ -150,6 +150,14 @@ def test_a_gap_in_a_column_of_objects_rejects_its_row_alone(table: Surrogate, ga
     assert answer["mu_macro"][2] == table.evaluate(**{**case, "k": "rigid", "v0": 0.03}).mu_macro
 
 
+@pytest.mark.parametrize("dtype", [object, "str", "string"])
+def test_a_gap_in_a_column_of_texts_rejects_its_row_alone(table: Surrogate, dtype: Any) -> None:
+    words = pd.Series(["rigid", None, "rigid"], dtype=dtype)
+    answer = table.evaluate(**{**CASE, "k": words})
+    assert answer.mu_macro.isna().tolist() == [False, True, False]
+    assert answer.mu_macro[2] == table.evaluate(**{**CASE, "k": "rigid"}).mu_macro
+
+
 def test_indexes_that_differ_are_refused(table: Surrogate) -> None:
     one, two = pd.Series([0.01, 0.02]), pd.Series([10.0, 10.0], index=[1, 2])
     with pytest.raises(InputError, match="indexed as the other inputs") as caught:
