@@ -1,4 +1,4 @@
-// Asking and its failures: one question in flight, what is reported of it, the API key and its field.
+// Asking and its failures: one question in flight, its report, the API key and its field.
 // The questions themselves are in service.js.
 import { $ } from "./plots.js";
 
@@ -14,8 +14,8 @@ addEventListener("online", wakeAll);
  * a key is entered.
  *
  * `ask(question)` -> { answer }, or why not: { refused }, { later, seconds } or { key: true };
- * `use(answer, question)`; `report(reason, calm)`: null where there is no reason, calm where it mends
- * itself.
+ * `use(answer, question)`; `report(reason, calm)`: null where there is no reason, calm where it
+ * mends itself.
  */
 export class Channel {
   constructor(ask, use, report) {

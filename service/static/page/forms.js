@@ -44,7 +44,7 @@ function fill(input, { text, fault, typed = text }) {
   input.setAttribute("aria-invalid", String(fault !== undefined && typed.trim() !== ""));
 }
 
-/** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are reported to `status`. */
+/** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults go to `status`. */
 export function inputForm(set, setSI, status) {
   let state;
   let elastic = about.inputs.k.start; // which the switch of a rigid contact brings back
