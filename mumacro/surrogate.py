@@ -432,7 +432,13 @@ class Surrogate:
             if kind.contact:
                 data = self._data_of(kind, code)
             try:
-                scalar = _SCALAR_KERNEL.value(data, code, v_tilde, y_tilde, kind.contact)  # type: ignore[arg-type]
+                scalar = _SCALAR_KERNEL.value(
+                    data,
+                    code,
+                    v_tilde,  # type: ignore[arg-type]
+                    y_tilde,  # type: ignore[arg-type]
+                    kind.contact,
+                )
                 if scalar[2] >= 0:
                     return scalar
             except OverflowError:  # a whole number beyond double range

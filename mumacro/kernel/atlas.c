@@ -73,6 +73,13 @@ enum { MU_BORDER_LOW, MU_BORDER_MID, MU_BORDER_HIGH, MU_PIECES };
 #define MU_LAYER \
     "(mu_ratio - outer) y_tilde/v_tilde, outer = 1/AGM(1, sqrt(1 + y_tilde^2/v_tilde^2))"
 
+/* Charts in ln y~ of large amplitudes, of a spring and of a ball. */
+#define MU_SLIDES_BETWEEN(name, low, high)                                              \
+    {name,          MU_CONTINUOUS, {"ln_y", low, high}, {"ln_rho", 0.0, MU_LN_RHO_MAX}, \
+     MU_HYPOTENUSE, 0.0,           6.0 * MU_ROUNDING}
+#define MU_STICKS_BETWEEN(name, regime, low, high) \
+    {name, regime, {"ln_y", low, high}, {"s", 0.0, 1.0}, MU_SLOPE, MU_DENORMAL, 16.0 * MU_ROUNDING}
+
 /* Each with coordinates a and b; s stands for sigma in evaluation and the angle
  * for its tangent, see charts.c. */
 MU_LISTED mumacro_chart MU_CHART[MU_CHARTS] = {
@@ -89,27 +96,9 @@ MU_LISTED mumacro_chart MU_CHART[MU_CHARTS] = {
     /* Continuous sliding, 1.5 < y~ <= 2^17.  a = ln y~, b = ln(v~/v~crit) from the border to
      * rho = 128, where two terms take over.  q is mu~ over the cosine v~/sqrt(v~^2 + y~^2): it
      * grows from 1 as slowly as a logarithm.  Three blocks, each with its own number of cells. */
-    {"continuous_mid_1",
-     MU_CONTINUOUS,
-     {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID},
-     {"ln_rho", 0.0, MU_LN_RHO_MAX},
-     MU_HYPOTENUSE,
-     0.0,
-     6.0 * MU_ROUNDING},
-    {"continuous_mid_2",
-     MU_CONTINUOUS,
-     {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH},
-     {"ln_rho", 0.0, MU_LN_RHO_MAX},
-     MU_HYPOTENUSE,
-     0.0,
-     6.0 * MU_ROUNDING},
-    {"continuous_high",
-     MU_CONTINUOUS,
-     {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL},
-     {"ln_rho", 0.0, MU_LN_RHO_MAX},
-     MU_HYPOTENUSE,
-     0.0,
-     6.0 * MU_ROUNDING},
+    MU_SLIDES_BETWEEN("continuous_mid_1", MU_LN_Y_CONT, MU_LN_Y_MID),
+    MU_SLIDES_BETWEEN("continuous_mid_2", MU_LN_Y_MID, MU_LN_Y_HIGH),
+    MU_SLIDES_BETWEEN("continuous_high", MU_LN_Y_HIGH, MU_LN_Y_TAIL),
     /* Continuous sliding, y~ > 2^17.  a = 1/y~, b = ln(v~/sqrt y~): the border is at a fixed
      * kappa = v~/sqrt(y~) there.  What the layers at the turning points add to the outer solution,
      * eq. (35), is v~/y~ times q, linear in a. */
@@ -152,27 +141,9 @@ MU_LISTED mumacro_chart MU_CHART[MU_CHARTS] = {
     /* Stick-slip, 1.5 < y~ <= 2^17.  a = ln y~, b = s.  mu~ is proportional to v~
      * for v~ -> 0, eq. (16) gives 0: q is the slope mu~ y~/v~, which keeps its
      * digits down to the smallest speed. */
-    {"stick_slip_mid_1",
-     MU_STICK_SLIP,
-     {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID},
-     {"s", 0.0, 1.0},
-     MU_SLOPE,
-     MU_DENORMAL,
-     16.0 * MU_ROUNDING},
-    {"stick_slip_mid_2",
-     MU_STICK_SLIP,
-     {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH},
-     {"s", 0.0, 1.0},
-     MU_SLOPE,
-     MU_DENORMAL,
-     16.0 * MU_ROUNDING},
-    {"stick_slip_high",
-     MU_STICK_SLIP,
-     {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL},
-     {"s", 0.0, 1.0},
-     MU_SLOPE,
-     MU_DENORMAL,
-     16.0 * MU_ROUNDING},
+    MU_STICKS_BETWEEN("stick_slip_mid_1", MU_STICK_SLIP, MU_LN_Y_CONT, MU_LN_Y_MID),
+    MU_STICKS_BETWEEN("stick_slip_mid_2", MU_STICK_SLIP, MU_LN_Y_MID, MU_LN_Y_HIGH),
+    MU_STICKS_BETWEEN("stick_slip_high", MU_STICK_SLIP, MU_LN_Y_HIGH, MU_LN_Y_TAIL),
     /* Stick-slip, y~ > 2^17.  a = 1/y~, b = s.  As in the tail of continuous sliding,
      * without the logarithm (2/pi) ln(v~/sqrt y~) that the layers have for v~ -> 0, where
      * the outer solution's cancels it. */

@@ -132,11 +132,11 @@ static mu_place mu_locate_ball(const mumacro_data *data, double v, double y) {
         at.block = rho >= 1.0 ? MU_B_TAIL : MU_B_S_TAIL;
         at.b = rho >= 1.0 ? mu_log1(rho) : rho < 0.5 ? sqrt(rho) : MU_SQRT2 - sqrt(1.0 - rho);
     } else {
-        const mu_places found = mu_place_ball(mu_steepest_of(data), mu_all(v), mu_all(y),
-                                              mu_all(at.crit), mu_all(ln_y));
-        at.block = (int)mu_first_whole(found.block);
-        at.a = mu_first(found.a);
-        at.b = mu_first(found.b);
+        const mu_places places = mu_place_ball(mu_steepest_of(data), mu_all(v), mu_all(y),
+                                               mu_all(at.crit), mu_all(ln_y));
+        at.block = (int)mu_first_whole(places.block);
+        at.a = mu_first(places.a);
+        at.b = mu_first(places.b);
         if (at.block == MU_B_CORNER) mu_place_ball_corner(&at);
     }
     return at;

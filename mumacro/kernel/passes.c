@@ -27,7 +27,7 @@ MU_INLINE void mu_pass_borders(const mumacro_data *data, int contact, int n, con
         double few[2][MU_LANES];
         mu_lanes speed, amplitude;
         mu_mask common;
-        mu_border_cells found;
+        mu_border_cells cells;
         if (rest && i + MU_LANES > n) {
             for (int j = 0; j < MU_LANES; ++j) {
                 few[0][j] = j < rest ? v[i + j] : 1.0;
@@ -46,13 +46,13 @@ MU_INLINE void mu_pass_borders(const mumacro_data *data, int contact, int n, con
         common = mu_is_common(speed, amplitude);
         speed = mu_select(common, speed, mu_all(1.0));
         amplitude = mu_select(common, amplitude, mu_all(1.0));
-        found = mu_border_cell(data, amplitude);
+        cells = mu_border_cell(data, amplitude);
         mu_store(c->v + i, speed);
         mu_store(c->y + i, amplitude);
-        mu_store(c->ln_y + i, found.ln_y);
-        mu_store(c->crit + i, found.scale);
-        mu_store(c->local + i, found.u);
-        memcpy(c->border + i, &found.cell, sizeof found.cell);
+        mu_store(c->ln_y + i, cells.ln_y);
+        mu_store(c->crit + i, cells.scale);
+        mu_store(c->local + i, cells.u);
+        memcpy(c->border + i, &cells.cell, sizeof cells.cell);
         mu_store_whole(c->block + i,
                        mu_select_whole(common, mu_all_whole(0), mu_all_whole(MU_OTHER)));
     }
@@ -68,22 +68,22 @@ MU_INLINE int mu_pass_places(const mumacro_data *data, int contact, int n, mu_ch
     int count = 0;
     for (int i = n; i % MU_LANES; ++i) c->crit[i] = 1.0;
     for (int i = 0; i < n; i += MU_LANES) {
-        mu_mask known, block;
+        mu_mask chosen, block;
         const mu_lanes v = mu_load(c->v + i), y = mu_load(c->y + i);
         const mu_lanes crit = mu_load(c->crit + i), ln_y = mu_load(c->ln_y + i);
-        const mu_places found = contact == MU_BALL ? mu_place_ball(steepest, v, y, crit, ln_y)
-                                                   : mu_place_common(v, y, crit, ln_y);
-        memcpy(&known, c->block + i, sizeof known);
-        block = mu_select_whole(MU_WHERE(known == 0), found.block, known);
+        const mu_places places = contact == MU_BALL ? mu_place_ball(steepest, v, y, crit, ln_y)
+                                                    : mu_place_common(v, y, crit, ln_y);
+        memcpy(&chosen, c->block + i, sizeof chosen);
+        block = mu_select_whole(MU_WHERE(chosen == 0), places.block, chosen);
         left |=
             MU_WHERE(block ==
                      mu_all_whole(contact == MU_BALL ? (int)MU_B_CORNER : (int)MU_CORNER)) |
             MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_FAST : (int)MU_FAST)) |
             MU_WHERE(block == mu_all_whole(MU_OTHER));
-        mu_store(c->a + i, found.a);
-        mu_store(c->b + i, found.b);
-        mu_store(c->base + i, found.base);
-        mu_store(c->factor + i, found.factor);
+        mu_store(c->a + i, places.a);
+        mu_store(c->b + i, places.b);
+        mu_store(c->base + i, places.base);
+        mu_store(c->factor + i, places.factor);
         mu_store_whole(c->block + i, block);
     }
     for (int i = 0; i < MU_LANES; ++i) {
@@ -119,10 +119,11 @@ MU_INLINE mu_column mu_column_of(const double *blocks, int column) { return bloc
 
 MU_INLINE mu_lanes mu_look_up(const mu_column *column, mu_mask block) {
     int64_t row[MU_LANES];
-    double found[MU_LANES];
+    double values[MU_LANES];
     memcpy(row, &block, sizeof block);
-    for (int i = 0; i < MU_LANES; ++i) found[i] = (*column)[MU_PLACE_OF(row[i]) * MU_BLOCK_COLUMNS];
-    return mu_load(found);
+    for (int i = 0; i < MU_LANES; ++i)
+        values[i] = (*column)[MU_PLACE_OF(row[i]) * MU_BLOCK_COLUMNS];
+    return mu_load(values);
 }
 #endif
 
@@ -179,13 +180,13 @@ MU_INLINE void mu_pass_slopes(const mumacro_data *data, int n, const mu_chunk *c
         slope[i] = mu_cell_slopes(polynomials + 64 * (int64_t)c->cell[i], c->u[i], c->w[i]);
 }
 
-/* mu~, from q in its cells or from slopes that are known already. */
+/* mu~, from q in its cells or from slopes that are there already. */
 MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c,
-                              const mu_slope *known, double *value) {
+                              const mu_slope *slopes, double *value) {
     const double *polynomials = data->quantities[MU_MU_RATIO].polynomials;
     for (int i = 0; i < n; ++i) {
         const double *cell = polynomials + 64 * (int64_t)c->cell[i];
-        const double q = known ? known[i].value : mu_cell_value(cell, c->u[i], c->w[i]);
+        const double q = slopes ? slopes[i].value : mu_cell_value(cell, c->u[i], c->w[i]);
         value[i] = mu_fma1(c->factor[i], q, c->base[i]);
     }
     for (int i = 0; i < n; ++i) value[i] = mu_min(mu_max(value[i], 0.0), 1.0);
@@ -260,10 +261,10 @@ MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int contact, int n, c
             (int8_t)(contact == MU_BALL ? mu_ball_source((int)c->block[i]) : (int)c->block[i]);
     for (int i = 0; left && i < n; ++i) {
         if (mu_is_left(c->block[i])) {
-            const mu_answer found = mu_answer_left(data, contact, MU_MU_RATIO, c, i, v[i], y[i]);
-            value[i] = found.value;
-            if (bound) bound[i] = found.bound;
-            if (source) source[i] = (int8_t)found.source;
+            const mu_answer answer = mu_answer_left(data, contact, MU_MU_RATIO, c, i, v[i], y[i]);
+            value[i] = answer.value;
+            if (bound) bound[i] = answer.bound;
+            if (source) source[i] = (int8_t)answer.source;
         }
     }
     return left;
@@ -276,17 +277,17 @@ MU_INLINE void mu_chunk_of_others(const mumacro_data *data, int contact, int qua
     mu_pass_borders(data, contact, n, v, y, c);
     mu_pass_places(data, contact, n, c);
     for (int i = 0; i < n; ++i) {
-        mu_answer found;
+        mu_answer answer;
         if (mu_is_left(c->block[i]))
-            found = mu_answer_left(data, contact, quantity, c, i, v[i], y[i]);
+            answer = mu_answer_left(data, contact, quantity, c, i, v[i], y[i]);
         else {
             const mu_place at = mu_place_of(data, c, i, 0);
-            found = mu_in_block(data, quantity, &at);
-            if (contact == MU_BALL) found.source = mu_ball_source(found.source);
+            answer = mu_in_block(data, quantity, &at);
+            if (contact == MU_BALL) answer.source = mu_ball_source(answer.source);
         }
-        value[i] = found.value;
-        if (bound) bound[i] = found.bound;
-        if (source) source[i] = (int8_t)found.source;
+        value[i] = answer.value;
+        if (bound) bound[i] = answer.bound;
+        if (source) source[i] = (int8_t)answer.source;
     }
 }
 
@@ -347,22 +348,22 @@ MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int q
         const int few = mu_few(n - i);
         mu_chunk c;
         mu_slope slope[MU_CHUNK];
-        const mu_slope *known = NULL;
+        const mu_slope *computed = NULL;
         mu_pass_borders(data, contact, few, v + i, y + i, &c);
         mu_pass_places(data, contact, few, &c);
         if (quantity == MU_MU_RATIO) {
             mu_pass_cells(data, few, &c);
             mu_pass_slopes(data, few, &c, slope);
-            known = slope;
+            computed = slope;
         }
         for (int j = 0; j < few; ++j) {
-            const mu_slopes found =
-                mu_slopes_of(data, contact, quantity, &c, known, j, v[i + j], y[i + j]);
-            out[MU_SLOPE_VALUE * stride + i + j] = found.value;
-            out[MU_SLOPE_V * stride + i + j] = found.along_v;
-            out[MU_SLOPE_Y * stride + i + j] = found.along_y;
-            out[MU_SLOPE_V_BOUND * stride + i + j] = found.bound_v;
-            out[MU_SLOPE_Y_BOUND * stride + i + j] = found.bound_y;
+            const mu_slopes slopes =
+                mu_slopes_of(data, contact, quantity, &c, computed, j, v[i + j], y[i + j]);
+            out[MU_SLOPE_VALUE * stride + i + j] = slopes.value;
+            out[MU_SLOPE_V * stride + i + j] = slopes.along_v;
+            out[MU_SLOPE_Y * stride + i + j] = slopes.along_y;
+            out[MU_SLOPE_V_BOUND * stride + i + j] = slopes.bound_v;
+            out[MU_SLOPE_Y_BOUND * stride + i + j] = slopes.bound_y;
         }
     }
 }

@@ -160,14 +160,14 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
                      last = (double)mu_whole_of(
                          mu_fma1(turn.end, block[MU_STEP_A], block[MU_OFFSET_A]));
         if (mu_fma1(at->a, block[MU_STEP_A], block[MU_OFFSET_A]) >= last) {
-            const mu_across found = mu_across_rays(cells, block, at, q_a, per_z);
-            along_a = found.slope;
-            along_a_y = -found.slope;
+            const mu_across rays = mu_across_rays(cells, block, at, q_a, per_z);
+            along_a = rays.slope;
+            along_a_y = -rays.slope;
             along_b = 0.0;
             along_b_y = per_z;
             share_a = mu_border_share(spot.u);
-            more = scale * (errors[1] * share_a * found.reach_a +
-                            errors[2] * share_b * reach * found.reach_b);
+            more = scale * (errors[1] * share_a * rays.reach_a +
+                            errors[2] * share_b * reach * rays.reach_b);
         }
     }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
@@ -223,12 +223,12 @@ static mu_slopes mu_slopes_at_place(const mumacro_data *data, int quantity, cons
 
 /* The same of a ball, where mu_limit_slopes is that of one spring: at rest along ln Y, which jumps
  * at Y = 1. */
-static mu_slopes mu_ball_limit_slopes(double y, mu_answer known) {
+static mu_slopes mu_ball_limit_slopes(double y, mu_answer limit) {
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, HUGE_VAL};
-    out.value = known.value;
-    if (known.source == -1)
+    out.value = limit.value;
+    if (limit.source == -1)
         out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
-    else if (known.source == MU_STATIC_LIMIT) {
+    else if (limit.source == MU_STATIC_LIMIT) {
         mu_ball_at_rest(y, &out.along_y);
         out.bound_y =
             8.0 * MU_ROUNDING * fabs(out.along_y) + (fabs(y - 1.0) < 2.0 * MU_ROUNDING ? 1.7 : 0.0);
@@ -237,13 +237,13 @@ static mu_slopes mu_ball_limit_slopes(double y, mu_answer known) {
 }
 
 /* The slopes where the record knows the value in closed form, at the ends of v~ and y~. */
-static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
+static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer limit) {
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-    out.value = known.value;
-    if (known.source == -1)
+    out.value = limit.value;
+    if (limit.source == -1)
         out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
-    else if (quantity == MU_MU_RATIO && known.source == MU_STATIC_LIMIT && y < 1.0) {
-        const double mu = known.value;
+    else if (quantity == MU_MU_RATIO && limit.source == MU_STATIC_LIMIT && y < 1.0) {
+        const double mu = limit.value;
         out.along_y = -y * y / mu;
         /* the slope of the square root, whose argument is uncertain by the last digit of y~ */
         out.bound_y =
@@ -262,10 +262,10 @@ static mu_slopes mu_slopes_at(const mumacro_data *data, int contact, int quantit
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_place at;
     if (!(0.0 < v && v < HUGE_VAL && 0.0 < y && y < HUGE_VAL)) {
-        const mu_answer known = about->limit(v, y);
-        if (known.source != MU_OTHER)
-            return contact == MU_BALL ? mu_ball_limit_slopes(y, known)
-                                      : mu_limit_slopes(quantity, y, known);
+        const mu_answer limit = about->limit(v, y);
+        if (limit.source != MU_OTHER)
+            return contact == MU_BALL ? mu_ball_limit_slopes(y, limit)
+                                      : mu_limit_slopes(quantity, y, limit);
     }
     at = mu_locate_as(data, contact, v == 0.0 ? MU_CREEP : v, y);
     if (at.block == MU_FAST || at.block == MU_B_FAST) return about->fast_slopes(data, v, y);
@@ -284,7 +284,7 @@ static mu_slopes mu_slopes_at(const mumacro_data *data, int contact, int quantit
  * the limit. */
 static double mu_speed_slope_at_zero(const mumacro_data *data, double y, double *bound) {
     double v;
-    mu_answer found;
+    mu_answer ratio;
     *bound = 0.0;
     if (y == 0.0 || y == HUGE_VAL) return 0.0;
     if (y < 1.0) {
@@ -294,7 +294,7 @@ static double mu_speed_slope_at_zero(const mumacro_data *data, double y, double 
     }
     if (y == 1.0) return *bound = HUGE_VAL;
     v = MU_CREEP * mu_min(1.0, y - 1.0);
-    found = mu_answer_at(data, MU_SPRING, MU_MU_RATIO, v, y);
-    *bound = found.bound / v;
-    return found.value / v;
+    ratio = mu_answer_at(data, MU_SPRING, MU_MU_RATIO, v, y);
+    *bound = ratio.bound / v;
+    return ratio.value / v;
 }
