@@ -5,7 +5,6 @@ The service serves it; the page itself is in ``service/static/page``.
 """
 
 from collections.abc import Mapping
-from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
@@ -14,12 +13,14 @@ import numpy as np
 from mumacro import plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import BOUNDS, LIKE, POSITIVE, RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import LIKE
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRINGS_OF, kind_of
 from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.surrogate import Surrogate
+from mumacro.table.atlas import REGIMES
 
 from . import __version__
+from .included import INCLUDABLE
 
 #: the content security policy of the page: no inline script, no inline style, nothing from another
 #: host
@@ -29,31 +30,62 @@ POLICY = (
 )
 
 _HALF = "half of peak to peak"
-# label, symbol, offered units, decimal exponents of the slider [SI], start value, a note
+# label, symbol, offered units, decimal exponents of the slider [SI], text at the start, a note
 _INPUTS = {
-    "mu0": ("friction µ₀", "µ₀", ["-"], [-2, 0.5], "0.3 -", ""),
-    "Fz": ("force Fz", "Fz", ["N", "mN", "kN"], [-3, 5], "10 N", ""),
-    "k": ("stiffness k", "k", ["N/µm", "kN/m", "N/m"], [2, 10], "1 N/µm", ""),
-    "y0": ("amplitude y₀", "y₀", ["µm", "nm", "mm", "m"], [-10, -3], "2 µm", _HALF),
-    AMPLITUDE: ("amplitude ΔFz", "ΔFz", ["N", "mN", "kN"], [-3, 5], "5 N", _HALF),
-    "omega": ("frequency f", "ω", ["kHz", "Hz", "rad/s"], [0, 7], "20 kHz", ""),
-    "v0": ("speed v₀", "v₀", ["mm/s", "µm/s", "m/s"], [-7, 2], "10 mm/s", ""),
+    "mu0": ("friction", "µ₀", ["-"], [-2, 0.5], "0.3", ""),
+    "Fz": ("force", "Fz", ["N", "mN", "kN"], [-3, 5], "10 N", ""),
+    "k": ("stiffness", "k", ["N/µm", "kN/m", "N/m"], [2, 10], "1 N/µm", ""),
+    "y0": ("amplitude", "y₀", ["µm", "nm", "mm", "m"], [-10, -3], "2 µm", _HALF),
+    AMPLITUDE: ("amplitude", "ΔFz", ["N", "mN", "kN"], [-3, 5], "5 N", _HALF),
+    "f": ("frequency", "f", ["kHz", "Hz", "MHz"], [0, 7], "20 kHz", ""),
+    "v0": ("speed", "v₀", ["mm/s", "µm/s", "m/s"], [-7, 2], "10 mm/s", ""),
 }
-# what may be chosen, with its part of the model line; the first is the usual one
+_MEANINGS = {
+    "mu0": "Coulomb's coefficient of friction of the contact",
+    "Fz": "normal force",
+    "k": "tangential stiffness of the contact, before it slips",
+    "y0": "amplitude of the oscillation, half of peak to peak",
+    AMPLITUDE: "amplitude of the normal force, half of peak to peak, below Fz",
+    "f": "frequency of the oscillation",
+    "v0": "speed at which the body is dragged",
+}
+# what may be chosen, with its part of the set-up in words; the first is the usual one
 _CHOICES = {
-    "contact": {name: springs.meaning for name, springs in SPRINGS_OF.items()},
+    "contact": {name: springs.meaning for name, springs in SPRINGS_OF.items()}
+    | {"rigid": "rigid contact"},
     "direction": {
-        "across": "oscillation across the sliding direction",
-        "along": "oscillation along the sliding direction",
-        "normal": "an oscillating normal force",
+        "across": "shaken across the sliding direction",
+        "along": "shaken along the sliding direction",
+        "normal": "under an oscillating force",
     },
 }
 # published points of steel on steel, docs/how-to/fit.md: the case as an address, the columns
 _EXAMPLE = {
-    "label": "steel on steel, shaken along at 26 kHz (published)",
-    "case": "mu0=0.3&Fz=10.79N&k=10N/um&y0=0.35um&f=26kHz&v0=0.2mm/s&contact=ball&direction=along",
+    "case": "mu0=0.3&Fz=10.79 N&k=10 N/µm&y0=0.35 µm&f=26 kHz&v0=0.2 mm/s&contact=ball"
+    "&direction=along",
+    "unknowns": "k",
     "points": "v0 [mm/s]\tmu0\tmu_macro\n0.05\t0.3031\t0.04662\n0.1\t0.2994\t0.04374\n"
-    "0.2\t0.2836\t0.03957\n0.5\t0.2716\t0.03068\n1\t0.2651\t0.02753",
+    "0.2\t0.2836\t0.03957\n0.5\t0.2716\t0.03068\n1\t0.2651\t0.02753\n",
+}
+# E and nu of usual materials: the middle of the ranges that Gere prints
+_MATERIALS = {
+    "source": "typical values after Gere, Mechanics of Materials, 5th edition",
+    "rows": [
+        {"name": name, "E": modulus, "nu": ratio}
+        for name, modulus, ratio in (
+            ("steel", "200 GPa", "0.29"),
+            ("aluminium alloy", "70 GPa", "0.33"),
+            ("titanium alloy", "110 GPa", "0.33"),
+            ("brass", "103 GPa", "0.34"),
+            ("bronze", "108 GPa", "0.34"),
+            ("copper", "115 GPa", "0.35"),
+            ("nickel alloy", "210 GPa", "0.31"),
+            ("tungsten", "360 GPa", "0.2"),
+            ("glass", "70 GPa", "0.2"),
+            ("nylon", "2.8 GPa", "0.4"),
+            ("polyethylene", "1 GPa", "0.4"),
+        )
+    ],
 }
 _WIDTH, _HEIGHT = 141, 101  # of the map's grid: twenty points a decade
 _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
@@ -69,50 +101,56 @@ def _impossible(contact: str, direction: str) -> str:
 
 
 def names(guide: bool) -> dict[str, Any]:
-    """``names.json``: inputs, choices, geometries with arguments, an example of measured points,
-    the version, and whether a ``guide`` is served."""
+    """``names.json``: inputs, choices, geometries with arguments, materials, an example of measured
+    points, the version, and whether a ``guide`` is served."""
     inputs: dict[str, dict[str, Any]] = {
         name: {
             "label": label,
             "symbol": symbol,
+            "meaning": _MEANINGS[name],
             "offered": offered,
             "range": slider,
-            "start": start,
             "note": note,
-            "unit": unit_of(name),
             "units": _scales(UNITS_OF[LIKE.get(name, name)]),
-            "bound": BOUNDS[name],
-            "positive": name in POSITIVE,
         }
-        for name, (label, symbol, offered, slider, start, note) in _INPUTS.items()
+        for name, (label, symbol, offered, slider, _, note) in _INPUTS.items()
     }
-    # a frequency f stands for omega = 2 pi f; a unit of both (1/s) says neither
-    angular = inputs["omega"]["units"]
-    for unit, (times, over) in UNITS_OF["f"].items():
-        angular[unit] = None if unit in angular else [RAD_PER_CYCLE * times, over]
     geometries = {
         name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]}
         for name, one in GEOMETRIES.items()
     }
     arguments = {
-        name: {**one._asdict(), "units": _scales(one.units)} for name, one in ARGUMENTS.items()
+        name: {"unit": one.unit, "meaning": one.meaning, "choices": one.choices}
+        for name, one in ARGUMENTS.items()
     }
+    kinds = [(contact, direction) for contact in CONTACTS for direction in DIRECTIONS]
+    reasons = {kind: _impossible(*kind) for kind in kinds}
     return {
         "inputs": inputs,
+        "start": {name: text for name, (*_, text, _) in _INPUTS.items()},
+        "titles": {"contact": "Contact", "direction": "Oscillation"},
+        "contacts": {name: name for name in _CHOICES["contact"]},
+        "directions": {name: name for name in _CHOICES["direction"]},
         "choices": _CHOICES,
-        "impossible": {
-            f"{contact} {direction}": reason
-            for contact in CONTACTS
-            for direction in DIRECTIONS
-            if (reason := _impossible(contact, direction))
-        },
-        "exponents": {name: _fraction(springs.exponent) for name, springs in SPRINGS_OF.items()},
+        "impossible": {" ".join(kind): reason for kind, reason in reasons.items() if reason},
+        "outputs": {" ".join(kind): _outputs_of(kind) for kind in kinds if not reasons[kind]},
+        "regimes": {name: name.replace("_", " ") for name in REGIMES},
         "geometries": geometries,
         "arguments": arguments,
+        "materials": _MATERIALS,
         "example": _EXAMPLE,
         "version": __version__,
         "guide": guide,
     }
+
+
+def _outputs_of(kind: tuple[str, str]) -> list[str]:
+    """What the page asks beside the friction, of those that a kind has."""
+    return [
+        name
+        for name in ("groups", "limits", "gradient", "stick_fraction", "power", "settling")
+        if not INCLUDABLE[name].lacks.keys() & {*kind}
+    ]
 
 
 @lru_cache(maxsize=2 * len(CONTACTS) * len(DIRECTIONS))  # computed once for each table
@@ -139,11 +177,6 @@ def map_of(
         "labels": plotting.label_places(ratio, on_map),
         "areas": [[*place, plotting.regime_words(name)] for place, name in regimes],
     }
-
-
-def _fraction(exponent: float) -> str:
-    """An exponent as a person writes it, such as 1/3."""
-    return str(Fraction(exponent).limit_denominator(9))
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:

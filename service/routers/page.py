@@ -20,7 +20,7 @@ from . import file_answer
 STATIC = Path(__file__).resolve().parent.parent / "static"
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _FRESH = {"Cache-Control": "no-cache"}
-# what is vendored changes with its version only
+LIBRARIES = ("lib", "swagger-ui")  # of others; they change with their versions only
 _ONE_DAY = {"Cache-Control": "public, max-age=86400"}
 # Inline styles are allowed at /docs: the interface sets some on its elements.
 _DOCS_POLICY = (
@@ -67,8 +67,12 @@ async def get_map(request: Request, tables: Loaded, work: Working) -> Response:
 
 
 # .js, .css
-ASSETS, _VENDORED = ([*(STATIC / folder).glob("*.*s")] for folder in ("page", "swagger-ui"))
-_FILES = {f"/static/{path.relative_to(STATIC).as_posix()}": path for path in (*ASSETS, *_VENDORED)}
+ASSETS, *_VENDORED = ([*(STATIC / folder).glob("*.*s")] for folder in ("page", *LIBRARIES))
+_FILES = {
+    f"/static/{path.relative_to(STATIC).as_posix()}": path
+    for paths in (ASSETS, *_VENDORED)
+    for path in paths
+}
 #: what needs no API key: the same for everyone, and without a number of a table
 OPEN = ("/", "/docs", "/static/page/names.json", *_FILES)
 
@@ -79,5 +83,5 @@ async def get_asset(request: Request, folder: str, name: str) -> Response:
     path = _FILES.get(f"/static/{folder}/{name}")
     if path is None:
         raise HTTPException(404)
-    headers = _ONE_DAY if name.startswith("swagger-ui") else _FRESH
+    headers = _ONE_DAY if folder in LIBRARIES else _FRESH
     return file_answer(request, path, headers, media_type=_TYPES[path.suffix])

@@ -1,6 +1,6 @@
 // Asking and its failures: one question in flight, its report, the API key and its field.
 // The questions themselves are in service.js.
-import { $ } from "./plots.js";
+export const $ = (id) => document.getElementById(id);
 
 const SLOW_MS = 1_500; // after which the old answer is marked as old
 const AGAIN_S = 3; // between attempts, where the service does not say it
@@ -14,8 +14,8 @@ addEventListener("online", wakeAll);
  * a key is entered.
  *
  * `ask(question)` -> { answer }, or why not: { refused }, { later, seconds } or { key: true };
- * `use(answer, question)`; `report(reason, calm)`: null where there is no reason, calm where it
- * mends itself.
+ * `use(answer, question)`; `report(reason, calm, reply)`: null where there is no reason, calm where
+ * it mends itself; a refusal has its faults and what was understood.
  */
 export class Channel {
   constructor(ask, use, report) {
@@ -41,7 +41,7 @@ export class Channel {
       if (reply.later || reply.key) await this.again(pending, reply);
       else {
         showKeyForm(false); // the key was taken, or none is needed
-        this.report(reply.refused ?? null);
+        this.report(reply.refused ?? null, false, reply);
         if (!reply.refused) this.use(reply.answer, pending.question);
       }
     }
@@ -62,38 +62,6 @@ export class Channel {
   mark(busy) {
     this.busy = busy;
     $("main")?.setAttribute("data-asking", String(channels.some((one) => one.busy)));
-  }
-}
-
-/**
- * One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is
- * one.
- */
-export class Status {
-  constructor(place, shown) {
-    Object.assign(this, { place: $(place), shown: $(shown), reasons: new Map(), answered: false });
-  }
-
-  /**
-   * Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not
-   * typed yet.
-   */
-  set(topic, text, calm = false) {
-    const old = this.answered ? " Grey results belong to earlier values." : "";
-    this.reasons.delete(topic);
-    if (text) this.reasons.set(topic, { text: text + old, calm });
-    // one reason is enough: what was typed, else the newest
-    const all = [...this.reasons];
-    const [, first = { text: "" }] =
-      all.find(([name]) => name.startsWith("typed")) ?? all.at(-1) ?? [];
-    if (this.place.textContent !== first.text) this.place.textContent = first.text;
-    this.place.classList.toggle("bad", first.calm === false);
-    this.shown.classList.toggle("old", this.reasons.size > 0);
-  }
-
-  /** A channel whose failures are reported here. */
-  channel(topic, ask, use) {
-    return new Channel(ask, use, (text, calm = false) => this.set(topic, text, calm));
   }
 }
 

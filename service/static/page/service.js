@@ -1,22 +1,7 @@
-// Questions to the service.
+// Questions to the service, and what its answers mean for the page.
 import { withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
-
-/**
- * All faults of a question, where it has several; names that share a reason stand together: "E, nu:
- * are required".
- */
-function faults(errors = []) {
-  if (errors.length < 2) return null;
-  const names = Map.groupBy(errors, ({ reason }) => reason);
-  return [...names]
-    .map(([reason, all]) => {
-      const verb = all.length > 1 ? reason.replace(/^is /, "are ") : reason;
-      return `${all.map(({ field }) => field).join(", ")}: ${verb}`;
-    })
-    .join("; ");
-}
 
 async function ask(path, options) {
   let response, body;
@@ -31,11 +16,11 @@ async function ask(path, options) {
   if (response.ok) return { answer: body };
   const { status, headers } = response;
   if (status === 401) return { key: true };
-  const why = faults(body.errors) ?? body.detail ?? `status ${status}`;
+  const { errors = [], inputs = {}, detail = `status ${status}` } = body;
   if (status < 500 && ![408, 429].includes(status))
-    return { refused: `The service refuses this: ${why}.` };
+    return { refused: detail, faults: errors, inputs };
   return {
-    later: `The service cannot answer now: ${why}.`,
+    later: `The service cannot answer now: ${detail}.`,
     seconds: Number(headers.get("Retry-After")) || null,
   };
 }

@@ -1,0 +1,226 @@
+// The panel "k from measured points": a table pasted or dropped, what the service read of it, and
+// the fit with its residuals.
+import { $, Channel } from "./ask.js";
+import { html, nothing, render } from "../lib/lit-html.js";
+import { Plot } from "./plot.js";
+import { post } from "./service.js";
+import { caseOf } from "./state.js";
+import { about, inUnit, prose, show, toUnit, unitFor } from "./words.js";
+const { area } = globalThis.d3;
+
+const ROWS = 6; // of the table that was read, which are shown
+/** What a fit takes from the table beside the inputs. */
+const MEASURED = ["mu_macro", "std"];
+
+/** The bytes of a file as base64. */
+async function encoded(file) {
+  const url = await new Promise((done, fail) => {
+    const reader = new FileReader();
+    reader.onload = () => done(reader.result);
+    reader.onerror = () => fail(reader.error);
+    reader.readAsDataURL(file);
+  });
+  return url.slice(url.indexOf(",") + 1);
+}
+
+export function fitPanel(store, moved, openCase) {
+  let source = { points: "" }; // what is sent: a text, or the bytes of a file
+  let table, fit, answer;
+  const plot = new Plot($("fit-plot"), paint);
+  const dialect = () =>
+    Object.fromEntries(
+      ["sep", "decimal", "encoding"].map((name) => [name, $(`points-${name}`).value]).filter(([, value]) => value),
+    );
+  const say = (text, bad = false) => {
+    $("fit-status").textContent = text ? prose(text) : "";
+    $("fit-status").classList.toggle("bad", bad);
+  };
+
+  /** What is asked: the case above without what the table has and what is unknown. */
+  function question(more = {}) {
+    const unknowns = $("unknowns").value.split(" ").filter((name) => !(table && name in table.columns));
+    const columns = table ? Object.keys(table.columns) : [];
+    const body = caseOf(store.state, ["v0", ...unknowns, ...columns.map((name) => (name === "omega" ? "f" : name))]);
+    for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {})) if (std && name in body) body[name] = value;
+    return { ...body, unknowns, ...source, ...dialect(), ...more };
+  }
+
+  const readings = new Channel(
+    (body) => post("v1/fit", body),
+    (reply) => {
+      table = reply;
+      fit = undefined;
+      say("");
+      show_();
+    },
+    (reason) => {
+      if (reason) {
+        table = fit = undefined;
+        show_();
+      }
+      say(reason, true);
+    },
+  );
+  const fits = new Channel(
+    (body) => post("v1/fit", body),
+    (reply, body) => {
+      fit = { ...reply, question: body, unknowns: body.unknowns };
+      say("");
+      show_();
+    },
+    (reason) => say(reason, true),
+  );
+  const read = () => {
+    const empty = !(source.points?.trim() || source.points_base64);
+    if (empty) {
+      table = fit = undefined;
+      say("");
+      show_();
+    } else readings.push({ ...question(), read_only: true });
+  };
+
+  /** A value of k or µ₀ as text; k may be rigid, a bound infinite (null). */
+  const text = (name, value, digits = 4) =>
+    value === null || value === "rigid" ? (value ?? "∞") : inUnit(name, value, undefined, digits);
+
+  function result() {
+    if (!fit) return nothing;
+    const { values, std, interval, solutions, warnings, reduced_chi2: scatter } = fit;
+    const names = Object.keys(values).filter((name) => values[name] !== null);
+    const equals = (name, one) => `${about.inputs[name].symbol} = ${text(name, one[name])}`;
+    const best = names.map((name) => {
+      const spread = std[name] === null ? "not determined" : `± ${text(name, std[name], 2)}`;
+      return `${equals(name, values)} ${spread} (95 %: ${interval[name].map((end) => text(name, end)).join(" to ")})`;
+    });
+    const use = (one) => () => {
+      const numbers = Object.entries(one).filter(([name, value]) => names.includes(name) && typeof value === "number");
+      moved(Object.fromEntries(numbers), 6, one.k === "rigid" ? { contact: "rigid" } : {});
+    };
+    const line = (words, one) =>
+      html`<li><span>${words}</span><button class="use" aria-label=${`Use ${words}`} @click=${use(one)}>Use</button></li>`;
+    return [
+      line(best.join("; "), values),
+      ...solutions.slice(1).map((other) => line(`The points allow as well: ${names.map((name) => equals(name, other)).join(", ")}`, other)),
+      fit.question && table?.columns.std && scatter !== null ? html`<li>reduced χ² = ${show(scatter, 3)}</li>` : nothing,
+      ...warnings.map((words) => html`<li class="doubt">${prose(words)}</li>`),
+    ];
+  }
+
+  /** The table that the service read, before anything is fitted. */
+  function readTable() {
+    if (!table) return nothing;
+    const { columns, units = {}, skipped_lines: skipped = [] } = table;
+    const names = Object.keys(columns);
+    const count = columns[names[0]]?.length ?? 0;
+    const head = (name) => `${name}${units[name] && units[name] !== "-" ? ` [${units[name]}]` : ""}`;
+    const row = (i) => html`<tr>${names.map((name) => html`<td>${show(columns[name][i], 6)}</td>`)}</tr>`;
+    const more = skipped.length ? `; lines that were skipped: ${skipped.slice(0, 8).join(", ")}${skipped.length > 8 ? ", …" : ""}` : "";
+    return html`<p class="hint">Read: ${count} points${more}. Values in SI.</p>
+      <div class="scroll"><table>
+        <thead><tr>${names.map((name) => html`<th scope="col">${head(name)}</th>`)}</tr></thead>
+        <tbody>${Array.from({ length: Math.min(count, ROWS) }, (_, i) => row(i))}</tbody>
+      </table></div>
+      ${count > ROWS ? html`<p class="hint">and ${count - ROWS} more</p>` : nothing}`;
+  }
+
+  function show_() {
+    render(readTable(), $("points-read"));
+    $("fit-button").disabled = !table;
+    render(result(), $("fit-lines"));
+    const old = fit && JSON.stringify(question()) !== JSON.stringify(fit.question);
+    $("fit-lines").classList.toggle("old", Boolean(old));
+    plot.redraw();
+  }
+
+  /** Points, fit and band above; below them, on the same axis, the residuals. */
+  function paint() {
+    const columns = table?.columns;
+    if (!columns?.v0 || !columns.mu_macro) {
+      plot.svg.replaceChildren();
+      return;
+    }
+    const unit = unitFor("v0", Math.max(...columns.v0));
+    const x = columns.v0.map((value) => toUnit("v0", value, unit));
+    const moving = x.filter((value) => value > 0);
+    const log = Math.min(...moving) < Math.max(...moving) / 10;
+    const domain = log ? [Math.min(...moving) / 1.3, Math.max(...moving) * 1.3] : [0, 1.05 * Math.max(...x)];
+    const std = columns.std ?? x.map(() => 0);
+    const curve = fit?.curve;
+    const top = 1.08 * Math.max(...columns.mu_macro.map((mu, i) => mu + (std[i] || 0)), ...(curve?.high ?? [0]));
+    const residuals = fit?.residuals ?? [];
+    const worst = Math.max(...residuals.map((one, i) => Math.abs(one) + (std[i] || 0)), 1e-12);
+    const share = residuals.length ? 0.3 : 0; // of the height, for the residuals
+    plot.axes({
+      x: { domain, log, title: `v₀ [${unit}]` },
+      y: { domain: [(-share / (1 - share)) * top, top], log: false, title: "friction µ" },
+    });
+    const { inside } = plot;
+    if (curve) {
+      const at = curve.v0.map((value) => toUnit("v0", value, unit));
+      const band = area().x((_, i) => plot.x(at[i])).y0((_, i) => plot.y(curve.low[i])).y1((_, i) => plot.y(curve.high[i]));
+      inside.append("path").attr("class", "band").attr("d", band(at));
+      plot.path(at.map((one, i) => [one, curve.mu_macro[i]]), "curve");
+    }
+    const bar = (i, y, size) => plot.path([[x[i], y - size], [x[i], y + size]], "measured");
+    const dot = (i, y) => inside.append("circle").attr("class", "measured").attr("r", 3.5).attr("cx", plot.x(x[i])).attr("cy", plot.y(y));
+    columns.mu_macro.forEach((mu, i) => {
+      if (std[i]) bar(i, mu, std[i]);
+      dot(i, mu);
+    });
+    if (!residuals.length) return;
+    const middle = (-0.5 * share * top) / (1 - share);
+    const scale = (0.4 * share * top) / (1 - share) / worst;
+    plot.path([[domain[0], 0], [domain[1], 0]], "rule");
+    plot.path([[domain[0], middle], [domain[1], middle]], "still");
+    residuals.forEach((one, i) => {
+      bar(i, middle + scale * one, scale * (std[i] || 0));
+      dot(i, middle + scale * one);
+    });
+    plot.text(`residuals, ± ${show(worst, 2)} at most`, plot.box.x + 6, plot.y(0) + 13, "note", "start");
+  }
+
+  $("points").addEventListener("change", ({ target }) => {
+    source = { points: target.value };
+    $("file-name").textContent = "";
+    read();
+  });
+  async function take(file) {
+    if (!file) return;
+    source = { points_base64: await encoded(file) };
+    $("points").value = "";
+    $("file-name").textContent = `${file.name}, ${prefixedBytes(file.size)}`;
+    read();
+  }
+  const prefixedBytes = (size) => (size < 1000 ? `${size} bytes` : `${Math.round(size / 1000)} kB`);
+  $("points-file").addEventListener("change", ({ target }) => take(target.files[0]));
+  const zone = $("fit-form");
+  zone.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    zone.classList.add("over");
+  });
+  zone.addEventListener("dragleave", () => zone.classList.remove("over"));
+  zone.addEventListener("drop", (event) => {
+    event.preventDefault();
+    zone.classList.remove("over");
+    take(event.dataTransfer.files[0]);
+  });
+  for (const name of ["sep", "decimal", "encoding"]) $(`points-${name}`).addEventListener("change", read);
+  $("unknowns").addEventListener("change", () => show_());
+  $("fit-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    fits.push(question());
+  });
+  $("fit-example").addEventListener("click", () => {
+    $("points").value = about.example.points;
+    $("unknowns").value = about.example.unknowns;
+    source = { points: about.example.points };
+    openCase(about.example.case);
+    read();
+  });
+  $("fit-image").addEventListener("click", () => fit && plot.save($("fit-lines").textContent.replaceAll(/\s+/g, " ").trim().slice(0, 200), "friction-fit.svg"));
+
+  return (latest) => {
+    answer = latest;
+    if (table) show_();
+  };
+}

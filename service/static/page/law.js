@@ -1,0 +1,199 @@
+// The friction law: µ over one input, with the map's colours behind it.
+import { $, Channel } from "./ask.js";
+import { textAt } from "./map.js";
+import { Plot, save } from "./plot.js";
+import { post } from "./service.js";
+import { caseOf, inputsOf } from "./state.js";
+import { about, inUnit, inWords, show, toSI, toUnit, unitFor } from "./words.js";
+const { area, bisectCenter } = globalThis.d3;
+
+const POINTS = 241;
+const EXTREMES = [1e-300, 1e300]; // of a range
+
+/** Where the law is drawn while no range is typed [SI]. */
+function usualRange(state, { inputs, limits }) {
+  const { along, scale } = state;
+  const border = along === "v0" ? limits?.v0_crit : null;
+  const marks = [inputs[along]?.value, border].filter((one) => one > 0 && Number.isFinite(one));
+  const slider = about.inputs[along].range.map((exponent) => 10 ** exponent);
+  let [low, high] = slider;
+  if (marks.length) {
+    const exponents = marks.map(Math.log10);
+    low = scale === "linear" ? 0 : 10 ** (Math.floor(Math.min(...exponents)) - 2);
+    high = scale === "linear" ? 2 * Math.max(...marks) : 10 ** (Math.ceil(Math.max(...exponents)) + 1);
+  } else if (scale === "linear") low = 0;
+  // at Fz the contact lifts off
+  if (along === "Fz" && state.direction === "normal") low = Math.max(low, 1.01 * inputs.Fz_amplitude.value);
+  if (along === "Fz_amplitude") high = Math.min(high, 0.99 * inputs.Fz.value);
+  return [Math.max(low, scale === "linear" ? 0 : EXTREMES[0]), Math.min(high, EXTREMES[1])];
+}
+
+/** The question of a law: the case without deviations, which a law does not have. */
+export function lawQuestion(state, answer) {
+  const { along, scale } = state;
+  const grows = along === "Fz" && (state.exponent || state.contact === "ball") && state.contact !== "rigid";
+  const question = caseOf(state, grows ? [] : [along]);
+  for (const [name, { std, value }] of Object.entries(answer.inputs)) {
+    if (std && name in question) question[name] = value;
+  }
+  const [start, stop] = usualRange(state, answer);
+  return {
+    ...question,
+    along,
+    start: state.from || start,
+    stop: state.to || stop,
+    points: POINTS,
+    scale,
+    ...(grows && state.exponent ? { stiffness_exponent: state.exponent } : {}),
+  };
+}
+
+/** `moved({ name: value [SI] })` takes a value that was pointed at. */
+export function lawPanel(store, moved) {
+  let answer, law, colours, target, latest;
+  const plot = new Plot($("law"), paint);
+  const along = () => law?.along ?? store.state.along;
+  /** The unit of the axis: that of the input as it was typed. */
+  const unit = () => answer?.inputs[along()]?.unit || unitFor(along(), law?.values.at(-1) ?? 1);
+  const text = (value) => `${about.inputs[along()].symbol} = ${inUnit(along(), value, unit())}`;
+  const heading = () => `${about.inputs[along()].symbol}${unit() === "-" ? "" : ` [${unit()}]`}`;
+  const channel = new Channel(
+    (question) => post("v1/law", question),
+    (reply, { scale }) => {
+      law = { ...reply, scale };
+      $("law-status").textContent = "";
+      show_();
+    },
+    (reason) => {
+      $("law-status").textContent = reason ?? "";
+      $("law").classList.toggle("old", reason !== null);
+    },
+  );
+
+  function show_() {
+    const at = (i) => `${show(law.mu_macro.at(i))} at ${text(law.values.at(i))}`;
+    const marks = law.border.map(({ value }) => `; border of continuous sliding at ${text(value)}`).join("");
+    $("law").setAttribute("aria-label", `Friction law from ${at(0)} to ${at(-1)}${marks}.`);
+    read(null);
+    plot.redraw();
+  }
+
+  /** µ₀ at each value of the law. */
+  const heights = () => (law.along === "mu0" ? law.values : law.values.map(() => answer.inputs.mu0.value));
+
+  function paint() {
+    if (!law || !answer) return;
+    const mu0 = heights();
+    const shown = law.values.map((value) => toUnit(law.along, value, unit()));
+    const top = 1.05 * Math.max(...mu0, ...(law.mu_macro_high ?? law.mu_macro)) || 1;
+    plot.axes({
+      x: { domain: [shown[0], shown.at(-1)], log: law.scale === "log", title: heading() },
+      y: { domain: [0, top], log: false, title: "friction µ" },
+    });
+    const { inside, over, box } = plot;
+    bands(shown, mu0);
+    plot.path(shown.map((x, i) => [x, law.mu_static[i]]), "still");
+    if (law.mu_macro_low) range(shown, law.mu_macro_low, law.mu_macro_high, "band");
+    plot.path(shown.map((x, i) => [x, law.mu_macro[i]]), "curve");
+    for (const { value } of law.border) {
+      const x = plot.x(toUnit(law.along, value, unit()));
+      inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
+      const left = x > box.x + box.width - 60;
+      plot.text("border", x + (left ? -5 : 5), box.y + box.height - 6, "mark", left ? "end" : "start");
+    }
+    const still = plot.y(law.mu_static[0]);
+    plot.text("static", box.x + 5, Math.min(still + 14, box.y + box.height - 6), "note", "start");
+    if (target?.along === law.along) {
+      plot.path(shown.map((x) => [x, target.mu_macro]), "target");
+    }
+    const here = answer.inputs[law.along]?.value;
+    if (here === undefined) return;
+    const x = here === null ? Infinity : toUnit(law.along, here, unit());
+    if (answer.std) {
+      const ends = [answer.mu_macro - answer.std, answer.mu_macro + answer.std];
+      plot.path(ends.map((mu) => [x, mu]), "deviation", over);
+    }
+    plot.point(x, answer.mu_macro);
+  }
+
+  /** The areas between the levels of µ/µ₀, in the colours of the map. */
+  function bands(shown, mu0) {
+    if (!colours) return;
+    const levels = [0, ...colours.levels, 1];
+    colours.colours.forEach((colour, i) => {
+      const [low, high] = [levels[i], levels[i + 1]].map((level) => mu0.map((one) => level * one));
+      range(shown, low, high, "shade").style("fill", colour);
+    });
+  }
+
+  const range = (shown, low, high, className) =>
+    plot.inside
+      .append("path")
+      .attr("class", className)
+      .attr(
+        "d",
+        area()
+          .x((_, i) => plot.x(shown[i]))
+          .y0((_, i) => plot.y(low[i]))
+          .y1((_, i) => plot.y(high[i]))(shown),
+      );
+
+  /** What stands below the law: at the pointer, else at the user's point. */
+  function read(place) {
+    if (!law) return;
+    if (!place || !plot.box || !plot.holds(place)) {
+      const one = answer?.inputs[law.along]?.value;
+      const words = one === undefined || one === null ? "" : `Your case: ${text(one)}: µ = ${show(answer.mu_macro)}`;
+      $("law-read").textContent = words;
+      return;
+    }
+    const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));
+    $("law-read").textContent =
+      `At the pointer: ${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ${inWords(law.regime[i])}`;
+  }
+
+  plot.follow({
+    read,
+    pull: ([x]) => law && moved({ [law.along]: toSI(law.along, plot.x.invert(x), unit()) }),
+    grab: (moving) => store.drag(moving),
+    step(right, up, factor) {
+      const value = answer?.inputs[along()]?.value;
+      if (!right || !Number.isFinite(value)) return false;
+      moved({ [along()]: value * factor ** right }, 6);
+      return true;
+    },
+  });
+
+  /** All that is drawn, as CSV (RFC 4180), in the units that are shown. */
+  function csv() {
+    const { values, k, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high } = law;
+    const columns = {
+      [heading()]: values.map((value) => Number(toUnit(law.along, value, unit()).toPrecision(15))),
+      ...(k && { "k [N/m]": k }),
+      "mu_macro [-]": mu_macro,
+      "mu_static [-]": mu_static,
+      regime,
+      ...(low && { "mu_macro_low [-]": low, "mu_macro_high [-]": high }),
+    };
+    const rows = values.map((_, i) => Object.values(columns).map((column) => column[i]));
+    return [Object.keys(columns), ...rows].map((cells) => `${cells.join(",")}\r\n`).join(""); // no cell holds a comma
+  }
+  const caption = () => inputsOf(store.state).filter((name) => name !== law.along)
+    .map((name) => `${about.inputs[name].symbol} = ${textAt(answer, name, answer.inputs[name]?.value ?? Infinity)}`).join(", ");
+  $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${law.along}.csv`));
+  $("law-image").addEventListener("click", () => law && plot.save(caption(), `friction-law-${law.along}.svg`));
+
+  return (state, reply, scale, wanted) => {
+    [answer, colours, target] = [reply, scale, wanted];
+    if (!answer) return;
+    const question = lawQuestion(state, answer);
+    const [start, stop] = [question.start, question.stop];
+    $("from").placeholder = typeof start === "number" ? inUnit(state.along, start, unit(), 3) : "";
+    $("to").placeholder = typeof stop === "number" ? inUnit(state.along, stop, unit(), 3) : "";
+    if (law) show_();
+    const words = JSON.stringify(question);
+    if (words === latest) return;
+    latest = words;
+    channel.push(question);
+  };
+}

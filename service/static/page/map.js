@@ -1,0 +1,190 @@
+// The map: µ/µ₀ over ṽ and ỹ with the user's point, which can be dragged.
+import { $, Channel } from "./ask.js";
+import { caseOf, inputsOf } from "./state.js";
+import { Plot } from "./plot.js";
+import { get } from "./service.js";
+import { about, inUnit, inWords, show, toUnit, unitFor } from "./words.js";
+const { contours } = globalThis.d3;
+
+/** The text of an input at a value [SI], in the unit and with the relative deviation it had. */
+export function textAt(answer, name, value, digits = 4) {
+  const { unit, std, value: before } = answer.inputs[name] ?? {};
+  const number = unit ? Math.abs(toUnit(name, value, unit)) : NaN;
+  const text = inUnit(name, value, number >= 1e-3 && number < 1e5 ? unit : unitFor(name, value), digits);
+  return std ? `${text} ± ${show((100 * std) / before, 3)} %` : text;
+}
+
+/** The relative deviation of a product of powers of inputs; 0 where none has one. */
+function deviationOf(inputs, names) {
+  const relative = names.map((name) => (inputs[name]?.std ? inputs[name].std / inputs[name].value : 0));
+  return Math.hypot(...relative);
+}
+
+const SPEED = ["v0", "k", "mu0", "Fz", "f"]; // what ṽ depends on
+const AMPLITUDE = { y0: ["y0", "k", "mu0", "Fz"], Fz_amplitude: ["Fz_amplitude", "Fz"] };
+
+/** `moved({ name: value [SI] })` takes values of the point; `loaded()` hears of a new map. */
+export function mapPanel(store, moved, loaded) {
+  let map, answer, target;
+  const plot = new Plot($("map"), paint);
+  const amplitude = () => inputsOf(store.state)[3];
+  const channel = new Channel(
+    (kind) => get(`static/page/map.json?${new URLSearchParams(kind)}`),
+    (data, { contact, direction }) => {
+      map = { ...data, contact, direction };
+      map.shades = contours()
+        .size([data.v_tilde.n, data.y_tilde.n])
+        .thresholds(data.levels)(data.mu_ratio.map((one) => one * data.unit));
+      loaded();
+    },
+    (reason) => ($("map-read").textContent = reason ?? ""),
+  );
+
+  /** A ring of a contour in cells of the grid, as the path of a plot. */
+  function outline({ coordinates }) {
+    const { box } = plot;
+    const x = (at) => box.x + ((at - 0.5) / (map.v_tilde.n - 1)) * box.width;
+    const y = (at) => box.y + box.height - ((at - 0.5) / (map.y_tilde.n - 1)) * box.height;
+    const place = ([a, b]) => `${x(a).toFixed(1)} ${y(b).toFixed(1)}`;
+    return coordinates.flat().map((ring) => `M${ring.map(place).join("L")}Z`).join("");
+  }
+
+  function paint() {
+    if (!map) return;
+    const normal = map.direction === "normal";
+    plot.axes({
+      x: { domain: [map.v_tilde.start, map.v_tilde.stop], log: true, title: "speed ṽ = v₀/(l₀ω)" },
+      y: {
+        domain: [map.y_tilde.start, map.y_tilde.stop],
+        log: map.y_tilde.log,
+        title: normal ? "amplitude ỹ = ΔFz/Fz" : "amplitude ỹ = y₀/l₀",
+      },
+      right: 66,
+    });
+    const { box, inside, over } = plot;
+    const ground = inside.append("rect").attr("class", "shade").style("fill", map.colours[0]);
+    ground.attr("x", box.x).attr("y", box.y).attr("width", box.width).attr("height", box.height);
+    map.shades.forEach((shade, i) => {
+      inside.append("path").attr("class", "shade").style("fill", map.colours[i + 1]).attr("d", outline(shade));
+    });
+    plot.path(map.border.filter(([v, y]) => v > 0 && y > 0), "border");
+    const at = (u, w) => [box.x + u * box.width, box.y + (1 - w) * box.height];
+    for (const [level, u, w] of map.labels) plot.text(show(level), ...at(u, w), "tag").attr("dy", "0.35em");
+    for (const [u, w, words] of map.areas) plot.text(words, ...at(u, w), "area");
+    legend(over);
+    if (target) {
+      const values = map.mu_ratio.map((one) => one * map.unit);
+      const shape = contours().size([map.v_tilde.n, map.y_tilde.n]).contour(values, target);
+      inside.append("path").attr("class", "target").attr("d", outline(shape));
+    }
+    if (answer?.groups && store.state.contact !== "rigid") mark(answer.groups, answer.inputs);
+  }
+
+  /** The colours and the levels between them, beside the map. */
+  function legend(over) {
+    const { box } = plot;
+    const left = box.x + box.width + 14;
+    const tall = box.height / map.colours.length;
+    const group = over.append("g").attr("class", "legend");
+    map.colours.forEach((colour, i) => {
+      const y = box.y + box.height - (i + 1) * tall;
+      group.append("rect").attr("x", left).attr("y", y).attr("width", 12).attr("height", tall + 0.5).style("fill", colour);
+      if (i) group.append("text").attr("x", left + 16).attr("y", y + tall + 4).text(show(map.levels[i - 1]));
+    });
+    group.append("text").attr("x", left + 16).attr("y", box.y + 6).text("µ/µ₀");
+  }
+
+  /** The user's point, with a bar for its deviation or for the interval of k. */
+  function mark({ v_tilde: v, y_tilde: y }, inputs) {
+    const [along, up] = [v ?? Infinity, y ?? Infinity];
+    const bar = (from, to) => plot.path([from, to], "deviation", plot.over);
+    const [dv, dy] = [SPEED, AMPLITUDE[amplitude()]].map((names) => deviationOf(inputs, names));
+    if (dv) bar([along * Math.exp(-dv), up], [along * Math.exp(dv), up]);
+    if (dy && map.y_tilde.log) bar([along, up * Math.exp(-dy)], [along, up * Math.exp(dy)]);
+    const { low, high, value } = inputs.k ?? {};
+    if (low && high) {
+      const at = (k) => [(along * k) / value, map.y_tilde.log ? (up * k) / value : up];
+      bar(at(low), at(high));
+    }
+    plot.point(along, up);
+  }
+
+  function outside() {
+    if (store.state.contact === "rigid") return "A rigid contact has no point on this map: ṽ and ỹ are infinite.";
+    if (!answer?.groups || !map) return "";
+    const { v_tilde: v, y_tilde: y } = answer.groups;
+    const beyond = (value, { start, stop }) => value === null || value < start || value > stop;
+    const names = [
+      beyond(v, map.v_tilde) && `ṽ = ${show(v ?? Infinity, 3)}`,
+      beyond(y, map.y_tilde) && !(y === 0 && !map.y_tilde.log) && `ỹ = ${show(y ?? Infinity, 3)}`,
+    ].filter(Boolean);
+    return names.length ? `Outside of this map: ${names.join(", ")}.` : "";
+  }
+
+  /** What stands below the map: at the pointer, else at the user's point. */
+  function read(place) {
+    if (!map) return;
+    const at = place && plot.holds(place) ? place : null;
+    if (!at) {
+      const { v_tilde: v, y_tilde: y } = answer?.groups ?? {};
+      const words = answer?.groups ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}: µ/µ₀ = ${show(answer.mu_ratio)}` : "";
+      $("map-read").textContent = outside() || words;
+      return;
+    }
+    const [v, y] = [plot.x.invert(at[0]), plot.y.invert(at[1])];
+    const cell = (value, from, size, n) => Math.round(((value - from) / size) * (n - 1));
+    const column = cell(at[0], plot.box.x, plot.box.width, map.v_tilde.n);
+    const row = cell(plot.box.y + plot.box.height - at[1], 0, plot.box.height, map.y_tilde.n);
+    const ratio = map.mu_ratio[row * map.v_tilde.n + column] * map.unit;
+    $("map-read").textContent = `At the pointer: ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}: µ/µ₀ ≈ ${show(ratio, 3)}`;
+  }
+
+  /** The values of the case at a place of the map. */
+  function pull([x, y]) {
+    if (!answer?.groups?.l0 || store.state.contact === "rigid") return;
+    const omega = 2 * Math.PI * answer.inputs.f.value;
+    const { l0 } = answer.groups;
+    const scale = map.direction === "normal" ? answer.inputs.Fz.value : l0;
+    moved({ v0: plot.x.invert(x) * l0 * omega, [amplitude()]: plot.y.invert(y) * scale });
+  }
+
+  plot.follow({
+    read,
+    pull,
+    grab: (moving) => store.drag(moving),
+    step(right, up, factor) {
+      if (!answer || store.state.contact === "rigid") return false;
+      const names = { v0: right, [amplitude()]: up };
+      const changed = Object.entries(names).filter(([, way]) => way);
+      moved(
+        Object.fromEntries(changed.map(([name, way]) => [name, answer.inputs[name].value * factor ** way])),
+        6,
+      );
+      return true;
+    },
+  });
+  $("map-image").addEventListener("click", () => map && plot.save(caption(), "friction-map.svg"));
+  const caption = () => `${about.choices.contact[map.contact]}, ${about.choices.direction[map.direction]}`;
+
+  let asked;
+  return (latest, ratio) => {
+    [answer, target] = [latest, ratio];
+    const { contact, direction } = caseOf(store.state);
+    const kind = `${contact} ${direction}`;
+    if (asked !== kind) {
+      asked = kind;
+      channel.push({ contact, direction });
+    }
+    $("map").setAttribute(
+      "aria-label",
+      answer?.groups
+        ? `Map of µ/µ₀. Your point: speed ${show(answer.groups.v_tilde ?? Infinity, 3)}, amplitude ` +
+            `${show(answer.groups.y_tilde ?? Infinity, 3)}, ${inWords(answer.regime)}.`
+        : "Map of µ/µ₀ over dimensionless speed and amplitude",
+    );
+    read(null);
+    plot.redraw();
+    return map;
+  };
+}
+

@@ -1,0 +1,75 @@
+// The number: µ_macro, as large as the page has it, with its deviation, its doubt and what it
+// assumes.
+import { $ } from "./ask.js";
+import { html, nothing, render } from "../lib/lit-html.js";
+import { about, digitsWithin, friction, inWords, prose, show, withDeviation } from "./words.js";
+
+/** Rows of remarks that have a place of their own beside the number. */
+const BESIDE = ["units", "k is known", "first order"];
+const SHOWN = 3; // lines of assumptions; all of them are one click away
+
+const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
+
+/** The number and its deviation as texts. */
+function numberOf(answer, all) {
+  const { mu_macro: mu, std, error_bound: bound, mu_macro_low: low, mu_macro_high: high, digits = 4 } = answer;
+  if (all) return { value: friction(mu, digitsWithin(mu, bound)), std: std ? show(std, 6) : null };
+  if (std) {
+    const [value, deviation] = withDeviation(mu, std);
+    return { value, std: deviation };
+  }
+  const width = high > low ? digitsWithin(mu, (high - low) / 2) + 1 : digits;
+  return { value: friction(mu, Math.min(width, digits)), std: null };
+}
+
+/** One line below the number: where its deviation comes from, or how much k matters. */
+function spread(answer, rows) {
+  const { std_share: shares, mu_macro_low: low, mu_macro_high: high, inputs } = answer;
+  if (low !== undefined && high > low) {
+    const digits = Math.max(2, digitsWithin(high, high - low) + 2);
+    return `${friction(low, digits)} to ${friction(high, digits)} for k = ${inputs.k.text}`;
+  }
+  if (shares) {
+    const parts = Object.entries(shares).filter(([, share]) => share >= 0.005);
+    const words = parts.sort(([, a], [, b]) => b - a).map(([name, share]) => `${symbolOf(name)} ${Math.round(100 * share)} %`);
+    return words.length ? `The variance comes from ${words.join(", ")}.` : "";
+  }
+  const known = rows.find(({ row }) => row === "k is known");
+  return known ? `${prose(known.text)}.` : "";
+}
+
+export function numberPanel(store) {
+  $("assumes").addEventListener("click", () => $("assumptions").showModal());
+  $("assumptions").addEventListener("click", ({ target, currentTarget }) => {
+    if (target === currentTarget || target.closest("button")) currentTarget.close();
+  });
+  return (answer, trouble, old) => {
+    $("status").textContent = trouble?.text ? `${prose(trouble.text)}${old ? " The last answer stays." : ""}` : "";
+    $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
+    for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
+    if (!answer) {
+      render(html`<output id="mu" for="fields">…</output>`, $("number"));
+      return;
+    }
+    const rows = answer.remarks ?? answer.model ?? [];
+    const { value, std } = numberOf(answer, store.state.digits === "all");
+    const doubt = rows.find(({ row }) => row === "units");
+    const warning = doubt ?? rows.find(({ row }) => row === "first order");
+    render(
+      html`<output id="mu" for="fields">${value}</output>${std
+          ? html`<span id="std"> ± ${std}</span>`
+          : nothing}`,
+      $("number"),
+    );
+    $("regime").textContent = inWords(answer.regime);
+    $("spread").textContent = spread(answer, rows);
+    $("doubt").textContent = warning ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}` : "";
+    const lines = rows.filter(({ row }) => !BESIDE.includes(row));
+    const line = ({ row, text }) => html`<li title=${prose(text)}><b>${row}:</b> ${prose(text)}</li>`;
+    render(lines.slice(0, SHOWN).map(line), $("rows"));
+    render(
+      rows.map(({ row, text }) => html`<p><b>${row}.</b> ${prose(text)}</p>`),
+      $("all-rows"),
+    );
+  };
+}

@@ -1,0 +1,213 @@
+// What the plots share: a frame of two axes that follows its size, dragging, arrow keys, pictures
+// for download.  Scales, axes, shapes and dragging are those of d3.
+const { axisBottom, axisLeft, drag, scaleLinear, scaleLog, select, line } = globalThis.d3;
+
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+/** Of an input, by one press of an arrow key; with Shift. */
+const STEP = 1.05;
+const FINE_STEP = 1.005;
+/** Of a drawn element; a saved picture has no style sheet. */
+const LOOKS = [
+  "fill",
+  "fill-opacity",
+  "stroke",
+  "stroke-width",
+  "stroke-opacity",
+  "stroke-dasharray",
+  "font",
+  "text-anchor",
+  "paint-order",
+  "opacity",
+];
+const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+
+/** A power of ten as people write it; other ticks of a logarithmic axis have no number. */
+function decade(value) {
+  const exponent = Math.log10(value);
+  if (Math.abs(exponent - Math.round(exponent)) > 1e-9) return "";
+  return `10${[...String(Math.round(exponent))].map((sign) => RAISED[sign]).join("")}`;
+}
+
+/** Decades of a logarithmic scale, so many that their numbers have room. */
+function decades(scale, most) {
+  const [low, high] = scale.domain().map(Math.log10);
+  const [first, last] = [Math.ceil(low - 1e-9), Math.floor(high + 1e-9)];
+  const step = Math.max(1, Math.ceil((last - first + 1) / most));
+  return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, i) => 10 ** (first + i * step));
+}
+
+/** An axis of d3 with ticks that suit its length. */
+function ticked(axis, scale, room) {
+  const [from, to] = scale.range();
+  const most = Math.max(2, Math.floor(Math.abs(to - from) / room));
+  if (!scale.base) return axis.ticks(most);
+  const whole = decades(scale, most);
+  if (whole.length > 1) return axis.tickValues(whole).tickFormat(decade);
+  const within = scale.ticks(most).filter((value) => /^[125]e/.test(value.toExponential()));
+  return axis.tickValues(within).tickFormat((value) => String(Number(value.toPrecision(3))));
+}
+
+/**
+ * An SVG that `paint(plot)` fills when its size or what it shows changes.
+ *
+ * `axes({ x, y })` gives it two scales { domain, log, title }; then `plot.x`, `plot.y` are d3's
+ * scales, `plot.inside` the group that is cut off at the frame, `plot.over` the one above it.
+ */
+export class Plot {
+  constructor(svg, paint) {
+    Object.assign(this, { svg, paint });
+    new ResizeObserver(() => this.redraw()).observe(svg);
+  }
+
+  redraw() {
+    cancelAnimationFrame(this.next);
+    this.next = requestAnimationFrame(() => this.draw());
+  }
+
+  draw() {
+    const { clientWidth: width, clientHeight: height } = this.svg;
+    if (!width || !height) return;
+    Object.assign(this, { width, height });
+    this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    this.paint(this);
+  }
+
+  /** Two axes with titles; `right` pixels are left free beside them. */
+  axes({ x, y, right = 12 }) {
+    const [left, top, foot] = [52, 10, 42];
+    const made = ({ domain, log }) => (log ? scaleLog() : scaleLinear()).domain(domain).clamp(false);
+    this.box = { x: left, y: top, width: this.width - left - right, height: this.height - top - foot };
+    this.x = made(x).range([left, this.width - right]);
+    this.y = made(y).range([this.height - foot, top]);
+    const root = select(this.svg);
+    root.selectAll("*").remove();
+    const { box } = this;
+    const clip = `${this.svg.id}-clip`;
+    root
+      .append("clipPath")
+      .attr("id", clip)
+      .append("rect")
+      .attr("x", box.x)
+      .attr("y", box.y)
+      .attr("width", box.width)
+      .attr("height", box.height);
+    this.inside = root.append("g").attr("clip-path", `url(#${clip})`);
+    const bottom = root.append("g").attr("class", "axis").attr("transform", `translate(0 ${box.y + box.height})`);
+    const side = root.append("g").attr("class", "axis").attr("transform", `translate(${box.x} 0)`);
+    bottom.call(ticked(axisBottom(this.x).tickSizeOuter(0), this.x, 44));
+    side.call(ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 34));
+    const title = (text, place) => root.append("text").attr("class", "title").attr("transform", place).text(text);
+    title(x.title, `translate(${box.x + box.width / 2} ${this.height - 8})`);
+    title(y.title, `translate(13 ${box.y + box.height / 2}) rotate(-90)`);
+    this.over = root.append("g");
+    return this;
+  }
+
+  path(points, className, where = this.inside) {
+    const shape = line()
+      .defined(([x, y]) => Number.isFinite(x) && Number.isFinite(y))
+      .x(([x]) => this.x(x))
+      .y(([, y]) => this.y(y));
+    return where.append("path").attr("class", className).attr("d", shape(points));
+  }
+
+  text(words, x, y, className, anchor = "middle") {
+    return this.over
+      .append("text")
+      .attr("class", className)
+      .attr("text-anchor", anchor)
+      .attr("x", x)
+      .attr("y", y)
+      .text(words);
+  }
+
+  /** The user's point; where it is outside, an arrow on the frame that points to it. */
+  point(x, y) {
+    const { box } = this;
+    const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+    const at = [this.x(x), this.y(y)].map((value) => (Number.isNaN(value) ? -Infinity : value));
+    const place = [clamp(at[0], box.x, box.x + box.width), clamp(at[1], box.y, box.y + box.height)];
+    const [right, down] = at.map((value, i) => Math.sign(Math.trunc(100 * clamp(value - place[i], -1e6, 1e6))));
+    const outside = right !== 0 || down !== 0;
+    const turn = (Math.atan2(down, right) * 180) / Math.PI;
+    return this.over
+      .append("path")
+      .attr("class", "point")
+      .attr("d", outside ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z")
+      .attr("transform", `translate(${place}) rotate(${turn})`);
+  }
+
+  holds([x, y]) {
+    const { box } = this;
+    return box && x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height;
+  }
+
+  /**
+   * Calls back with the place of the pointer in the plot: `read(place)` while it moves, `read(null)`
+   * when it leaves; `pull(place)` for a click and each step of a drag; `grab(moving)` around it;
+   * and `step(right, up, factor)` for the arrow keys.
+   */
+  follow({ read, pull, grab, step }) {
+    const { svg } = this;
+    const place = ({ clientX, clientY }) => {
+      const { x, y } = svg.getBoundingClientRect();
+      return [clientX - x, clientY - y];
+    };
+    const inFrame = ([x, y]) => {
+      const { box } = this;
+      return [
+        Math.min(Math.max(x, box.x), box.x + box.width),
+        Math.min(Math.max(y, box.y), box.y + box.height),
+      ];
+    };
+    const at = ({ x, y }) => {
+      read([x, y]);
+      pull(inFrame([x, y]));
+    };
+    select(svg).call(
+      drag()
+        .container(() => svg)
+        .filter((event) => !event.button && this.box)
+        .clickDistance(4)
+        .on("start", (event) => {
+          svg.focus({ preventScroll: true });
+          grab(true);
+          at(event);
+        })
+        .on("drag", at)
+        .on("end", () => grab(false)),
+    );
+    svg.addEventListener("pointermove", (event) => event.buttons || read(place(event)));
+    svg.addEventListener("pointerleave", () => read(null));
+    svg.addEventListener("keydown", (event) => {
+      const arrow = ARROWS[event.key];
+      if (arrow && step(...arrow, event.shiftKey ? FINE_STEP : STEP)) event.preventDefault();
+    });
+  }
+
+  /** Saves the plot as an SVG file on the card's colour, with a line of text below it. */
+  save(text, name) {
+    const { width, height } = this;
+    const { color, backgroundColor } = getComputedStyle(this.svg.closest("section"));
+    const copy = this.svg.cloneNode(true);
+    const [copies, originals] = [copy, this.svg].map((one) => one.querySelectorAll("*"));
+    copies.forEach(({ style }, i) => {
+      const seen = getComputedStyle(originals[i]);
+      for (const look of LOOKS) style.setProperty(look, seen.getPropertyValue(look));
+    });
+    const root = select(copy).attr("width", width).attr("height", height + 24).attr("class", null);
+    root.attr("viewBox", `0 0 ${width} ${height + 24}`).attr("xmlns", "http://www.w3.org/2000/svg");
+    root.insert("rect", ":first-child").attr("width", width).attr("height", height + 24).attr("fill", backgroundColor);
+    const words = root.append("text").attr("x", 12).attr("y", height + 14).attr("fill", color);
+    words.attr("font-family", "sans-serif").attr("font-size", 12).text(text);
+    if (6.6 * text.length > width - 24) words.attr("textLength", width - 24).attr("lengthAdjust", "spacingAndGlyphs");
+    save(new XMLSerializer().serializeToString(copy), "image/svg+xml", name);
+  }
+}
+
+/** Saves a text as a file of the user. */
+export function save(text, type, name) {
+  const href = URL.createObjectURL(new Blob([text], { type }));
+  Object.assign(document.createElement("a"), { href, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 10_000);
+}

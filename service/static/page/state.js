@@ -1,0 +1,121 @@
+// The state of the page: what is chosen, and the inputs as they were typed.  It reads no number.
+//
+// The address holds it as text, and every change is one entry of the history, a drag as a whole.
+
+/** The six inputs by direction, in the order of the form. */
+export const inputsOf = ({ direction }) => [
+  "mu0",
+  "Fz",
+  "k",
+  direction === "normal" ? "Fz_amplitude" : "y0",
+  "f",
+  "v0",
+];
+
+/** What is chosen beside the inputs, each with its values; the first is where the page starts. */
+const CHOICES = {
+  contact: ["spring", "ball", "rigid"],
+  direction: ["across", "along", "normal"],
+  along: ["v0", "mu0", "Fz", "k", "y0", "Fz_amplitude", "f"],
+  scale: ["log", "linear"],
+  digits: ["few", "all"],
+  unknown: ["y0", "mu0", "Fz", "k", "Fz_amplitude", "f", "v0"],
+  quantity: ["mu_ratio", "mu_macro"],
+};
+/** Texts beside the inputs; an empty one is left to the service. */
+const TEXTS = { from: "", to: "", exponent: "", target: "0.5" };
+
+/** The inputs of the usual case, by name, as the service gives them. */
+let usual = {};
+export const useStart = (texts) => {
+  usual = texts;
+};
+
+export const startState = () => ({
+  ...Object.fromEntries(Object.entries(CHOICES).map(([name, [first]]) => [name, first])),
+  ...TEXTS,
+  ...usual,
+});
+
+/** The state as the part of an address behind "#": the inputs, and what is not as at the start. */
+export function toAddress(state) {
+  const start = startState();
+  const words = new URLSearchParams();
+  for (const name of inputsOf(state)) words.set(name, name === "k" ? stiffnessOf(state) : state[name]);
+  if (state.contact === "ball") words.set("contact", "ball");
+  if (state.direction !== "across") words.set("direction", state.direction);
+  for (const name of [...Object.keys(CHOICES).slice(2), ...Object.keys(TEXTS)]) {
+    if (state[name] !== start[name]) words.set(name, state[name]);
+  }
+  return `#${words}`;
+}
+
+/** The state that an address holds, and the names in it that the page does not know. */
+export function fromAddress(hash) {
+  const state = startState();
+  const unknown = [];
+  for (const [name, value] of new URLSearchParams(hash.slice(1))) {
+    if (name in CHOICES ? CHOICES[name].includes(value) : name in state) state[name] = value;
+    else unknown.push(`${name}=${value}`);
+  }
+  if (state.k.trim().toLowerCase() === "rigid") Object.assign(state, { contact: "rigid", k: usual.k });
+  return { state: allowed(state), unknown };
+}
+
+/** k as it is asked: a rigid contact has none. */
+export const stiffnessOf = (state) => (state.contact === "rigid" ? "rigid" : state.k);
+
+/** The inputs of the case as they are asked, by name, and what it is. */
+export function caseOf(state, without = []) {
+  const names = inputsOf(state).filter((name) => !without.includes(name));
+  const inputs = names.map((name) => [name, name === "k" ? stiffnessOf(state) : state[name]]);
+  return {
+    ...Object.fromEntries(inputs),
+    contact: state.contact === "ball" ? "ball" : "spring",
+    direction: state.direction,
+  };
+}
+
+/** The state with what is chosen of the inputs that the direction has. */
+function allowed(state) {
+  const names = inputsOf(state);
+  const other = state.direction === "normal" ? "Fz_amplitude" : "y0";
+  const shown = (name) => (names.includes(name) ? name : other);
+  return { ...state, along: shown(state.along), unknown: shown(state.unknown) };
+}
+
+/** One state and those who follow it; `change` makes an entry of the history. */
+export class Store {
+  constructor(follow) {
+    Object.assign(this, { follow, dragged: false });
+    this.state = startState();
+    addEventListener("popstate", () => this.open());
+  }
+
+  /** Takes the state of the address; names in it that are not known go to `this.unknown`. */
+  open() {
+    const { state, unknown } = fromAddress(location.hash);
+    Object.assign(this, { state, unknown, dragged: false });
+    this.follow();
+  }
+
+  change(part) {
+    this.state = allowed({ ...this.state, ...part });
+    if (!this.dragged) this.remember();
+    this.follow();
+  }
+
+  /** The changes of one drag are one entry of the history. */
+  drag(moving) {
+    const ended = this.dragged && !moving;
+    this.dragged = moving;
+    if (ended) this.remember();
+  }
+
+  remember() {
+    const address = toAddress(this.state);
+    if (address === location.hash) return;
+    // the first entry has no address: it is the start, and stays one
+    history.pushState(null, "", address);
+  }
+}

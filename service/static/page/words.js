@@ -1,0 +1,94 @@
+// Numbers and names for people: the one place where the page writes a value.
+import { html } from "../lib/lit-html.js";
+const { format } = globalThis.d3;
+
+/** What the service says of inputs, contacts and geometries (names.json). */
+export const about = {};
+
+/** A number with up to so many digits; "–" where there is none, ∞ where it is infinite. */
+export function show(value, digits = 4) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+  return String(Number(value.toPrecision(digits))).replace("e+", "e").replace(/^-/, "−");
+}
+
+/** A quantity with the SI prefix that suits it: 13.4 mW. */
+export function prefixed(value, unit, digits = 4) {
+  if (value === null || value === undefined || !Number.isFinite(value) || value === 0)
+    return `${show(value)} ${unit}`;
+  const magnitude = Math.abs(value);
+  if (magnitude < 1e-24 || magnitude >= 1e27) return `${show(value, digits)} ${unit}`;
+  const [, number, prefix] = format(`.${digits}~s`)(value).match(/^(.*\d)(\D?)$/);
+  return `${number.replace("-", "−")} ${prefix}${unit}`;
+}
+
+/** The size of a unit of an input [SI]: value = number × times / over. */
+const scaleOf = (name, unit) => about.inputs[name].units[unit] ?? [1, 1];
+
+/** The offered unit in which a value of an input [SI] reads best. */
+export function unitFor(name, value) {
+  const { offered } = about.inputs[name];
+  const fits = offered.find((unit) => {
+    const number = Math.abs(toUnit(name, value, unit));
+    return number >= 0.1 && number < 1000;
+  });
+  return fits ?? offered[0];
+}
+
+export const toUnit = (name, value, unit) => {
+  const [times, over] = scaleOf(name, unit);
+  return (value * over) / times;
+};
+export const toSI = (name, number, unit) => {
+  const [times, over] = scaleOf(name, unit);
+  return (number * times) / over;
+};
+
+/** A value of an input [SI] as text in a unit, as a person types it: "2 µm". */
+export function inUnit(name, value, unit = unitFor(name, value), digits = 4) {
+  const number = Number(toUnit(name, value, unit).toPrecision(digits));
+  return unit === "-" ? String(number) : `${number} ${unit}`;
+}
+
+const SMALL = 1e-4; // below, a number is written with a power of ten
+
+/** A friction coefficient with so many digits, trailing zeros kept. */
+export function friction(value, digits) {
+  if (value === null) return "–";
+  if (value === 0) return "0";
+  const places = digits - 1 - Math.floor(Math.log10(Math.abs(value)));
+  return Math.abs(value) < SMALL ? show(value, digits) : value.toFixed(Math.max(places, 0)).replace("-", "−");
+}
+
+/** A friction coefficient and its deviation, both to the second digit of the deviation. */
+export function withDeviation(value, std) {
+  const places = Math.min(Math.max(1 - Math.floor(Math.log10(std)), 0), 12);
+  return [value, std].map((one) => one.toFixed(places));
+}
+
+/** The digits of a value that its error bound leaves. */
+export const digitsWithin = (value, bound) =>
+  value && bound ? Math.max(Math.min(Math.floor(Math.log10(Math.abs(value) / bound)), 15), 1) : 15;
+
+/** A sentence of the service in the page's signs. */
+export const prose = (text) =>
+  text
+    .replaceAll("mu_macro", "µ")
+    .replaceAll("mu0", "µ₀")
+    .replace(/\b([yvl])0\b/g, "$1₀")
+    .replace(/\b([yv])~/g, "$1\u0303")
+    .replaceAll(" um ", " µm ")
+    .replace("give k_range", "give k as an interval, such as 0.9..1.1 N/µm")
+    .replace(/(\d) (?=%|µm|N\b|mm\b)/g, "$1\u00a0");
+
+/** A regime as a person names it. */
+export const inWords = (regime) => about.regimes[regime] ?? regime;
+
+const INDEX = { "₀": "0", "₂": "2", z: "z" };
+const LETTERS = { nu: "ν", nu2: "ν₂", E2: "E₂" };
+
+/** A symbol as it is typeset: letters slanted, indices below. */
+export function typeset(symbol) {
+  const [, upright, letter, index] = (LETTERS[symbol] ?? symbol).match(/^(Δ?)(\p{L}+?)([₀₂z]?)$/u);
+  return html`<span class="symbol">${upright}<i>${letter}</i>${index && html`<sub>${INDEX[index]}</sub>`}</span>`;
+}
