@@ -255,6 +255,28 @@ class Page:
         (actions.click() if click else actions).perform()
         self.settle()
 
+    def drag_begins(self, selector: str, x: float, y: float) -> None:
+        """Press the pointer at a relative position in an element, and keep it down."""
+        from selenium.webdriver import ActionChains
+
+        element = self.find(selector)
+        offset = round((x - 0.5) * element.size["width"]), round((y - 0.5) * element.size["height"])
+        actions = ActionChains(self.browser, duration=0)
+        actions.move_to_element_with_offset(element, *offset).click_and_hold().perform()
+        self.settle()
+
+    def drag_moves(self, right: int, down: int) -> None:
+        """Move the pointer that is down by so many pixels."""
+        from selenium.webdriver import ActionChains
+
+        ActionChains(self.browser, duration=0).move_by_offset(right, down).perform()
+
+    def drag_ends(self) -> None:
+        from selenium.webdriver import ActionChains
+
+        ActionChains(self.browser, duration=0).release().perform()
+        self.settle()
+
     def download(self, selector: str, folder: Path, name: str) -> Any:
         """The text of the file that is downloaded when an element is clicked."""
         behaviour = {"behavior": "allow", "downloadPath": str(folder)}

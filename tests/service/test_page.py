@@ -1,7 +1,7 @@
 """The pages: their headers, whether they fit the screen, accessibility, and the API key."""
 
+import hashlib
 import json
-import math
 import os
 import re
 import shutil
@@ -74,39 +74,61 @@ def test_there_is_no_map_of_what_is_not_modelled(client: Any, problem: Any) -> N
 
 
 def test_units_and_geometries_are_the_librarys(client: Any) -> None:
-    def scales(units: Any) -> Any:
-        return {unit: list(scale) for unit, scale in units.items()}
-
     names = client.get("/static/page/names.json").json()
-    expected = {
-        name: scales(units) for name, units in {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}.items()
-    }
-    cycles = {
-        unit: [2 * math.pi * times, over] for unit, (times, over) in expected.pop("f").items()
-    }
-    # a unit of both says neither
-    expected["omega"] |= cycles | dict.fromkeys(expected["omega"].keys() & cycles)
-    assert {name: one["units"] for name, one in names["inputs"].items()} == expected
-    assert all(set(one["offered"]) <= set(one["units"]) for one in names["inputs"].values())
+    expected = {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}
+    for name, one in names["inputs"].items():
+        assert one["units"] == {unit: list(scale) for unit, scale in expected[name].items()}
+        assert set(one["offered"]) <= set(one["units"])
+        assert one["meaning"]
+    assert names["start"].keys() == names["inputs"].keys() == expected.keys() - {"omega"}
     assert [list(words) for words in names["choices"].values()] == [
-        list(CONTACTS),
+        [*CONTACTS, "rigid"],
         list(DIRECTIONS),
     ]
     assert {
         name: (one["meaning"], one["arguments"]) for name, one in names["geometries"].items()
     } == {name: (one.meaning, [*one.arguments, *BODIES]) for name, one in GEOMETRIES.items()}
-    for name, one in ARGUMENTS.items():
-        assert names["arguments"][name] == {
-            **one._asdict(),
-            "units": scales(one.units),
-            "choices": list(one.choices),
-        }
-    # what is offered is what a request may hold
+    assert names["arguments"].keys() == ARGUMENTS.keys()
+    # what is offered is what a request may hold, and the outputs are those that a kind has
     described = client.get("/openapi.json").json()
     fields = described["components"]["schemas"]["CaseRequest"]["properties"]
-    assert {*names["inputs"], *names["choices"], "k_range"} <= fields.keys()
-    assert {"/v1/solve-for", "/v1/stiffness", "/v1/fit"} <= described["paths"].keys()
+    assert {*names["inputs"], *names["choices"]} <= fields.keys()
+    assert names["outputs"].keys() == {" ".join(kind) for kind in KINDS}
     assert names["guide"] is False
+
+
+def test_the_start_and_the_materials_are_answered(client: Any) -> None:
+    names = client.get("/static/page/names.json").json()
+    for kind, outputs in names["outputs"].items():
+        contact, direction = kind.split()
+        amplitude = "y0" if direction == "normal" else "Fz_amplitude"
+        case = {name: text for name, text in names["start"].items() if name != amplitude}
+        body = {**case, "contact": contact, "direction": direction, "include": outputs}
+        answer = client.post("/v1/mu-macro", json=body)
+        assert answer.status_code == 200, answer.text
+        assert answer.json().keys() >= {*outputs}
+    assert len(names["materials"]["rows"]) >= 10
+    for one in names["materials"]["rows"]:
+        body = {"geometry": "ball", "radius": "5 mm", "Fz": "1 mN", "E": one["E"], "nu": one["nu"]}
+        assert client.post("/v1/stiffness", json=body).json()["k"] > 0.0
+
+
+def test_the_libraries_are_those_of_their_authors(client: Any, repository: Path) -> None:
+    folder = repository / "service" / "static" / "lib"
+    listed = dict(
+        line.split()[::-1] for line in (folder / "checksums.txt").read_text().splitlines()
+    )
+    files = {path.name: path.read_bytes() for path in folder.glob("*.js")}
+    assert {name: hashlib.sha256(data).hexdigest() for name, data in files.items()} == listed
+    assert sum(map(len, files.values())) <= 180_000
+    # in an order in which each finds what it needs
+    page = client.get("/").text
+    loaded = re.findall(r'src="static/lib/([^"]+)"', page)
+    assert {*loaded, "lit-html.js"} == files.keys()
+    for i, name in enumerate(loaded):
+        head = files[name].decode()[:700]
+        needs = set(re.findall(r'require\("(d3-[^"]+)"\)', head))
+        assert needs <= {one.removesuffix(".min.js") for one in loaded[:i]}, name
 
 
 def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, problem: Any) -> None:
@@ -169,10 +191,10 @@ def test_a_wheel_holds_the_built_documents_where_there_are_any(
     assert settings.Settings().guide == tmp_path / "guide"
 
 
-def test_what_is_typed_and_asked_without_a_browser(
+def test_numbers_and_addresses_without_a_browser(
     client: Any, repository: Path, tmp_path: Path
 ) -> None:
-    """The tests of the modules in node: texts, numbers, addresses, questions."""
+    """The tests of the modules in node: numbers, addresses."""
     node = shutil.which("node")
     if node is None or tuple(
         map(int, re.findall(r"\d+", subprocess.check_output([node, "-v"], text=True)))
@@ -189,54 +211,52 @@ def test_what_is_typed_and_asked_without_a_browser(
         check=False,
     )
     assert done.returncode == 0, done.stdout
-    assert int(re.findall(r"^(?:#|ℹ) pass (\d+)$", done.stdout, re.MULTILINE)[0]) > 50
+    assert int(re.findall(r"^(?:#|ℹ) pass (\d+)$", done.stdout, re.MULTILINE)[0]) > 25
 
 
-@pytest.mark.parametrize(("width", "height"), [(390, 844), (320, 640), (1024, 768), (1440, 900)])
-def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
-    page = open_page(width=width, height=height)
-    drawn, law, mu, inputs = (page.find(f"#{name}").rect for name in ("map", "law", "mu", "inputs"))
-    assert min(drawn["width"], law["width"]) >= 0.25 * width
-    # the result is seen without scrolling, on a small phone on the second screen; beside the
-    # inputs, or below them and above the law, which is above the map
-    assert 0 < mu["y"] < height * (2 if width < 390 else 1)
-    if width > 760:
-        assert drawn["y"] + drawn["height"] <= height
-        assert inputs["x"] < drawn["x"] - 50
-    else:
-        assert inputs["y"] + inputs["height"] < mu["y"] < law["y"] < drawn["y"]
-    page = open_page("#k=rigid&digits=all&bad=1", width=width, height=height)
+WIDTHS = (320, 360, 390, 480, 600, 768, 800, 1024, 1180, 1280, 1440, 1920)
+#: the longest of what the cards may hold
+LONGEST = "#mu0=0.3±0.02&k=0.912345 ± 0.1 N/um&v0=1e6&digits=all&bad=1"
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("address", ["", LONGEST, "#k=rigid&y0=2"])
+def test_it_fits_every_width(open_page: Any, width: int, address: str) -> None:
+    page = open_page(address, width=width, height=800)
     assert page.run("return document.documentElement.scrollWidth;") <= width
-    # no section lies on another, and controls are large enough for a finger
+    # the number stands on one line, inside of its card
+    box, card = (page.find(one).rect for one in ("#number", "#answer"))
+    lines = page.run(
+        "const range = document.createRange(); range.selectNodeContents(document.querySelector"
+        "('#number')); return new Set([...range.getClientRects()].filter((one) => one.width > 1)"
+        ".map((one) => Math.round(one.bottom / 12))).size;"
+    )
+    assert lines <= 2  # a deviation is set smaller, on the same line
+    assert box["x"] + box["width"] <= card["x"] + card["width"]
+    # no card lies on another
     overlaps = page.run(
         "const all = [...document.querySelectorAll('section, header, .notice')]"
         ".map((one) => one.getBoundingClientRect()).filter(({ width }) => width > 0);"
         "return all.flatMap((a, i) => all.slice(i + 1).filter((b) => a.left < b.right && b.left < "
-        "a.right && a.top < b.bottom && b.top < a.bottom)).length"
-        " + [...document.querySelectorAll('*')].filter((one) => ['sticky', 'fixed'].includes("
-        "getComputedStyle(one).position)).length;"
+        "a.right && a.top < b.bottom && b.top < a.bottom)).length;"
     )
     assert overlaps == 0
+    # controls are large enough for a finger
     small = page.run(
-        "return [...document.querySelectorAll('input, select, button, summary, nav "
-        "a')].map((element) => [element.id || element.outerHTML,"
-        " (element.closest('.switch, .choice label') ?? element).getBoundingClientRect().height])"
-        ".filter(([, height]) => height > 0 && height < 40);"
+        "return [...document.querySelectorAll('input, select, button, nav a')].map((element) =>"
+        " [element.id || element.outerHTML, (element.closest('.switch, .choice label, .button') ??"
+        " element).getBoundingClientRect().height])"
+        ".filter(([, height]) => height > 0 && height < 38);"
     )
     assert small == [] or width > 760
-    # no text is cut in its field, and the choices stand in one row each
-    page = open_page("#k=0.8..1.2N/um&along=k", width=width, height=height)
-    cut = page.run(
-        "return ['field-k', 'range'].map((id) => document.getElementById(id)).filter((field) => {"
-        " const pen = new OffscreenCanvas(1, 1).getContext('2d'); pen.font = "
-        "getComputedStyle(field).font; return pen.measureText(field.value || "
-        "field.placeholder).width > field.clientWidth - 16; }).length;"
-    )
-    rows = (
-        "return ['contact', 'direction'].map((id) => new "
-        "Set([...document.getElementById(id).querySelectorAll('label')].map((one) =>"
-    )
-    assert (cut, page.run(f"{rows} one.getBoundingClientRect().y)).size);")) == (0, [1, 1])
+
+
+def test_one_screen_holds_inputs_number_and_map(open_page: Any) -> None:
+    page = open_page(width=1280, height=800)
+    for name in ("inputs", "answer", "map-section", "law-section", "side", "copy"):
+        box = page.find(f"#{name}").rect
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= 800, name
 
 
 def inaccessible(page: Any, repository: Path) -> Any:
@@ -258,17 +278,23 @@ def inaccessible(page: Any, repository: Path) -> Any:
 @pytest.mark.parametrize("width", [1440, 390])
 def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) -> None:
     page = open_page("#bad=1&v0=1e6&digits=all", width=width)
-    page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
     assert inaccessible(page, repository) == {}
     page = open_page("#contact=ball&direction=along&k=0.8..1.2N/um&along=Fz", width=width)
-    page.choose("#unknown", "Fz", "input")
+    page.click("#tab-target")
+    page.click("#solve-form button")
     for name, text in (("radius", "5 mm"), ("E", "210 GPa"), ("nu", "0.3")):
-        page.type(f"#argument-{name}", text, commit=False)
-    page.choose("#points", "0.001 0.1\n0.1 0.2", "input")
-    for panel in ("solve", "stiffness", "fit"):
-        page.click(f"#{panel}-form button:not([type])")
-        assert page.find(f"#{panel}-result").is_displayed()
+        page.type(f"#argument-{name}", text)
+    page.click("#stiffness-form button")
     assert inaccessible(page, repository) == {}
+    page.click("#tab-fit")
+    page.choose("#points", "v0 mu_macro\n0.001 0.1\n0.1 0.2")
+    page.click("#fit-button")
+    assert inaccessible(page, repository) == {}
+    page.click("#tab-motion")
+    page.click("#motion-form button")
+    page.click("#assumes")
+    assert inaccessible(page, repository) == {}
+    page.click("#assumptions button")
     assert page.run("return document.documentElement.scrollWidth;") <= width
 
 

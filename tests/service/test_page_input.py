@@ -1,12 +1,18 @@
-"""The page in a browser: typed values, links, and the display while there is no response."""
+"""The page in a browser: what is typed, dragged, undone, linked, and what it shows while there is
+no answer."""
 
 import math
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks.support.browser import START
 from mumacro import Surrogate
+from benchmarks.support.browser import START
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -20,78 +26,235 @@ def test_a_typed_value_applies_on_commit(open_page: Any, surrogate: Surrogate) -
 
     page.type("#field-y0", "2.9", commit=False)
     expect()  # not while it is typed
-    page.find("#field-Fz").click()  # but on leaving the field
+    page.find("#field-Fz").click()  # but on leaving the field; a plain number keeps its unit
     page.settle()
     expect(y0=2.9e-6)
-    # a plain number keeps the unit of its field; all digits that were typed stay
     for field, typed, shown, changed in (
-        ("y0", "0.0031mm", "0.0031 mm", {"y0": 3.1e-6}),
+        ("y0", "0.0031mm", "0.0031mm", {"y0": 3.1e-6}),
         ("y0", "0.0032", "0.0032 mm", {"y0": 3.2e-6}),
-        ("omega", "1000 Hz", "1000 Hz", {"y0": 3.2e-6, "omega": 2000 * math.pi}),
+        ("f", "1000 Hz", "1000 Hz", {"y0": 3.2e-6, "omega": 2000 * math.pi}),
+        ("v0", "1e1 mm/s", "1e1 mm/s", {"y0": 3.2e-6, "omega": 2000 * math.pi}),
     ):
         page.type(f"#field-{field}", typed)
         assert page.value(f"#field-{field}") == shown
         expect(**changed)
 
 
-def test_a_bad_value_greys_the_result_and_gives_the_reason(
+def test_what_was_understood_stands_below_the_field(open_page: Any) -> None:
+    page = open_page()
+    page.type("#field-k", "1 ± 10 % N/um")
+    page.type("#field-k", "1 N/um ± 10 %")
+    assert "deviation" in page.text("#note-k")
+    page.type("#field-k", "1000 N/mm")
+    page.type("#field-y0", "2e-6 m")
+    assert page.text("#note-y0")  # "half of peak to peak", or what was read
+
+
+def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surrogate) -> None:
+    page = open_page("#k=1 ± 0.1 N/um&mu0=0.3 ± 0.02")
+    answer = surrogate.evaluate(**START, gradient=True)
+    deviation = math.hypot(0.02 * answer.gradient["mu0"], 1e5 * answer.gradient["k"])
+    assert float(page.text("#std").removeprefix(" ± ")) == close(deviation, rel=0.05)
+    assert page.number() == close(answer.mu_macro, abs=10.0 ** math.floor(math.log10(deviation)))
+    assert re.search("µ₀ .* k|k .* µ₀", page.text("#spread"))
+    assert len(page.texts("#map .deviation")) == 2
+    assert len(page.texts("#law .deviation")) == 1
+    # which a drag keeps
+    page.press("#slider-k", "ARROW_RIGHT")
+    assert "±" in page.value("#field-k")
+
+
+def test_a_bad_value_greys_the_result_and_gives_the_services_reason(
     open_page: Any, surrogate: Surrogate
 ) -> None:
     page = open_page()
-    page.type("#field-Fz", "5 mm")
-    assert page.is_old()
-    assert page.find("#field-Fz").get_attribute("aria-invalid") == "true"
-    assert page.text("#fault-Fz") == "Fz: “mm” is not a unit of Fz: give N, mN, kN."
-    assert (
-        page.text("#status") == f"{page.text('#fault-Fz')} Grey results belong to earlier values."
-    )
-    assert page.is_red("#status")
     before = page.number()
-    # another field does not repair it, and no request is sent meanwhile
+    page.type("#field-Fz", "5 mm")
+    assert page.is_old("#number")
+    assert page.find("#field-Fz").get_attribute("aria-invalid") == "true"
+    assert page.find("#field-y0").get_attribute("aria-invalid") == "false"
+    assert page.text("#note-Fz")
+    assert "Fz" in page.text("#status")
+    assert page.is_red("#status")
+    # another field does not repair it, and the last answer stays
     page.type("#field-mu0", "0.4")
-    assert (page.is_old(), page.number()) == (True, before)
-    page.press("#field-Fz", "ESCAPE")
-    assert not page.is_old()
-    assert (page.text("#status"), page.text("#fault-Fz"), page.value("#field-Fz")) == (
-        "",
-        "",
-        "10 N",
-    )
-    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "mu0": 0.4}).mu_macro)
-    # an empty field is no error, but there is no result for it
-    page.type("#field-Fz", "")
-    assert page.text("#status").startswith("Fz: give a number.")
-    assert (page.is_old(), page.is_red("#status")) == (True, False)
-    assert page.find("#field-Fz").get_attribute("aria-invalid") == "false"
-    page.press("#field-Fz", "ESCAPE")
+    assert (page.is_old("#number"), page.number()) == (True, before)
+    page.run("history.back();")
+    page.settle()
+    page.run("history.back(); await new Promise((next) => setTimeout(next, 100));")
+    page.settle()
+    assert (page.is_old("#number"), page.text("#status")) == (False, "")
+    assert page.value("#field-Fz") == "10 N"
     # the slider of a field repairs it, too
     page.type("#field-v0", "fast")
-    assert page.is_old()
-    page.choose("#slider-v0", "-1000", "input")
-    assert not page.is_old()
-    assert page.number() == page.rounded(
-        surrogate.evaluate(**{**START, "mu0": 0.4, "v0": 0.1}).mu_macro
+    assert page.is_old("#number")
+    page.run(
+        "const one = document.querySelector('#slider-v0'); one.value = -100;"
+        "for (const kind of ['input', 'change']) one.dispatchEvent(new Event(kind, { bubbles: true"
+        " }));"
     )
+    page.settle()
+    assert not page.is_old("#number")
+    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "v0": 0.1}).mu_macro)
     assert page.text("#regime") == "continuous"
-    assert page.find("#slider-v0").get_attribute("aria-valuetext") == "v₀ = 100 mm/s"
 
 
-def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) -> None:
-    page = open_page("#k=5e5")
-    page.click("#rigid")
-    # no k to be known
-    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro, 6)
+def test_escape_takes_back_what_is_typed(open_page: Any) -> None:
+    page = open_page()
+    page.type("#field-Fz", "77 N", commit=False)
+    page.press("#field-Fz", "ESCAPE")
+    assert page.value("#field-Fz") == "10 N"
+
+
+def test_a_contact_is_rigid_by_a_choice(open_page: Any, surrogate: Surrogate) -> None:
+    page = open_page("#k=5e5 N/m")
+    page.click("[name=contact][value=rigid]")
+    rigid = surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro
+    assert page.number() == close(rigid, rel=1e-5)
     assert not page.find("#field-k").is_enabled()
     assert "k=rigid" in page.address()
-    assert (page.shown()["ṽ = v₀/(l₀ω)"], page.shown()["shaker power"]) == ("∞", "– (rigid)")
-    assert page.text("#model").startswith("One model: rigid contact, oscillation across")
-    assert "rigid contact has no point" in page.text("#map-out")
+    assert page.shown()["ṽ"] == "∞"
+    assert "rigid contact has no point" in page.text("#map-read")
     page.touched("#map", 0.5, 0.5, click=True)
     assert page.value("#field-v0") == "10 mm/s"
-    page.click("#rigid")
-    assert page.value("#field-k") == "500000 N/m"  # the earlier value
-    page.type("#field-k", "rigid")
-    assert page.find("#rigid").is_selected()
+    page.click("[name=contact][value=spring]")
+    assert page.value("#field-k") == "5e5 N/m"  # the earlier value
+    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": 5e5}).mu_macro)
+
+
+def test_a_ball_whose_load_oscillates_cannot_be_chosen(open_page: Any) -> None:
+    page = open_page("#contact=ball")
+    normal, ball = (page.find(f"[value={name}]") for name in ("normal", "ball"))
+    assert not normal.is_enabled()
+    page.click("[name=contact][value=spring]")
+    assert normal.is_enabled()
+    page.click("[name=direction][value=normal]")
+    assert not ball.is_enabled()
+
+
+# --- the history ----------------------------------------------------------------------------------
+
+
+def back(page: Any, steps: int = -1) -> None:
+    page.run(f"history.go({steps}); await new Promise((next) => setTimeout(next, 150));")
+    page.settle()
+
+
+def test_back_and_forward_go_through_the_inputs(open_page: Any) -> None:
+    page = open_page(new=True)
+    page.type("#field-y0", "3 um")
+    page.type("#field-mu0", "0.2")
+    page.click("[name=contact][value=ball]")
+    values = lambda: (page.value("#field-y0"), page.value("#field-mu0"))  # noqa: E731
+    back(page)
+    assert page.find("[name=contact][value=spring]").is_selected()
+    assert values() == ("3 um", "0.2")
+    back(page)
+    assert values() == ("3 um", "0.3")
+    back(page, 2)
+    assert page.find("[name=contact][value=ball]").is_selected()
+    # the example can be undone
+    page.click("#reset")
+    assert values() == ("2 µm", "0.3")
+    back(page)
+    assert values() == ("3 um", "0.2")
+
+
+def test_a_drag_is_one_step_and_the_map_stays_where_it_is(open_page: Any) -> None:
+    page = open_page(new=True, width=1280, height=800)
+    steps = page.run("return history.length;")
+    place = "return document.querySelector('#map').getBoundingClientRect().toJSON();"
+    before = page.run(place)
+    amplitudes = []
+    page.drag_begins("#map", 0.5, 0.6)
+    for i in range(1, 13):
+        page.drag_moves(0, -4)
+        page.settle()
+        number, unit = page.value("#field-y0").split()
+        amplitudes.append(float(number) * {"nm": 1e-3, "µm": 1.0, "um": 1.0, "mm": 1e3}[unit])
+        assert page.run(place) == before, i
+        assert page.text("#map-read").startswith("At the pointer")
+    page.drag_ends()
+    # each step is the same factor
+    ratios = [b / a for a, b in zip(amplitudes, amplitudes[1:], strict=False)]
+    assert min(ratios) > 1.0
+    assert ratios == [close(ratios[0], rel=0.01)] * len(ratios)
+    assert page.run("return history.length;") == steps + 1
+    back(page)
+    assert page.value("#field-y0") == "2 µm"
+
+
+def test_arrow_keys_move_a_step_that_is_seen(open_page: Any, surrogate: Surrogate) -> None:
+    page = open_page()
+    page.press("#map", "ARROW_RIGHT", "ARROW_UP")
+    expected = surrogate.evaluate(**{**START, "v0": 0.0105, "y0": 2.1e-6})
+    assert page.number() == page.rounded(expected.mu_macro)
+    page.press("#law", "ARROW_LEFT")
+    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "y0": 2.1e-6}).mu_macro)
+    page.press("#slider-k", "ARROW_RIGHT")
+    assert page.value("#field-k") == "1.05 N/µm"
+
+
+# --- links and copies -----------------------------------------------------------------------------
+
+
+def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> None:
+    page = open_page("#Fz=12.5 N&along=y0&v0=0.01m/s&from=1e-7 m&to=1e-5 m&digits=all")
+    before = [page.text("#mu"), page.find("#law").get_attribute("aria-label")]
+    page.type("#field-mu0", "0.3")
+    again = open_page("#" + page.address(), new=True)
+    assert [again.text("#mu"), again.find("#law").get_attribute("aria-label")] == before
+    expected = surrogate.evaluate(**{**START, "Fz": 12.5})
+    assert float(before[0]) == close(expected.mu_macro, abs=2 * expected.error_bound)
+    shown = [again.value(f"#{field}") for field in ("field-Fz", "along", "field-v0", "from")]
+    assert shown == ["12.5 N", "y0", "0.01m/s", "1e-7 m"]
+    assert not again.find("#notice").is_displayed()
+    bad = open_page("#mu0=-1&k=rigid&bad=1", new=True)
+    assert "bad=1" in bad.text("#notice-text")
+    assert bad.find("#field-mu0").get_attribute("aria-invalid") == "true"
+    bad.click("#notice-close")
+    assert not bad.find("#notice").is_displayed()
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "#y0=2.5 um&k=0.8 N/um",
+        "#contact=ball&direction=along&v0=5 mm/s",
+        "#direction=normal&Fz_amplitude=3 N",
+        "#k=rigid&mu0=25 %",
+        "#k=0.8..1.2 N/um",
+        "#mu0=0.3 ± 0.02&k=1 N/um ± 10 %",
+    ],
+)
+def test_every_copy_of_a_case_gives_the_number_of_the_page(
+    open_page: Any, repository: Path, address: str
+) -> None:
+    page = open_page(f"{address}&digits=all")
+    number = page.number()
+
+    def copied(name: str) -> str:
+        page.click(f"[data-copy={name}]")
+        return str(page.value("#copied"))
+
+    def output(*words: str, text: str | None = None) -> str:
+        done = subprocess.run(
+            words, input=text, cwd=repository, capture_output=True, text=True, check=True
+        )
+        return done.stdout
+
+    python = copied("python").replace("mumacro.open()", "print(mumacro.open()") + ".mu_macro)"
+    assert float(output(sys.executable, "-", text=python)) == close(number, rel=1e-11)
+    words = shlex.split(copied("command"))
+    command = output(sys.executable, "-m", *words, "--json")
+    assert float(re.findall(r'"mu_macro": ([^,\s]+)', command)[0]) == close(number, rel=1e-11)
+    curl = output(*shlex.split(copied("curl")))
+    assert float(re.findall(r'"mu_macro":([^,\s]+)', curl)[0]) == close(number, rel=1e-11)
+    link = open_page("#" + copied("link").partition("#")[2], new=True)
+    assert link.number() == number
+
+
+# --- while there is no answer ---------------------------------------------------------------------
 
 
 def test_every_trouble_of_the_service_has_its_own_message(
@@ -104,47 +267,38 @@ def test_every_trouble_of_the_service_has_its_own_message(
     with open_page.faked("(...all) => (window.reply ?? real)(...all)") as page:
         before = page.number()
         for reply, message, red in (
-            (
-                f"async () => {answer % 503}",
-                "^The service cannot answer now: too many cases. Asking again by its",
-                False,
-            ),
-            (
-                f"async () => {answer % 422}",
-                "^The service refuses this: too many cases. Grey results belong to e",
-                True,
-            ),
+            (f"async () => {answer % 503}", "cannot answer now: too many cases. Asking", False),
+            (f"async () => {answer % 422}", "^too many cases", True),
             (
                 "async () => new Response('<html>', { status: 200 })",
-                "^The response of the service cannot be read .status 200.. Asking again by itself",
+                "cannot be read .status 200.. Asking again by itself",
                 False,
             ),
             (
                 "(...all) => new Promise((done) => (window.late ??= []).push(() => "
                 "done(real(...all))))",
-                "^Waiting for the service. Grey results belong to earlier values.$",
+                "^Waiting for the service",
                 False,
             ),
         ):
-            page.run(f"window.reply = {reply}; document.querySelector('#rigid').click();")
+            page.run(f"window.reply = {reply};")
+            other = "rigid" if page.find("[value=spring]").is_selected() else "spring"
+            page.run(f"document.querySelector('[value={other}]').click();")
             page.wait_for("#status", message)
-            assert (page.is_old(), page.is_red("#status"), page.number()) == (True, red, before)
+            assert (page.is_old("#number"), page.is_red("#status")) == (True, red)
+            assert page.number() == before
         page.run("delete window.reply; window.late.forEach((answer) => answer());")
         page.settle()
         page.run(
-            "window.reply = () => Promise.reject(new TypeError()); "
-            "document.querySelector('#rigid').click();"
+            "window.reply = () => Promise.reject(new TypeError());"
+            "document.querySelector('[value=rigid]').click();"
         )
-        page.wait_for(
-            "#status",
-            "^The service does not answer. Asking again by itself. Grey results belong to earlier",
-        )
+        page.wait_for("#status", "^The service does not answer. Asking again by itself.")
         page.run("delete window.reply; dispatchEvent(new Event('online'));")
         page.settle()
-        assert page.number() == page.rounded(
-            surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro, 6
-        )
-        assert (page.is_old(), page.text("#status")) == (False, "")
+        rigid = surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro
+        assert page.number() == close(rigid, rel=1e-5)
+        assert (page.is_old("#number"), page.text("#status")) == (False, "")
 
 
 def test_the_start_is_calm_while_the_service_is_not_ready(
@@ -156,34 +310,30 @@ def test_the_start_is_calm_while_the_service_is_not_ready(
         "headers: { 'Retry-After': '1' } }))"
     )
     with open_page.faked(unready, wait=False) as page:
-        message = (
-            "^The service cannot answer now: the tables are not loaded yet. Asking again by "
-            "itself.$"
-        )
-        page.wait_for("#status", message)  # no word of earlier values: there are none
+        page.wait_for("#status", "the tables are not loaded yet. Asking again by itself.$")
         assert not page.is_red("#status")
         assert page.text("#law-status") == page.text("#solve-status") == ""
         assert len(page.texts("[aria-invalid=true]")) == 0
-        assert (page.text("#mu"), page.is_old()) == ("…", True)
+        assert page.text("#mu") == "…"
         page.run("window.ready = true;")
         page.settle()
         assert page.text("#status") == ""
         assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
 
 
-def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> None:
-    page = open_page("#Fz=12.5&along=y0&v0=0.01m/s&range=1e-7..1e-5&digits=all")
-    before = [page.text("#mu"), page.find("#law").get_attribute("aria-label")]
-    again = open_page("#" + page.address(), new=True)
-    assert [again.text("#mu"), again.find("#law").get_attribute("aria-label")] == before
-    expected = surrogate.evaluate(**{**START, "Fz": 12.5})
-    assert float(before[0]) == close(expected.mu_macro, abs=2 * expected.error_bound)
-    shown = [again.value(f"#{field}") for field in ("field-Fz", "along", "field-v0", "range")]
-    assert shown == ["12.5 N", "y0", "0.01 m/s", "1e-7..0.00001 m"]
-    assert not again.find("#notice").is_displayed()
-    again.click("#reset")
-    assert again.number() == again.rounded(surrogate.evaluate(**START).mu_macro)
-    bad = open_page("#mu0=-1&k=rigid")
-    assert "mu0 = -1 (must be finite and > 0)" in bad.text("#notice-text")
-    bad.click("#notice-close")
-    assert not bad.find("#notice").is_displayed()
+def test_no_message_moves_the_page(open_page: Any) -> None:
+    page = open_page(width=1280, height=800)
+    places = (
+        "return ['field-v0', 'answer', 'map', 'law', 'side', 'panels'].map((id) =>"
+        " document.getElementById(id).getBoundingClientRect().y + scrollY);"
+    )
+    before = page.run(places)
+    for text in ("5 mm", "", "abc", "1e9", "12"):
+        page.type("#field-Fz", text)
+        assert page.run(places) == before, text
+    for name in ("ball", "along", "spring", "normal", "across", "rigid", "spring"):
+        page.click(f"[type=radio][value={name}]")
+        assert page.run(places) == before, name
+    for address in ("#y0=2", "#k=0.8..1.2 N/um", "#k=1 ± 0.1 N/um", "#digits=all", "#v0=1e300"):
+        page = open_page(address, width=1280, height=800)
+        assert page.run(places) == before, address

@@ -5,11 +5,15 @@ const { format } = globalThis.d3;
 /** What the service says of inputs, contacts and geometries (names.json). */
 export const about = {};
 
+const SMALL = 1e-4; // below, a number is written with a power of ten
+
 /** A number with up to so many digits; "–" where there is none, ∞ where it is infinite. */
 export function show(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
-  return String(Number(value.toPrecision(digits))).replace("e+", "e").replace(/^-/, "−");
+  const number = Number(value.toPrecision(digits));
+  const text = number !== 0 && Math.abs(number) < SMALL ? number.toExponential() : String(number);
+  return text.replace("e+", "e").replace(/^-/, "−");
 }
 
 /** A quantity with the SI prefix that suits it: 13.4 mW. */
@@ -49,8 +53,6 @@ export function inUnit(name, value, unit = unitFor(name, value), digits = 4) {
   const number = Number(toUnit(name, value, unit).toPrecision(digits));
   return unit === "-" ? String(number) : `${number} ${unit}`;
 }
-
-const SMALL = 1e-4; // below, a number is written with a power of ten
 
 /** A friction coefficient with so many digits, trailing zeros kept. */
 export function friction(value, digits) {
