@@ -1,6 +1,7 @@
 """The page in a browser: what is typed, dragged, undone, linked, and what it shows while there is
 no answer."""
 
+import itertools
 import math
 import re
 import shlex
@@ -11,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from mumacro import Surrogate
 from benchmarks.support.browser import START
+from mumacro import Surrogate
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -176,7 +177,7 @@ def test_a_drag_is_one_step_and_the_map_stays_where_it_is(open_page: Any) -> Non
         assert page.text("#map-read").startswith("At the pointer")
     page.drag_ends()
     # each step is the same factor
-    ratios = [b / a for a, b in zip(amplitudes, amplitudes[1:], strict=False)]
+    ratios = [b / a for a, b in itertools.pairwise(amplitudes)]
     assert min(ratios) > 1.0
     assert ratios == [close(ratios[0], rel=0.01)] * len(ratios)
     assert page.run("return history.length;") == steps + 1
