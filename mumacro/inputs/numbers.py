@@ -13,6 +13,7 @@ NUMBER = re.compile(
 _PLAIN = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _WORDS = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 _POWER = re.compile(r" ?[x×*·⋅] ?10\^?([+-]?\d{1,3})", re.ASCII)
+_RAISED = re.compile(r"(?<=10)\^[+-]?\d{1,3}", re.ASCII)
 _TEN = re.compile(r"([+-]?)10\^([+-]?\d{1,3})", re.ASCII)
 # digits in groups of three behind one sign
 _GROUPS = re.compile(r"\d{1,3}([.,' ])\d{3}(?:\1\d{3})*", re.ASCII)
@@ -133,3 +134,20 @@ def _split(digits: str, decimal: str) -> tuple[str, str, str]:
     if decimal:
         return digits.partition(decimal)
     return digits.partition(max(".,", key=digits.rfind))
+
+
+def split_number(text: str) -> tuple[float, str]:
+    """The number at the start of a tidy text, and what follows it; ValueError as
+    :func:`read_number`, also where the text does not begin with a number.
+
+    >>> split_number("1e6N/m"), split_number("2x10^-6 m"), split_number("1 000 N")
+    ((1000000.0, 'N/m'), (2e-06, 'm'), (1000.0, 'N'))
+    """
+    match = NUMBER.match(text)
+    if match is None:
+        raise ValueError("must be a number")
+    end = match.end()
+    more = _POWER.match(text, end) or _RAISED.match(text, end)
+    if more is not None:
+        end = more.end()
+    return read_number(text[:end]), text[end:].strip()
