@@ -13,7 +13,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import LIKE
+from mumacro.inputs.fields import INPUTS, LIKE
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRINGS_OF, kind_of
 from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.surrogate import Surrogate
@@ -39,15 +39,6 @@ _INPUTS = {
     AMPLITUDE: ("amplitude", "ΔFz", ["N", "mN", "kN"], [-3, 5], "5 N", _HALF),
     "f": ("frequency", "f", ["kHz", "Hz", "MHz"], [0, 7], "20 kHz", ""),
     "v0": ("speed", "v₀", ["mm/s", "µm/s", "m/s"], [-7, 2], "10 mm/s", ""),
-}
-_MEANINGS = {
-    "mu0": "Coulomb's coefficient of friction of the contact",
-    "Fz": "normal force",
-    "k": "tangential stiffness of the contact, before it slips",
-    "y0": "amplitude of the oscillation, half of peak to peak",
-    AMPLITUDE: "amplitude of the normal force, half of peak to peak, below Fz",
-    "f": "frequency of the oscillation",
-    "v0": "speed at which the body is dragged",
 }
 # what may be chosen, with its part of the set-up in words; the first is the usual one
 _CHOICES = {
@@ -107,7 +98,7 @@ def names(guide: bool) -> dict[str, Any]:
         name: {
             "label": label,
             "symbol": symbol,
-            "meaning": _MEANINGS[name],
+            "meaning": INPUTS[name].meaning,
             "offered": offered,
             "range": slider,
             "note": note,
@@ -180,5 +171,6 @@ def map_of(
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:
-    """The factor and the divisor of each unit."""
-    return {unit: [scale.times, scale.over] for unit, scale in units.items()}
+    """The factor and the divisor of each unit, also as it is typeset, with µ."""
+    scales = {unit: [scale.times, scale.over] for unit, scale in units.items()}
+    return scales | {unit.replace("u", "µ"): scale for unit, scale in scales.items() if "u" in unit}
