@@ -3,7 +3,7 @@
 import { $ } from "./ask.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
-import { about, inUnit, prose, typeset } from "./words.js";
+import { about, inPrint, inUnit, prose, typeset } from "./words.js";
 
 const STEPS = 100; // of a slider, a decade
 
@@ -45,7 +45,7 @@ function understood(name, { text, value, unit, std, low, high } = {}) {
 export function withUnit(name, text, answer) {
   const unit = answer?.inputs[name]?.unit;
   const bare = text.trim() && !/[^\d\s.,e+±%-]/i.test(text) && /\d\s*$/.test(text.trim());
-  return bare && unit && unit !== "-" && /[^-\d]/.test(unit) ? `${text.trim()} ${unit}` : text;
+  return bare && unit && unit !== "-" && /[^-\d]/.test(unit) ? `${text.trim()} ${inPrint(unit)}` : text;
 }
 
 /** `moved({ name: value [SI] })` takes the value of a slider. */

@@ -4,7 +4,7 @@ import { textAt } from "./map.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseOf, inputsOf } from "./state.js";
-import { about, inUnit, inWords, show, toSI, toUnit, unitFor } from "./words.js";
+import { about, inPrint, inUnit, inWords, show, toSI, toUnit, unitFor } from "./words.js";
 const { area, bisectCenter } = globalThis.d3;
 
 const POINTS = 241;
@@ -56,7 +56,7 @@ export function lawPanel(store, moved) {
   /** The unit of the axis: that of the input as it was typed. */
   const unit = () => answer?.inputs[along()]?.unit || unitFor(along(), law?.values.at(-1) ?? 1);
   const text = (value) => `${about.inputs[along()].symbol} = ${inUnit(along(), value, unit())}`;
-  const heading = () => `${about.inputs[along()].symbol}${unit() === "-" ? "" : ` [${unit()}]`}`;
+  const heading = () => `${about.inputs[along()].symbol}${unit() === "-" ? "" : ` [${inPrint(unit())}]`}`;
   const channel = new Channel(
     (question) => post("v1/law", question),
     (reply, { scale }) => {

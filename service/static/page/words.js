@@ -48,10 +48,13 @@ export const toSI = (name, number, unit) => {
   return (number * times) / over;
 };
 
+/** A unit with µ, for which the service writes u: N/µm. */
+export const inPrint = (unit) => unit.replace(/\bu(?=[A-Za-z])/, "µ");
+
 /** A value of an input [SI] as text in a unit, as a person types it: "2 µm". */
 export function inUnit(name, value, unit = unitFor(name, value), digits = 4) {
   const number = Number(toUnit(name, value, unit).toPrecision(digits));
-  return unit === "-" ? String(number) : `${number} ${unit}`;
+  return unit === "-" ? String(number) : `${number} ${inPrint(unit)}`;
 }
 
 /** A friction coefficient with so many digits, trailing zeros kept. */
