@@ -23,7 +23,8 @@ from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import check, without_interval
 from mumacro.inputs.fields import LIKE, NAMES, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
-from mumacro.inputs.text_tables import SEPARATORS
+from mumacro.inputs.signs import THOUSANDS
+from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import read_number, read_range, scale_of, suggestion
 from mumacro.surrogate import Surrogate
 
@@ -129,13 +130,32 @@ def add_table(parser: OneLineParser) -> None:
     add_form(parser)
 
 
-def add_format(parser: OneLineParser) -> None:
-    """The options for the form of CSV."""
+def add_format(parser: argparse.ArgumentParser) -> None:
+    """The options for the form of a table as text; :func:`dialect_in` reads them."""
+    for name, choices, text in (
+        ("sep", SEPARATORS, "between the cells"),
+        ("decimal", (".", ","), "in its numbers"),
+        ("thousands", THOUSANDS, "between the thousands of its numbers"),
+    ):
+        parser.add_argument(f"--{name}", choices=choices, help=f"{text}; default: as the table has")
     parser.add_argument(
-        "--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,"
+        "--encoding", help="of its bytes, as utf-8, utf-16, windows-1252; default: found out"
     )
     parser.add_argument(
-        "--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: ."
+        "--skip", type=int, default=0, metavar="N", help="leave out the first N lines"
+    )
+
+
+def dialect_in(chosen: argparse.Namespace) -> Dialect:
+    """How a table as text is written, as far as the options say."""
+    if chosen.skip < 0:
+        raise UsageError(f"--skip {chosen.skip}: a number of lines, 0 or more")
+    return Dialect(
+        None if chosen.sep is None else SEPARATORS[chosen.sep],
+        chosen.decimal,
+        None if chosen.thousands is None else THOUSANDS[chosen.thousands],
+        chosen.encoding,
+        chosen.skip,
     )
 
 

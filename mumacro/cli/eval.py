@@ -9,10 +9,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from mumacro.cli.common import OneLineParser, add_format, add_kind, open_table
+from mumacro.cli.common import OneLineParser, add_format, add_kind, dialect_in, open_table
 from mumacro.files.reading import find_files
 from mumacro.files.run import evaluate_files
-from mumacro.inputs.text_tables import SEPARATORS
 
 _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
@@ -20,13 +19,15 @@ columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [u
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
   for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N];
   amplitudes are half of peak to peak
-  other columns are copied; those of CSV and NDJSON stay text
+  other columns are copied; those of text and NDJSON stay text
+tables as text: the head is the first line that names these columns; a row of units may follow it;
+  encoding, separator, decimal and thousands signs are found out, the options below win
 added: mu_macro, mu_ratio, regime, error_bound, source; with k_low, k_high mu_macro_low and _high
-rejected rows are in OUT.rejects.csv only: row (from 1), field, value, reason
+rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 
 examples:
   mumacro eval cases.parquet -o out.parquet
-  mumacro eval german.csv -o out.csv --sep ';' --decimal ,
+  mumacro eval rig.txt -o out.csv --decimal ,
   mumacro eval - -o - < cases.csv > out.csv
 
 A stopped run goes on when the same command is given again; the output has the same bytes.
@@ -42,7 +43,8 @@ def _spooled(folder: Path) -> Path:
         shutil.copyfileobj(sys.stdin.buffer, stream, 2**20)
         stream.seek(0)
         begin = stream.read(4)
-    kind = ".parquet" if begin == b"PAR1" else ".ndjson" if begin.lstrip()[:1] == b"{" else ".csv"
+    endings = {b"PAR1": ".parquet", b"PK\x03\x04": ".xlsx"}
+    kind = endings.get(begin, ".ndjson" if begin.lstrip()[:1] == b"{" else ".csv")
     return path.rename(f"{path}{kind}" + ".gz" * (begin[:2] == b"\x1f\x8b"))
 
 
@@ -51,8 +53,8 @@ def main(words: Sequence[str]) -> int:
     :func:`mumacro.cli.common.run`."""
     parser = OneLineParser(
         prog="mumacro eval",
-        description="Evaluate every case of Parquet, CSV or NDJSON files (text also compressed, "
-        ".gz).",
+        description="Evaluate every case of files: Parquet, NDJSON, tables as text (.csv, .tsv, "
+        ".txt and others; also compressed, .gz), the first sheet of .xlsx.",
         epilog=_COLUMNS,
     )
     parser.add_argument(
@@ -88,7 +90,7 @@ def main(words: Sequence[str]) -> int:
     surrogate = open_table(chosen.table)
     options = {
         name: getattr(chosen, name)
-        for name in ("rigid", "include", "decimal", "contact", "direction", "force")
+        for name in ("rigid", "include", "contact", "direction", "force")
     }
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     bars = (
@@ -116,7 +118,7 @@ def main(words: Sequence[str]) -> int:
                     cases,
                     out,
                     surrogate,
-                    sep=SEPARATORS[chosen.sep],
+                    dialect=dialect_in(chosen),
                     progress=progress,
                     say=lambda text: console.print(f"mumacro eval: {text}"),
                     **options,

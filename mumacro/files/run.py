@@ -24,15 +24,17 @@ import numpy as np
 import pyarrow as pa
 
 from mumacro.files import reading
+from mumacro.files.errors import FilesError
 from mumacro.files.record_batch import (
     REJECTS,
-    FilesError,
     added_fields,
     answer_columns,
     find_columns,
+    wanted_columns,
 )
-from mumacro.files.writing import Output, csv_lines
+from mumacro.files.writing import Output, csv_lines, written_as
 from mumacro.inputs.kind import Kind, kind_of
+from mumacro.inputs.text_tables import Dialect
 from mumacro.surrogate import Surrogate
 from mumacro.table.atomic import alone_in, put, write_whole
 from mumacro.version import __version__
@@ -58,8 +60,7 @@ def evaluate_files(
     *,
     rigid: bool = False,
     include: Sequence[str] = (),
-    sep: str = ",",
-    decimal: str = ".",
+    dialect: Dialect = Dialect(),  # noqa: B008
     contact: str = "spring",
     direction: str = "across",
     force: bool = False,
@@ -78,13 +79,14 @@ def evaluate_files(
     surrogate : Surrogate
     rigid, include, contact, direction
         As in :func:`mumacro.files.answer`.
-    sep, decimal : str
-        Between the cells of CSV, and within its numbers, read and written.
+    dialect : mumacro.inputs.text_tables.Dialect
+        How tables as text are written, as far as it is known; the rest is found in the files.  A
+        separator and a decimal sign hold for an output as text, too.
     force : bool
         Replace an output that exists, and delete the parts of another run.
     progress, say : callable
-        Called with the finished share, rows read and rejected; with one line about
-        what a resumed run keeps.
+        Called with the finished share, rows read and rejected; with one line about how a table
+        as text is read, which files of a folder are left out, what a resumed run keeps.
 
     Raises
     ------
@@ -104,9 +106,8 @@ def evaluate_files(
     1
     """
     try:
-        run = _Run(
-            cases, Path(out), surrogate, rigid, include, sep, decimal, kind_of(contact, direction)
-        )
+        kind = kind_of(contact, direction)
+        run = _Run(cases, Path(out), surrogate, rigid, include, dialect, kind, say)
         return run.go(force, progress, say)
     except (
         pa.ArrowException
@@ -133,15 +134,11 @@ class _Run:
         surrogate: Surrogate,
         rigid: bool,
         include: Sequence[str],
-        sep: str,
-        decimal: str,
+        dialect: Dialect,
         kind: Kind,
+        say: Callable[[str], None],
     ) -> None:
-        if sep == decimal:
-            raise FilesError(
-                f"--sep and --decimal are both {sep!r}; give another --sep, such as ';'"
-            )
-        self.files, input_format = reading.find_files(cases)
+        self.files, input_format = reading.find_files(cases, say)
         output_format, compressed = reading.format_of(out)
         if not output_format or out.is_dir():
             raise FilesError(f"{out}: must be the name of a file that ends in {reading.ENDINGS}")
@@ -157,26 +154,28 @@ class _Run:
                 )
         self.checksums = [_checksum(path) for path in self.files]
         self.verbatim = input_format == output_format != "parquet"
-        self.source: reading.ParquetSource | reading.TextSource
+        self.source: reading.ParquetSource | reading.TextSource | reading.NdjsonSource
         if input_format == "parquet":
             folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
             self.source = reading.ParquetSource(self.files, folder)
+        elif input_format == "ndjson":
+            self.source = reading.NdjsonSource(self.files, self.verbatim)
         else:
             self.source = reading.TextSource(
-                self.files, sep if input_format == "csv" else "", decimal, self.verbatim
+                self.files, dialect, wanted_columns(rigid), self.verbatim
             )
+            self.source.describe(say)
         headings, names = find_columns(
             self.source.schema.names, rigid, include, kind, f"{self.files[0]}: "
         )
-        self.evaluation = (
-            surrogate,
-            headings,
-            names,
-            kind,
-            decimal if input_format == "csv" else ".",
+        self.evaluation = (surrogate, headings, names, kind)
+        sep, decimal = written_as(
+            reading.ending_of(out), self.source.sep, self.source.decimal, dialect
         )
         input_headings = [heading for heading, _ in headings.values()]
         self.output = Output(output_format, compressed, sep, decimal, headings.get("k", (None,))[0])
+        if isinstance(self.source, reading.TextSource):
+            self.source.write_with(sep)
         input_fields = [
             field.with_type(pa.float64())
             if field.name in input_headings and input_format != "parquet"
@@ -305,17 +304,21 @@ class _Run:
         """The pieces that follow a state, with the share of the input that is read; at the
         beginning the head comes first."""
         if state is None:
-            headings = csv_lines(
-                [[*(self.source.head if self.verbatim else ()), *self.schema.names]],
-                self.output.sep,
-            )
-            state = _State(rejects=csv_lines([["file"] * (len(self.files) > 1) + REJECTS.names]))
-            yield state, self.output.pack(headings) if self.output.format == "csv" else b"", 0.0
+            copied = self.source.head if self.verbatim else ()
+            headings = csv_lines([[*copied, *self.schema.names]], self.output.sep)
+            state = _State(rejects=csv_lines([self._rejects_head()]))
+            mark = "\ufeff" * (self.verbatim and self.source.has_mark)
+            text = self.output.pack(mark + headings) if self.output.format == "text" else b""
+            yield state, text, 0.0
         for file in range(state.file, len(self.files)):
+            done = state.at if file == state.file else 0
             state = state if file == state.file else state._replace(file=file, at=0)
-            for block in self.source.blocks(file, state.at, self.columns_read):
-                state, text = self._piece(state, block)
-                yield state, text, (file + block.share) / len(self.files)
+            row = 0
+            for block in self.source.blocks(file, self.columns_read):
+                row += len(block.batch)
+                if row > done:
+                    state, piece = self._piece(state, block)
+                    yield state, piece, (file + block.share) / len(self.files)
         self._refuse_changed()
 
     def _refuse_changed(self) -> None:
@@ -325,9 +328,13 @@ class _Run:
                     f"{path}: changed while it was read; give the command again"
                 ) from None
 
+    def _rejects_head(self) -> list[str]:
+        where = REJECTS.names[0] if isinstance(self.source, reading.ParquetSource) else "line"
+        return [*["file"] * (len(self.files) > 1), where, *REJECTS.names[1:]]
+
     def _piece(self, state: _State, block: reading.Block) -> tuple[_State, bytes]:
         """A block as it stands in the output, and the state after it."""
-        added, rejects, columns_in = answer_columns(block.batch, *self.evaluation)
+        added, rejects, columns_in = answer_columns(block.batch, *self.evaluation, block.signs)
         faults = {row: reason for row, *reason in rejects}
         faults |= {i: [None, text, reason] for i, text, reason in block.unreadable}
         columns = [
@@ -345,7 +352,9 @@ class _Run:
             accepted[[*faults]] = False
             batch, texts = batch.filter(pa.array(accepted)), [*compress(texts, accepted)]
         file = [self.files[state.file]] * (len(self.files) > 1)
-        reject_lines = csv_lines([*file, state.at + i + 1, *reason] for i, reason in faults.items())
+        reject_lines = csv_lines(
+            [*file, block.lines[i], *reason] for i, reason in faults.items()
+        )
         n, rejected = len(block.batch), state.rejected + len(faults)
         text = self.output.piece(batch, texts if self.verbatim else None)
         return _State(state.file, state.at + n, state.rows + n, rejected, reject_lines), text
