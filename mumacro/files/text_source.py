@@ -93,13 +93,15 @@ class TextTable:
         """Find the decimal sign in the first rows that tell it."""
         places, _ = find_heads(self.layout.heads, self.wanted.like)
         rows = islice(records(lines, self.layout, self.wanted), _LOOKED_AT)
-        while not self.signs.decimal and (some := [*islice(rows, _AT_ONCE)]):
+        while some := [*islice(rows, _AT_ONCE)]:
             self.signs.see(
                 Cell(row.line, name, row.cells[i])
                 for row in some
                 if row.fault is None
                 for name, (i, _) in places.items()
             )
+            if self.signs.decimal:
+                break
 
     def _find_signs_in(self, block: Block) -> None:
         """Find the decimal sign in a block, where all numbers before it have none."""

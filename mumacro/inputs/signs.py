@@ -66,15 +66,14 @@ class Signs:
             both = f"{dashes}decimal and {dashes}thousands"
             raise TextError(f"{both} are both {thousands!r}; give one of them")
         self._sep, self._dashes = sep, dashes
+        self.grouped = ""  #: the sign between thousands, once a number has shown it
         self._cells: dict[tuple[Decimal, bool], Cell] = {}
 
     def see(self, cells: Iterable[Cell]) -> None:
-        """Look at numbers until it is known what their signs are.
+        """Look at numbers, to know what their signs are.
 
         TextError where they contradict each other, or may be read in two ways.
         """
-        if self.decimal:
-            return
         seen = self._cells
         for cell in cells:
             if "." in cell.text or "," in cell.text:
@@ -83,12 +82,16 @@ class Signs:
                 sure = sure or self.thousands is not None or (sign, self._sep) == (".", ",")
                 if sign:
                     seen.setdefault((sign, sure), cell)
-        surely = [sign for sign in (".", ",") if (sign, True) in seen]
-        if len(surely) == 2:
-            raise self._contradiction(seen[".", True], seen[",", True])
-        if not surely and seen:
-            raise self._ambiguity(*seen.values())
-        self.decimal = surely[0] if surely else ""
+        if not self.decimal:
+            surely = [sign for sign in (".", ",") if (sign, True) in seen]
+            if len(surely) == 2:
+                raise self._contradiction(seen[".", True], seen[",", True])
+            if not surely and seen:
+                raise self._ambiguity(*seen.values())
+            self.decimal = surely[0] if surely else ""
+        other: Decimal = "," if self.decimal == "." else "."
+        if self.decimal and (other, False) in seen:
+            self.grouped = other
 
     def _contradiction(self, point: Cell, comma: Cell) -> TextError:
         first, second = sorted((point, comma))

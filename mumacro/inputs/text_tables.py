@@ -32,6 +32,7 @@ BLANKS = " "  #: the separator where any number of blanks stands between the cel
 #: separators of the cells, by the name that an option has
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}
 _WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
+_WORDS_OF_SIGNS = {".": "point", ",": "comma"}
 _COMMENT = ("#", "%", "//", "!")  # what begins a comment
 _LOOKED_AT = 2_000  # lines, in which the head must stand
 _MOST_COLUMNS = 200_000
@@ -102,6 +103,7 @@ class Layout(NamedTuple):
         words = [] if self.encoding in ("", "utf-8") else [NAMES.get(self.encoding, self.encoding)]
         words += [_WORDS.get(self.sep, repr(self.sep))] if self.sep != "," else []
         words += ["decimal comma"] if signs.decimal == "," else []
+        words += [f"{_WORDS_OF_SIGNS[signs.grouped]} between thousands"] if signs.grouped else []
         words += [f"head in line {self.head}"] if self.head > 1 else []
         words += [f"units in line {self.units}"] if self.units else []
         return ", ".join(words)

@@ -45,27 +45,71 @@ async def post_stiffness(contact: StiffnessRequest) -> Response:
 
 @router.post(
     "/fit",
-    responses={200: {"model": FitAnswer}, **POST_PROBLEMS, **problems(501)},
+    responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS, **problems(501)},
     summary="k and mu0 from measured points",
 )
 async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Response:
     """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word
     rigid."""
-    columns, table = measured.points, tables.pick(measured.tolerance)
-    return await work.question(lambda: Json(_fitted(table, measured, columns)))
+    columns, source, table = measured.columns, measured.table, tables.pick(measured.tolerance)
+
+    def answer() -> Response:
+        points = None if source is None else _points(*source, measured)
+        if points is not None and measured.read_only:
+            return Json(_as_read(points))
+        return Json(_fitted(table, measured, columns, points))
+
+    return await work.question(answer)
 
 
-def _fitted(table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]) -> dict[str, Any]:
+def _points(member: str, data: bytes, measured: FitRequest) -> Table:
+    """The points of a table; a request has what is wrong with its lines at ``member``."""
+    try:
+        return read_points(data, measured.dialect, MAX_POINTS)
+    except TextError as error:
+        faults = error.faults or [str(error)]
+        refuse([FieldFault.of(member, fault) for fault in faults[:_FAULTS]])
+
+
+def _as_read(points: Table) -> dict[str, Any]:
+    return {
+        "columns": {name: points.scales[name].of(x) for name, x in points.columns.items()},
+        "units": points.units,
+        "lines": points.lines,
+        "skipped_lines": points.skipped,
+        "read_as": points.read_as,
+        "api_version": API_VERSION,
+    }
+
+
+def _fitted(
+    table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any], points: Table | None
+) -> dict[str, Any]:
     words: Any = measured.kind.names
+    unknowns: Sequence[str] = measured.unknowns
+    if points is not None:
+        if both := sorted(columns.keys() & points.columns.keys()):
+            raise InputError(both[0], None, "given once: it is a column of the points")
+        columns = {**points.columns, **columns}
+        if "unknowns" not in measured.model_fields_set:
+            unknowns = unknowns_beside(columns)
     try:
         with warnings.catch_warnings():  # they are in the answer
             warnings.simplefilter("ignore")
-            fit = mumacro.fit(columns, measured.unknowns, surrogate=table.surrogate, **words)
+            fit = mumacro.fit(columns, unknowns, surrogate=table.surrogate, **words)
     except ModuleNotFoundError as error:
         raise RequestError(ProblemKind.NOT_INSTALLED, missing("fit", error)) from None
+    except InputError as error:
+        if points is None or error.index is None:
+            raise
+        reason = f"line {points.lines[error.index]}: {error.field} must be {error.bound}"
+        refuse([FieldFault.of("points", reason, error.value)])
     members = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
+    if points is not None:
+        members |= {"read_as": points.read_as, "skipped_lines": points.skipped}
     return {
         **members,
+        "points": dict(fit.points) if points is not None else None,
         "values": _in_words(fit.values),
         "interval": {
             name: [_in_words({name: end})[name] for end in ends]
