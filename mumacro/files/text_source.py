@@ -64,7 +64,6 @@ class TextTable:
 
     def __init__(self, path: Path, wanted: Wanted, dialect: Dialect) -> None:
         self.path, self.wanted, self.dialect = path, wanted, dialect
-        self.skipped = 0  # comments, and repetitions of the head
         try:
             pieces, self.dialect = source_of(path, dialect)
             text = Text(pieces, self.dialect.encoding)
@@ -147,7 +146,6 @@ class TextTable:
         doubtful = {"", " ", "\t", sep, *(mark[0] for mark in layout.comment)}
         if any(line[:1] in doubtful for line in lines):
             kept = [i for i, x in enumerate(lines) if x[:1] not in doubtful or is_row(x, layout)]
-            self.skipped += sum(1 for line in lines if line.strip()) - len(kept)
             lines, numbers = [lines[i] for i in kept], [numbers[i] for i in kept]
         if not lines:
             return Block(pa.RecordBatch.from_pylist([], self._schema(names)), 0.0, [])
@@ -175,11 +173,7 @@ class TextTable:
     def _by_row(self, piece: Piece, text: Text, names: Sequence[str], texts: str) -> Block:
         """A block whose rows are read one by one; the last may go on in the next piece."""
         lines, rows, width = _Lines(piece, text), list[Record](), len(self.layout.heads)
-
-        def skip(_line: int) -> None:
-            self.skipped += 1
-
-        for row in records(lines, self.layout, self.wanted, skip):
+        for row in records(lines, self.layout, self.wanted):
             rows.append(row)
             if lines.at_end:
                 break

@@ -100,7 +100,7 @@ class Layout(NamedTuple):
         >>> layout.described(signs)
         'semicolon, decimal comma, head in line 2, units in line 3'
         """
-        words = [] if self.encoding in ("", "utf-8") else [NAMES.get(self.encoding, self.encoding)]
+        words = [] if self.encoding in ("", "utf-8", "utf-8-sig") else [NAMES.get(self.encoding, self.encoding)]
         words += [_WORDS.get(self.sep, repr(self.sep))] if self.sep != "," else []
         words += ["decimal comma"] if signs.decimal == "," else []
         words += [f"{_WORDS_OF_SIGNS[signs.grouped]} between thousands"] if signs.grouped else []
@@ -379,7 +379,7 @@ def records(
     sep, width = layout.sep, len(layout.heads)
     for line, text in lines:
         if not is_row(text, layout):
-            if text.strip():
+            if text.strip(f" \t{sep}"):
                 skip(line)
             continue
         if may_be_head(text, layout, wanted) and _repeats_head(line, text, layout, wanted):
@@ -446,7 +446,7 @@ def _regular(record: Record, layout: Layout) -> Record:
 
 
 def _irregular(count: int, width: int) -> str:
-    return f"has {count:,} cells, the head has {width:,}"
+    return f"has {count:,} cell{'s' * (count != 1)}, the head has {width:,}"
 
 
 # --- its numbers ----------------------------------------------------------------------------------
@@ -490,9 +490,16 @@ class Table(NamedTuple):
 
     columns: dict[str, Array]  #: by name, in SI, (n,)
     units: dict[str, str]  #: of each column in the table; the SI unit where it has none
+    scales: dict[str, Scale]  #: of these units
     lines: list[int]  #: of each row
     skipped: list[int]  #: lines that are neither head nor units nor rows, and not empty
     read_as: str  #: what was found out, see :meth:`Layout.described`
+
+    @property
+    def in_own_units(self) -> dict[str, Array]:
+        """The columns in their units."""
+        scales = self.scales
+        return {name: x * scales[name].over / scales[name].times for name, x in self.columns.items()}
 
 
 def source_of(
@@ -569,7 +576,9 @@ def read_table(
         name: split_unit(layout.heads[i])[1] or unit_in_si(name)
         for name, (i, _) in columns.items()
     }
-    return Table(numbers, units, [row.line for row in rows], skipped, layout.described(signs))
+    scales = {name: scale for name, (_, scale) in columns.items()}
+    lines_of_rows = [row.line for row in whole]
+    return Table(numbers, units, scales, lines_of_rows, skipped, layout.described(signs))
 
 
 def _one_number(name: str, cell: str, signs: Signs, scale: Scale) -> float:

@@ -3,7 +3,7 @@ points."""
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,22 +12,25 @@ from fastapi import Response
 
 import mumacro
 from mumacro.analysis.fit import Fit, quantile
-from mumacro.analysis.measured_points import STD
+from mumacro.analysis.measured_points import STD, read_points, unknowns_beside
 from mumacro.contacts.geometries import contact_of
-from mumacro.errors import missing
+from mumacro.errors import InputError, missing
+from mumacro.inputs.decoding import TextError
 from mumacro.inputs.fields import RIGID
+from mumacro.inputs.text_tables import Table
 
 from .. import API_VERSION
 from ..limits import Working
-from ..models.answers import FitAnswer, StiffnessAnswer
-from ..models.questions import FitRequest, StiffnessRequest
-from ..problems import ProblemKind, RequestError
+from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
+from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
+from ..problems import FieldFault, ProblemKind, RequestError, refuse
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
 from . import POST_PROBLEMS, problems, router_of
 
 router = router_of("answers", StrictRoute)
 _CURVE = 200  # points of the fitted law
+_FAULTS = 100  # lines of a table that an answer names
 _MEASURED = ("mu_macro", STD)
 
 
@@ -73,7 +76,7 @@ def _points(member: str, data: bytes, measured: FitRequest) -> Table:
 
 def _as_read(points: Table) -> dict[str, Any]:
     return {
-        "columns": {name: points.scales[name].of(x) for name, x in points.columns.items()},
+        "columns": points.in_own_units,
         "units": points.units,
         "lines": points.lines,
         "skipped_lines": points.skipped,
@@ -106,10 +109,10 @@ def _fitted(
         refuse([FieldFault.of("points", reason, error.value)])
     members = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
     if points is not None:
-        members |= {"read_as": points.read_as, "skipped_lines": points.skipped}
+        members |= {"points": fit.points, "read_as": points.read_as}
+        members["skipped_lines"] = points.skipped
     return {
         **members,
-        "points": dict(fit.points) if points is not None else None,
         "values": _in_words(fit.values),
         "interval": {
             name: [_in_words({name: end})[name] for end in ends]
