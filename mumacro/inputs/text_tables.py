@@ -160,9 +160,17 @@ def find_layout(start: Piece, wanted: Wanted, dialect: Dialect, encoding: str = 
         label_line = _split(lines[declared.units], head.sep)
         heads = _with_units(heads, ["", *label_line[1:]], wanted, number + declared.units) or heads
         units = number + declared.units
-    at = next((i for i in range(head.end, len(lines)) if lines[i].strip()), None)
     commented = lines[head.at].lstrip("\ufeff ").startswith(_COMMENT)
-    if at is not None and (commented or not lines[at].lstrip().startswith(_COMMENT)):
+    at = next(
+        (
+            i
+            for i in range(head.end, len(lines))
+            if lines[i].strip(f" \t{head.sep}")
+            and (commented or not lines[i].lstrip().startswith(_COMMENT))
+        ),
+        None,
+    )
+    if at is not None:
         unit_cells = _split(_uncommented(lines[at]) if commented else lines[at], head.sep)
         if with_units := _with_units(heads, unit_cells, wanted, number + at):
             heads, first, units = with_units, at + 1, number + at
