@@ -36,7 +36,7 @@ def evidence(cell: str) -> tuple[Decimal, bool]:
     match = _DIGITS.match(cell.partition("..")[0])
     assert match is not None
     digits = match[1] + (match[2] or "")
-    if not digits.strip(".,"):
+    if not digits.strip(".,") or cell.startswith("#", match.end()):  # 1.#QNAN
         return "", False
     sign: Decimal = "." if digits.rfind(".") > digits.rfind(",") else ","
     other: Decimal = "," if sign == "." else "."

@@ -171,8 +171,10 @@ def find_layout(start: Piece, wanted: Wanted, dialect: Dialect, encoding: str = 
         None,
     )
     if at is not None:
-        unit_cells = _split(_uncommented(lines[at]) if commented else lines[at], head.sep)
-        if with_units := _with_units(heads, unit_cells, wanted, number + at):
+        is_comment = lines[at].lstrip().startswith(_COMMENT)
+        unit_cells = _split(_uncommented(lines[at]) if is_comment else lines[at], head.sep)
+        with_units = _with_units(heads, unit_cells, wanted, number + at, is_comment)
+        if with_units:
             heads, first, units = with_units, at + 1, number + at
     layout = Layout(
         head.sep,
@@ -309,11 +311,16 @@ def _is_number(cell: str) -> bool:
 
 
 def _with_units(
-    heads: Sequence[str], cells: Sequence[str], wanted: Wanted, line: int
+    heads: Sequence[str],
+    cells: Sequence[str],
+    wanted: Wanted,
+    line: int,
+    may_be_prose: bool = False,
 ) -> list[str] | None:
     """The heads with the units in the row below them; None where that is no row of units.
 
-    A row without any number is one: TextError where an input has none of its units there.
+    A row without any number is one, unless it ``may_be_prose``: TextError where an input has none
+    of its units there.
     """
     names = [split_unit(head) for head in heads]
     texts = [cell.strip(" []()") for cell in cells[: len(heads)]] + [""] * (len(heads) - len(cells))
@@ -325,6 +332,8 @@ def _with_units(
         return None
     is_empty = any(texts[i].lower() in GAPS or is_rigid(texts[i]) for i in known)
     if not known or not units and (numbers or is_empty):
+        return None
+    if may_be_prose and len(units) < len(known):
         return None
     for i in known:
         name, own = names[i]
