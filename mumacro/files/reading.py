@@ -131,7 +131,7 @@ class ParquetSource:
             for batch in part.to_batches(self.schema, columns=names, **options):
                 numbers = range(row + 1, row + 1 + len(batch))
                 row += len(batch)
-                yield Block(batch, row / part.metadata.num_rows, numbers)
+                yield Block(batch, row / max(part.metadata.num_rows, 1), numbers)
         except (pa.ArrowException, OSError) as error:
             raise FilesError(f"{part.path}: damaged after row {row} ({error})") from None
 
@@ -166,6 +166,11 @@ class TextSource:
         """Whether the first file has a mark of byte order, or needs one as UTF-8, so that Excel
         reads its signs."""
         return self.tables[0].layout.encoding != "utf-8"
+
+    @property
+    def where(self) -> str:
+        """The place of the head, for messages."""
+        return f"{self.tables[0].path}: line {self.tables[0].layout.head}: "
 
     def describe(self, say: Callable[[str], None]) -> None:
         """Say how the files are read, where they are no plain CSV: once where all are alike."""
@@ -219,7 +224,8 @@ class NdjsonSource:
             objects, faults = zip(*map(_object, texts), strict=True)
             new = {name for record in objects for name in record} - {*self.schema.names}
             if new and not self.verbatim:
-                where = f"{path}: lines {numbers[0]} to {numbers[-1]}"
+                first = next(i for i, x in zip(numbers, objects, strict=True) if new & x.keys())
+                where = f"{path}: line {first}"
                 remedy = "name it in the first, or write NDJSON"
                 raise FilesError(f"{where}: {min(new)!r} is in no earlier line; {remedy}")
             columns = [pa.array([_text(x.get(name)) for x in objects], pa.string()) for name in names]

@@ -258,7 +258,7 @@ def numbers(
     with np.errstate(over="ignore"):
         si: Array = values if scale == Scale() else values * scale.times / scale.over
     beyond = np.isinf(si) & np.isfinite(values)  # a large stiffness is not a rigid contact
-    si[beyond] = math.nan
+    si = np.where(beyond, math.nan, si) if beyond.any() else si
     return values, si, dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)
 
 

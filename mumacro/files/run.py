@@ -155,6 +155,7 @@ class _Run:
         self.checksums = [_checksum(path) for path in self.files]
         self.verbatim = input_format == output_format != "parquet"
         self.source: reading.ParquetSource | reading.TextSource | reading.NdjsonSource
+        where = f"{self.files[0]}: "
         if input_format == "parquet":
             folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
             self.source = reading.ParquetSource(self.files, folder)
@@ -164,10 +165,8 @@ class _Run:
             self.source = reading.TextSource(
                 self.files, dialect, wanted_columns(rigid), self.verbatim
             )
-            self.source.describe(say)
-        headings, names = find_columns(
-            self.source.schema.names, rigid, include, kind, f"{self.files[0]}: "
-        )
+            where = self.source.where
+        headings, names = find_columns(self.source.schema.names, rigid, include, kind, where)
         self.evaluation = (surrogate, headings, names, kind)
         sep, decimal = written_as(
             reading.ending_of(out), self.source.sep, self.source.decimal, dialect
@@ -176,6 +175,7 @@ class _Run:
         self.output = Output(output_format, compressed, sep, decimal, headings.get("k", (None,))[0])
         if isinstance(self.source, reading.TextSource):
             self.source.write_with(sep)
+            self.source.describe(say)
         input_fields = [
             field.with_type(pa.float64())
             if field.name in input_headings and input_format != "parquet"
