@@ -136,16 +136,13 @@ def add_format(parser: argparse.ArgumentParser) -> None:
     """The options for the form of a table as text; :func:`dialect_in` reads them."""
     for name, choices, text in (
         ("sep", SEPARATORS, "between the cells"),
-        ("decimal", (".", ","), "in its numbers"),
-        ("thousands", THOUSANDS, "between the thousands of its numbers"),
+        ("decimal", (".", ","), "in numbers"),
+        ("thousands", THOUSANDS, "between thousands"),
     ):
-        parser.add_argument(f"--{name}", choices=choices, help=f"{text}; default: as the table has")
-    parser.add_argument(
-        "--encoding", help="of its bytes, as utf-8, utf-16, windows-1252; default: found out"
-    )
-    parser.add_argument(
-        "--skip", type=int, default=0, metavar="N", help="leave out the first N lines"
-    )
+        words = f"{text}: {' '.join(choices)}; default: as the table has"
+        parser.add_argument(f"--{name}", choices=choices, metavar="SIGN", help=words)
+    parser.add_argument("--encoding", metavar="NAME", help="such as utf-16; default: found out")
+    parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out N lines")
 
 
 def dialect_in(chosen: argparse.Namespace) -> Dialect:

@@ -18,21 +18,16 @@ columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [u
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
   for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N];
-  amplitudes are half of peak to peak
-  other columns are copied; those of text and NDJSON stay text
-tables as text: the head is the first line that names these columns; a row of units may follow it;
-  encoding, separator, decimal and thousands signs are found out, the options below win
+  amplitudes are half of peak to peak; other columns are copied, text as text
+in text the head is the first line that has these names; a row of units may stand below it
 added: mu_macro, mu_ratio, regime, error_bound, source; with k_low, k_high mu_macro_low and _high
 rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 
 examples:
-  mumacro eval cases.parquet -o out.parquet
   mumacro eval rig.txt -o out.csv --decimal ,
   mumacro eval - -o - < cases.csv > out.csv
-
 A stopped run goes on when the same command is given again; the output has the same bytes.
-exit codes: 0 every row evaluated, 3 some rows rejected, 1 could not run, 2 wrong arguments,
-  130 interrupted
+exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments, 130 interrupted
 """
 
 

@@ -126,4 +126,3 @@ def _text(result: Fit, shown: int | None) -> str:
         values = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in result.values)
         rows.append((f"solution {i}", values))
     return "\n".join([in_columns(rows), *(f"warning: {text}" for text in result.warnings)])
-

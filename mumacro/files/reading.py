@@ -228,7 +228,9 @@ class NdjsonSource:
                 where = f"{path}: line {first}"
                 remedy = "name it in the first, or write NDJSON"
                 raise FilesError(f"{where}: {min(new)!r} is in no earlier line; {remedy}")
-            columns = [pa.array([_text(x.get(name)) for x in objects], pa.string()) for name in names]
+            columns = [
+                pa.array([_text(x.get(name)) for x in objects], pa.string()) for name in names
+            ]
             unreadable = [
                 (i, excerpt(texts[i].decode("utf-8", "replace")), fault)
                 for i, fault in enumerate(faults)

@@ -17,12 +17,12 @@ from mumacro.files.errors import FilesError
 from mumacro.files.text_columns import numbers_of
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import GAP, LIKE, SI, refusal
+from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
-from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
-from mumacro.inputs.text_tables import Wanted, read_cell
+from mumacro.inputs.text_tables import Wanted
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.surrogate import Surrogate

@@ -352,9 +352,7 @@ class _Run:
             accepted[[*faults]] = False
             batch, texts = batch.filter(pa.array(accepted)), [*compress(texts, accepted)]
         file = [self.files[state.file]] * (len(self.files) > 1)
-        reject_lines = csv_lines(
-            [*file, block.lines[i], *reason] for i, reason in faults.items()
-        )
+        reject_lines = csv_lines([*file, block.lines[i], *reason] for i, reason in faults.items())
         n, rejected = len(block.batch), state.rejected + len(faults)
         text = self.output.piece(batch, texts if self.verbatim else None)
         return _State(state.file, state.at + n, state.rows + n, rejected, reject_lines), text

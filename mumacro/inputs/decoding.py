@@ -89,9 +89,7 @@ def encoding_of(name: str) -> str:
     return found
 
 
-def file_pieces(
-    path: Path, seen: Callable[[int], None] = lambda _at: None
-) -> Iterator[bytes]:
+def file_pieces(path: Path, seen: Callable[[int], None] = lambda _at: None) -> Iterator[bytes]:
     """The bytes of a file in pieces, also of a compressed one (.gz); ``seen`` is told how far the
     file is read.  TextError where a compressed one is damaged."""
     try:
@@ -180,7 +178,11 @@ class Text:
                 raise TextError(f"it {what}")
         marked = next((name for mark, name in _MARKS if data.startswith(mark)), None)
         self.encoding = self._given or marked or _of_zeros(data[:_START]) or "utf-8"
-        if marked and self.encoding in (marked.removesuffix("-sig"), f"{marked}-le", f"{marked}-be"):
+        if marked and self.encoding in (
+            marked.removesuffix("-sig"),
+            f"{marked}-le",
+            f"{marked}-be",
+        ):
             self.encoding = marked
         self._decoder = codecs.getincrementaldecoder(self.encoding)("strict")
 

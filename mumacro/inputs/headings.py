@@ -84,8 +84,7 @@ def absent(name: str, heads: Sequence[str]) -> str:
     if alike := _similar(name, heads):
         remedy = f"rename that column to {alike[1]} (or another unit in brackets)"
         return f"there is no column {name}; {alike[0]!r} is similar: {remedy}"
-    meaning = ": the mean friction force over Fz" if name == "mu_macro" else ""
-    return f"there is no column {_heading(name)}{meaning}; there are {_listed(heads)}"
+    return f"there is no column {_heading(name)}; there are {_listed(heads)}"
 
 
 def absent_together(names: Sequence[str], heads: Sequence[str]) -> str:
@@ -103,7 +102,9 @@ def absent_together(names: Sequence[str], heads: Sequence[str]) -> str:
 
 def _listed(heads: Sequence[str]) -> str:
     """The heads for a message of bounded length."""
-    shown = ", ".join(repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED])
+    shown = ", ".join(
+        repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED]
+    )
     more = len(heads) - _LISTED
     return f"{shown} and {more:,} more" if more > 0 else shown
 
@@ -111,7 +112,8 @@ def _listed(heads: Sequence[str]) -> str:
 def _heading(name: str) -> str:
     """The heading that a column of an input has, in SI units."""
     heading = f"{name} [{unit_in_si(name)}]"
-    return f"{heading} or f [Hz]" if name == "omega" else heading
+    more = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
+    return heading + more.get(name, "")
 
 
 def unit_in_si(name: str) -> str:

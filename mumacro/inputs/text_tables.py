@@ -20,7 +20,14 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.decoding import NAMES, Piece, Text, TextError, file_pieces
 from mumacro.inputs.fields import is_rigid
-from mumacro.inputs.headings import absent, absent_together, find_heads, heading, meant_by, unit_in_si
+from mumacro.inputs.headings import (
+    absent,
+    absent_together,
+    find_heads,
+    heading,
+    meant_by,
+    unit_in_si,
+)
 from mumacro.inputs.numbers import TOO_LARGE, read_number
 from mumacro.inputs.reading import Value, read, reason_of
 from mumacro.inputs.signs import Cell, Signs
@@ -100,7 +107,11 @@ class Layout(NamedTuple):
         >>> layout.described(signs)
         'semicolon, decimal comma, head in line 2, units in line 3'
         """
-        words = [] if self.encoding in ("", "utf-8", "utf-8-sig") else [NAMES.get(self.encoding, self.encoding)]
+        words = (
+            []
+            if self.encoding in ("", "utf-8", "utf-8-sig")
+            else [NAMES.get(self.encoding, self.encoding)]
+        )
         words += [_WORDS.get(self.sep, repr(self.sep))] if self.sep != "," else []
         words += ["decimal comma"] if signs.decimal == "," else []
         words += [f"{_WORDS_OF_SIGNS[signs.grouped]} between thousands"] if signs.grouped else []
@@ -331,7 +342,7 @@ def _with_units(
     if any(number != "1" for number in numbers) or any(map(str.strip, cells[len(heads) :])):
         return None
     is_empty = any(texts[i].lower() in GAPS or is_rigid(texts[i]) for i in known)
-    if not known or not units and (numbers or is_empty):
+    if not known or (not units and (numbers or is_empty)):
         return None
     if may_be_prose and len(units) < len(known):
         return None
@@ -346,14 +357,14 @@ def _with_units(
                 f"line {line}: {name} is in {texts[i]}, its head says {own}; leave one of them out"
             )
     return [
-        f"{head} [{text}]" if own is None and text not in ("", "-", "1") and len(text) <= 20 else head
+        f"{head} [{text}]"
+        if own is None and text not in ("", "-", "1") and len(text) <= 20
+        else head
         for head, text, (_, own) in zip(heads, texts, names, strict=True)
     ]
 
 
-def begin(
-    text: Text, wanted: Wanted, dialect: Dialect
-) -> tuple[Layout, Iterator[tuple[int, str]]]:
+def begin(text: Text, wanted: Wanted, dialect: Dialect) -> tuple[Layout, Iterator[tuple[int, str]]]:
     """How a text is written, and the numbered lines behind the head."""
     start = list[str]()
     for piece in text:
@@ -516,7 +527,9 @@ class Table(NamedTuple):
     def in_own_units(self) -> dict[str, Array]:
         """The columns in their units."""
         scales = self.scales
-        return {name: x * scales[name].over / scales[name].times for name, x in self.columns.items()}
+        return {
+            name: x * scales[name].over / scales[name].times for name, x in self.columns.items()
+        }
 
 
 def source_of(
@@ -565,7 +578,9 @@ def read_table(
     missing = [group[0] for group in wanted.needed if not columns.keys() & set(group)]
     if missing:
         one = len(missing) == 1
-        faults.append((absent(missing[0], layout.heads) if one else absent_together(missing, layout.heads)))
+        faults.append(
+            absent(missing[0], layout.heads) if one else absent_together(missing, layout.heads)
+        )
     if faults:
         raise TextError.of([f"line {layout.head}: {fault}" for fault in faults])
     skipped = [*layout.skipped]
@@ -590,8 +605,7 @@ def read_table(
     if wrong:
         raise TextError.of([fault for _, fault in sorted(wrong, key=lambda one: one[0])])
     units = {
-        name: split_unit(layout.heads[i])[1] or unit_in_si(name)
-        for name, (i, _) in columns.items()
+        name: split_unit(layout.heads[i])[1] or unit_in_si(name) for name, (i, _) in columns.items()
     }
     scales = {name: scale for name, (_, scale) in columns.items()}
     lines_of_rows = [row.line for row in whole]

@@ -47,7 +47,7 @@ def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:
         yield "\n".join([*lines, ""]).encode()
     except TextError:
         raise
-    except Exception as error:  # noqa: BLE001  # openpyxl raises what a damaged file makes it to
+    except Exception as error:  # openpyxl raises what a damaged file makes it to
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise TextError(f"it is no workbook, or a damaged one ({reason})") from None
 

@@ -63,7 +63,9 @@ def refused(text: str | bytes, **options: Any) -> TextError:
 
 def read(text: str | bytes, **options: Any) -> Table:
     data = text if isinstance(text, bytes) else text.encode()
-    return read_table(data, Wanted(dict(list(POINTS.like.items())[:2]), POINTS.needed), Dialect(**options))
+    return read_table(
+        data, Wanted(dict(list(POINTS.like.items())[:2]), POINTS.needed), Dialect(**options)
+    )
 
 
 @pytest.mark.parametrize("name", RIGS)
@@ -110,7 +112,13 @@ FORMS = st.sampled_from(["r", ".6g", ".3f", ".4e", "D", ",.4f", ",.0f"])
 
 def written(number: float, form: str, decimal: str) -> str:
     """A number as text; groups of thousands have the other sign."""
-    text = repr(number) if form == "r" else f"{number:.8E}".replace("E", "D") if form == "D" else f"{number:{form}}"
+    text = (
+        repr(number)
+        if form == "r"
+        else f"{number:.8E}".replace("E", "D")
+        if form == "D"
+        else f"{number:{form}}"
+    )
     return text if decimal == "." else text.translate(str.maketrans(".,", ",."))
 
 
@@ -128,7 +136,9 @@ def value_of(text: str, decimal: str) -> float:
     line_end=st.sampled_from(["\n", "\r\n", "\r"]),
     encoding=st.sampled_from(["utf-8", "utf-8-sig", "cp1252", "utf-16"]),
     before=st.lists(
-        st.sampled_from(["", "Rig: 7", "# v0 is the speed", "a,b;c\td", "date 2026-11-27", "1 2 3"]),
+        st.sampled_from(
+            ["", "Rig: 7", "# v0 is the speed", "a,b;c\td", "date 2026-11-27", "1 2 3"]
+        ),
         max_size=4,
     ),
     units=st.sampled_from(["none", "in the head", "below"]),
@@ -147,7 +157,9 @@ def test_a_table_is_read_as_it_was_written_or_refused(
     quoted: bool,
     more: str,
 ) -> None:
-    cells = [[written(x, form, decimal) for x, form in zip(row, forms, strict=True)] for row in rows]
+    cells = [
+        [written(x, form, decimal) for x, form in zip(row, forms, strict=True)] for row in rows
+    ]
     head = ["v0 [µm/s]", "mu_macro"] if units == "in the head" else ["v0", "mu_macro"]
     lines = [*before]
     for row in [head, *([["µm/s", "-"]] if units == "below" else []), *cells]:
@@ -197,7 +209,11 @@ def test_lines_do_not_depend_on_how_the_bytes_come(
     assert numbered == list(enumerate(expected, 1))
 
 
-@given(text=st.text(alphabet="0123456789.,", max_size=12).filter(lambda x: not re.search(r"\.\.|,,", x)))
+@given(
+    text=st.text(alphabet="0123456789.,", max_size=12).filter(
+        lambda x: not re.search(r"\.\.|,,", x)
+    )
+)
 def test_the_signs_of_a_number_tell_the_same_with_both_swapped(text: str) -> None:
     swapped = str.maketrans(".,", ",.")
     sign, sure = evidence(text)
@@ -228,7 +244,9 @@ def test_a_given_option_wins_over_what_is_found() -> None:
     assert "both" in str(refused("v0,mu_macro\n1,2\n", decimal=",", thousands=","))
 
 
-@pytest.mark.parametrize("name", ["punycode", "idna", "rot13", "utf-7", "unicode_escape", "x" * 999])
+@pytest.mark.parametrize(
+    "name", ["punycode", "idna", "rot13", "utf-7", "unicode_escape", "x" * 999]
+)
 def test_what_is_no_encoding_of_texts_is_refused(name: str) -> None:
     with pytest.raises(TextError, match="is no encoding"):
         encoding_of(name)
@@ -348,11 +366,13 @@ def long_line(n: int) -> bytes:
 #: tables of n signs, made to be slow
 SLOW: dict[str, Callable[[int], bytes]] = {
     "one line": long_line,
-    "a head of columns": lambda n: b"v0,mu_macro," + b",".join(b"c%d" % i for i in range(n // 8)) + b"\n1,2\n",
+    "a head of columns": lambda n: (
+        b"v0,mu_macro," + b",".join(b"c%d" % i for i in range(n // 8)) + b"\n1,2\n"
+    ),
     "heads that are nearly right": lambda n: b"v0 mu_macr0 x\n" * (n // 14),
     "blanks in brackets": lambda n: b"v0 mu_macro k [" + b" " * n + b"x\n1 2\n",
     "open brackets": lambda n: b"v0 mu_macro " + b"[(" * (n // 2) + b"\n1 2\n",
-    "quotes": lambda n: b'v0,mu_macro\n' + b'"",' * (n // 3) + b"\n",
+    "quotes": lambda n: b"v0,mu_macro\n" + b'"",' * (n // 3) + b"\n",
     "open quotes": lambda n: b'v0,mu_macro\n"' + b"1\n" * (n // 2),
     "digits": lambda n: b"v0;mu_macro\n" + b"1" * (n // 2) + b".;" + b"1" * (n // 2) + b"\n",
     "groups": lambda n: b"v0;mu_macro\n1" + b".111" * (n // 4) + b"x;2\n",
