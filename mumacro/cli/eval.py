@@ -48,8 +48,8 @@ def main(words: Sequence[str]) -> int:
     :func:`mumacro.cli.common.run`."""
     parser = OneLineParser(
         prog="mumacro eval",
-        description="Evaluate every case of files: Parquet, NDJSON, tables as text (.csv, .tsv, "
-        ".txt and others; also compressed, .gz), the first sheet of .xlsx.",
+        description="Evaluate every case of files: Parquet, NDJSON, text (.csv, .tsv, .txt, ...), "
+        ".xlsx; also .gz.",
         epilog=_COLUMNS,
     )
     parser.add_argument(

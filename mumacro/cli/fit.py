@@ -59,8 +59,6 @@ def run(words: Sequence[str]) -> str:
         table = read_points(source, common.dialect_in(chosen))
     except TextError as error:
         raise ImpossibleError(f"{chosen.points}: {error}") from None
-    if table.read_as:
-        print(f"mumacro fit: read as: {table.read_as}", file=sys.stderr)
     points: dict[str, Any] = {**table.columns}
     unknown = unknown or unknowns_beside(points)
     there = [*unknown, *(name for name in points if name in kind.columns)]
@@ -81,6 +79,8 @@ def run(words: Sequence[str]) -> str:
         raise ImpossibleError(f"{chosen.points}: {at_line}{fault}") from None
     except ModuleNotFoundError as error:  # says what to install
         raise ImpossibleError(str(error)) from None
+    if table.read_as:
+        print(f"mumacro fit: read as: {table.read_as}", file=sys.stderr)
     if chosen.out is not None:
         heads = [
             name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]"

@@ -231,8 +231,8 @@ def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Ar
 def numbers(
     array: pa.Array, name: str, signs: Signs, scale: Scale
 ) -> tuple[Array, Array, dict[int, str]]:
-    """A column of the input ``name`` as doubles (n,) in its own unit and in SI, NaN where a cell has
-    no number, and what is wrong with it.
+    """A column of the input ``name`` as doubles (n,) in its own unit and in SI, NaN where a cell
+    has no number, and what is wrong with it.
 
     FilesError where the column is of another type than numbers or text.
     """

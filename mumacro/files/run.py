@@ -32,6 +32,7 @@ from mumacro.files.record_batch import (
     find_columns,
     wanted_columns,
 )
+from mumacro.files.text_source import Block
 from mumacro.files.writing import Output, csv_lines, written_as
 from mumacro.inputs.kind import Kind, kind_of
 from mumacro.inputs.text_tables import Dialect
@@ -332,7 +333,7 @@ class _Run:
         where = REJECTS.names[0] if isinstance(self.source, reading.ParquetSource) else "line"
         return [*["file"] * (len(self.files) > 1), where, *REJECTS.names[1:]]
 
-    def _piece(self, state: _State, block: reading.Block) -> tuple[_State, bytes]:
+    def _piece(self, state: _State, block: Block) -> tuple[_State, bytes]:
         """A block as it stands in the output, and the state after it."""
         added, rejects, columns_in = answer_columns(block.batch, *self.evaluation, block.signs)
         faults = {row: reason for row, *reason in rejects}

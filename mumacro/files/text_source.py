@@ -1,5 +1,5 @@
-"""Files of tables as text, in blocks of rows: plain lines go through Arrow's reader of CSV, which is
-many times as fast; blocks with quotes or faults are read row by row."""
+"""Files of tables as text, in blocks of rows: plain lines go through Arrow's reader of CSV, which
+is many times as fast; blocks with quotes or faults are read row by row."""
 
 import csv
 import io

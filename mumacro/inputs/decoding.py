@@ -158,8 +158,7 @@ class Text:
     def _decoded(self, data: bytes, final: bool = False) -> str:
         """The text of some bytes, whose lines end in line feeds."""
         if self._decoder is None:
-            self._begin(data)
-        assert self._decoder is not None
+            self._decoder = self._begin(data)
         try:
             text = self._decoder.decode(data, final)
         except UnicodeDecodeError as error:
@@ -171,8 +170,8 @@ class Text:
             raise TextError(f"line {line} has a zero byte: it is no text, or damaged")
         return text
 
-    def _begin(self, data: bytes) -> None:
-        """Take the encoding from the first bytes, and refuse what is no text."""
+    def _begin(self, data: bytes) -> codecs.IncrementalDecoder:
+        """The decoder for the first bytes, which tell the encoding; what is no text is refused."""
         for begin, what in _OTHERS:
             if data.startswith(begin):
                 raise TextError(f"it {what}")
@@ -184,7 +183,7 @@ class Text:
             f"{marked}-be",
         ):
             self.encoding = marked
-        self._decoder = codecs.getincrementaldecoder(self.encoding)("strict")
+        return codecs.getincrementaldecoder(self.encoding)("strict")
 
     def _in_windows_1252(self, error: UnicodeDecodeError, final: bool) -> str:
         """The text of bytes that are not UTF-8, if they may be Windows-1252."""

@@ -34,9 +34,10 @@ def evidence(cell: str) -> tuple[Decimal, bool]:
     ((',', True), ('.', False), (',', True), ('', False))
     """
     match = _DIGITS.match(cell.partition("..")[0])
-    assert match is not None
+    if match is None or cell.startswith("#", match.end()):  # 1.#QNAN
+        return "", False
     digits = match[1] + (match[2] or "")
-    if not digits.strip(".,") or cell.startswith("#", match.end()):  # 1.#QNAN
+    if not digits.strip(".,"):
         return "", False
     sign: Decimal = "." if digits.rfind(".") > digits.rfind(",") else ","
     other: Decimal = "," if sign == "." else "."
@@ -105,9 +106,9 @@ class Signs:
     def _ambiguity(self, cell: Cell, *_others: Cell) -> TextError:
         sign, _ = evidence(cell.text)
         other = "," if sign == "." else "."
-        match = _DIGITS.match(cell.text)
-        assert match is not None
-        part, whole = f"{float(match[1].replace(sign, '.')):g}", match[1].replace(sign, "")
+        match = _NUMBER.search(cell.text)
+        digits = match[0] if match else cell.text
+        part, whole = f"{float(digits.replace(sign, '.')):g}", digits.replace(sign, "")
         option = f"{self._dashes}decimal"
         return TextError(
             f"line {cell.line}: {cell.name} {cell.text.strip()[:40]!r} may be {part} or {whole}: "

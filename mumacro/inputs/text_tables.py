@@ -43,13 +43,16 @@ _WORDS_OF_SIGNS = {".": "point", ",": "comma"}
 _COMMENT = ("#", "%", "//", "!")  # what begins a comment
 _LOOKED_AT = 2_000  # lines, in which the head must stand
 _MOST_COLUMNS = 200_000
-_GAP = Value(math.nan)
+_GAP, SI_UNIT = Value(math.nan), Scale()
 #: cells without a value, in small letters
 GAPS = frozenset(
-    ("", "nan", "na", "n/a", "#n/a", "#nv", "#na", "null", "none", "nil", "missing", "-", "--")
-    + ("---", "—", "–", "−", ".", "..", "...", "?", "*", "nan(ind)", "-nan", "-nan(ind)", "1.#qnan")
-    + ("-1.#ind", "1.#ind", "#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#num!", "#zahl!")
-    + ("#name?", "n.a.", "n.d.", "n. v.", "k.a.", "k. a.", "(null)", "<na>", "undefined")
+    (
+        *("", "-", "--", "---", "—", "–", "−", ".", "..", "...", "?", "*"),
+        *("nan", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "1.#ind", "-1.#ind"),
+        *("na", "n/a", "n.a.", "n.d.", "k.a.", "k. a.", "n. v.", "<na>", "#n/a", "#na", "#nv"),
+        *("null", "(null)", "none", "nil", "missing", "undefined"),
+        *("#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#num!", "#zahl!", "#name?"),
+    )
 )
 # cells between blanks: quoted, or with blanks within brackets; brackets belong to what is before
 _CELL = re.compile(r'"([^"]*)"|((?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+)')
@@ -202,9 +205,9 @@ def find_layout(start: Piece, wanted: Wanted, dialect: Dialect, encoding: str = 
     # a first column of names may begin with the sign of a comment, such as #1
     data = next((line for line in islice(lines, first, None) if line.strip()), "")
     is_name = bool(heads) and split_unit(heads[0])[0] not in wanted.like
-    if is_name and not commented and data.startswith(_COMMENT):
-        if len(_split(data, head.sep)) == len(heads) > 1:
-            layout = layout._replace(comment=())
+    as_wide = len(_split(data, head.sep)) == len(heads) > 1
+    if is_name and not commented and data.startswith(_COMMENT) and as_wide:
+        return layout._replace(comment=())
     return layout
 
 
@@ -234,9 +237,10 @@ def _heads_in(
 ) -> Iterator[_Head]:
     """The lines that name all that is needed."""
     for i in range(skip, min(len(lines), _LOOKED_AT)):
-        if not all(any(name in lines[i] for name in names) for names in wanted.needed):
-            if lines[i].count('"') % 2 == 0:  # else a cell of the head goes on in the next line
-                continue
+        names_all = all(any(name in lines[i] for name in names) for names in wanted.needed)
+        # of an odd number of quotes a cell goes on in the next line
+        if not names_all and lines[i].count('"') % 2 == 0:
+            continue
         text, end = _whole(lines, i)
         for sep in seps:
             cells = _split(_uncommented(text), sep)
@@ -480,7 +484,7 @@ def _irregular(count: int, width: int) -> str:
 # --- its numbers ----------------------------------------------------------------------------------
 
 
-def read_cell(name: str, cell: str, signs: Signs, scale: Scale = Scale()) -> Value:
+def read_cell(name: str, cell: str, signs: Signs, scale: Scale = SI_UNIT) -> Value:
     """What a cell of the column ``name`` says, in SI: NaN for a gap.
 
     A number is in the unit of the column, whose ``scale`` is given; a unit in the cell comes first.

@@ -27,7 +27,7 @@ def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:
     TextError where it is no workbook, or openpyxl is missing.
     """
     try:
-        import openpyxl
+        import openpyxl  # type: ignore[import-untyped]
     except ModuleNotFoundError as error:
         remedy = f"{missing('files', error)}; or save it as CSV"
         raise TextError(f"it is a workbook (.xlsx), and {remedy}") from None

@@ -296,12 +296,12 @@ class FitRequest(Choice):
         if self.points is not None and self.points_base64 is not None:
             raise InputError("points_base64", None, "left out beside points")
         if self.points is None and self.points_base64 is None:
-            for name in ("v0", "mu_macro"):
-                if getattr(self, name) is None:
-                    raise InputError(name, None, "given: a list, or a table as points")
-            for name in ("sep", "decimal", "thousands", "encoding", "skip", "read_only"):
-                if name in self.model_fields_set:
-                    raise InputError(name, None, "left out: it belongs to a table, points")
+            for column in ("v0", "mu_macro"):
+                if getattr(self, column) is None:
+                    raise InputError(column, None, "given: a list, or a table as points")
+            for option in ("sep", "decimal", "thousands", "encoding", "skip", "read_only"):
+                if option in self.model_fields_set:
+                    raise InputError(option, None, "left out: it belongs to a table, points")
         return self
 
     @property

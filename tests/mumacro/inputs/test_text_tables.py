@@ -7,6 +7,7 @@ import itertools
 import re
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from mumacro.inputs.text_tables import (
     read_table,
 )
 from mumacro.inputs.units import Scale
+from tests.support.comparing import close
 
 V0 = [1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2]
 MU = [0.069, 0.097, 0.174, 0.221, 0.247, 0.274, 0.289, 0.305]
@@ -71,8 +73,8 @@ def read(text: str | bytes, **options: Any) -> Table:
 @pytest.mark.parametrize("name", RIGS)
 def test_what_rigs_write_is_read_and_said(rigs: Path, name: str) -> None:
     points = read_points(rigs / name)
-    assert points.columns["v0"].tolist() == pytest.approx(V0, rel=1e-12)
-    assert points.columns["mu_macro"].tolist() == pytest.approx(MU, rel=1e-12)
+    assert points.columns["v0"].tolist() == close(V0, rel=1e-12)
+    assert points.columns["mu_macro"].tolist() == close(MU, rel=1e-12)
     assert points.read_as == RIGS[name]
     same = read_points((rigs / name).read_bytes())
     assert same.columns["v0"].tolist() == points.columns["v0"].tolist()
@@ -98,8 +100,8 @@ def test_what_can_be_read_in_two_ways_is_refused_with_its_line(
 def test_the_advice_for_an_ambiguous_number_works(rigs: Path) -> None:
     as_thousands = read_points(rigs / "ambiguous.txt", Dialect(decimal=",")).columns["v0"]
     as_decimals = read_points(rigs / "ambiguous.txt", Dialect(decimal=".")).columns["v0"]
-    assert as_thousands.tolist() == pytest.approx(V0, rel=1e-12)
-    assert as_decimals.tolist() == pytest.approx([1e-3 * v for v in V0], rel=1e-12)
+    assert as_thousands.tolist() == close(V0, rel=1e-12)
+    assert as_decimals.tolist() == close([1e-3 * v for v in V0], rel=1e-12)
     same = read_points(rigs / "ambiguous.txt", Dialect(thousands=".")).columns["v0"]
     assert same.tolist() == as_thousands.tolist()
 
@@ -171,13 +173,15 @@ def test_a_table_is_read_as_it_was_written_or_refused(
         lines.append(text + sep * (more == "trailing" and sep != BLANKS))
         lines += {"comments": ["# a comment"], "empty": ["", sep * 3]}.get(more, [])
     data = line_end.join([*lines, ""]).encode(encoding)
-    try:
-        table = read(data)
-    except TextError as refusal:
+    shown = [evidence(cell) for row in cells for cell in row]
+    if any(sign for sign, _ in shown) and not any(sure for _, sure in shown):
         # alone what may be read in two ways is refused; and read, once the sign is given
-        assert "may be" in str(refusal)
-        assert all(evidence(cell)[1] is False for row in cells for cell in row)
+        signs = {sign for sign, _ in shown if sign}
+        if not (sep == "," and signs == {"."}):
+            assert "may be" in str(refused(data))
         table = read(data, decimal=decimal)
+    else:
+        table = read(data)
     scale = 1.0 if units == "none" else 1e-6
     expected = np.array([[value_of(cell, decimal) for cell in row] for row in cells])
     np.testing.assert_allclose(table.columns["v0"], scale * expected[:, 0], rtol=1e-14)
@@ -273,12 +277,12 @@ def test_what_is_no_encoding_of_texts_is_refused(name: str) -> None:
 )
 def test_numbers_in_cells(cell: str, si: float) -> None:
     value = read_cell("v0", cell, Signs(".", None), Scale(over=1e3))
-    assert value.si == pytest.approx(si, rel=1e-15)
+    assert value.si == close(si, rel=1e-15)
 
 
 def test_per_cent_in_a_cell_comes_before_the_unit_of_the_column() -> None:
     for scale in (Scale(), Scale(over=1e2)):
-        assert read_cell("mu_macro", "7 %", Signs(".", None), scale).si == pytest.approx(0.07)
+        assert read_cell("mu_macro", "7 %", Signs(".", None), scale).si == close(0.07, rel=1e-15)
 
 
 @pytest.mark.parametrize("gap", sorted(GAPS))
@@ -389,10 +393,8 @@ def test_no_table_takes_longer_than_in_proportion_to_its_size(name: str) -> None
         data, times = SLOW[name](n), []
         for _ in range(3):
             start = time.process_time()
-            try:
+            with suppress(TextError):
                 read(data)
-            except TextError:
-                pass
             times.append(time.process_time() - start)
         return min(times)
 
