@@ -18,7 +18,6 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import check, without_interval
 from mumacro.inputs.fields import LIKE, NAMES, RAD_PER_CYCLE, unit_of
@@ -26,6 +25,7 @@ from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, k
 from mumacro.inputs.text_tables import SEPARATORS
 from mumacro.inputs.units import read_number, read_range, scale_of, suggestion
 from mumacro.surrogate import Surrogate
+from mumacro.validity import Row, digits, k_effect
 
 INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate, fit
-from mumacro.analysis.validity import model_rows
 from mumacro.cli.main import COMMANDS, main
 from mumacro.contacts.geometries import GEOMETRIES, contact_of
 from mumacro.inputs.fields import NAMES, SI
 from mumacro.inputs.units import UNITS_OF, read_number, scale_of, split_unit, suggestion
+from mumacro.validity import model_rows
 from tests.support.cases import Capture, Case
 from tests.support.comparing import close
 
