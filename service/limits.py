@@ -7,7 +7,6 @@ have slots and threads of their own, and so have questions that may take longer 
 
 import asyncio
 import os
-import re
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -35,7 +34,7 @@ LONG_QUESTIONS = 4  # of those that take longer, such as the motion of a ball: u
 LONG = 100.0 * AT_ONCE
 # that is added to the threads of batches and long questions: short requests are answered first
 _NICENESS = 5
-_OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
+_CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
 
 
 def form_of(headers: Mapping[bytes, bytes], forms: Mapping[str, T]) -> T:
@@ -43,7 +42,7 @@ def form_of(headers: Mapping[bytes, bytes], forms: Mapping[str, T]) -> T:
     media_type = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(forms))
     media, _, parameters = media_type.partition(";")
     form = forms.get(media.strip())
-    if form is None or (parameters and _OTHER_CHARSET.search(parameters)):
+    if form is None or not _is_utf8(parameters):
         offer = ", ".join(forms)
         detail = f"send {offer}, not {media_type[:80]}"
         raise RequestError(ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": offer})
@@ -53,6 +52,18 @@ def form_of(headers: Mapping[bytes, bytes], forms: Mapping[str, T]) -> T:
             ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"}
         )
     return form
+
+
+def _is_utf8(parameters: str) -> bool:
+    """Whether the parameters of a media type name no other character set.
+
+    >>> _is_utf8('header=present; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
+    (True, False)
+    """
+    named = (parameter.partition("=") for parameter in parameters.split(";"))
+    return all(
+        value.strip(' \t"') in _CHARSETS for name, _, value in named if name.strip() == "charset"
+    )
 
 
 async def read_body(
