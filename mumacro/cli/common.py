@@ -67,10 +67,12 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault, with the choice that may have been meant, or
         with the example of the help where something is missing."""
-        if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
-            choices = [word.strip(" '") for word in wrong[3].split(",")]
-            near = difflib.get_close_matches(wrong[2].lower(), choices, n=1)
-            message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
+        fault, _, offer = message.rpartition(" (choose from ")
+        _, wrong, chosen = fault.rpartition(": invalid choice: ")
+        if wrong:
+            choices = [word.strip(" '") for word in offer.removesuffix(")").split(",")]
+            near = difflib.get_close_matches(chosen.strip("'").lower(), choices, n=1)
+            message = f"{fault}, did you mean {near[0]}?" if near else message
         message = message.replace("the following arguments are required", "missing")
         lines = (self.epilog or "").splitlines()
         example = next((line.strip() for line in lines if line.startswith("  mumacro ")), None)
