@@ -26,7 +26,7 @@ rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field,
 examples:
   mumacro eval rig.txt -o out.csv --decimal ,
   mumacro eval - -o - < cases.csv > out.csv
-A stopped run goes on when the same command is given again; the output has the same bytes.
+The output appears whole or not at all; an interrupted run leaves an older one as it is.
 exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments, 130 interrupted
 """
 
@@ -78,9 +78,7 @@ def main(words: Sequence[str]) -> int:
         default=[],
         help="add d mu_macro / d input",
     )
-    parser.add_argument(
-        "--force", action="store_true", help="replace an output, delete the parts of another run"
-    )
+    parser.add_argument("--force", action="store_true", help="replace an output that exists")
     chosen = parser.parse_intermixed_args(words)
     surrogate = open_table(chosen.table)
     options = {
@@ -94,7 +92,6 @@ def main(words: Sequence[str]) -> int:
         TextColumn("{task.description}"),
         TimeRemainingColumn(),
     )
-    # a bar on a terminal, and lines above it; elsewhere lines alone
     bar = Progress(*bars, console=console, disable=not console.is_terminal)
     task = bar.add_task("", total=1.0)
 
@@ -128,9 +125,8 @@ def main(words: Sequence[str]) -> int:
                 )
             else:
                 rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
-                resumed = f"; {done.resumed:,} were done already" if done.resumed else ""
-                print(f"{counts}: {done.out}{rejects}{resumed}")
+                print(f"{counts}: {done.out}{rejects}")
     except KeyboardInterrupt:
-        print("mumacro eval: stopped; the same command goes on", file=sys.stderr)
+        print("mumacro eval: interrupted; nothing was written", file=sys.stderr)
         return 130
     return 3 if done.rejected else 0

@@ -10,13 +10,13 @@ from typing import Any
 
 from mumacro.analysis.fit import Fit, fit
 from mumacro.analysis.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
-from mumacro.analysis.validity import digits
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, open_table
 from mumacro.errors import InputError
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import AMPLITUDE
+from mumacro.validity import digits
 
 EXAMPLE = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\

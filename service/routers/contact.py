@@ -14,7 +14,7 @@ import mumacro
 from mumacro.analysis.fit import Fit, quantile
 from mumacro.analysis.measured_points import STD, read_points, unknowns_beside
 from mumacro.contacts.geometries import contact_of
-from mumacro.errors import InputError, missing
+from mumacro.errors import InputError
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.fields import RIGID
 from mumacro.inputs.text_tables import Table
@@ -23,10 +23,10 @@ from .. import API_VERSION
 from ..limits import Working
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
-from ..problems import FieldFault, ProblemKind, RequestError, refuse
+from ..problems import FieldFault, refuse
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
-from . import POST_PROBLEMS, problems, router_of
+from . import POST_PROBLEMS, router_of
 
 router = router_of("answers", StrictRoute)
 _CURVE = 200  # points of the fitted law
@@ -48,7 +48,7 @@ async def post_stiffness(contact: StiffnessRequest) -> Response:
 
 @router.post(
     "/fit",
-    responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS, **problems(501)},
+    responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS},
     summary="k and mu0 from measured points",
 )
 async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Response:
@@ -100,8 +100,6 @@ def _fitted(
         with warnings.catch_warnings():  # they are in the answer
             warnings.simplefilter("ignore")
             fit = mumacro.fit(columns, unknowns, surrogate=table.surrogate, **words)
-    except ModuleNotFoundError as error:
-        raise RequestError(ProblemKind.NOT_INSTALLED, missing("fit", error)) from None
     except InputError as error:
         if points is None or error.index is None:
             raise
