@@ -295,6 +295,8 @@ class FitRequest(Choice):
             raise InputError(other, None, f"left out for direction {self.direction}")
         if self.points is not None and self.points_base64 is not None:
             raise InputError("points_base64", None, "left out beside points")
+        if self.points is not None and self.encoding is not None:
+            raise InputError("encoding", None, "left out beside points, which are text already")
         if self.points is None and self.points_base64 is None:
             for column in ("v0", "mu_macro"):
                 if getattr(self, column) is None:

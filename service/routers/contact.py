@@ -24,11 +24,11 @@ from ..limits import Working
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
 from ..problems import FieldFault, refuse
-from ..reading import Json, StrictRoute
+from ..reading import Json, StrictRoute, TableRoute
 from ..tables import Loaded, LoadedTable
 from . import POST_PROBLEMS, router_of
 
-router = router_of("answers", StrictRoute)
+router, _tables = router_of("answers", StrictRoute), router_of("answers", TableRoute)
 _CURVE = 200  # points of the fitted law
 _FAULTS = 100  # lines of a table that an answer names
 _MEASURED = ("mu_macro", STD)
@@ -46,7 +46,7 @@ async def post_stiffness(contact: StiffnessRequest) -> Response:
     return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 
 
-@router.post(
+@_tables.post(
     "/fit",
     responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS},
     summary="k and mu0 from measured points",
@@ -141,3 +141,6 @@ def _curve(fit: Fit) -> dict[str, Any] | None:
     mu, off = fit.predict(v0=fine, **{name: float(x[0]) for name, x in inputs.items()})
     width = quantile(None if STD in fit.points else v0.size - len(fit.values)) * off
     return {"v0": fine, "mu_macro": mu, "low": np.maximum(mu - width, 0.0), "high": mu + width}
+
+
+router.include_router(_tables)
