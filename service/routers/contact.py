@@ -143,4 +143,4 @@ def _curve(fit: Fit) -> dict[str, Any] | None:
     return {"v0": fine, "mu_macro": mu, "low": np.maximum(mu - width, 0.0), "high": mu + width}
 
 
-router.include_router(_tables)
+router.routes.extend(_tables.routes)
