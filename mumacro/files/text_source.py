@@ -19,6 +19,7 @@ from mumacro.inputs.headings import find_heads
 from mumacro.inputs.signs import Cell, Signs
 from mumacro.inputs.text_tables import (
     BLANKS,
+    COMMENT,
     Dialect,
     Record,
     Wanted,
@@ -143,7 +144,7 @@ class TextTable:
         are others."""
         layout, sep, lines = self.layout, self.sep, piece.lines
         numbers: Sequence[int] = range(piece.first, piece.first + len(lines))
-        doubtful = {"", " ", "\t", sep, *(mark[0] for mark in layout.comment)}
+        doubtful = {"", " ", "\t", sep, *(mark[0] for mark in COMMENT)}
         if any(line[:1] in doubtful for line in lines):
             kept = [i for i, x in enumerate(lines) if x[:1] not in doubtful or is_row(x, layout)]
             lines, numbers = [lines[i] for i in kept], [numbers[i] for i in kept]

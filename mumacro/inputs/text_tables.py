@@ -40,7 +40,7 @@ BLANKS = " "  #: the separator where any number of blanks stands between the cel
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}
 _WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
 _WORDS_OF_SIGNS = {".": "point", ",": "comma"}
-_COMMENT = ("#", "%", "//", "!")  # what begins a comment
+COMMENT = ("#", "%", "//", "!")  #: what begins a comment
 _LOOKED_AT = 2_000  # lines, in which the head must stand
 _MOST_COLUMNS = 200_000
 _GAP, SI_UNIT = Value(math.nan), Scale()
@@ -92,7 +92,7 @@ class Layout(NamedTuple):
     units: int | None  #: the line of the units, where they have one
     heads: list[str]  #: names of the columns, with their units in brackets
     first: int  #: the line behind them
-    comment: tuple[str, ...]  #: what begins a comment
+    names_first: bool  #: whether the first column is none of those that mean something
     labview: bool  #: whether LabVIEW wrote it
     encoding: str
     skipped: list[int]  #: lines before the head that are not empty
@@ -174,41 +174,34 @@ def find_layout(start: Piece, wanted: Wanted, dialect: Dialect, encoding: str = 
         label_line = _split(lines[declared.units], head.sep)
         heads = _with_units(heads, ["", *label_line[1:]], wanted, number + declared.units) or heads
         units = number + declared.units
-    commented = lines[head.at].lstrip("\ufeff ").startswith(_COMMENT)
+    commented = lines[head.at].lstrip("\ufeff ").startswith(COMMENT)
     at = next(
         (
             i
             for i in range(head.end, len(lines))
             if lines[i].strip(f" \t{head.sep}")
-            and (commented or not lines[i].lstrip().startswith(_COMMENT))
+            and (commented or not lines[i].lstrip().startswith(COMMENT))
         ),
         None,
     )
     if at is not None:
-        is_comment = lines[at].lstrip().startswith(_COMMENT)
+        is_comment = lines[at].lstrip().startswith(COMMENT)
         unit_cells = _split(_uncommented(lines[at]) if is_comment else lines[at], head.sep)
         with_units = _with_units(heads, unit_cells, wanted, number + at, is_comment)
         if with_units:
             heads, first, units = with_units, at + 1, number + at
-    layout = Layout(
+    return Layout(
         head.sep,
         declared.decimal,
         number + head.at,
         units,
         heads,
         number + first,
-        _COMMENT,
+        bool(heads) and split_unit(heads[0])[0] not in wanted.like,
         declared.labview,
         encoding,
         [number + i for i in range(head.at) if lines[i].strip()],
     )
-    # a first column of names may begin with the sign of a comment, such as #1
-    data = next((line for line in islice(lines, first, None) if line.strip()), "")
-    is_name = bool(heads) and split_unit(heads[0])[0] not in wanted.like
-    as_wide = len(_split(data, head.sep)) == len(heads) > 1
-    if is_name and not commented and data.startswith(_COMMENT) and as_wide:
-        return layout._replace(comment=())
-    return layout
 
 
 def _declared(lines: Sequence[str]) -> _Declared:
@@ -262,7 +255,7 @@ def _whole(lines: Sequence[str], i: int) -> tuple[str, int]:
 def _uncommented(line: str) -> str:
     """A line without the sign that makes it a comment: the head of a table may be in one."""
     text = line.lstrip("\ufeff ")
-    return text.lstrip("#%/!").lstrip() if text.startswith(_COMMENT) else text
+    return text.lstrip("#%/!").lstrip() if text.startswith(COMMENT) else text
 
 
 def _split(line: str, sep: str) -> list[str]:
@@ -290,7 +283,7 @@ def _fits(head: _Head, lines: Sequence[str], labview: bool) -> bool:
     """Whether the row behind a head has as many cells."""
     width = len(head.cells)
     for line in islice(lines, head.end, None):
-        if line.strip() and not line.lstrip().startswith(_COMMENT):
+        if line.strip() and not line.lstrip().startswith(COMMENT):
             cells = _split(line, head.sep)
             return len(cells) in (width, width - labview) or not any(cells[width:] or ["x"])
     return True
@@ -384,10 +377,17 @@ def begin(text: Text, wanted: Wanted, dialect: Dialect) -> tuple[Layout, Iterato
 
 
 def is_row(line: str, layout: Layout) -> bool:
-    """Whether a line is neither empty nor a comment."""
-    if not line.strip(f" \t{layout.sep}"):
+    """Whether a line is neither empty nor a comment.
+
+    A name such as #1 in the first column makes no comment of a row that is whole.
+    """
+    sep = layout.sep
+    if not line.strip(f" \t{sep}"):
         return False
-    return not (layout.comment and line.lstrip().startswith(layout.comment))
+    if not line.lstrip().startswith(COMMENT):
+        return True
+    cells = len(line.split()) if sep == BLANKS else line.count(sep) + 1
+    return layout.names_first and cells == len(layout.heads) > 1
 
 
 def may_be_head(text: str, layout: Layout, wanted: Wanted) -> bool:
@@ -530,10 +530,13 @@ class Table(NamedTuple):
     @property
     def in_own_units(self) -> dict[str, Array]:
         """The columns in their units."""
-        scales = self.scales
-        return {
-            name: x * scales[name].over / scales[name].times for name, x in self.columns.items()
-        }
+        return {name: _in_unit(x, self.scales[name]) for name, x in self.columns.items()}
+
+
+def _in_unit(values: Array, scale: Scale) -> Array:
+    """Values in SI in another unit, with the digits that both have."""
+    own = values * scale.over / scale.times
+    return np.array([float(f"{value:.15g}") for value in own.tolist()])
 
 
 def source_of(
