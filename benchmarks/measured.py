@@ -7,7 +7,7 @@ tests/data/luo-2024.csv.  k is fitted by `mumacro.fit`; mu0 at each speed is the
 shaking over the weight.  Forces do not depend on the weight: mu0 Fz and k count alone.
 """
 
-from benchmarks.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
+from tests.support.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
 
 import csv
 import warnings

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import measured, validation
 from mumacro import Surrogate, closed_forms
 from tests.support.comparing import close
+from tests.support.scripts import script
 
 pytest.importorskip("scipy")
 pyplot = pytest.importorskip("matplotlib.pyplot")
+measured, validation = map(script, ("benchmarks.measured", "benchmarks.validation"))
 
 
 @pytest.fixture(scope="module")
