@@ -124,7 +124,8 @@ _SYNONYMS = {
 }
 _SYNONYMS |= {name.lower(): name for name in NAMES}
 
-_IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
+# closing bracket -> the one that opens it
+_OPENING = {"]": "[", ")": "("}
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
 # an interval, as people write it
@@ -139,10 +140,14 @@ def split_unit(column: str) -> tuple[str, str | None]:
     >>> split_unit("k [N/mm]"), split_unit("v0")
     (('k', 'N/mm'), ('v0', None))
     """
-    match = _IN_BRACKETS.fullmatch(column)
-    if match is None:
-        return column.strip(), None
-    return match[1], match[2] if match[2] is not None else match[3]
+    text = column.strip()
+    closing = text[-1:]
+    if closing not in _OPENING:
+        return text, None
+    name, opening, unit = text[:-1].rpartition(_OPENING[closing])
+    if not opening or closing in unit:
+        return text, None
+    return name.strip(), unit.strip()
 
 
 def scale_of(name: str, unit: str) -> Scale | None:
