@@ -15,7 +15,7 @@ import json
 import math
 import warnings
 from multiprocessing import Pool
-from time import perf_counter
+from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,10 @@ Array = NDArray[np.float64]
 CACHE = ROOT / "build" / "fit_coverage"
 DRAWS, PROCESSES = 400, 2
 REGULAR = 0.95  # share of draws with one solution and closed intervals, in a set-up that has these
-_CODE = ("fit.py", "measured_points.py", "profile.py", "rootfinding.py")
+_CODE = b"".join(
+    (ROOT / "mumacro" / "analysis" / name).read_bytes()
+    for name in ("fit.py", "measured_points.py", "profile.py")
+)
 
 
 class SetUp(NamedTuple):
@@ -157,13 +160,13 @@ def _tried(index: int) -> dict[str, Any]:
     seconds = []
     for draw in range(DRAWS):
         noise = np.random.default_rng([index, draw]).normal(scale=set_up.spread, size=clean.size)
-        started = perf_counter()
+        started = process_time()
         try:
             result = fitted(set_up, clean + noise)
         except InputError:
             refused += 1
             continue
-        seconds.append(perf_counter() - started)
+        seconds.append(process_time() - started)
         ends = result.interval
         for name in unknowns:
             covered[name] += ends[name][0] <= getattr(set_up, name) <= ends[name][1]
@@ -187,12 +190,7 @@ def _tried(index: int) -> dict[str, Any]:
 def _digest(set_up: SetUp) -> str:
     """Of the set-up, the draws and the code of the fit: a result is kept until one of them
     changes."""
-    code = [
-        (ROOT / "mumacro" / "analysis" / name).read_bytes()
-        for name in _CODE
-        if (ROOT / "mumacro" / "analysis" / name).exists()
-    ]
-    return hashlib.sha256(repr((set_up, DRAWS)).encode() + b"".join(code)).hexdigest()[:24]
+    return hashlib.sha256(repr((set_up, DRAWS)).encode() + _CODE).hexdigest()[:24]
 
 
 def coverage() -> str:

@@ -11,7 +11,8 @@ try:
     from mumacro import closed_forms, plotting
     from mumacro import moved as _moved
     from mumacro.analysis import validity
-    from mumacro.analysis.fit import Fit, fit
+    from mumacro.analysis.fit import fit
+    from mumacro.analysis.fitted import Fit
     from mumacro.analysis.law import law
     from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.settling import settling
