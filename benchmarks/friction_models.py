@@ -59,7 +59,9 @@ def elements() -> str:
                 for c in ("spring", "ball")
             )
             rows.append([f"{y:g}", f"{v:g}", f"{spring:.3f}", f"{ball:.3f}", f"{dahl(v, y):.3f}"])
-    return markdown(("y~", "v~", "one spring (Jenkins)", "ball", "Dahl, LuGre"), rows, 0)
+    return markdown(
+        ("y0/l0", "v0/(l0 omega)", "one spring (Jenkins)", "ball", "Dahl, LuGre"), rows, 0
+    )
 
 
 SECTIONS = sections(elements)
