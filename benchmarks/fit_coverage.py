@@ -28,8 +28,7 @@ CACHE = ROOT / "build" / "fit_coverage"
 DRAWS, PROCESSES = 400, 2
 REGULAR = 0.95  # share of draws with one solution and closed intervals, in a set-up that has these
 _CODE = b"".join(
-    (ROOT / "mumacro" / "analysis" / name).read_bytes()
-    for name in ("fit.py", "measured_points.py", "profile.py")
+    (ROOT / "mumacro" / "analysis" / name).read_bytes() for name in ("fit.py", "profile.py")
 )
 
 

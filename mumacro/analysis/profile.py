@@ -175,11 +175,19 @@ class Profile:
         """Places in the chords at which a quantity passes through zero."""
         from scipy.optimize import brentq
 
-        def value(s: float) -> float:
-            return float(of(self.samples(np.array([s]), slopes))[0])
+        s, f = self.at.s.tolist(), of(self.at).tolist()
 
-        ends = zip(self.at.s[chords], self.at.s[chords + 1], strict=True)
-        return np.array([brentq(value, *pair, xtol=tolerance, rtol=1e-14) for pair in ends])
+        def zero(i: int) -> float:
+            known = {s[i]: f[i], s[i + 1]: f[i + 1]}  # computed again, they may differ by rounding
+
+            def value(place: float) -> float:
+                if place in known:
+                    return float(known[place])
+                return float(of(self.samples(np.array([place]), slopes))[0])
+
+            return float(brentq(value, s[i], s[i + 1], xtol=tolerance, rtol=1e-14))
+
+        return np.array([zero(i) for i in chords.tolist()])
 
     # --- ranges -----------------------------------------------------------------------------------
 
