@@ -1,22 +1,18 @@
 """A contact: ``POST /v1/stiffness``, from materials and geometry; ``POST /v1/fit``, from measured
 points."""
 
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
 from fastapi import Response
 
 import mumacro
-from mumacro.analysis.fit import Fit, quantile
-from mumacro.analysis.measured_points import STD, read_points, unknowns_beside
+from mumacro.analysis.measured_points import read_points, unknowns_beside
 from mumacro.contacts.geometries import contact_of
 from mumacro.errors import InputError
 from mumacro.inputs.decoding import TextError
-from mumacro.inputs.fields import RIGID
 from mumacro.inputs.text_tables import Table
 
 from .. import API_VERSION
@@ -29,9 +25,7 @@ from ..tables import Loaded, LoadedTable
 from . import POST_PROBLEMS, router_of
 
 router, _tables = router_of("answers", StrictRoute), router_of("answers", TableRoute)
-_CURVE = 200  # points of the fitted law
 _FAULTS = 100  # lines of a table that an answer names
-_MEASURED = ("mu_macro", STD)
 
 
 @router.post(
@@ -90,12 +84,14 @@ def _fitted(
 ) -> dict[str, Any]:
     words: Any = measured.kind.names
     unknowns: Sequence[str] = measured.unknowns
+    about: dict[str, Any] = {}
     if points is not None:
         if both := sorted(columns.keys() & points.columns.keys()):
             raise InputError(both[0], None, "given once: it is a column of the points")
         columns = {**points.columns, **columns}
         if "unknowns" not in measured.model_fields_set:
             unknowns = unknowns_beside(columns)
+        about = {"read_as": points.read_as, "skipped_lines": points.skipped}
     try:
         with warnings.catch_warnings():  # they are in the answer
             warnings.simplefilter("ignore")
@@ -105,42 +101,7 @@ def _fitted(
             raise
         reason = f"line {points.lines[error.index]}: {error.field} must be {error.bound}"
         refuse([FieldFault.of("points", reason, error.value)])
-    members = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
-    if points is not None:
-        members |= {"points": fit.points, "read_as": points.read_as}
-        members["skipped_lines"] = points.skipped
-    return {
-        **members,
-        "values": _in_words(fit.values),
-        "interval": {
-            name: [_in_words({name: end})[name] for end in ends]
-            for name, ends in fit.interval.items()
-        },
-        "solutions": [_in_words(one) for one in fit.solutions],
-        "curve": _curve(fit),
-        **table.signature,
-    }
-
-
-def _in_words(values: Mapping[str, float]) -> dict[str, float | str]:
-    """Values with the word rigid for an infinite k."""
-    return {
-        name: RIGID if name == "k" and value == math.inf else value
-        for name, value in values.items()
-    }
-
-
-def _curve(fit: Fit) -> dict[str, Any] | None:
-    """The fitted law over v0 with its 95 % band; None where other inputs vary, too."""
-    inputs = {name: x for name, x in fit.points.items() if name not in _MEASURED}
-    v0 = inputs.pop("v0")
-    moving = v0[v0 > 0.0]
-    if any(np.ptp(x) > 0.0 for x in inputs.values() if np.isfinite(x).all()) or not moving.size:
-        return None
-    fine = np.unique(np.concatenate([np.geomspace(moving.min(), moving.max(), _CURVE), v0]))
-    mu, off = fit.predict(v0=fine, **{name: float(x[0]) for name, x in inputs.items()})
-    width = quantile(None if STD in fit.points else v0.size - len(fit.values)) * off
-    return {"v0": fine, "mu_macro": mu, "low": np.maximum(mu - width, 0.0), "high": mu + width}
+    return {**fit.to_dict(), **about, **table.signature}
 
 
 router.routes.extend(_tables.routes)

@@ -403,6 +403,7 @@ def test_fit_is_the_librarys(
         assert answer["std"][name] == close(expected.std[name], rel=1e-6)
         assert answer["interval"][name] == close(list(expected.interval[name]), rel=1e-6)
     assert (answer["contact"], answer["warnings"]) == ("ball", list(expected.warnings))
+    assert answer.keys() == {*expected.to_dict(), "table"}
     stdin = io.TextIOWrapper(io.BytesIO(path.read_bytes()))
     monkeypatch.setattr(sys, "stdin", stdin)
     text = output_of(capsys, 0, "fit", "-", *words, "--unknown", *unknowns)
