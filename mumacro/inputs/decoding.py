@@ -109,7 +109,7 @@ class Text:
     encoding, of a zero byte, and of a line that is too long.
 
     >>> [piece.lines for piece in Text([b"a\\rb\\r", b"\\nc"])]
-    [['a'], ['b'], ['c']]
+    [['a', 'b'], ['c']]
     """
 
     def __init__(self, pieces: Iterable[bytes], encoding: str | None = None) -> None:

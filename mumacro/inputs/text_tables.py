@@ -105,7 +105,9 @@ class Layout(NamedTuple):
     def described(self, signs: Signs) -> str:
         """How the table is read, in a few words; empty for plain CSV.
 
-        >>> layout = find_layout(Piece(1, ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"]), _POINTS)
+        >>> wanted = Wanted({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
+        >>> start = Piece(1, ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"])
+        >>> layout = find_layout(start, wanted, Dialect())
         >>> (signs := Dialect().signs(layout)).see([Cell(4, "v0", "1,5")])
         >>> layout.described(signs)
         'semicolon, decimal comma, head in line 2, units in line 3'
