@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.support.seams import beside_border_seams, beside_seams, slopes_across_rays
 from builder.solver.ball import Springs
 from builder.solver.sweep import Sweep
 from builder.tables.build import build_table
@@ -15,6 +14,7 @@ from mumacro import Surrogate
 from mumacro.inputs.kind import BALL, SPRING, Kind
 from mumacro.table.atlas import BALL_CHARTS, CHARTS_OF, MIDDLE, QUANTITIES, Quantity
 from tests.support.cases import Array, opened
+from tests.support.seams import beside_border_seams, beside_seams, slopes_across_rays
 
 RING = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
 
