@@ -238,21 +238,6 @@ def test_friction_that_looks_like_per_cent_is_remarked_on(surrogate: Surrogate) 
 # --- the least chi2 -------------------------------------------------------------------------------
 
 
-def random_contact(chance: np.random.Generator) -> tuple[Case, Any]:
-    """A rig with its contact, and speeds from creep to sliding."""
-    mu0, force, k = (
-        chance.uniform(0.1, 0.8),
-        10.0 ** chance.uniform(-1, 2),
-        10 ** chance.uniform(4, 8),
-    )
-    y0 = 10.0 ** chance.uniform(-0.7, 1.0) * mu0 * force / k
-    f = 10.0 ** chance.uniform(1, 5)
-    low = chance.uniform(-4.0, -1.0)
-    high = chance.uniform(max(low + 0.7, -1.0), 0.5)
-    v0 = 2.0 * math.pi * f * y0 * np.geomspace(10.0**low, 10.0**high, int(chance.integers(3, 9)))
-    return {"mu0": mu0, "k": k, "Fz": force, "y0": y0, "f": f}, v0
-
-
 @pytest.mark.parametrize("direction", ["across", "along"])
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_exact_points_of_any_contact_give_it(
@@ -261,7 +246,7 @@ def test_exact_points_of_any_contact_give_it(
     chance = np.random.default_rng(7)
     words: Any = {"contact": contact, "direction": direction}
     for _ in range(25):
-        truth, v0 = random_contact(chance)
+        truth, v0 = fit_coverage.random_contact(chance)
         mu = np.asarray(surrogate.evaluate(**truth, v0=v0, **words).mu_macro)
         rig = {name: truth[name] for name in ("Fz", "y0", "f")}
         found = fit({"v0": v0, "mu_macro": mu}, **rig, **words)
@@ -294,7 +279,7 @@ def test_no_contact_fits_better_and_the_intervals_end_where_chi2_says(
     words: Any = {"contact": contact, "direction": direction}
     p = np.geomspace(1e-4, 1e5, 4001)[:, None]  # of y~
     for _ in range(4):
-        truth, v0 = random_contact(chance)
+        truth, v0 = fit_coverage.random_contact(chance)
         rig = {name: truth[name] for name in ("Fz", "y0", "f")}
         spread = 0.01 * truth["mu0"]
         clean = np.asarray(surrogate.evaluate(**truth, v0=v0, **words).mu_macro)
