@@ -11,7 +11,7 @@ pi v~) a cycle in continuous sliding, so the cost grows as v~ falls; for the sam
 agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
 """
 
-from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
+from tests.support.measuring import best_of, main, markdown, quantity  # isort: split
 
 import math
 from dataclasses import dataclass
