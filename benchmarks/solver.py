@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from builder.solver.steady import REGIMES
 from builder.solver.sweep import solve_chunk
+from mumacro import REGIMES
 
 PEER_LOW = 0.01  # smallest v~ of the marched points, so that marching ends
 RTOL, ATOL, AGREE = 1e-9, 1e-12, 1e-9

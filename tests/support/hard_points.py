@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mumacro import Surrogate
+from mumacro.table.atlas import STEEPEST
 from tests.support.cases import Array, opened
 
 NAMES = ("mu_ratio", "power", "stick_fraction", "slope along v~", "slope along y~")
@@ -42,12 +43,12 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
             (small * small * decades(-5, 2), small),
             (decades(-25, 0.3), 1.5 * beside(-15, 0)),
         ]
-        pairs += [(0.33516779066085 * wide * beside(-12, -0.5), wide)]
+        pairs += [(STEEPEST * wide * beside(-12, -0.5), wide)]
         pairs += [(1.5 * border(high / 1.5) * beside(-12, -0.5), high)]
         # the steepest ray enters where the ball begins to slide as a whole
         near = decades(-0.2, 0.6)
         pairs += [
-            (0.33516779066085 * near * beside(-9, -0.5), near),
+            (STEEPEST * near * beside(-9, -0.5), near),
             (decades(-3, 0.2), 1.5 * decades(0.0, 0.25)),
         ]
     v, y = (np.concatenate(column) for column in zip(*pairs, strict=True))
