@@ -33,9 +33,11 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # Sources and headers for compilers, and stubs for type checkers.
     && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' \
         -o -name '*.p[xy][xdi]' \) -delete \
-# Builders of Fortran and C extensions, which nothing here calls.
-    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/bin/f2py \
-        venv/lib/python3*/site-packages/numpy/distutils \
+# Of scipy what a fit needs: optimize and special, and what these import.
+    && cd venv/lib/python3*/site-packages/scipy \
+    && rm -rf cluster datasets differentiate fftpack integrate interpolate io misc ndimage odr \
+        signal stats \
+    && cd /app \
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after
 # linking.
     && if command -v strip >/dev/null; then \
@@ -49,12 +51,10 @@ COPY tables tables
 COPY hatch_build.py pyproject.toml /build/
 COPY mumacro/kernel /build/mumacro/kernel
 # The kernel holds code for several processors and chooses when it is loaded: the image also runs on
-# other machines than the one that built it.  Its sources stay in this stage, apart from the three
-# headers that the library reads.  Every user of the container may read all files, whatever the
-# umask of the checkout; no user may write them.
+# other machines than the one that built it.  Its sources stay in this stage.  Every user of the
+# container may read all files, whatever the umask of the checkout; no user may write them.
 RUN /build/venv/bin/python /build/hatch_build.py mumacro \
-    && find mumacro/kernel -name '*.[ch]' -not -name data.h -not -name records.h \
-        -not -name library.h -delete \
+    && rm mumacro/kernel/*.[ch] \
     && venv/bin/python -m compileall -q mumacro service \
     && chmod -R a+rX,go-w .
 

@@ -18,16 +18,17 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import check, without_interval
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import NO_DEVIATION, read
-from mumacro.inputs.text_tables import SEPARATORS
+from mumacro.inputs.signs import THOUSANDS
+from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import belongs_to_value
 from mumacro.surrogate import Surrogate
+from mumacro.validity import Row, digits, k_effect
 
 ABOUT_INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
@@ -67,10 +68,12 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault, with the choice that may have been meant, or
         with the example of the help where something is missing."""
-        if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
-            choices = [word.strip(" '") for word in wrong[3].split(",")]
-            near = difflib.get_close_matches(wrong[2].lower(), choices, n=1)
-            message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
+        fault, _, offer = message.rpartition(" (choose from ")
+        _, wrong, chosen = fault.rpartition(": invalid choice: ")
+        if wrong:
+            choices = [word.strip(" '") for word in offer.removesuffix(")").split(",")]
+            near = difflib.get_close_matches(chosen.strip("'").lower(), choices, n=1)
+            message = f"{fault}, did you mean {near[0]}?" if near else message
         message = message.replace("the following arguments are required", "missing")
         lines = (self.epilog or "").splitlines()
         example = next((line.strip() for line in lines if line.startswith("  mumacro ")), None)
@@ -131,13 +134,29 @@ def add_table(parser: OneLineParser) -> None:
     add_form(parser)
 
 
-def add_format(parser: OneLineParser) -> None:
-    """The options for the form of CSV."""
-    parser.add_argument(
-        "--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,"
-    )
-    parser.add_argument(
-        "--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: ."
+def add_format(parser: argparse.ArgumentParser) -> None:
+    """The options for the form of a table as text; :func:`dialect_in` reads them."""
+    for name, choices, text in (
+        ("sep", SEPARATORS, "between the cells"),
+        ("decimal", (".", ","), "in numbers"),
+        ("thousands", THOUSANDS, "between thousands"),
+    ):
+        words = f"{text}: {' '.join(choices)}; default: as the table has"
+        parser.add_argument(f"--{name}", choices=choices, metavar="SIGN", help=words)
+    parser.add_argument("--encoding", metavar="NAME", help="such as utf-16; default: found out")
+    parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out N lines")
+
+
+def dialect_in(chosen: argparse.Namespace) -> Dialect:
+    """How a table as text is written, as far as the options say."""
+    if chosen.skip < 0:
+        raise UsageError(f"--skip {chosen.skip}: a number of lines, 0 or more")
+    return Dialect(
+        None if chosen.sep is None else SEPARATORS[chosen.sep],
+        chosen.decimal,
+        None if chosen.thousands is None else THOUSANDS[chosen.thousands],
+        chosen.encoding,
+        chosen.skip,
     )
 
 

@@ -1,17 +1,18 @@
-"""Evaluated batches as pieces of a file: CSV, NDJSON, or Arrow streams, of which a Parquet file is
-made at the end."""
+"""Evaluated batches as pieces of a file: CSV, NDJSON or Parquet."""
 
 import csv
 import gzip
 import io
 import json
-from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, BinaryIO, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet
+
+from mumacro.inputs.text_tables import BLANKS, Dialect
 
 
 def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
@@ -21,12 +22,23 @@ def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
     return text.getvalue()
 
 
+def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[str, str]:
+    """Separator and decimal sign of an output as text: those that are given, else those of the
+    input, ``sep`` and ``decimal``, where the ending fits."""
+    sep, decimal = dialect.sep or sep, dialect.decimal or decimal
+    if ending == ".tsv" or sep == BLANKS or (ending == ".txt" and not sep):
+        sep = "\t"
+    elif ending == ".csv" and not dialect.sep and sep in ("", "\t"):
+        sep = ";" if decimal == "," else ","
+    return sep or ",", decimal
+
+
 class Output(NamedTuple):
-    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``compressed`` (.gz) piece by
+    """How rows are written: ``text``, ``ndjson`` or ``parquet``; text ``compressed`` (.gz) piece by
     piece.
 
-    ``sep`` and ``decimal`` are those of CSV; in the column ``stiffness`` infinity is written as
-    ``rigid``.
+    ``sep`` and ``decimal`` are those of a table as text; in the column ``stiffness`` infinity is
+    written as ``rigid``.
     """
 
     format: str
@@ -41,26 +53,18 @@ class Output(NamedTuple):
         # without name and time, so that the same text gives the same bytes
         return gzip.compress(data, 6, mtime=0) if self.compressed else data
 
-    def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes:
-        """Rows as bytes; where ``texts`` has the unchanged input records, the columns stand behind
-        them."""
+    def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> Any:
+        """Rows as they are written, for Parquet the batch itself; where ``texts`` has the unchanged
+        input records, the columns stand behind them."""
         if self.format == "parquet":
-            sink = pa.BufferOutputStream()
-            with pa.ipc.new_stream(sink, batch.schema) as writer:
-                writer.write_batch(batch)
-            return bytes(sink.getvalue())
+            return batch
         cells = [
             self._cells(name, column)
             for name, column in zip(batch.schema.names, batch.columns, strict=True)
         ]
         rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
-        if self.format == "csv":
-            rows = (
-                rows
-                if texts is None
-                else ([*first, *row] for first, row in zip(texts, rows, strict=True))
-            )
-            return self.pack(csv_lines(rows, self.sep))
+        if self.format == "text":
+            return self.pack(self._lines(rows, texts))
         line = (
             ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names)
             + "}\n"
@@ -73,6 +77,23 @@ class Output(NamedTuple):
         )
         return self.pack(
             "".join(begun + line % row for begun, row in zip(first, rows, strict=True))
+        )
+
+    def _lines(self, rows: Iterable[Sequence[Any]], texts: Sequence[Any] | None) -> str:
+        """Rows of cells as lines, behind ``texts``, which are lines or lists of cells."""
+        if texts is None:
+            return csv_lines(rows, self.sep)
+        if not texts or not isinstance(texts[0], str) or self.sep == self.decimal:
+            of_cells = (
+                [*(next(csv.reader([x], delimiter=self.sep)) if isinstance(x, str) else x), *row]
+                for x, row in zip(texts, rows, strict=True)
+            )
+            return csv_lines(of_cells, self.sep)
+        # numbers and words need no quotes
+        sep = self.sep
+        return "".join(
+            f"{text}{sep}{sep.join([cell or '' for cell in row])}\n"
+            for text, row in zip(texts, rows, strict=True)
         )
 
     def _cells(self, name: str, column: pa.Array) -> list[str | None]:
@@ -98,18 +119,15 @@ class Output(NamedTuple):
             return list(pc.fill_null(text, "null").to_pylist())
         return [json.dumps(cell) for cell in text.to_pylist()]
 
-    def whole(self, path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
-        """The file of all pieces; doubles in Parquet are written plainly, which is three times as
+    @contextmanager
+    def writing(self, stream: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[Any], object]]:
+        """What writes a piece; doubles in Parquet are written plainly, which is three times as
         fast."""
         if self.format != "parquet":
-            with path.open("wb") as stream:
-                stream.writelines(pieces)
+            yield stream.write
             return
-        dictionary_columns = [
-            field.name for field in schema if not pa.types.is_floating(field.type)
-        ]
+        words = [field.name for field in schema if not pa.types.is_floating(field.type)]
         with pa.parquet.ParquetWriter(
-            path, schema, use_dictionary=dictionary_columns, compression="snappy"
+            stream, schema, use_dictionary=words, compression="snappy"
         ) as writer:
-            for piece in pieces:
-                writer.write_table(pa.ipc.open_stream(piece).read_all())
+            yield writer.write_batch

@@ -1,34 +1,31 @@
 """A contact: ``POST /v1/stiffness``, from materials and geometry; ``POST /v1/fit``, from measured
 points."""
 
-import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
 from fastapi import Response
 
 import mumacro
-from mumacro.analysis.fit import Fit, quantile
-from mumacro.analysis.measured_points import STD
+from mumacro.analysis.measured_points import read_points, unknowns_beside
 from mumacro.contacts.geometries import contact_of
-from mumacro.errors import missing
-from mumacro.inputs.fields import RIGID
+from mumacro.errors import InputError
+from mumacro.inputs.decoding import TextError
+from mumacro.inputs.text_tables import Table
 
 from .. import API_VERSION
 from ..limits import Working
-from ..models.answers import FitAnswer, StiffnessAnswer
-from ..models.questions import FitRequest, StiffnessRequest
-from ..problems import ProblemKind, RequestError
-from ..reading import Json, StrictRoute
+from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
+from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
+from ..problems import FieldFault, refuse
+from ..reading import Json, StrictRoute, TableRoute
 from ..tables import Loaded, LoadedTable
-from . import POST_PROBLEMS, problems, router_of
+from . import POST_PROBLEMS, router_of
 
-router = router_of("answers", StrictRoute)
-_CURVE = 200  # points of the fitted law
-_MEASURED = ("mu_macro", STD)
+router, _tables = router_of("answers", StrictRoute), router_of("answers", TableRoute)
+_FAULTS = 100  # lines of a table that an answer names
 
 
 @router.post(
@@ -43,56 +40,68 @@ async def post_stiffness(contact: StiffnessRequest) -> Response:
     return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 
 
-@router.post(
+@_tables.post(
     "/fit",
-    responses={200: {"model": FitAnswer}, **POST_PROBLEMS, **problems(501)},
+    responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS},
     summary="k and mu0 from measured points",
 )
 async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Response:
     """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word
     rigid."""
-    columns, table = measured.points, tables.pick(measured.tolerance)
-    return await work.question(lambda: Json(_fitted(table, measured, columns)))
+    columns, source, table = measured.columns, measured.table, tables.pick(measured.tolerance)
+
+    def answer() -> Response:
+        points = None if source is None else _points(*source, measured)
+        if points is not None and measured.read_only:
+            return Json(_as_read(points))
+        return Json(_fitted(table, measured, columns, points))
+
+    return await work.question(answer)
 
 
-def _fitted(table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]) -> dict[str, Any]:
+def _points(member: str, data: bytes, measured: FitRequest) -> Table:
+    """The points of a table; a request has what is wrong with its lines at ``member``."""
+    try:
+        return read_points(data, measured.dialect, MAX_POINTS)
+    except TextError as error:
+        faults = error.faults or [str(error)]
+        refuse([FieldFault.of(member, fault) for fault in faults[:_FAULTS]])
+
+
+def _as_read(points: Table) -> dict[str, Any]:
+    return {
+        "columns": points.in_own_units,
+        "units": points.units,
+        "lines": points.lines,
+        "skipped_lines": points.skipped,
+        "read_as": points.read_as,
+        "api_version": API_VERSION,
+    }
+
+
+def _fitted(
+    table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any], points: Table | None
+) -> dict[str, Any]:
     words: Any = measured.kind.names
+    unknowns: Sequence[str] = measured.unknowns
+    about: dict[str, Any] = {}
+    if points is not None:
+        if both := sorted(columns.keys() & points.columns.keys()):
+            raise InputError(both[0], None, "given once: it is a column of the points")
+        columns = {**points.columns, **columns}
+        if "unknowns" not in measured.model_fields_set:
+            unknowns = unknowns_beside(columns)
+        about = {"read_as": points.read_as, "skipped_lines": points.skipped}
     try:
         with warnings.catch_warnings():  # they are in the answer
             warnings.simplefilter("ignore")
-            fit = mumacro.fit(columns, measured.unknowns, surrogate=table.surrogate, **words)
-    except ModuleNotFoundError as error:
-        raise RequestError(ProblemKind.NOT_INSTALLED, missing("fit", error)) from None
-    members = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
-    return {
-        **members,
-        "values": _in_words(fit.values),
-        "interval": {
-            name: [_in_words({name: end})[name] for end in ends]
-            for name, ends in fit.interval.items()
-        },
-        "solutions": [_in_words(one) for one in fit.solutions],
-        "curve": _curve(fit),
-        **table.signature,
-    }
+            fit = mumacro.fit(columns, unknowns, surrogate=table.surrogate, **words)
+    except InputError as error:
+        if points is None or error.index is None:
+            raise
+        reason = f"line {points.lines[error.index]}: {error.field} must be {error.bound}"
+        refuse([FieldFault.of("points", reason, error.value)])
+    return {**fit.to_dict(), **about, **table.signature}
 
 
-def _in_words(values: Mapping[str, float]) -> dict[str, float | str]:
-    """Values with the word rigid for an infinite k."""
-    return {
-        name: RIGID if name == "k" and value == math.inf else value
-        for name, value in values.items()
-    }
-
-
-def _curve(fit: Fit) -> dict[str, Any] | None:
-    """The fitted law over v0 with its 95 % band; None where other inputs vary, too."""
-    inputs = {name: x for name, x in fit.points.items() if name not in _MEASURED}
-    v0 = inputs.pop("v0")
-    moving = v0[v0 > 0.0]
-    if any(np.ptp(x) > 0.0 for x in inputs.values() if np.isfinite(x).all()) or not moving.size:
-        return None
-    fine = np.unique(np.concatenate([np.geomspace(moving.min(), moving.max(), _CURVE), v0]))
-    mu, off = fit.predict(v0=fine, **{name: float(x[0]) for name, x in inputs.items()})
-    width = quantile(None if STD in fit.points else v0.size - len(fit.values)) * off
-    return {"v0": fine, "mu_macro": mu, "low": np.maximum(mu - width, 0.0), "high": mu + width}
+router.routes.extend(_tables.routes)

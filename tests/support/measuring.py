@@ -22,7 +22,7 @@ for _name in (
 ):
     os.environ[_name] = "1"
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "build" / "results"
 IMAGES = ROOT / "docs" / "img"
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvicorn")
@@ -31,7 +31,13 @@ FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 #: section
 PAGES = tuple(
     ROOT / path
-    for path in ("docs/accuracy.md", "docs/python.md", "docs/service.md", "tables/README.md")
+    for path in (
+        "docs/accuracy.md",
+        "docs/python.md",
+        "docs/service.md",
+        "docs/validation.md",
+        "tables/README.md",
+    )
 )
 
 
