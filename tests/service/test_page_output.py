@@ -372,7 +372,7 @@ def test_the_measured_example_is_read_and_fitted(open_page: Any) -> None:
     page.click("#fit-example")
     assert page.value("#field-Fz") == "10.79 N"
     assert page.find("[value=along]").is_selected()
-    assert page.texts("#points-read th") == ["v0 [m/s]", "mu0", "mu_macro"]
+    assert page.texts("#points-read th") == ["v0 [mm/s]", "mu0", "mu_macro"]
     page.click("#fit-button")
     page.wait_for("#fit-lines", r"k = 9.9\d+ N/µm ± 0.07\d N/µm")  # docs/how-to/fit.md
     assert len(page.texts("#fit-plot circle.measured")) == 10  # and the residuals below
@@ -421,6 +421,7 @@ def test_a_file_of_an_instrument_is_dropped(
     page.wait_for("#points-read", "9 points")
     page.settle()
     assert "run 1.txt" in page.text("#file-name")
+    assert "head in line 4" in page.text("#points-read")
     assert "skipped" in page.text("#points-read")
     page.click("#fit-button")
     assert re.search(r"k = 1.3 N/µm", page.texts("#fit-lines li")[0])

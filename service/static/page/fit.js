@@ -5,7 +5,7 @@ import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
 import { caseOf } from "./state.js";
-import { about, inUnit, prose, show, toUnit, unitFor } from "./words.js";
+import { about, inUnit, prose, show, toSI, toUnit, unitFor } from "./words.js";
 const { area } = globalThis.d3;
 
 const ROWS = 6; // of the table that was read, which are shown
@@ -27,10 +27,19 @@ export function fitPanel(store, moved, openCase) {
   let source = { points: "" }; // what is sent: a text, or the bytes of a file
   let table, fit, answer;
   const plot = new Plot($("fit-plot"), paint);
+  /** How the table is written, as far as it is chosen; a text has its encoding already. */
   const dialect = () =>
     Object.fromEntries(
-      ["sep", "decimal", "encoding"].map((name) => [name, $(`points-${name}`).value]).filter(([, value]) => value),
+      ["sep", "decimal", ...(source.points_base64 ? ["encoding"] : [])]
+        .map((name) => [name, $(`points-${name}`).value])
+        .filter(([, value]) => value),
     );
+  /** A column of the table in SI; mu_macro and its deviation may be in per cent. */
+  const column = (name) => {
+    const unit = table.units[name];
+    const like = MEASURED.includes(name) ? "mu0" : name;
+    return unit ? table.columns[name].map((one) => toSI(like, one, unit)) : table.columns[name];
+  };
   const say = (text, bad = false) => {
     $("fit-status").textContent = text ? prose(text) : "";
     $("fit-status").classList.toggle("bad", bad);
@@ -109,13 +118,13 @@ export function fitPanel(store, moved, openCase) {
   /** The table that the service read, before anything is fitted. */
   function readTable() {
     if (!table) return nothing;
-    const { columns, units = {}, skipped_lines: skipped = [] } = table;
+    const { columns, units, skipped_lines: skipped, read_as: how } = table;
     const names = Object.keys(columns);
     const count = columns[names[0]]?.length ?? 0;
     const head = (name) => `${name}${units[name] && units[name] !== "-" ? ` [${units[name]}]` : ""}`;
     const row = (i) => html`<tr>${names.map((name) => html`<td>${show(columns[name][i], 6)}</td>`)}</tr>`;
     const more = skipped.length ? `; lines that were skipped: ${skipped.slice(0, 8).join(", ")}${skipped.length > 8 ? ", …" : ""}` : "";
-    return html`<p class="hint">Read: ${count} points${more}. Values in SI.</p>
+    return html`<p class="hint">${how ? `Read as: ${how}; ` : ""}${count} points${more}.</p>
       <div class="scroll"><table>
         <thead><tr>${names.map((name) => html`<th scope="col">${head(name)}</th>`)}</tr></thead>
         <tbody>${Array.from({ length: Math.min(count, ROWS) }, (_, i) => row(i))}</tbody>
@@ -134,19 +143,20 @@ export function fitPanel(store, moved, openCase) {
 
   /** Points, fit and band above; below them, on the same axis, the residuals. */
   function paint() {
-    const columns = table?.columns;
-    if (!columns?.v0 || !columns.mu_macro) {
+    if (!table?.columns.v0 || !table.columns.mu_macro) {
       plot.svg.replaceChildren();
       return;
     }
-    const unit = unitFor("v0", Math.max(...columns.v0));
-    const x = columns.v0.map((value) => toUnit("v0", value, unit));
+    const speeds = column("v0");
+    const measured = column("mu_macro");
+    const unit = unitFor("v0", Math.max(...speeds));
+    const x = speeds.map((value) => toUnit("v0", value, unit));
     const moving = x.filter((value) => value > 0);
     const log = Math.min(...moving) < Math.max(...moving) / 10;
     const domain = log ? [Math.min(...moving) / 1.3, Math.max(...moving) * 1.3] : [0, 1.05 * Math.max(...x)];
-    const std = columns.std ?? x.map(() => 0);
+    const std = table.columns.std ? column("std") : x.map(() => 0);
     const curve = fit?.curve;
-    const top = 1.08 * Math.max(...columns.mu_macro.map((mu, i) => mu + (std[i] || 0)), ...(curve?.high ?? [0]));
+    const top = 1.08 * Math.max(...measured.map((mu, i) => mu + (std[i] || 0)), ...(curve?.high ?? [0]));
     const residuals = fit?.residuals ?? [];
     const worst = Math.max(...residuals.map((one, i) => Math.abs(one) + (std[i] || 0)), 1e-12);
     const share = residuals.length ? 0.3 : 0; // of the height, for the residuals
@@ -163,7 +173,7 @@ export function fitPanel(store, moved, openCase) {
     }
     const bar = (i, y, size) => plot.path([[x[i], y - size], [x[i], y + size]], "measured");
     const dot = (i, y) => inside.append("circle").attr("class", "measured").attr("r", 3.5).attr("cx", plot.x(x[i])).attr("cy", plot.y(y));
-    columns.mu_macro.forEach((mu, i) => {
+    measured.forEach((mu, i) => {
       if (std[i]) bar(i, mu, std[i]);
       dot(i, mu);
     });
