@@ -36,13 +36,6 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # Builders of Fortran and C extensions, which nothing here calls.
     && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/bin/f2py \
         venv/lib/python3*/site-packages/numpy/distutils \
-# Of Arrow what reads and writes streams and CSV: no network, no clouds, no Parquet, no datasets, no
-# second name of a library.
-    && cd venv/lib/python3*/site-packages/pyarrow \
-    && rm -rf include libarrow_flight* libarrow_python_flight* libarrow_python_parquet* \
-        libarrow_s3* libarrow_python.so libarrow_python.so.*.*.* _flight* _s3fs* _gcsfs* \
-        _azurefs* _hdfs* _orc* _substrait* _dataset* _parquet* _feather* \
-    && cd /app \
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after
 # linking.
     && if command -v strip >/dev/null; then \

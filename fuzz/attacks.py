@@ -61,17 +61,6 @@ def strange_words(server: Server, share: float) -> None:
     posted(server, "application/json", *columns)
 
 
-def idle_streams(server: Server, share: float) -> None:
-    def law() -> None:
-        case = {name: value for name, value in CASE.items() if name != "v0"}
-        status, _, _ = server.ask(
-            "POST", "/v1/law", json.dumps({**case, "start": 1e-4, "stop": 1.0})
-        )
-        assert status == 200, f"/v1/law: {status}"
-
-    hold_connections(server, share, head("/v1/mu-macro/batch", None, "application/x-ndjson"), law)
-
-
 def motions(server: Server, share: float) -> None:
     """Many motions of a ball with high harmonics; a law is answered beside them."""
     terms = [
@@ -141,7 +130,6 @@ ATTACKS: dict[str, Attack] = {
     "JSON of the smallest values and lists": brackets,
     "As many rows, and as long columns, as are allowed, with everything included": everything,
     "Columns of words and of nulls, which Python reads one by one": strange_words,
-    "Streams without a line; the question of a person is answered beside them": idle_streams,
     "Many at once ask for /openapi.json for the first time": descriptions,
     "Motions of a ball with high harmonics; a law is answered beside them": motions,
 }
