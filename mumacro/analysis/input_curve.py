@@ -48,7 +48,8 @@ class InputCurve:
         inputs of the case.  InputError for a value out of bounds where ``strict``, else NaN."""
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         inputs = {**self.case, **k, self.unknown: x, **others}
-        return self.surrogate.answer(Cases.of(inputs, self.kind, strict), gradient, groups)
+        cases = Cases.of(inputs, self.kind, strict)
+        return self.surrogate.answer(cases, ("gradient",) if gradient else (), groups)
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""

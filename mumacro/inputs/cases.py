@@ -215,7 +215,7 @@ class Cases(NamedTuple):
         for those cases that have it."""
         column, has = self.given.get(name, self.columns.get(name, math.nan)), self._has(name)
         one_for_all = self.codes is not None and not isinstance(column, np.ndarray)
-        return ~has & ~np.isnan(column) & ~(one_for_all and has.any())
+        return ~has & ~np.isnan(column) & (not (one_for_all and has.any()))
 
     def _where_they_agree(self, values: Mapping[str, Any], refuse: bool) -> "Cases":
         """The same, with NaN in v0 where contact, direction, amplitudes and deviations do not go
@@ -495,9 +495,13 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     amplitude of another direction.
     """
     _strange_amplitude(values, kind, refuse=True)
+    for name in values.keys() & {"std", *DEVIATIONS}:
+        raise InputError(name, values[name], WITHOUT_DEVIATION)
     columns, _, std, ends = _numbers(values, kind.fields)
-    for name in (*std, *(["k"] if ends else [])):
-        raise InputError(name, values.get(name), WITHOUT_DEVIATION if std else "one value")
+    for name in std:
+        raise InputError(name, values.get(name, values.get("f")), WITHOUT_DEVIATION)
+    if ends is not None:
+        raise InputError("k", values.get("k"), "one value, no interval")
     return columns
 
 
@@ -671,6 +675,17 @@ def _frequency_in(values: Mapping[str, Any], fields: tuple[str, ...]) -> str:
         return "f"
     bound = "left out beside f [Hz], which stands in its place: give one, not both"
     raise InputError("omega", values["omega"], bound)
+
+
+def real(name: str, value: Any) -> Array:
+    """A value as an array of float64, exact: InputError where it has a deviation or is an
+    interval."""
+    quantity = read(name, value)
+    if quantity.std is not None:
+        raise InputError(name, value, WITHOUT_DEVIATION)
+    if quantity.low is not None:
+        raise InputError(name, value, "one value: only evaluate and its forms take intervals")
+    return np.asarray(quantity.si)
 
 
 def check(

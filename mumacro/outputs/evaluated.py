@@ -91,7 +91,8 @@ class Evaluated:
 
     def crit(self, y: Any) -> Any:
         """v~crit at amplitudes in the shape of the cases."""
-        return self._take(self.tabulated.crit(np.atleast_1d(y), self.kind))
+        crit = self.tabulated.crit(np.atleast_1d(y), self.kind)
+        return crit if self.cases.shape else _item(crit)
 
     def at(self, **columns: Any) -> "Evaluated":
         """The answers to the same cases with other values of some inputs, and one k."""

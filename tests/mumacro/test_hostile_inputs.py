@@ -15,9 +15,10 @@ from tests.support.cases import CASE, tables, without
 
 #: methods of (v~, y~)
 PLANE: dict[str, Callable[..., Any]] = {
-    **{name: getattr(Surrogate, name) for name in (*QUANTITY_NAMES, "ratio_with_bound")},
+    **{name: getattr(Surrogate, name) for name in QUANTITY_NAMES},
     **{
-        name: getattr(Surrogate, name) for name in ("power_with_bound", "stick_fraction_with_bound")
+        f"{name} with its bound": lambda s, v, y, name=name: s.quantity(name, v, y)
+        for name in QUANTITY_NAMES
     },
     **{
         f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True)
@@ -251,7 +252,7 @@ def test_six_inputs_of_any_bits_are_answered_alone_as_in_an_array(table: Surroga
     assert np.array_equal(np.isnan(answer.mu_macro), ~legal)
     assert np.all(answer.error_bound[legal] >= 0.0)
     for i, case in enumerate(six.T.tolist()):
-        assert table.evaluate_case(*case)[3] == answer.source_code[i]
+        assert table.tabulated.one(case).source == answer.source_code[i]
         try:
             one = table.evaluate(dict(zip(CASE, case, strict=True)), gradient=True)
         except InputError:
