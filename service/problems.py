@@ -31,7 +31,8 @@ from mumacro.inputs.fields import BOUNDS, LIKE, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE
-from mumacro.inputs.units import number_hint, unknown_name
+from mumacro.inputs.names import unknown_name
+from mumacro.inputs.old_texts import number_hint
 
 from . import API_VERSION
 

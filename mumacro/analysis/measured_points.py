@@ -10,7 +10,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import by_name, check, columns_of, real, select
 from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
-from mumacro.inputs.units import unknown_name
+from mumacro.inputs.names import unknown_name
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 

@@ -21,13 +21,15 @@ from mumacro import plotting
 from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import check, without_interval
-from mumacro.inputs.fields import LIKE, NAMES, RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
+from mumacro.inputs.names import suggestion
+from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.text_tables import SEPARATORS
-from mumacro.inputs.units import read_number, read_range, scale_of, suggestion
+from mumacro.inputs.units import belongs_to_value
 from mumacro.surrogate import Surrogate
 
-INPUTS = """\
+ABOUT_INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
   mu0    Coulomb friction coefficient [-], > 0
   Fz     normal force [N], > 0
@@ -221,7 +223,7 @@ def read_case(
         case[name] = math.nan
         try:
             case[name] = _read(name, text, one_k)
-        except ValueError as error:
+        except InputError as error:
             faults.append(str(error))
     if strange:
         verb = "is" if len(strange) == 1 else "are"
@@ -234,16 +236,17 @@ def read_case(
 
 
 def _read(name: str, text: str, one_k: str) -> float | tuple[float, float]:
-    """The value of an input, or the ends of k; ValueError where it is none, or out of bounds."""
-    if name == "k" and ".." in text:
-        ends = read_range(name, text)
+    """The value of an input, or the ends of k; InputError where it is none, or out of bounds."""
+    value = read(name, text)
+    if value.low is not None:
         if one_k:
-            raise ValueError(f"k={text}: {one_k}")
-        return ends
-    value = read_number(name, text)
-    field, in_model = ("omega", value * RAD_PER_CYCLE) if name == "f" else (name, value)
-    check({field: in_model}, value if name == "f" else None)
-    return value
+            raise InputError(name, text, f"one number: {one_k}")
+        return value.low, value.high
+    if value.std is not None:
+        raise InputError(name, text, NO_DEVIATION)
+    field, in_model = ("omega", value.si * RAD_PER_CYCLE) if name == "f" else (name, value.si)
+    check({field: in_model}, value.si if name == "f" else None)
+    return float(value.si)
 
 
 def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
@@ -261,13 +264,14 @@ def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
 def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
     """Name and value of each ``name=value``; a unit may stand apart; other words have no value."""
     pairs: list[tuple[str, str | None]] = []
-    for word in re.sub(r"\s*=\s*", "=", " ".join(words)).split():
+    text = " ".join(" ".join(words).split())
+    for word in text.replace(" =", "=").replace("= ", "=").split():
         name, equals, text = word.strip(",;").partition("=")
         last, value = pairs[-1] if pairs else ("", None)
         if equals:
             pairs.append((name, text))
-        elif value is not None and last in (*NAMES, *LIKE) and scale_of(last, name):
-            pairs[-1] = last, f"{value} {name}"
+        elif value is not None and last in INPUTS and belongs_to_value(word):
+            pairs[-1] = last, f"{value} {word.rstrip(',;')}"
         else:
             pairs.append((name, None))
     return pairs
@@ -323,16 +327,14 @@ def format_for(
     return f".{digits(k_effect(surrogate, case, contact, direction))}g"
 
 
-def read_values(
-    pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
-) -> list[Any]:
+def read_values(pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any]) -> list[Any]:
     """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
     are none."""
     values, faults = [], []
     for name, text in pairs:
         try:
             values.append(read(name, text))
-        except ValueError as error:
+        except InputError as error:
             faults.append(str(error))
     if faults:
         raise UsageError("; ".join(dict.fromkeys(faults)))

@@ -26,7 +26,7 @@ ROW_OF_K = ("k is known", True)  # the answer for an interval tells that already
 
 def run(words: Sequence[str], description: str) -> str:
     """``mumacro 'mu0=0.3 ...'``; ``description`` is what the help says of the whole command."""
-    parser = OneLineParser(prog="mumacro", description=description + common.INPUTS)
+    parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
     parser.add_argument("--gradient", action="store_true", help="also d mu_macro / d input")
     parser.add_argument(

@@ -7,15 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 
 from mumacro.inputs.fields import LIKE, is_rigid, unit_of
-from mumacro.inputs.units import (
-    PLAIN,
-    UNITS_OF,
-    Scale,
-    number_hint,
-    scale_of,
-    split_unit,
-    suggestion,
-)
+from mumacro.inputs.names import suggestion
+from mumacro.inputs.old_texts import PLAIN, number_hint
+from mumacro.inputs.units import UNITS_OF, Scale, scale_of, split_unit
 
 #: separators of the cells of CSV, by name
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
