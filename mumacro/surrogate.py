@@ -594,7 +594,7 @@ class Surrogate:
         strict = options["illegal"] == "raise"
         shorthand = [name for name in ("gradient", "groups") if options[name]]
         names = [*names_in(options["include"]), *shorthand]
-        if has_labels(cases, values):
+        if has_labels(values.values()):
             return evaluate_labelled(self, cases, values, names, strict)
         return self.answer(Cases.of(values, strict=strict), names)
 

@@ -28,6 +28,7 @@ from mumacro.inputs.fields import (
 from mumacro.inputs.k_range import BOUND, ENDS
 from mumacro.inputs.kind import (
     AMPLITUDE,
+    CONTACTS,
     DIRECTIONS,
     KINDS,
     LIFTS_OFF,
@@ -110,10 +111,9 @@ class Cases(NamedTuple):
         >>> Cases.of({**inputs, "contact": ["ball", "spring"]}).codes.tolist()
         [1, 0]
         """
-        words = {name: values[name] for name in KIND if name in values}
-        if kind is None and all(isinstance(word, str) for word in words.values()):
-            kind = kind_of(**words)
-        texts = {} if kind is not None else _texts(words)
+        texts = {} if kind is not None else _texts(values)
+        if kind is None and not any(isinstance(text, np.ndarray) for text in texts.values()):
+            kind, texts = kind_of(**texts), {}
         fields = _fields(texts) if kind is None else kind.fields
         columns, given, std, ends = _numbers(values, fields)
         std |= _deviations(values, fields, std)
@@ -126,12 +126,12 @@ class Cases(NamedTuple):
                     part[name] = flat(x, shape) if x.size != 1 else x.item()
         if ends is not None:
             ends = _flat_ends(ends, shape, strict)
-        codes = codes_of(given, shape or (1,)).ravel() if texts else None
+        codes = codes_of(given, (math.prod(shape),)) if texts else None
         cases = cls(kind, fields, columns, shape, ends, std, codes, given)
         if std or strange or texts:
             return cases._where_they_agree(values, strict or not shape)
         if strict or not shape:
-            check(columns, given.get("f"), shape)
+            check(columns, given.get("f"), (cases.size,) if shape else ())
         return cases
 
     @property
@@ -242,7 +242,7 @@ class Cases(NamedTuple):
         """Refuse the first case that is ``bad``, or has a number out of bounds."""
         for where, part in self.by_kind():
             try:
-                check(part.columns, part.given.get("f"), part.shape)
+                check(part.columns, part.given.get("f"), (part.size,) if part.shape else ())
             except InputError as error:
                 index = error.index or 0
                 bad.append(index if isinstance(where, slice) else int(where[index]))
@@ -302,7 +302,8 @@ def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
         for name in cases.keys() - {*COLUMNS, *OPTIONS}:
             raise unknown(str(name), cases[name])
         return dict(cases), []
-    return select("cases", cases, COLUMNS)
+    columns, present = _columns_in("cases", cases, COLUMNS)
+    return columns, [name for name in present if name not in columns]
 
 
 def unknown(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
@@ -329,9 +330,18 @@ def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
             raise InputError(str(column), "a column", f"named {meant} if it is that: {meant} is missing")
 
 
-def select(argument: str, cases: Any, names: Iterable[str]) -> tuple[dict[str, Any], list[str]]:
+def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
     """Those of ``names`` that a mapping, a data frame or one row of it, an Arrow table or stream,
-    or a Dataset has, and the other names."""
+    or a Dataset has."""
+    return _columns_in(argument, cases, names)[0]
+
+
+def _columns_in(
+    argument: str, cases: Any, names: Iterable[str]
+) -> tuple[dict[str, Any], Iterable[str]]:
+    """The columns of these names, and the names of all columns."""
+    if library_of(cases) == "pandas" and not hasattr(cases, "columns"):  # one row of a frame
+        cases = cases.to_dict()
     # a stream of batches has no columns by name
     if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):
         # its columns come from one reading: a second one may have another order
@@ -341,13 +351,12 @@ def select(argument: str, cases: Any, names: Iterable[str]) -> tuple[dict[str, A
     try:
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars
         # have lists of names
-        present = (
+        present: Any = (
             cases
             if hasattr(cases, "keys")
             else getattr(cases, "column_names", None) or cases.columns
         )
-        found = {name: cases[name] for name in names if name in present}
-        return found, [name for name in present if name not in found]
+        return {name: cases[name] for name in names if name in present}, present
     except (AttributeError, TypeError, KeyError) as error:
         type_name = f"{type(cases).__module__}.{type(cases).__qualname__}".removeprefix("builtins.")
         raise InputError(
@@ -371,10 +380,10 @@ def library_of(value: Any) -> str:
     return name if name in ("pandas", "xarray", "dask") else ""
 
 
-def has_labels(cases: Any, inputs: Mapping[str, Any]) -> bool:
+def has_labels(values: Iterable[Any]) -> bool:
     """Whether the answer is labelled, since an input is."""
-    values = (cases, *inputs.values())
-    return not _UNLABELLED.issuperset(map(type, values)) and any(map(library_of, values))
+    types = {*map(type, values)}
+    return not types <= _UNLABELLED and any(map(library_of, values))
 
 
 def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
@@ -593,13 +602,15 @@ def _no_such_amplitude(name: str, value: Any, kind: Kind) -> InputError:
     return InputError(name, value, bound)
 
 
-def _texts(words: Mapping[str, Any]) -> dict[str, Any]:
-    """Contact and direction, of which one or both are columns: texts, or arrays of them."""
-    texts = {"contact": "spring", "direction": "across"} | dict(words)
-    for name, text in texts.items():
+def _texts(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Contact and direction: one text each, or arrays of them."""
+    texts = {}
+    for name, usual in (("contact", CONTACTS[0]), ("direction", DIRECTIONS[0])):
+        text = values.get(name, usual)
         if not isinstance(text, str):
             column = np.asarray(text, dtype=object)
-            texts[name] = column if column.ndim else column.item()
+            text = column if column.ndim else column.item()
+        texts[name] = text
     return texts
 
 

@@ -26,7 +26,7 @@ PLANE: dict[str, Callable[..., Any]] = {
     },
 }
 NO_NUMBERS: dict[str, Any] = {
-    "text": "0.1",
+    "text": "fast",
     "bytes": b"0.1",
     "complex": 1j,
     "None": None,
@@ -35,7 +35,7 @@ NO_NUMBERS: dict[str, Any] = {
     "a mapping": {"a": 1.0},
     "a type": float,
     "ragged": [[1.0], [1.0, 2.0]],
-    "texts": ["0.1", "0.2"],
+    "texts": ["fast", "0.2"],
     "bytes in a list": [b"1"],
     "complex array": np.array([1j, 2.0]),
     "too large": 10**400,
@@ -43,7 +43,7 @@ NO_NUMBERS: dict[str, Any] = {
     "times": np.array(["2020-01-01"], dtype="datetime64[s]"),
     "durations": np.array([1], dtype="timedelta64[s]"),
     "a time": np.datetime64("2020-01-01"),
-    "text array": np.array(["0.1"]),
+    "text array": np.array(["fast"]),
     "None in an array": [0.1, None],
     "records": np.zeros(3, dtype=[("a", "f8")]),
     "objects": np.array([object()]),

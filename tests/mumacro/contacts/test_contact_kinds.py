@@ -135,7 +135,7 @@ REFUSED = [
     ({"k": None, "k_range": (0.0, 1e6)}, "k_range", "0 < low"),
     ({"k": None, "k_range": (1e6, math.inf)}, "k_range", "finite"),
     ({"k": None, "k_low": 1e6}, "k_high", "given"),
-    ({"k": None, "k_range": ("a", 1e6)}, "k_low", "real number"),
+    ({"k": None, "k_range": ("a", 1e6)}, "k_low", "a number"),
 ]
 
 
@@ -181,7 +181,7 @@ def test_labels_are_kept(table: Surrogate) -> None:
     force = {"Fz_amplitude": xr.DataArray([1.0, 4.0], dims="force"), "k_range": (1e6, 2e6)}
     answer = table.evaluate(**without(CASE, "k", "y0"), **force, **NORMAL, gradient=True)
     assert answer.mu_macro_low.dims == ("force",)
-    assert answer.gradient["Fz_amplitude"].name == "d_mu_macro_d_Fz_amplitude"
+    assert answer.gradient["Fz_amplitude"].name == "gradient.Fz_amplitude"
     assert np.all(answer.mu_macro_low <= answer.mu_macro_high)
 
 
