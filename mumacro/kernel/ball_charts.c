@@ -44,6 +44,21 @@ static double mu_entry_slope(double t, double root, double *of_root) {
     return root > 0.0 ? -0.5 * t / root * *of_root : HUGE_VAL;
 }
 
+/* (d ln entry / d root at root = sqrt(1 - t) - the same at 0, which is at_end) / root, for t >= 1/2:
+ * by division of polynomials, so nothing cancels next to root = 0. */
+static double mu_entry_bend(double root, double at_end) {
+    const double *c = MU_ENTRY[1], u = mu_fma1(2.0 * MU_SQRT2, root, -1.0);
+    const double level = at_end / (2.0 * MU_SQRT2);
+    double sum = c[0], quotient = -level * c[0], bend = quotient;
+    for (int i = 1; i < MU_ENTRY_TERMS - 1; ++i) { /* (slope - level sum) / (u + 1) */
+        quotient = (MU_ENTRY_TERMS - i) * c[i - 1] - level * c[i] - quotient;
+        bend = mu_fma1(bend, u, quotient);
+        sum = mu_fma1(sum, u, c[i]);
+    }
+    sum = mu_fma1(sum, u, c[MU_ENTRY_TERMS - 1]);
+    return 8.0 * bend / sum - 2.0 / (1.0 - root * root);
+}
+
 /* x^(1/6), then 2 MU_FOLD_KNOT - MU_FOLD_SCALE sqrt(1 - x) from x = 1/2 on: from the root of x or
  * of 1 - x. */
 MU_INLINE mu_lanes mu_folded(mu_mask half, mu_lanes root) {

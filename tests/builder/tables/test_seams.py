@@ -1,0 +1,81 @@
+"""Beside every seam of cells, on both sides: answers of every table, all quantities, slopes."""
+
+import numpy as np
+import pytest
+
+from benchmarks.support.seams import beside_seams, slopes_across_rays
+from builder.solver.ball import Springs
+from builder.tables.contacts import ball, slopes_of
+from builder.tables.verify import BESIDE_BORDER
+from mumacro import Surrogate
+from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.table.atlas import BALL_CHARTS, CHARTS_OF, MIDDLE, QUANTITIES, Quantity
+from tests.support.cases import Array, opened
+
+RING = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
+
+
+def drawn(table: Surrogate, kind: Kind, index: int, n: int) -> tuple[Array, Array]:
+    chart = CHARTS_OF[kind.contact][index]
+    block = (table.table.ball if kind == BALL else table.table.blocks)[index]
+    rng = np.random.default_rng([kind.contact, index])
+    v, y = beside_seams(rng, chart, block, table.border, n)
+    return (MIDDLE * v / MIDDLE, MIDDLE * y / MIDDLE) if kind == BALL else (v, y)
+
+
+def apart(table: Surrogate, quantity: Quantity, v: Array, y: Array) -> Array:
+    """Where slopes are compared: of what is not smooth at the border, away from it."""
+    if quantity.smooth_at_border:
+        return np.full(v.shape, True)
+    return np.asarray(np.abs(v / table.v_tilde_crit(y) - 1.0) > BESIDE_BORDER)
+
+
+@pytest.mark.parametrize("kind", [SPRING, BALL], ids=["spring", "ball"])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
+def test_coarse_tables_are_within_their_bounds_of_the_finest(tolerance: float, kind: Kind) -> None:
+    """The finest table has digits to spare for both."""
+    table, fine = opened(tolerance), opened(1e-12)
+    for index, chart in enumerate(CHARTS_OF[kind.contact]):
+        v, y = drawn(table, kind, index, 8000)
+        for quantity in QUANTITIES:
+            name = quantity.name
+            scale = MIDDLE if kind == BALL else 1.0
+            (value, bound, _), (true, unsure, _) = (
+                s.quantity(name, scale * v, scale * y, **kind.names) for s in (table, fine)
+            )
+            assert np.all(np.abs(value - true) <= bound + unsure), (chart.name, name)
+            if kind == BALL and name != "mu_ratio":
+                continue  # slopes that no table gives
+            here, truth = (slopes_of(s, kind, name, v, y) for s in (table, fine))
+            off = np.abs(here[1:3] - truth[1:3]) > here[3:5] + truth[3:5]
+            assert not np.any(off & apart(table, quantity, v, y)), (chart.name, name)
+
+
+@pytest.fixture(scope="module")
+def springs() -> Springs:
+    return Springs(opened(1e-12))
+
+
+#: V, Y beside a seam and the steepest ray, at a seam next to it, and next to the ridge
+HARD = (
+    (0.1831568889210307, 0.5464632760800225),
+    (0.32447345362176977, 0.9680925873409648),
+    (0.648947093063553, 1.9361857288972757),
+)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10, 1e-12])
+def test_slopes_of_a_ball_across_the_rays_are_those_of_fresh_quadratures(
+    tolerance: float, springs: Springs
+) -> None:
+    table, of = opened(tolerance), ball(springs)
+    v, y = drawn(table, BALL, RING, 400)
+    near = np.random.default_rng(1).permutation(np.flatnonzero(y > 1e-3))[:60]
+    hard_v, hard_y = (np.array(x) / MIDDLE for x in zip(*HARD, strict=True))
+    v, y = of.as_asked(np.append(hard_v, v[near]), np.append(hard_y, y[near]))
+    truth, noise = slopes_across_rays(of, v, y, table.v_tilde_crit(y))
+    assert np.isfinite(noise[:, :2]).all()
+    rows = of.slopes(table, "mu_ratio", v, y)
+    assert np.all(np.abs(rows[1:3] - truth) <= rows[3:5] + noise)
+    seen = np.abs(rows[1:3] - truth) > noise
+    assert np.median((rows[3:5] / np.abs(rows[1:3] - truth))[seen]) <= 100.0
