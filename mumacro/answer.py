@@ -24,8 +24,7 @@ else:
 
     Number = TypeVar("Number")
 
-# by code; the last entry is that of -1, an illegal case
-_REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)
+# by source code; the last entry is that of -1, an illegal case
 _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
 BAND = ("mu_macro_low", "mu_macro_high")  # of an interval of k
 GROUPS = ("v_tilde", "y_tilde", "length_scale")
@@ -33,6 +32,7 @@ GROUPS = ("v_tilde", "y_tilde", "length_scale")
 DEFAULT = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 TEXTS = ("regime", "source")
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
+_REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)[_REGIME_CODES]
 Remark = dict[str, Any]  # row, field, cases, text
 
 
@@ -159,7 +159,7 @@ class Answer(Generic[Number]):
         springs of a ball slide continuously and others do not; ``"reverse_slip"`` where an
         oscillation along slides backwards, too.
         """
-        return self._by_source("regime", _REGIME_NAMES[_REGIME_CODES])
+        return self._by_source("regime", _REGIME_NAMES)
 
     @property
     def source(self) -> Any:
@@ -314,6 +314,15 @@ class IntervalAnswer(AnswerWithGradient[Number]):
 
     mu_macro_low: Number
     mu_macro_high: Number
+
+
+def add(remarks: list[Remark], remark: Remark) -> None:
+    """Add a remark to others, or its cases to one of the same row and field."""
+    for other in remarks:
+        if (other["row"], other["field"]) == (remark["row"], remark["field"]):
+            other["cases"] += remark["cases"]
+            return
+    remarks.append(remark)
 
 
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, codes_of, 
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.reading import without_unit
-from mumacro.outputs import MEMBERS
+from mumacro.outputs import MEMBERS, OUTPUTS
 from mumacro.outputs.evaluation import chosen
 from mumacro.table.atlas import REGIMES
 
@@ -131,7 +131,8 @@ def _of_pandas(
     index = next(x.index for x in values.values() if isinstance(x, pd.Series))
     arrays = _plain(values, index)
     try:
-        answer = surrogate.answer(Cases.of(arrays, strict=strict), include)
+        cases = Cases.of(arrays, strict=strict)
+        answer = surrogate.answer(cases, chosen(include, cases))
         return _labelled(answer, lambda x, name: pd.Series(x, index, name=name))
     except InputError:
         raise
@@ -181,7 +182,8 @@ def _of_chunks(
     results are known before."""
     arguments = {name: x for name, x in values.items() if library_of(x) or np.ndim(x)}
     fixed = {name: x for name, x in values.items() if name not in arguments}
-    outputs = chosen(include, any(name in DEVIATIONS for name in values))
+    deviations = any(name in DEVIATIONS for name in values)
+    outputs = tuple(OUTPUTS[x] for x in OUTPUTS if x in include or (x == "std" and deviations))
     direction = values.get("direction", "across")
     fields = kind_of(direction=direction).fields if isinstance(direction, str) else ALL_FIELDS
     paths = [path for output in outputs for path in output.paths(fields)]
@@ -192,8 +194,9 @@ def _of_chunks(
 
     def chunk(*columns: Any) -> list[Any]:
         inputs = {**fixed, **dict(zip(arguments, columns, strict=True))}
-        answer = surrogate.answer(Cases.of(inputs, strict=strict), include)
-        if {*answer.paths} - {*names, "regime", "source"}:
+        cases = Cases.of(inputs, strict=strict)
+        answer = surrogate.answer(cases, chosen(include, cases))
+        if (cases.std and not deviations) or (cases.ends is not None and not band):
             bound = "numbers: give deviations and intervals as arrays, std={...}, k_low and k_high"
             raise InputError("inputs", "texts", bound)
         found = dict(answer.outputs)

@@ -31,7 +31,8 @@ from mumacro.inputs.reading import read
 from mumacro.inputs.signature import AnyCases, ManyCases, OneCase, OneInterval
 from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.threads import default_threads
-from mumacro.outputs.evaluation import evaluate, names_in
+from mumacro.outputs import Output, evaluation
+from mumacro.outputs.evaluation import chosen, names_in
 from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
@@ -596,13 +597,15 @@ class Surrogate:
         names = [*names_in(options["include"]), *shorthand]
         if has_labels(values.values()):
             return evaluate_labelled(self, cases, values, names, strict)
-        return self.answer(Cases.of(values, strict=strict), names)
+        cases = Cases.of(values, strict=strict)
+        return self.answer(cases, chosen(names, cases))
 
     def answer(
-        self, cases: Cases, include: Iterable[str] | str = (), groups: bool = False
+        self, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
     ) -> Answer[Any]:
-        """:meth:`evaluate` of cases in their one form; ``groups`` keeps v~, y~ and l0, too."""
-        answer = evaluate(self.tabulated, cases, include, groups)
+        """:meth:`evaluate` of cases in their one form, with outputs of
+        :func:`mumacro.outputs.evaluation.chosen`; ``groups`` keeps v~, y~ and l0, too."""
+        answer = evaluation.answer(self.tabulated, cases, outputs, groups)
         answer._surrogate = self
         return answer
 

@@ -11,6 +11,7 @@ from mumacro.answer import Answer
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array
+from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
@@ -49,7 +50,7 @@ class InputCurve:
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         inputs = {**self.case, **k, self.unknown: x, **others}
         cases = Cases.of(inputs, self.kind, strict)
-        return self.surrogate.answer(cases, ("gradient",) if gradient else (), groups)
+        return self.surrogate.answer(cases, (GRADIENT,) if gradient else (), groups)
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""

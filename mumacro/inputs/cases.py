@@ -139,6 +139,13 @@ class Cases(NamedTuple):
         """How many cases."""
         return math.prod(self.shape)
 
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """The contacts and directions among the cases."""
+        if self.codes is None:
+            return () if self.kind is None else (self.kind,)
+        return tuple(KINDS[code] for code in np.unique(self.codes).tolist() if code >= 0)
+
     def part(self, which: slice | Places) -> "Cases":
         """Some of many cases, (m,)."""
 
@@ -162,13 +169,13 @@ class Cases(NamedTuple):
         if self.codes is None:
             yield slice(None), self
             return
-        for code in np.unique(self.codes[self.codes >= 0]).tolist():
-            where, fields = np.flatnonzero(self.codes == code), KINDS[code].fields
+        for kind in self.kinds:
+            where, fields = np.flatnonzero(self.codes == KINDS.index(kind)), kind.fields
             part = self.part(where)
             yield (
                 where,
                 part._replace(
-                    kind=KINDS[code],
+                    kind=kind,
                     fields=fields,
                     columns={name: part.columns[name] for name in fields},
                     std={name: part.std[name] for name in fields if name in part.std},
@@ -208,7 +215,7 @@ class Cases(NamedTuple):
         """Whether a case has an amplitude of this name, () or (n,)."""
         if self.codes is None:
             return np.bool_(name in self.fields)
-        return _NORMAL[self.codes] == (name == AMPLITUDE)
+        return (_NORMAL[self.codes] == (name == AMPLITUDE)) & (self.codes >= 0)
 
     def _strange(self, name: str) -> Any:
         """Whether a case is given an amplitude that it does not have, () or (n,).  One number is

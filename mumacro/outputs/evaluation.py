@@ -1,7 +1,8 @@
 """Cases become their answer: the one place where outputs are computed."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from mumacro.answer import (
     AnswerWithGradient,
     IntervalAnswer,
     Remark,
+    add,
 )
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
@@ -25,27 +27,10 @@ from mumacro.outputs.entry import Output, Values
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.tabulated import Tabulated
 
-# in times of one spring, across, at one k
+# in times of one spring across at one k
 _COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0}
 _BALL_ALONG = 5.0  # times both: a sum over springs
 _INTERVAL = 200.0
-
-
-def chosen(include: Iterable[str] | str, std: bool = False) -> tuple[Output, ...]:
-    """The outputs of these names, each once, in their order; with those of deviations where there
-    are some.
-
-    InputError for an unknown name, and for ``std`` without a deviation.
-
-    >>> [output.name for output in chosen("power, groups")]
-    ['groups', 'power']
-    """
-    names = names_in(include)
-    if "std" in names and not std:
-        bound = "given if include has std: the deviation of at least one input"
-        raise InputError("std", None, bound)
-    wanted = {*names, "std"} if std else {*names}
-    return tuple(output for name, output in OUTPUTS.items() if name in wanted)
 
 
 def names_in(include: Iterable[str] | str) -> list[str]:
@@ -62,52 +47,60 @@ def names_in(include: Iterable[str] | str) -> list[str]:
     return names
 
 
-def cost(outputs: Iterable[Output], cases: Cases) -> float:
+def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
+    """The outputs of these names, each once, in their order; with those of deviations where the
+    cases have some.
+
+    InputError for an unknown name, one that all of the cases lack, and std without a deviation.
+    """
+    names = {*names_in(include)}
+    if "std" in names and not cases.std:
+        bound = "given if include has std: the deviation of at least one input"
+        raise InputError("std", None, bound)
+    if cases.std:
+        names.add("std")
+    outputs = tuple(output for name, output in OUTPUTS.items() if name in names)
+    if cases.kind is not None:
+        for output, word, why, where in _lacked(outputs, cases):
+            if where is True:
+                bound = f"without {output.name} for {word}: {why}"
+                raise InputError("include", output.name, bound)
+    return outputs
+
+
+@cache
+def cost(outputs: tuple[str, ...], kinds: tuple[Kind, ...], interval: bool) -> float:
     """The time of a case, about, in times of mu_macro alone for one spring across; of several kinds
     that of the slowest."""
-    words = [kind.names for kind in kinds_of(cases)]
-    factors = [
-        math.prod(_COSTS.get(word, 1.0) for word in names.values())
-        * (_BALL_ALONG if [*names.values()] == ["ball", "along"] else 1.0)
-        for names in words
-    ]
-    interval = 1.0 if cases.ends is None else _INTERVAL
-    return (1.0 + sum(output.cost for output in outputs)) * max(factors, default=1.0) * interval
+    slowest = 1.0
+    for kind in kinds:
+        words = [*kind.names.values()]
+        both = _BALL_ALONG if words == ["ball", "along"] else 1.0
+        slowest = max(slowest, both * math.prod(_COSTS.get(word, 1.0) for word in words))
+    each = 1.0 + sum(OUTPUTS[name].cost for name in outputs)
+    return each * slowest * (_INTERVAL if interval else 1.0)
 
 
-def kinds_of(cases: Cases) -> list[Kind]:
-    """The contacts and directions among cases."""
-    if cases.kind is not None:
-        return [cases.kind]
-    return [part.kind for _, part in cases.by_kind() if part.kind is not None]
-
-
-def evaluate(
-    tabulated: Tabulated, cases: Cases, include: Iterable[str] | str = (), groups: bool = False
+def answer(
+    tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
 ) -> Answer[Any]:
-    """The answer to cases with the outputs of these names; ``groups`` keeps v~, y~ and l0, too.
+    """The answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too.
 
-    InputError for an output that none of the cases has.
+    In a column of several kinds an output is NaN where a kind does not have it, with a remark.
     """
-    outputs = chosen(include, bool(cases.std))
     gradient = any(output.gradient for output in outputs)
     detail: Detail = "gradient" if gradient else "groups" if outputs or groups else "values"
     remarks: list[Remark] = []
+    columns: Values = {}
     if cases.codes is None:
-        lacking = _lacking(outputs, cases, remarks)
-        for output in outputs:
-            if lacking.get(output.name) is True:
-                raise InputError("include", output.name, f"left out: {remarks[0]['text']}")
         evaluated = Evaluated(tabulated, cases, detail)
-        columns = _columns(evaluated, outputs, lacking)
+        columns = _columns(evaluated, outputs, remarks)
         if cases.std and not cases.shape:
             remarks += bent(evaluated, columns["std"])
     else:
-        columns = {}
         for where, part in cases.by_kind():
             evaluated = Evaluated(tabulated, part, detail)
-            lacking = _lacking(outputs, part, remarks)
-            for name, column in _columns(evaluated, outputs, lacking).items():
+            for name, column in _columns(evaluated, outputs, remarks).items():
                 none = -1 if name == "source" else math.nan
                 columns.setdefault(name, np.full(cases.size, none))[where] = column
     return _answer(cases, columns, outputs, detail, remarks)
@@ -119,14 +112,21 @@ _SLOPES = ("gradient", "gradient_bound")
 
 
 def _columns(
-    evaluated: Evaluated, outputs: tuple[Output, ...], lacking: Mapping[str, Any]
+    evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Remark]
 ) -> Values:
     """All that is computed of cases of one kind: outputs by path, and what stands beside them by
     name; NaN where a case lacks an output, or is not legal."""
+    lacking: dict[str, Any] = {}
+    for output, word, why, where in _lacked(outputs, evaluated.cases):
+        lacking[output.name] = where
+        number = evaluated.cases.size if where is True else int(np.count_nonzero(where))
+        text = f"there is no {output.name} for {word}: {why}"
+        add(remarks, {"row": "include", "field": output.name, "cases": number, "text": text})
     columns: Values = {}
     with np.errstate(all="ignore"):
         for output in outputs:
-            if (where := lacking.get(output.name)) is True:
+            where = lacking.get(output.name)
+            if where is True:
                 continue
             part = output.compute(evaluated)
             if where is not None:
@@ -147,34 +147,21 @@ def _columns(
     return columns
 
 
-def _lacking(
-    outputs: tuple[Output, ...], cases: Cases, remarks: list[Remark]
-) -> dict[str, Bools | Literal[True]]:
-    """The outputs that cases of one kind lack, all of them or these, with remarks that say why."""
-    kind = cases.kind or SPRING
-    lacking: dict[str, Bools | Literal[True]] = {}
+def _lacked(
+    outputs: tuple[Output, ...], cases: Cases
+) -> Iterator[tuple[Output, str, str, Bools | Literal[True]]]:
+    """The outputs that cases of one kind lack, for which direction or interval, why, and which
+    cases do: all of them, or these."""
+    words = (cases.kind or SPRING).names.values()
     for output in outputs:
         for word, why in output.lacks.items():
-            where: Any = word in kind.names.values()
-            if word == "k_range" and cases.ends is not None:
-                low, high = cases.ends  # a number is an interval of itself
-                where = low != high
-                where = True if where.all() else where
-            number = cases.size if where is True else int(np.count_nonzero(where))
-            if number:
-                lacking[output.name] = where
-                text = f"there is no {output.name} for {word}: {why}"
-                _remark(remarks, output.name, number, text)
-    return lacking
-
-
-def _remark(remarks: list[Remark], name: str, number: int, text: str) -> None:
-    """Add a remark, or its cases to the same one."""
-    for remark in remarks:
-        if (remark["field"], remark["text"]) == (name, text):
-            remark["cases"] += number
-            return
-    remarks.append({"row": "include", "field": name, "cases": number, "text": text})
+            if word in words:
+                yield output, word, why, True
+            elif word == "k_range" and cases.ends is not None:
+                low, high = cases.ends
+                wide = np.asarray(low != high)  # a number is an interval of itself
+                if wide.any():
+                    yield output, word, why, True if wide.all() else wide
 
 
 def _answer(
