@@ -18,7 +18,6 @@ from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
     ABSENT,
     DEVIATIONS,
-    NUMBERS,
     Absent,
     Cases,
     has_labels,
@@ -26,12 +25,13 @@ from mumacro.inputs.cases import (
     unknown,
 )
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
-from mumacro.inputs.kind import AMPLITUDE, BALL, SPRING, Kind, kind_of
-from mumacro.inputs.reading import read
+from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
+from mumacro.inputs.reading import NUMBERS, read
 from mumacro.inputs.signature import AnyCases, ManyCases, OneCase, OneInterval
 from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.threads import default_threads
-from mumacro.outputs import Output, evaluation
+from mumacro.outputs import evaluation
+from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, names_in
 from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
 from mumacro.table import atlas
@@ -402,17 +402,17 @@ class Surrogate:
     # --- dimensional ------------------------------------------------------------------------------
 
     @overload
-    def evaluate(
+    def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: Literal[True], **case: Unpack[OneCase]
     ) -> AnswerWithGradient[float]: ...
 
     @overload
-    def evaluate(
+    def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: Literal[False] = ..., **case: Unpack[OneCase]
     ) -> Answer[float]: ...
 
     @overload
-    def evaluate(
+    def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: bool = ..., **case: Unpack[OneInterval]
     ) -> IntervalAnswer[float]: ...
 
@@ -583,7 +583,12 @@ class Surrogate:
             "direction": direction,
         }
         keywords = {name: x for name, x in keywords.items() if x is not ABSENT}
-        options = {"include": include, "gradient": gradient, "groups": groups, "illegal": illegal}
+        options: dict[str, Any] = {
+            "include": include,
+            "gradient": gradient,
+            "groups": groups,
+            "illegal": illegal,
+        }
         keywords |= {name: x for name, x in options.items() if x is not _OPTIONS[name]}
         keywords |= {} if std is None else {"std": std}
         for name in more.keys() - DEVIATIONS.keys():
@@ -609,9 +614,7 @@ class Surrogate:
         answer._surrogate = self
         return answer
 
-    def _one(
-        self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind
-    ) -> Answer[float]:
+    def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
         """The answer to one case across in plain numbers; NaN where it is illegal."""
         if with_f:
             six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
@@ -674,8 +677,7 @@ def _flat_groups(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, .
         v, y = v_tilde, y_tilde
     else:
         v, y = (
-            np.asarray(read(name, x).si)
-            for name, x in (("v_tilde", v_tilde), ("y_tilde", y_tilde))
+            np.asarray(read(name, x).si) for name, x in (("v_tilde", v_tilde), ("y_tilde", y_tilde))
         )
     try:
         shape = common_shape((v, y))

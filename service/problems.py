@@ -212,10 +212,11 @@ def invalid(
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
     """The faults of inputs of which one of several is required: the library would tell the first
     of them, when everything else is right."""
-    direction = members.get("direction")
-    amplitudes = (AMPLITUDE,) if isinstance(direction, str) and direction == "normal" else ("y0",)
-    if not (direction is None or isinstance(direction, str)):  # one for each case
-        amplitudes = ("y0", AMPLITUDE)
+    direction = members.get("direction", "across")
+    one = isinstance(direction, str)  # else there is one for each case
+    amplitudes = ("y0", AMPLITUDE) if not one else ("y0",)
+    if one and direction == "normal":
+        amplitudes = (AMPLITUDE,)
     for names in (("k", "k_range", *ENDS), amplitudes, ("omega", "f")):
         if all(members.get(name) is None for name in names):
             yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))
@@ -323,8 +324,8 @@ def _of_input(error: InputError, _: Scope) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
     option, _, name = error.field.partition("_")
-    path = (option, name) if option == "std" and name else (error.field,)
-    return refused([FieldFault(path, reason_of(error), value)])
+    steps = (option, name) if option == "std" and name else (error.field,)
+    return refused([FieldFault(steps, reason_of(error), value)])
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:

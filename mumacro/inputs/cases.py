@@ -9,7 +9,6 @@ Keywords, a mapping, a data frame, Arrow columns, rows of a file or of JSON beco
 import enum
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -37,9 +36,9 @@ from mumacro.inputs.kind import (
     code_of,
     kind_of,
 )
-from mumacro.inputs.reading import NUMBERS, read
 from mumacro.inputs.names import suggestion, unknown_name
-from mumacro.kernel.arrays import Array, Bools, Codes, Places, common_shape, flat
+from mumacro.inputs.reading import NUMBERS, read
+from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
 
 
 class Absent(enum.Enum):
@@ -53,10 +52,6 @@ class Absent(enum.Enum):
 
 
 ABSENT: Final = Absent.ABSENT
-#: types of one real number
-NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(code).type for code in "efdbhilqBHILQ"))
-)
 _UNLABELLED = NUMBERS | {np.ndarray, list, tuple, type(None), dict, str}
 _FLOAT = np.dtype(np.float64)
 _AMPLITUDES = ("y0", AMPLITUDE)
@@ -146,6 +141,13 @@ class Cases(NamedTuple):
             return () if self.kind is None else (self.kind,)
         return tuple(KINDS[code] for code in np.unique(self.codes).tolist() if code >= 0)
 
+    @property
+    def one_kind(self) -> Kind:
+        """The contact and direction of all cases; TypeError where each has its own."""
+        if self.kind is None:
+            raise TypeError("the cases are of several kinds: see by_kind")
+        return self.kind
+
     def part(self, which: slice | Places) -> "Cases":
         """Some of many cases, (m,)."""
 
@@ -230,7 +232,9 @@ class Cases(NamedTuple):
         bad = np.zeros(self.size if self.shape else 1, np.bool_)
         for name in _AMPLITUDES:
             if name not in self.columns and self.codes is not None and self._has(name).any():
-                raise _missing(values, tuple(x for x in self.fields if x not in _AMPLITUDES or x == name))
+                raise _missing(
+                    values, tuple(x for x in self.fields if x not in _AMPLITUDES or x == name)
+                )
             bad |= self._strange(name)
         for name, deviation in self.std.items():
             legal = (np.asarray(deviation) >= 0.0) & (np.asarray(deviation) < math.inf)
@@ -247,16 +251,16 @@ class Cases(NamedTuple):
 
     def _refuse_first(self, bad: list[int]) -> None:
         """Refuse the first case that is ``bad``, or has a number out of bounds."""
-        for where, part in self.by_kind():
+        for places, part in self.by_kind():
             try:
                 check(part.columns, part.given.get("f"), (part.size,) if part.shape else ())
             except InputError as error:
                 index = error.index or 0
-                bad.append(index if isinstance(where, slice) else int(where[index]))
+                bad.append(index if isinstance(places, slice) else int(places[index]))
         if bad:
-            error = self.reason(min(bad))
-            index = min(bad) if self.shape else None
-            raise InputError(error.field, error.value, error.bound, index)
+            reason = self.reason(min(bad))
+            where = min(bad) if self.shape else None
+            raise InputError(reason.field, reason.value, reason.bound, where)
 
 
 # --- from inputs of any form to names and values --------------------------------------------------
@@ -334,7 +338,9 @@ def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
     for column in rest:
         meant = suggestion(str(column))
         if meant is not None and meant not in present:
-            raise InputError(str(column), "a column", f"named {meant} if it is that: {meant} is missing")
+            raise InputError(
+                str(column), "a column", f"named {meant} if it is that: {meant} is missing"
+            )
 
 
 def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
@@ -640,9 +646,7 @@ def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> t
 
 def _shape_of(*parts: Mapping[str, Any]) -> tuple[int, ...]:
     """The shape to which all columns broadcast; InputError where they do not."""
-    columns = {
-        name: x for part in parts for name, x in part.items() if isinstance(x, np.ndarray)
-    }
+    columns = {name: x for part in parts for name, x in part.items() if isinstance(x, np.ndarray)}
     try:
         return common_shape(columns.values())
     except ValueError as error:
@@ -713,7 +717,7 @@ def check(
     it replaced omega, ``shape`` is that of all cases, for the index of the case."""
     for name, values in columns.items():
         if type(values) is float and (
-            (0.0 < values or (values == 0.0 and name not in POSITIVE))
+            (values > 0.0 or (values == 0.0 and name not in POSITIVE))
             and (values < math.inf or name == "k")
         ):
             continue

@@ -41,6 +41,7 @@ _CONTACT = "One spring of stiffness k, or a ball on a flat (Hertz) whose stiffne
 _DIRECTION = (
     "Of the oscillation, to that of sliding: across it, along it, or normal: the force oscillates"
 )
+_EACH = "; a list has one for each case"
 _TOLERANCE = "Error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
 
 
@@ -175,7 +176,9 @@ class CaseColumns(Outputs, InputColumns):
         }
     )
 
-    contact: ContactColumn = Field("spring", description=f"{_CONTACT}; a list has one for each case")
+    contact: ContactColumn = Field(
+        "spring", description=f"{_CONTACT}; a list has one for each case"
+    )
     direction: DirectionColumn = Field(
         "across", description=f"{_DIRECTION}; a list has one for each case"
     )

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from service.included import INCLUDABLE
 
 import mumacro
 from benchmarks.support.serving import CASE
 from mumacro import Surrogate
 from mumacro.contacts.geometries import contact_of
-from service.included import INCLUDABLE
 from service.routers.questions import unit_at
 from tests.support.cases import Case
 from tests.support.comparing import close
