@@ -220,14 +220,12 @@ class Surrogate:
 
     @property
     def ball_tolerance(self) -> float:
-        """The tolerance of mu~ of a ball that is shaken across [-]; NaN for a table without a
-        ball."""
-        return float(self.table.attributes.get(f"{BALL_ATTRIBUTES}tolerance", math.nan))
+        """The tolerance of mu~ of a ball that is shaken across [-]."""
+        return float(self.table.attributes[f"{BALL_ATTRIBUTES}tolerance"])
 
     @property
     def ball_error_distribution(self) -> dict[str, dict[str, float]]:
-        """The same of a ball that is shaken across, without the border; empty for a table without
-        a ball."""
+        """The same of a ball that is shaken across, without the border."""
         return error_distribution(self.table, BALL_ATTRIBUTES)
 
     @property
