@@ -153,7 +153,7 @@ class OneCase(Strict):
         return {name: values[name] for name in INPUTS if values.get(name) is not None}
 
 
-class Case(OneCase):
+class CaseInputs(OneCase):
     """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})
