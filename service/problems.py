@@ -322,8 +322,8 @@ def _no_such_path(scope: Scope) -> str:
 def _of_input(error: InputError, _: Scope) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
-    option, _, name = error.field.partition("_")
-    steps = (option, name) if option == "std" and name else (error.field,)
+    name = error.field.removeprefix("std_")  # a deviation is a member of std
+    steps = (name,) if name == error.field else ("std", name)
     return refused([FieldFault(steps, reason_of(error), value)])
 
 
