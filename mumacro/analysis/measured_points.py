@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import by_name, check, columns_of, real, select
+from mumacro.inputs.cases import check, columns_of, real, select
 from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.names import unknown_name
@@ -107,7 +107,7 @@ class Measured:
         }
         # labels are dropped: a fit is not labelled
         values = {name: x if x is None else np.asarray(x) for name, x in data.items()}
-        inputs = by_name(None, {**values, **dict.fromkeys(self.unknowns, 1.0)}, self.kind)
+        inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
         numbers = columns_of(inputs, self.kind)
         check(numbers, inputs.get("f"))
         columns = {name: np.asarray(x, np.float64) for name, x in numbers.items()}

@@ -6,15 +6,19 @@ from typing import Annotated, Any
 from fastapi import Query, Request, Response
 from starlette.responses import PlainTextResponse
 
+from mumacro import Surrogate
+from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
+from mumacro.inputs.k_range import ENDS
+from mumacro.outputs.evaluation import cost
 
-from ..included import Plan, answer_case
 from ..models.answers import CaseAnswer
-from ..models.options import CaseQuery, CaseRequest, TextQuery
+from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
 from ..reading import DirectRoute, Json, dump
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
+_INTERVAL = frozenset(("k_range", *ENDS))
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
 _CACHED: Any = {
     "model": CaseAnswer,
@@ -29,13 +33,28 @@ _CACHED: Any = {
 
 async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str, Any]:
     """The answer to a case."""
-    state, inputs = request.app.state, case.inputs
-    table, plan = state.tables.pick(case.tolerance), Plan.of(case, inputs)
-    work = partial(answer_case, table.surrogate, inputs, plan)
-    large = plan.model or plan.cost > _LARGE
-    values, source = await state.work.question(work) if large else work()
+    state = request.app.state
+    table = state.tables.pick(case.tolerance)
+    work = partial(_answer, table.surrogate, case)
+    members, source = await state.work.question(work) if _is_large(case) else work()
     state.metrics.case(table, source)
-    return {**values, **table.signature}
+    return {**members, **table.signature}
+
+
+def _is_large(case: CaseRequest | CaseQuery) -> bool:
+    interval = not _INTERVAL.isdisjoint(case.inputs)
+    return case.model or cost(case.outputs, (case.kind,), interval) > _LARGE
+
+
+def _answer(surrogate: Surrogate, case: CaseRequest | CaseQuery) -> tuple[dict[str, Any], int]:
+    """The members of the answer, and the code of its source."""
+    answer = surrogate.evaluate(**case.values, include=case.outputs)
+    members = answer.to_dict()
+    if case.model:  # rows of docs/validity.md, and the digits that k supports
+        inputs, words = case.inputs, case.kind.names
+        members[MODEL] = model_rows(surrogate, inputs, **words)
+        members["digits"] = digits(k_effect(surrogate, inputs, **words))
+    return members, answer.source_code
 
 
 @router.get(
