@@ -215,7 +215,10 @@ def _of_chunks(
     if gradient:
         answer.gradient, answer.gradient_bound = (
             {field: results[f"{name}.{field}"] for field in fields} | {"k": results[of_k]}
-            for of_k, name in (("slope of k", "gradient"), ("bound of the slope of k", "gradient_bound"))
+            for of_k, name in (
+                ("slope of k", "gradient"),
+                ("bound of the slope of k", "gradient_bound"),
+            )
         )
     return answer
 

@@ -609,9 +609,7 @@ class Surrogate:
         answer._surrogate = self
         return answer
 
-    def _one(
-        self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind
-    ) -> Answer[float]:
+    def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
         """The answer to one case across in plain numbers; NaN where it is illegal."""
         if with_f:
             six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
@@ -674,8 +672,7 @@ def _flat_groups(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, .
         v, y = v_tilde, y_tilde
     else:
         v, y = (
-            np.asarray(read(name, x).si)
-            for name, x in (("v_tilde", v_tilde), ("y_tilde", y_tilde))
+            np.asarray(read(name, x).si) for name, x in (("v_tilde", v_tilde), ("y_tilde", y_tilde))
         )
     try:
         shape = common_shape((v, y))

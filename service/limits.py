@@ -56,6 +56,9 @@ def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
         )
 
 
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
 async def read_body(
     headers: Mapping[bytes, bytes],
     receive: Receive,
@@ -80,7 +83,7 @@ async def read_body(
         if size > SMALL_BODY:
             large()
         if not more:
-            return body
+            return body.removeprefix(_BYTE_ORDER_MARK)  # RFC 8259, 8.1
         message = await receive()
         if message["type"] != "http.request":
             raise ClientDisconnect

@@ -172,7 +172,11 @@ def solve_for(
             stiffness_exponent=stiffness_exponent,
             **case,
         )
-        return _in_unit(solution, given, per)
+        solution = _in_unit(solution, given, per)
+        if ends_given is None:
+            return solution
+        low, high = ends_given
+        return replace(solution, reach=replace(solution.reach, low=low, high=high))
     within = ends_given
     inputs, interval = without_interval(case, unknown)
     if interval:

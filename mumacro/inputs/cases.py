@@ -230,7 +230,9 @@ class Cases(NamedTuple):
         bad = np.zeros(self.size if self.shape else 1, np.bool_)
         for name in _AMPLITUDES:
             if name not in self.columns and self.codes is not None and self._has(name).any():
-                raise _missing(values, tuple(x for x in self.fields if x not in _AMPLITUDES or x == name))
+                raise _missing(
+                    values, tuple(x for x in self.fields if x not in _AMPLITUDES or x == name)
+                )
             bad |= self._strange(name)
         for name, deviation in self.std.items():
             legal = (np.asarray(deviation) >= 0.0) & (np.asarray(deviation) < math.inf)
@@ -334,7 +336,9 @@ def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
     for column in rest:
         meant = suggestion(str(column))
         if meant is not None and meant not in present:
-            raise InputError(str(column), "a column", f"named {meant} if it is that: {meant} is missing")
+            raise InputError(
+                str(column), "a column", f"named {meant} if it is that: {meant} is missing"
+            )
 
 
 def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
@@ -400,8 +404,9 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
     ``f`` may stand for ``omega``; inputs that are None are left out.  InputError where one of the
     five is missing or is not one legal number, and where the unknown has a value.
     """
-    if unknown not in kind.fields:
-        raise InputError("unknown", unknown, f"one of {', '.join(kind.fields)}")
+    if unknown not in kind.columns:
+        raise InputError("unknown", unknown, f"one of {', '.join(kind.columns)}")
+    field = field_of(unknown)[0]
     for name in ("k_range", *ENDS):
         if case.get(name) is not None:
             bound = (
@@ -417,13 +422,13 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
     inputs = {
         name: value for name, value in case.items() if value is not None or name == "k" != unknown
     }
-    for name in inputs.keys() & ({"omega", "f"} if unknown == "omega" else {unknown}):
+    for name in inputs.keys() & ({"omega", "f"} if field == "omega" else {field}):
         raise InputError(name, inputs[name], f"left out, because {unknown} is the unknown or swept")
-    columns = columns_of({**inputs, unknown: 1.0}, kind)
+    columns = columns_of({**inputs, field: 1.0}, kind)
     for name, column in columns.items():
         if np.size(column) != 1:
             raise InputError(name, inputs.get(name, inputs.get("f")), "one number")
-    del columns[unknown]
+    del columns[field]
     check(columns, inputs.get("f"))
     return {name: float(np.ravel(column)[0]) for name, column in columns.items()}
 
@@ -640,9 +645,7 @@ def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> t
 
 def _shape_of(*parts: Mapping[str, Any]) -> tuple[int, ...]:
     """The shape to which all columns broadcast; InputError where they do not."""
-    columns = {
-        name: x for part in parts for name, x in part.items() if isinstance(x, np.ndarray)
-    }
+    columns = {name: x for part in parts for name, x in part.items() if isinstance(x, np.ndarray)}
     try:
         return common_shape(columns.values())
     except ValueError as error:

@@ -68,9 +68,7 @@ STD = Output(
     "std",
     std,
     {
-        "std": Member(
-            "-", "Standard deviation of mu_macro to first order, from the gradient"
-        ),
+        "std": Member("-", "Standard deviation of mu_macro to first order, from the gradient"),
         "std_bound": Member("-", "The part of std that comes from the gradient's bound"),
     }
     | {f"std_share.{name}": Member("-", f"Share of {name}") for name in ALL_FIELDS},

@@ -111,9 +111,7 @@ _ALWAYS = ("mu_macro", "mu_ratio", "error_bound", "source")
 _SLOPES = ("gradient", "gradient_bound")
 
 
-def _columns(
-    evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Remark]
-) -> Values:
+def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Remark]) -> Values:
     """All that is computed of cases of one kind: outputs by path, and what stands beside them by
     name; NaN where a case lacks an output, or is not legal."""
     lacking: dict[str, Any] = {}

@@ -32,7 +32,9 @@ GRADIENT = Output(
     gradient,
     {f"gradient.{name}": Member(unit, f"d mu_macro / d {name}") for name, unit in PER.items()}
     | {
-        f"gradient_bound.{name}": Member(unit, f"Bound of the absolute error of the slope of {name}")
+        f"gradient_bound.{name}": Member(
+            unit, f"Bound of the absolute error of the slope of {name}"
+        )
         for name, unit in PER.items()
     },
     cost=6,

@@ -83,9 +83,7 @@ class Tabulated:
         """A quantity at points (n,), its bound, and the source codes."""
         return shared_out.values(CODES[name], self.data(name, kind), v, y, self.threads, kind)
 
-    def value(
-        self, name: str, v: float, y: float, kind: Kind = SPRING
-    ) -> tuple[float, float, int]:
+    def value(self, name: str, v: float, y: float, kind: Kind = SPRING) -> tuple[float, float, int]:
         """The same at one point."""
         if kind.direction:
             value, bound, source = self.values(name, np.array([v]), np.array([y]), kind)
@@ -136,9 +134,7 @@ class Tabulated:
             raise TypeError("the cases have one k each")
         low, high = cases.ends
         six = [*{**cases.columns, "k": low}.values()]
-        return shared_out.intervals(
-            self.data(kind=cases.kind), six, high, self.threads, cases.kind
-        )
+        return shared_out.intervals(self.data(kind=cases.kind), six, high, self.threads, cases.kind)
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:

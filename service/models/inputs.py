@@ -6,7 +6,7 @@ the amplitude of the direction) are the library's, which refuses them when it is
 
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from pydantic import (
     PlainValidator,
     ValidationInfo,
     WithJsonSchema,
-    WrapValidator,
 )
 from pydantic_core import PydanticCustomError
 
@@ -27,6 +26,19 @@ from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from mumacro.inputs.old_texts import number_hint
 from mumacro.kernel.arrays import Array
+
+from .values import (
+    Amplitude,
+    AngularFrequency,
+    Force,
+    ForceAmplitude,
+    Frequency,
+    Friction,
+    Positive,
+    Speed,
+    Stiffness,
+    interval_of,
+)
 
 #: what a case may hold, in the order in which it is described
 INPUTS = (
@@ -47,18 +59,7 @@ EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20
 MAX_REASONS = 1000  # bad cases of a batch that are listed
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, {"const": "rigid", "type": "string"}]
-
-
-def rigid_or(value: Any, number: Callable[[Any], float]) -> float:
-    """Infinity for the word rigid; any other value must be a number."""
-    return math.inf if isinstance(value, str) and is_rigid(value) else number(value)
-
-
-Stiffness = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
 
 
 def optional(description: str, **more: Any) -> Any:
@@ -135,22 +136,21 @@ Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 class OneCase(Strict):
     """The inputs of one case; omega or f, and k or an interval of it: exactly one of each."""
 
-    mu0: Positive = Field(description=_MU0, examples=[0.3])
-    Fz: Positive = Field(description=_FZ, examples=[10.0])
+    mu0: Friction = Field(description=_MU0, examples=[0.3])
+    Fz: Force = Field(description=_FZ, examples=[10.0])
     k: Stiffness = either(_K, examples=[1e6])
-    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
-    omega: NotNegative | None = optional(_OMEGA)
-    f: Hertz | None = optional(_F, examples=[20e3])
-    v0: NotNegative = Field(description=_V0, examples=[0.01])
-    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
-    k_low: Positive | None = optional(_LOW)
-    k_high: Positive | None = optional(_HIGH)
+    y0: Amplitude | None = optional(_Y0, examples=[2e-6])
+    omega: AngularFrequency | None = optional(_OMEGA)
+    f: Frequency | None = optional(_F, examples=[20e3])
+    v0: Speed = Field(description=_V0, examples=[0.01])
+    Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
+    k_low: Stiffness | None = optional(_LOW)
+    k_high: Stiffness | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite."""
-        values = self.__dict__
-        return {name: values[name] for name in INPUTS if values.get(name) is not None}
+        return _with_interval(_given(self))
 
 
 class Case(OneCase):
@@ -164,25 +164,38 @@ class Case(OneCase):
 class OtherInputs(Strict):
     """The inputs of a question about one of them, which is left out or null."""
 
-    mu0: Positive | None = optional(_MU0, examples=[0.3])
-    Fz: Positive | None = optional(_FZ, examples=[10.0])
+    mu0: Friction | None = optional(_MU0, examples=[0.3])
+    Fz: Force | None = optional(_FZ, examples=[10.0])
     k: Stiffness | None = optional(_K, examples=[1e6])
-    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
-    omega: NotNegative | None = optional(_OMEGA)
-    f: Hertz | None = optional(_F, examples=[20e3])
-    v0: NotNegative | None = optional(_V0)
-    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
-    k_low: Positive | None = optional(_LOW)
-    k_high: Positive | None = optional(_HIGH)
+    y0: Amplitude | None = optional(_Y0, examples=[2e-6])
+    omega: AngularFrequency | None = optional(_OMEGA)
+    f: Frequency | None = optional(_F, examples=[20e3])
+    v0: Speed | None = optional(_V0)
+    Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
+    k_low: Stiffness | None = optional(_LOW)
+    k_high: Stiffness | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite, and a null in k stays."""
-        values = self.__dict__
-        inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
-        if values["k"] is None and "k" in self.model_fields_set:
+        inputs = _with_interval(_given(self))
+        if self.k is None and "k" in self.model_fields_set:
             inputs["k"] = None
         return inputs
+
+
+def _given(model: BaseModel) -> dict[str, Any]:
+    """The inputs that are given, by name."""
+    values = model.__dict__
+    return {name: values[name] for name in INPUTS if values.get(name) is not None}
+
+
+def _with_interval(inputs: dict[str, Any]) -> dict[str, Any]:
+    """The inputs, with k_range for an interval in k."""
+    if (ends := interval_of(inputs.get("k"))) is not None:
+        del inputs["k"]
+        inputs["k_range"] = ends
+    return inputs
 
 
 # --- columns --------------------------------------------------------------------------------------

@@ -13,32 +13,30 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
-    WrapValidator,
     model_validator,
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import STIFFNESS, is_rigid
+from mumacro.inputs.fields import QUANTITY_OF, STIFFNESS, is_rigid
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.old_texts import number_hint
+from mumacro.inputs.reading import read_one
 
 from .inputs import (
     EXAMPLE,
     NOT_BOTH,
     OR_RIGID,
     Name,
-    NotNegative,
     OtherInputs,
     Pair,
-    Positive,
     Strict,
     optional,
-    rigid_or,
 )
-from .options import Choice, Options, QueryOptions, QueryStiffness, with_interval
+from .options import Choice, Options, QueryOptions
+from .values import End, Length, Load, Modulus, NotNegative
 
 MAX_VALUES = 10_001  # of a law
 MAX_TARGETS = 10_000
@@ -61,13 +59,19 @@ class Sweep(Strict):
     """The values of a law."""
 
     along: Name = Field("v0", description="The swept input, which is left out of the case")
-    start: NotNegative = Field(
-        description="First value [SI]; > 0 on a logarithmic scale", examples=[1e-4]
+    start: End = Field(
+        description="First value [SI], or with a unit; > 0 on a logarithmic scale", examples=[1e-4]
     )
-    stop: Positive = Field(description="Last value [SI], > start", examples=[10.0])
+    stop: End = Field(description="Last value [SI], or with a unit; > start", examples=[10.0])
     points: _Whole = Field(201, description="Number of values")
     scale: Literal["log", "linear"] = Field("log", description="Spacing of the values")
     stiffness_exponent: _Exponent | None = optional(_EXPONENT)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Both ends in the SI unit of the swept input."""
+        quantity = QUANTITY_OF[self.along]
+        return read_one("start", self.start, quantity), read_one("stop", self.stop, quantity)
 
 
 _five = {name: value for name, value in EXAMPLE.items() if name != "v0"}
@@ -89,17 +93,6 @@ class LawRequest(Options, Sweep, OtherInputs):
 
 class LawQuery(QueryOptions, Sweep, OtherInputs):
     """mu_macro over a range of one input."""
-
-    k: QueryStiffness | None = optional(
-        'Tangential stiffness of the contact [N/m], "rigid", or low..high; required, '
-        "unless it is swept",
-        examples=[1e6],
-    )
-
-    @property
-    def inputs(self) -> dict[str, Any]:
-        """Those that are given, by name; two ends are an interval of k."""
-        return with_interval(super().inputs)
 
 
 class SolveForRequest(Options, OtherInputs):
@@ -136,15 +129,14 @@ class SolveForRequest(Options, OtherInputs):
         "mu_macro",
         description="What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)",
     )
-    range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = optional(
-        "Where to search [SI], ascending; left out: wherever it changes mu_macro"
+    range: Annotated[list[End], Field(min_length=2, max_length=2)] | None = optional(
+        "Where to search [SI], or with units, ascending; left out: wherever it changes mu_macro"
     )
     stiffness_exponent: _Exponent | None = optional(_EXPONENT)
 
 
 # --- stiffness ------------------------------------------------------------------------------------
 
-_Modulus = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
 _Poisson = Annotated[float, Field(gt=-1, le=0.5, allow_inf_nan=False)]
 if TYPE_CHECKING:
     _Geometry = str
@@ -163,15 +155,15 @@ class StiffnessRequest(Strict):
     )
 
     geometry: _Geometry = Field(description=_GEOMETRIES)
-    radius: Positive | None = optional("Radius of the ball, pin or cylinder [m]")
-    length: Positive | None = optional("Length of the cylinder [m]; of: cylinder")
-    Fz: Positive | None = optional("Normal force [N]")
+    radius: Length | None = optional("Radius of the ball, pin or cylinder [m]")
+    length: Length | None = optional("Length of the cylinder [m]; of: cylinder")
+    Fz: Load | None = optional("Normal force [N]")
     oscillation: Literal["across", "along"] | None = optional(
         "To the axis of the cylinder; of: cylinder"
     )
-    E: _Modulus = Field(description='Young\'s modulus of the first body [Pa], or "rigid"')
+    E: Modulus = Field(description='Young\'s modulus of the first body [Pa], or "rigid"')
     nu: _Poisson = Field(description="Poisson's ratio of the first body [-]")
-    E2: _Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
+    E2: Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
     nu2: _Poisson | None = optional("Of the second body [-]")
 
 

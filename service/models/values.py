@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, WithJsonSchema, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import ABOVE_ZERO, INPUTS, MOST_HZ, QUANTITY_OF
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF
 from mumacro.inputs.reading import read, reason_of
 from mumacro.inputs.units import QUANTITIES
 
@@ -73,19 +73,40 @@ def _schema(name: str, positive: bool) -> dict[str, Any]:
     return {"anyOf": kinds}
 
 
-def value_of(name: str) -> Any:
-    """The type of an input: a number in SI, or a text, which stays one."""
-    positive = INPUTS[name].bound == ABOVE_ZERO
-    number = Positive if positive else Hertz if name == "f" else NotNegative
-    return Annotated[number, WrapValidator(_checked), WithJsonSchema(_schema(name, positive))]
+def _is(name: str, positive: bool) -> WithJsonSchema:
+    return WithJsonSchema(_schema(name, positive))
 
 
-def deviation_of(name: str) -> Any:
-    """The type of a standard deviation of an input, in its unit."""
-    number = Hertz if name == "f" else NotNegative
-    return Annotated[number, WrapValidator(_checked), WithJsonSchema(_schema(name, False))]
+_CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
+# values of inputs: a text stays one
+Friction = Annotated[Positive, _CHECKED, _is("mu0", True)]
+Force = Annotated[Positive, _CHECKED, _is("Fz", True)]
+Stiffness = Annotated[Positive, _CHECKED, _is("k", True)]
+Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False)]
+ForceAmplitude = Annotated[NotNegative, _CHECKED, _is("Fz_amplitude", False)]
+AngularFrequency = Annotated[NotNegative, _CHECKED, _is("omega", False)]
+Frequency = Annotated[Hertz, _CHECKED, _is("f", False)]
+Speed = Annotated[NotNegative, _CHECKED, _is("v0", False)]
+#: a standard deviation, in the unit of its input
+Deviation = Annotated[
+    NotNegative,
+    _CHECKED,
+    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}),
+]
+#: an end of a range; the library reads a text with the input that it belongs to
+End = Annotated[
+    NotNegative,
+    WrapValidator(lambda value, number: value if type(value) is str else number(value)),
+    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}),
+]
+# other arguments, in SI: a text becomes a number
+Length = Annotated[Positive, _IN_SI, _is("radius", True)]
+Modulus = Annotated[Positive, _IN_SI, _is("E", True)]
+Load = Annotated[Positive, _IN_SI, _is("Fz", True)]
 
 
-def number_of(name: str, number: Any, positive: bool) -> Any:
-    """The type of another argument, in SI from a number or a text."""
-    return Annotated[number, WrapValidator(_in_si), WithJsonSchema(_schema(name, positive))]
+def interval_of(k: Any) -> tuple[float, float] | None:
+    """Both ends of an interval of k in a text that was checked."""
+    if type(k) is str and (one := read("k", k)).low is not None:
+        return one.low, one.high
+    return None

@@ -14,7 +14,9 @@ from mumacro.outputs.evaluation import cost
 
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
+from ..problems import of_input
 from ..reading import DirectRoute, Json, dump
+from ..understood import UNDERSTOOD, understood
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
@@ -36,9 +38,15 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     state = request.app.state
     table = state.tables.pick(case.tolerance)
     work = partial(_answer, table.surrogate, case)
-    members, source = await state.work.question(work) if _is_large(case) else work()
+    more: dict[str, Any] = {}
+    if case.include and UNDERSTOOD in case.include:
+        more = {UNDERSTOOD: understood(case.model_dump())}
+    try:
+        members, source = await state.work.question(work) if _is_large(case) else work()
+    except InputError as error:
+        raise of_input(error, **more) from None
     state.metrics.case(table, source)
-    return {**members, **table.signature}
+    return {**members, **more, **table.signature}
 
 
 def _is_large(case: CaseRequest | CaseQuery) -> bool:
