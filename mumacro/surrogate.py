@@ -26,7 +26,7 @@ from mumacro.inputs.cases import (
     unknown,
 )
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
-from mumacro.inputs.kind import AMPLITUDE, BALL, SPRING, Kind, kind_of
+from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
 from mumacro.inputs.reading import read
 from mumacro.inputs.signature import AnyCases, ManyCases, OneCase, OneInterval
 from mumacro.kernel.arrays import Array, common_shape, flat

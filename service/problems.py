@@ -32,7 +32,7 @@ from mumacro.inputs.fields import NAMES as INPUTS
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.old_texts import number_hint
+from mumacro.inputs.reading import no_number
 
 from . import API_VERSION
 from .understood import UNDERSTOOD, is_wanted, understood
@@ -161,7 +161,7 @@ def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
     if kind == "float_type" and type(value) is int and name in BOUNDS:  # beyond double range
         return refusal(name, math.inf)
     if kind == "float_type":
-        return number_hint(name.removeprefix("std_"), value)
+        return no_number(name, value)
     if kind in _OUT_OF_BOUNDS and name in BOUNDS and len(error["loc"]) == 1:
         return refusal(name, math.inf if abs(value) > _LARGE else float(value))
     if kind == "finite_number":

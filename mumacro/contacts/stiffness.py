@@ -83,7 +83,7 @@ class Material:
 
     def __post_init__(self) -> None:
         E, nu = _number("E", self.E), _number("nu", self.nu)
-        _positive(E=LARGEST if E == math.inf else E)
+        _positive(E=LARGEST if math.inf == E else E)
         if not -1.0 < nu <= 0.5:
             raise InputError("nu", self.nu, "> -1 and <= 0.5")
         # as numbers in SI, where they came as texts

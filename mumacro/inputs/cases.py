@@ -9,7 +9,6 @@ Keywords, a mapping, a data frame, Arrow columns, rows of a file or of JSON beco
 import enum
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -37,9 +36,9 @@ from mumacro.inputs.kind import (
     code_of,
     kind_of,
 )
-from mumacro.inputs.reading import NUMBERS, read
 from mumacro.inputs.names import suggestion, unknown_name
-from mumacro.kernel.arrays import Array, Bools, Codes, Places, common_shape, flat
+from mumacro.inputs.reading import NUMBERS, read
+from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
 
 
 class Absent(enum.Enum):
@@ -716,7 +715,7 @@ def check(
     it replaced omega, ``shape`` is that of all cases, for the index of the case."""
     for name, values in columns.items():
         if type(values) is float and (
-            (0.0 < values or (values == 0.0 and name not in POSITIVE))
+            (values > 0.0 or (values == 0.0 and name not in POSITIVE))
             and (values < math.inf or name == "k")
         ):
             continue

@@ -138,6 +138,17 @@ def reason_of(bound: str) -> str:
     return bound if bound.startswith(("is ", "must ")) else f"must be {bound}"
 
 
+def no_number(name: str, value: object) -> str:
+    """Why a value that is neither a number nor a text is refused in JSON.
+
+    >>> no_number("k", None), no_number("y0", True)
+    ('is missing; write rigid or a number', 'must be a number')
+    """
+    if name == "k" and value is None:
+        return GAP
+    return "must be a number, not a text" if isinstance(value, str) else "must be a number"
+
+
 def carries_unit(value: Any) -> bool:
     """Whether a value, such as a quantity of pint or a labelled array with ``attrs["units"]``, says
     its unit."""

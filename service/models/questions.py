@@ -1,7 +1,6 @@
 """The bodies and queries of the questions: friction law, inverse problem, stiffness, fit."""
 
 import math
-import sys
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
@@ -15,15 +14,14 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import InitErrorDetails
 
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import QUANTITY_OF, STIFFNESS, is_rigid
+from mumacro.inputs.fields import QUANTITY_OF, STIFFNESS
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
-from mumacro.inputs.old_texts import number_hint
-from mumacro.inputs.reading import read_one
+from mumacro.inputs.reading import no_number, read_one, reason_of
 
 from .inputs import (
     EXAMPLE,
@@ -36,7 +34,7 @@ from .inputs import (
     optional,
 )
 from .options import Choice, Options, QueryOptions
-from .values import End, Length, Load, Modulus, NotNegative
+from .values import End, Length, Load, Modulus, NotNegative, fault
 
 MAX_VALUES = 10_001  # of a law
 MAX_TARGETS = 10_000
@@ -171,24 +169,34 @@ class StiffnessRequest(Strict):
 
 
 def _of_points(value: Any, info: ValidationInfo) -> Any:
-    """A number, or an array of numbers, as an array; the word rigid in k is infinite."""
+    """A number or a text, or an array of them, as an array in SI; the word rigid in k is
+    infinite."""
     name = info.field_name or ""
-    if name == "k" and isinstance(value, str) and is_rigid(value):
-        return math.inf
     entries = value if isinstance(value, list) else [value]
     if len(entries) > MAX_POINTS:
-        reason = f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them"
-        raise PydanticCustomError("input", "{reason}", {"reason": reason})
+        raise fault(f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them")
+    numbers = np.empty(len(entries))
     for i, entry in enumerate(entries):
-        if type(entry) not in (int, float) or not abs(entry) <= sys.float_info.max:
-            real = type(entry) in (int, float)
-            reason = "must be finite" if real else number_hint(name, entry)
-            fault = PydanticCustomError("input", "{reason}", {"reason": reason})
+        number, reason = _of_point(name, entry)
+        if reason is not None:
             place = (i,) if isinstance(value, list) else ()
             raise ValidationError.from_exception_data(
-                name, [InitErrorDetails(type=fault, loc=place, input=entry)]
+                name, [InitErrorDetails(type=fault(reason), loc=place, input=entry)]
             )
-    return np.array(value, np.float64)
+        numbers[i] = number
+    return numbers if isinstance(value, list) else numbers[0]
+
+
+def _of_point(name: str, value: Any) -> tuple[float, str | None]:
+    """One number in SI, or the reason why it is none."""
+    if type(value) not in (int, float, str):
+        return math.nan, no_number(name, value)
+    try:
+        number = read_one(name, value)
+    except InputError as error:
+        return math.nan, reason_of(error.bound)
+    rigid = name == "k" and type(value) is str
+    return number, None if math.isfinite(number) or rigid else "must be finite"
 
 
 _LISTED = {
