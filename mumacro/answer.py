@@ -9,7 +9,8 @@ import numpy as np
 from mumacro import plotting
 from mumacro.errors import MumacroError
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.doubts import remarks
+from mumacro.inputs.doubts import Remark
+from mumacro.inputs.doubts import remarks as doubts
 from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import Kind
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
@@ -33,7 +34,6 @@ DEFAULT = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 TEXTS = ("regime", "source")
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)[_REGIME_CODES]
-Remark = dict[str, Any]  # row, field, cases, text
 
 
 class Answer(Generic[Number]):
@@ -173,7 +173,7 @@ class Answer(Generic[Number]):
         bool; as v_tilde."""
         if self._groups is None:
             raise AttributeError("regime_certain needs the groups: evaluate(..., groups=True)")
-        cases, shape = self.cases, np.shape(self.mu_macro)
+        cases, shape = self.cases, np.shape(np.asarray(self.mu_macro))
         kind = cases.kind if cases.codes is None else cases.codes.reshape(shape)
         certain = self._surrogate.tabulated.certain(*self._groups[:2], kind)
         return certain if shape else bool(certain)
@@ -220,7 +220,7 @@ class Answer(Generic[Number]):
         if self._cases is None:
             return [*self.remarks_on_outputs]
         cases = self.cases
-        return [*remarks(cases.columns, "f" in cases.given), *self.remarks_on_outputs]
+        return [*doubts(cases.columns, "f" in cases.given), *self.remarks_on_outputs]
 
     # --- other forms ------------------------------------------------------------------------------
 
@@ -242,8 +242,9 @@ class Answer(Generic[Number]):
         return lambda y_tilde: self._surrogate.v_tilde_crit(y_tilde, **kind.names)
 
     def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON of one case: ``power.saved`` is ``saved`` within ``power``; arrays
-        are lists, and what is not finite is None.
+        """The members of the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
+
+        Arrays are lists, and what is not finite is None.
 
         >>> from mumacro import Surrogate
         >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3, v0=0.01)

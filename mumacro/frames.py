@@ -35,7 +35,8 @@ _BESIDE = {
     "regime_certain": ("1", "whether the regime is certain"),
     "source": ("1", "block or closed form that gave the value"),
 }
-#: the slopes along k of attributes, which are 0 where the contact is rigid; those of outputs are NaN
+_ALWAYS = ("mu_macro", "mu_ratio", "error_bound", "source_code")
+#: the slopes along k of attributes -> those of outputs: 0 and NaN where the contact is rigid
 _SLOPES_OF_K = {"slope of k": "gradient.k", "bound of the slope of k": "gradient_bound.k"}
 _DTYPES = {
     "source_code": np.int8,
@@ -51,6 +52,9 @@ class LabelledAnswer(IntervalAnswer[Any]):
     """An answer whose attributes and outputs are Series, DataArrays or Dask arrays."""
 
     __slots__ = ("_kinds", "_library")
+
+    _kinds: dict[str, Any]  # contact and direction, where they were given
+    _library: str
 
     def _apply(self, function: Callable[..., Any], inputs: Mapping[str, Any], name: str) -> Any:
         return _APPLY[self._library](lambda *arrays: [function(*arrays)], inputs, [name])[0]
@@ -155,11 +159,8 @@ def _plain(values: Mapping[str, Any], index: Any) -> dict[str, Any]:
 
 def _labelled(answer: Answer[Any], label: Callable[[Any, str], Any]) -> LabelledAnswer:
     """An answer of arrays with labels."""
-    labelled = LabelledAnswer(
-        *(label(getattr(answer, name), name) for name in ("mu_macro", "mu_ratio", "error_bound")),
-        label(answer.source_code, "source_code"),
-        cases=answer.cases,
-    )
+    numbers = [label(getattr(answer, name), name) for name in _ALWAYS]
+    labelled = LabelledAnswer(*numbers, None, answer.cases)
     if answer._groups is not None:
         v, y, length = map(label, answer._groups, GROUPS)
         labelled._groups = v, y, length
@@ -189,7 +190,7 @@ def _of_chunks(
     paths = [path for output in outputs for path in output.paths(fields)]
     gradient = any(output.name == "gradient" for output in outputs)
     band = BAND if {*ENDS} & values.keys() else ()
-    names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *band]
+    names = [*_ALWAYS, *band]
     names += [*(GROUPS if outputs else ()), *(_SLOPES_OF_K if gradient else ()), *paths]
 
     def chunk(*columns: Any) -> list[Any]:

@@ -18,7 +18,6 @@ from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
     ABSENT,
     DEVIATIONS,
-    NUMBERS,
     Absent,
     Cases,
     has_labels,
@@ -27,11 +26,12 @@ from mumacro.inputs.cases import (
 )
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
-from mumacro.inputs.reading import read
+from mumacro.inputs.reading import NUMBERS, read
 from mumacro.inputs.signature import AnyCases, ManyCases, OneCase, OneInterval
 from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.threads import default_threads
-from mumacro.outputs import Output, evaluation
+from mumacro.outputs import evaluation
+from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, names_in
 from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
 from mumacro.table import atlas
@@ -220,14 +220,12 @@ class Surrogate:
 
     @property
     def ball_tolerance(self) -> float:
-        """The tolerance of mu~ of a ball that is shaken across [-]; NaN for a table without a
-        ball."""
-        return float(self.table.attributes.get(f"{BALL_ATTRIBUTES}tolerance", math.nan))
+        """The tolerance of mu~ of a ball that is shaken across [-]."""
+        return float(self.table.attributes[f"{BALL_ATTRIBUTES}tolerance"])
 
     @property
     def ball_error_distribution(self) -> dict[str, dict[str, float]]:
-        """The same of a ball that is shaken across, without the border; empty for a table without
-        a ball."""
+        """The same of a ball that is shaken across, without the border."""
         return error_distribution(self.table, BALL_ATTRIBUTES)
 
     @property
@@ -402,17 +400,17 @@ class Surrogate:
     # --- dimensional ------------------------------------------------------------------------------
 
     @overload
-    def evaluate(
+    def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: Literal[True], **case: Unpack[OneCase]
     ) -> AnswerWithGradient[float]: ...
 
     @overload
-    def evaluate(
+    def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: Literal[False] = ..., **case: Unpack[OneCase]
     ) -> Answer[float]: ...
 
     @overload
-    def evaluate(
+    def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: bool = ..., **case: Unpack[OneInterval]
     ) -> IntervalAnswer[float]: ...
 
@@ -583,7 +581,12 @@ class Surrogate:
             "direction": direction,
         }
         keywords = {name: x for name, x in keywords.items() if x is not ABSENT}
-        options = {"include": include, "gradient": gradient, "groups": groups, "illegal": illegal}
+        options: dict[str, Any] = {
+            "include": include,
+            "gradient": gradient,
+            "groups": groups,
+            "illegal": illegal,
+        }
         keywords |= {name: x for name, x in options.items() if x is not _OPTIONS[name]}
         keywords |= {} if std is None else {"std": std}
         for name in more.keys() - DEVIATIONS.keys():

@@ -16,7 +16,7 @@ from mumacro.answer import Answer, Remark, add
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named
 from mumacro.kernel.arrays import Codes
-from mumacro.outputs import Output
+from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost
 
 from .forms import SLICE, Body, Reason, too_large, write_columns, write_rows

@@ -211,7 +211,8 @@ def _names_of_case(rows: list[Any], words: Mapping[str, Any]) -> list[str]:
     names = [*rows[0]]
     if not {*names} <= {*ALL_FIELDS, "f", *ENDS, *KIND}:
         raise ValueError("an unknown name")
-    ones = {name: np.ones(2) if name not in KIND else [rows[0][name]] * 2 for name in names}
+    first = rows[0]
+    ones = {name: np.ones(2) if name not in KIND else [first[name]] * 2 for name in names}
     Cases.of({**ones, **words})
     return names
 
@@ -235,8 +236,8 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
                 reasons[i] = _first(error)
             continue
         k = one.columns["k"]
-        ends = dict(zip(ENDS, one.ends or ((k,), (k,)), strict=True))
-        filled = {name: end[0] for name, end in ends.items()} | one.columns
+        ends: Any = one.ends or ((k,), (k,))
+        filled = {name: end[0] for name, end in zip(ENDS, ends, strict=True)} | one.columns
         filled |= {f"std_{name}": x for name, x in one.std.items()}
         filled |= {name: values[name] for name in KIND if name in values}
         for name, value in filled.items():

@@ -7,7 +7,6 @@ have slots and threads of their own, and so have questions that may take longer 
 
 import asyncio
 import os
-import re
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -36,14 +35,14 @@ LONG_QUESTIONS = 4  # of those that take longer, such as the motion of a ball: u
 LONG = 100.0 * AT_ONCE
 # that is added to the threads of batches and long questions: short requests are answered first
 _NICENESS = 5
-_OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
+_CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
 
 
 def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
     """Refuse a body that is not JSON in UTF-8, or is compressed; no Content-Type says JSON."""
     media_type = headers.get(b"content-type", JSON).lower()
     media, _, parameters = media_type.decode("latin-1").partition(";")
-    if media.strip().encode() != JSON or _OTHER_CHARSET.search(parameters):
+    if media.strip().encode() != JSON or not _is_utf8(parameters):
         shown = media_type[:80].decode("latin-1")
         detail = f"send {JSON.decode()}, not {shown}{remedy and f'; {remedy}'}"
         raise RequestError(
@@ -54,6 +53,18 @@ def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
         raise RequestError(
             ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"}
         )
+
+
+def _is_utf8(parameters: str) -> bool:
+    """Whether the parameters of a media type name no other character set.
+
+    >>> _is_utf8('version=1; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
+    (True, False)
+    """
+    named = (parameter.partition("=") for parameter in parameters.split(";"))
+    return all(
+        value.strip(' \t"') in _CHARSETS for name, _, value in named if name.strip() == "charset"
+    )
 
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"

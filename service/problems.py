@@ -220,10 +220,11 @@ def _understood(members: Any) -> dict[str, Any]:
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
     """The faults of inputs of which one of several is required: the library would tell the first
     of them, when everything else is right."""
-    direction = members.get("direction")
-    amplitudes = (AMPLITUDE,) if isinstance(direction, str) and direction == "normal" else ("y0",)
-    if not (direction is None or isinstance(direction, str)):  # one for each case
-        amplitudes = ("y0", AMPLITUDE)
+    direction = members.get("direction", "across")
+    one = isinstance(direction, str)  # else there is one for each case
+    amplitudes = ("y0", AMPLITUDE) if not one else ("y0",)
+    if one and direction == "normal":
+        amplitudes = (AMPLITUDE,)
     for names in (("k", "k_range", *ENDS), amplitudes, ("omega", "f")):
         if all(members.get(name) is None for name in names):
             yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))
@@ -252,7 +253,6 @@ class ProblemKind(Enum):
     INVALID_VALUE = 422, "The request holds invalid values"
     HEAD_TOO_LARGE = 431, "The head is too large", CLOSE
     UNEXPECTED = 500, "An unexpected error"
-    NOT_INSTALLED = 501, "This service lacks a package"
     NOT_READY = 503, "The service is not ready", {"Retry-After": "5"}
     OVERLOADED = 503, "The service is overloaded", {**CLOSE, "Retry-After": "1"}
     OUT_OF_MEMORY = 503, "The service has too little memory", {"Retry-After": "1"}

@@ -18,7 +18,6 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import check, without_interval
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
@@ -28,6 +27,7 @@ from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.text_tables import SEPARATORS
 from mumacro.inputs.units import belongs_to_value
 from mumacro.surrogate import Surrogate
+from mumacro.validity import Row, digits, k_effect
 
 ABOUT_INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
@@ -67,10 +67,12 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault, with the choice that may have been meant, or
         with the example of the help where something is missing."""
-        if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
-            choices = [word.strip(" '") for word in wrong[3].split(",")]
-            near = difflib.get_close_matches(wrong[2].lower(), choices, n=1)
-            message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
+        fault, _, offer = message.rpartition(" (choose from ")
+        _, wrong, chosen = fault.rpartition(": invalid choice: ")
+        if wrong:
+            choices = [word.strip(" '") for word in offer.removesuffix(")").split(",")]
+            near = difflib.get_close_matches(chosen.strip("'").lower(), choices, n=1)
+            message = f"{fault}, did you mean {near[0]}?" if near else message
         message = message.replace("the following arguments are required", "missing")
         lines = (self.epilog or "").splitlines()
         example = next((line.strip() for line in lines if line.startswith("  mumacro ")), None)

@@ -52,10 +52,6 @@ class Absent(enum.Enum):
 
 
 ABSENT: Final = Absent.ABSENT
-#: types of one real number
-NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(code).type for code in "efdbhilqBHILQ"))
-)
 _UNLABELLED = NUMBERS | {np.ndarray, list, tuple, type(None), dict, str}
 _FLOAT = np.dtype(np.float64)
 _AMPLITUDES = ("y0", AMPLITUDE)
@@ -144,6 +140,13 @@ class Cases(NamedTuple):
         if self.codes is None:
             return () if self.kind is None else (self.kind,)
         return tuple(KINDS[code] for code in np.unique(self.codes).tolist() if code >= 0)
+
+    @property
+    def one_kind(self) -> Kind:
+        """The contact and direction of all cases; TypeError where each has its own."""
+        if self.kind is None:
+            raise TypeError("the cases are of several kinds: see by_kind")
+        return self.kind
 
     def part(self, which: slice | Places) -> "Cases":
         """Some of many cases, (m,)."""
@@ -248,16 +251,16 @@ class Cases(NamedTuple):
 
     def _refuse_first(self, bad: list[int]) -> None:
         """Refuse the first case that is ``bad``, or has a number out of bounds."""
-        for where, part in self.by_kind():
+        for places, part in self.by_kind():
             try:
                 check(part.columns, part.given.get("f"), (part.size,) if part.shape else ())
             except InputError as error:
                 index = error.index or 0
-                bad.append(index if isinstance(where, slice) else int(where[index]))
+                bad.append(index if isinstance(places, slice) else int(places[index]))
         if bad:
-            error = self.reason(min(bad))
-            index = min(bad) if self.shape else None
-            raise InputError(error.field, error.value, error.bound, index)
+            reason = self.reason(min(bad))
+            where = min(bad) if self.shape else None
+            raise InputError(reason.field, reason.value, reason.bound, where)
 
 
 # --- from inputs of any form to names and values --------------------------------------------------

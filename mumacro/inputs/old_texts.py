@@ -15,7 +15,7 @@ def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
 # an interval, as people write it
-_DASHED = re.compile(rf"({_NUMBER})\s*(?:-|–|to)\s*({_NUMBER})\s*(\D.*)?")
+_DASHED = re.compile(rf"({_NUMBER})\s*(?:-|–|to)\s*({_NUMBER})(\D.*)?")
 PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 
 

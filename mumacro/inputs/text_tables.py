@@ -15,7 +15,8 @@ from mumacro.inputs.units import UNITS_OF, Scale, scale_of, split_unit
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"
 NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
-_SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
+# decimal sign -> a number that has it
+_SIGNED = {sign: re.compile(rf"[+-]?\d*[{sign}]\d+([eE][+-]?\d+)?") for sign in ".,"}
 
 
 def _advice(
@@ -52,7 +53,7 @@ def _detect(
     ]
 
     def cells_with(sign: str) -> int:
-        return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
+        return sum(_SIGNED[sign].fullmatch(cell) is not None for cell in cells)
 
     return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.inputs.cases import ALL_FIELDS
+from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import POSITIVE
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
@@ -36,17 +37,19 @@ def std(cases: Evaluated) -> Values:
     }
 
 
-def bent(cases: Evaluated, total: float) -> list[dict[str, Any]]:
+def bent(cases: Evaluated, total: float) -> list[Remark]:
     """Remarks on one case: the inputs along which first order is not enough, since mu_macro one
     deviation up or down differs from the slope's by more than a fifth of the whole deviation."""
     spreads = {name: x for name, x in cases.cases.std.items() if x and cases.columns[name] < np.inf}
     if not spreads:
         return []
-    moved = {name: np.full(2 * len(spreads), x) for name, x in cases.columns.items()}
+    moved: dict[str, Any] = {
+        name: np.full(2 * len(spreads), x) for name, x in cases.columns.items()
+    }
     for i, (name, spread) in enumerate(spreads.items()):
         moved[name][2 * i : 2 * i + 2] += spread, -spread
     mu = cases.beside(moved, 2 * len(spreads)).mu_macro.reshape(-1, 2) - cases.mu_macro
-    remarks = []
+    remarks: list[Remark] = []
     for (name, spread), (up, down) in zip(spreads.items(), mu.tolist(), strict=True):
         straight = cases.gradient[name] * spread
         if np.isnan(down):

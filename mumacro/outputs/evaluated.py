@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import AMPLITUDE, SPRING
+from mumacro.inputs.kind import AMPLITUDE
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Detail
 from mumacro.outputs.tabulated import Tabulated
@@ -32,7 +32,7 @@ class Evaluated:
     gradient_bound: dict[str, Any]
 
     def __init__(self, tabulated: Tabulated, cases: Cases, detail: Detail = "values") -> None:
-        self.tabulated, self.cases, self.kind = tabulated, cases, cases.kind or SPRING
+        self.tabulated, self.cases, self.kind = tabulated, cases, cases.one_kind
         self.columns, self.words = cases.columns, self.kind.names
         one = not cases.shape
         detail = "groups" if one and detail == "values" else detail

@@ -18,7 +18,7 @@ from mumacro.answer import (
 )
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import SPRING, Kind
+from mumacro.inputs.kind import Kind
 from mumacro.kernel.arrays import Bools
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
@@ -123,12 +123,12 @@ def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Re
     columns: Values = {}
     with np.errstate(all="ignore"):
         for output in outputs:
-            where = lacking.get(output.name)
-            if where is True:
+            absent = lacking.get(output.name)
+            if absent is True:
                 continue
             part = output.compute(evaluated)
-            if where is not None:
-                part = {path: np.where(where, math.nan, x) for path, x in part.items()}
+            if absent is not None:
+                part = {path: np.where(absent, math.nan, x) for path, x in part.items()}
             columns |= part
     if evaluated.cases.shape:
         illegal = evaluated.source < 0
@@ -150,7 +150,7 @@ def _lacked(
 ) -> Iterator[tuple[Output, str, str, Bools | Literal[True]]]:
     """The outputs that cases of one kind lack, for which direction or interval, why, and which
     cases do: all of them, or these."""
-    words = (cases.kind or SPRING).names.values()
+    words = cases.one_kind.names.values()
     for output in outputs:
         for word, why in output.lacks.items():
             if word in words:

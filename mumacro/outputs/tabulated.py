@@ -113,7 +113,7 @@ class Tabulated:
         with np.errstate(all="ignore"):
             # groups beyond double range are not near the border, or it cannot be decided
             extreme = (y == 0.0) | ~np.isfinite(y) | ~np.isfinite(v) | (v == 0.0)
-            return np.where(extreme, ~np.isnan(v), np.abs(v - crit) > margin * crit)
+            return np.asarray(np.where(extreme, ~np.isnan(v), np.abs(v - crit) > margin * crit))
 
     # --- cases ------------------------------------------------------------------------------------
 
@@ -124,17 +124,17 @@ class Tabulated:
 
     def rows(self, cases: Cases, detail: Detail = "values") -> CaseRows:
         """Answers to cases of one kind, in their shape, (1,) for one case."""
-        data, shape = self.data(kind=cases.kind), cases.shape or (1,)
+        kind, shape = cases.one_kind, cases.shape or (1,)
         six = [*cases.columns.values()]
-        return shared_out.cases(data, six, shape, self.threads, detail, cases.kind)
+        return shared_out.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
 
     def extremes(self, cases: Cases) -> ExtremeRows:
         """Extremes of mu_macro over intervals of k, (n,) each."""
         if cases.ends is None:
             raise TypeError("the cases have one k each")
         low, high = cases.ends
-        six = [*{**cases.columns, "k": low}.values()]
-        return shared_out.intervals(self.data(kind=cases.kind), six, high, self.threads, cases.kind)
+        six, kind = [*{**cases.columns, "k": low}.values()], cases.one_kind
+        return shared_out.intervals(self.data(kind=kind), six, high, self.threads, kind)
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:

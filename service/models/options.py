@@ -40,6 +40,7 @@ _CONTACT = "One spring of stiffness k, or a ball on a flat (Hertz) whose stiffne
 _DIRECTION = (
     "Of the oscillation, to that of sliding: across it, along it, or normal: the force oscillates"
 )
+_EACH = "; a list has one for each case"
 _TOLERANCE = "Error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
 
 

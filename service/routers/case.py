@@ -7,10 +7,10 @@ from fastapi import Query, Request, Response
 from starlette.responses import PlainTextResponse
 
 from mumacro import Surrogate
-from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 from mumacro.inputs.k_range import ENDS
 from mumacro.outputs.evaluation import cost
+from mumacro.validity import digits, k_effect, model_rows
 
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery

@@ -13,7 +13,6 @@ import mumacro
 from mumacro.analysis.law import Law
 from mumacro.analysis.solve_for import Solution
 from mumacro.analysis.stiffening import Stiffening
-from mumacro.analysis.validity import load_rows
 from mumacro.answer import Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named
@@ -21,6 +20,7 @@ from mumacro.inputs.fields import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
+from mumacro.validity import load_rows
 
 from ..forms import listed
 from ..limits import Working

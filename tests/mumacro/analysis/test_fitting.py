@@ -329,7 +329,11 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
             {**RIG, "unknowns": "k", "mu0": 0.28},
             "mu_macro at index 2 must be <= mu0",
         ),
-        ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "much"]}, RIG, "mu_macro at index 1 must be a number"),
+        (
+            {"v0": [0.1, 0.2], "mu_macro": ["0.2", "much"]},
+            RIG,
+            "mu_macro at index 1 must be a number",
+        ),
     ],
 )
 def test_bad_input_is_named_with_the_remedy(data: Any, inputs: Any, message: Any) -> None:

@@ -387,7 +387,9 @@ def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(
     ours, fine, worst = opened(coarse), opened(1e-12), 0.0
     for kind in KINDS:
         v, y = draw(kind, 20_000, ours, seed=5)
-        (mu, bound, _), (truth, fine_bound, _) = (s.quantity("mu_ratio", v, y) for s in (ours, fine))
+        (mu, bound, _), (truth, fine_bound, _) = (
+            s.quantity("mu_ratio", v, y) for s in (ours, fine)
+        )
         share = np.maximum(np.abs(mu - truth) - fine_bound, 0.0) / np.maximum(bound, 1e-300)
         for i in np.argsort(share)[-20::4]:
             point: Case = {"v0": float(v[i]), "y0": float(y[i])}
@@ -422,7 +424,11 @@ def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(
 ) -> None:
     coarse = opened(1e-4)
     decay = settling(coarse, **UNIT, y0=y, v0=v)
-    less = 2.0 * math.pi * (v * coarse.quantity("mu_ratio", v, y)[1] + coarse.quantity("power", v, y)[:2][1])
+    less = (
+        2.0
+        * math.pi
+        * (v * coarse.quantity("mu_ratio", v, y)[1] + coarse.quantity("power", v, y)[:2][1])
+    )
     assert decay.error_bound == close(
         math.log(100.0) / (decay.slip_path - less) - decay.periods, rel=1e-9
     )
