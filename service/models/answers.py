@@ -397,8 +397,15 @@ class FitAnswer(Answered):
     reduced_chi2: float | None = Field(description="null: no point more than unknowns")
     solutions: list[Solution] = Field(description="All minima within 95 %, best first")
     warnings: list[str] = Field(description="What the points do not determine")
+    remarks: list[RemarkRow] | None = Field(
+        None, description="What is doubtful about the points; left out where nothing is"
+    )
     contact: ContactName
     direction: DirectionName
+    points: dict[str, list[float | Literal["rigid"] | None]] = Field(
+        description="What was fitted to, in SI: the known inputs of each point, mu_macro, and std "
+        "where it was given"
+    )
     curve: FittedCurve | None = Field(
         description="null where other inputs than v0 vary, or v0 is 0 everywhere"
     )

@@ -85,6 +85,15 @@ ELSEWHERE = {
         "tests/mumacro/analysis/test_measured.py",
         "measured.SECTIONS",
     ),
+    "python benchmarks/friction_models.py": (
+        "tests/mumacro/analysis/test_measured.py",
+        "friction_models.elements()",
+    ),
+    "nice python benchmarks/fit_coverage.py": (
+        "tests/mumacro/analysis/test_fitting.py",
+        "fit_coverage.SET_UPS",
+    ),
+    "mumacro fit --json": ("tests/mumacro/cli/test_command.py", '*words, "--json")'),
     "python benchmarks/error_distribution.py": (
         "tests/project/test_benchmarks.py",
         '"error_distribution --share',
