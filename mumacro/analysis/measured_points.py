@@ -111,14 +111,8 @@ class Measured:
 
     def _read(self, data: dict[str, Any]) -> None:
         """Columns of one length, (n,), in SI."""
-        measured = {
-            name: real(name, np.asarray(data.pop(name)))
-            for name in ("mu_macro", STD)
-            if name in data
-        }
-        # labels are dropped: a fit is not labelled
-        values = {name: x if x is None else np.asarray(x) for name, x in data.items()}
-        inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
+        measured = {name: real(name, data.pop(name)) for name in ("mu_macro", STD) if name in data}
+        inputs = {**data, **dict.fromkeys(self.unknowns, 1.0)}
         numbers = columns_of(inputs, self.kind)
         check(numbers, inputs.get("f"))
         columns = {name: np.asarray(x, np.float64) for name, x in numbers.items()}
