@@ -37,7 +37,8 @@ from mumacro.inputs.kind import (
     kind_of,
 )
 from mumacro.inputs.names import suggestion, unknown_name
-from mumacro.inputs.reading import NUMBERS, read
+from mumacro.inputs.reading import NUMBERS, in_unit, read
+from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
 
 
@@ -369,7 +370,16 @@ def _columns_in(
             if hasattr(cases, "keys")
             else getattr(cases, "column_names", None) or cases.columns
         )
-        return {name: cases[name] for name in names if name in present}, present
+        names = {*names}
+        found = {name: cases[name] for name in names if name in present}
+        for head in present:
+            name, unit = split_unit(head) if isinstance(head, str) else (head, None)
+            if unit is None or name not in names or head in names:
+                continue
+            if name in found:
+                raise InputError(name, head, "given once")
+            found[name] = in_unit(name, cases[head], unit)
+        return found, present
     except (AttributeError, TypeError, KeyError) as error:
         type_name = f"{type(cases).__module__}.{type(cases).__qualname__}".removeprefix("builtins.")
         raise InputError(

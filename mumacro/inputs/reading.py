@@ -178,6 +178,25 @@ def without_unit(name: str, value: Any, quantity: str = "") -> Any:
     return value
 
 
+def in_unit(name: str, column: Any, unit: str) -> Any:
+    """A column whose head has the unit, such as ``y0 [um]``, in SI and with its labels.
+
+    >>> in_unit("y0", [2.0, 3.0], "um").tolist()
+    [2e-06, 3e-06]
+    """
+    quantity = QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
+    scale = scale_in(quantity, unit)
+    if scale is None:
+        raise InputError(name, f"a column in {unit}", QUANTITIES[quantity].bound)
+    kind = getattr(getattr(column, "dtype", None), "kind", "O")
+    if _library(column) in ("pandas", "xarray", "dask") and kind in "fiub":
+        return scale.si(column)
+    numbers = scale.si(np.asarray(read(name, column, quantity).si))
+    if _library(column) == "pandas":
+        return type(column)(numbers, index=column.index, name=column.name)
+    return numbers
+
+
 _WITHOUT_UNIT = NUMBERS | {str, list, tuple, dict, type(None), np.ndarray}
 
 
