@@ -8,7 +8,7 @@ results: spring and ball, across and along, one and two unknowns, 4 to 12 points
 deviations given and not given.
 """
 
-from benchmarks.measuring import ROOT, main, markdown, sections  # isort: split
+from tests.support.measuring import ROOT, main, markdown, sections  # isort: split
 
 import hashlib
 import json

@@ -8,7 +8,7 @@ forwards and du = (1 + u) dx backwards.  Between reversals u is an exponential, 
 linear map of u, and the steady cycle its fixed point.
 """
 
-from benchmarks.measuring import main, markdown, sections  # isort: split
+from tests.support.measuring import main, markdown, sections  # isort: split
 
 from functools import cache
 

@@ -9,7 +9,7 @@ is the force without shaking over the weight.  Forces do not depend on the weigh
 count alone.
 """
 
-from benchmarks.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
+from tests.support.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
 
 import csv
 import warnings

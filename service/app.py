@@ -25,7 +25,7 @@ from . import __version__
 from .limits import Room, Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
-from .models.options import CaseColumns, CaseRequest, CaseRow
+from .models.options import Case, CaseColumns, CaseRequest
 from .observe import Observe
 from .problems import HANDLERS, Failures
 from .routers import batch, case, contact, health, motion, page, questions, table
@@ -163,7 +163,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 #: models that are described by name only
-_MORE: Any = [(model, "validation") for model in (CaseRow, CaseRequest, CaseColumns)]
+_MORE: Any = [(model, "validation") for model in (Case, CaseRequest, CaseColumns)]
 _MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
 
 

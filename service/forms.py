@@ -22,7 +22,7 @@ from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
 from mumacro.inputs.k_range import ENDS
 
 from .models.inputs import MAX_REASONS
-from .models.options import CaseColumns, CaseRow
+from .models.options import Case, CaseColumns
 from .problems import FieldFault, ProblemKind, RequestError, faults_of, reason_of, refuse
 from .reading import decode, dump
 
@@ -255,18 +255,18 @@ def _only(columns: dict[str, Any], used: set[str]) -> dict[str, Any]:
     return {name: column for name, column in columns.items() if name not in unused}
 
 
-def _row(row: Any) -> CaseRow:
+def _row(row: Any) -> Case:
     if not isinstance(row, dict):
         raise InputError("", row, "an object")
-    return CaseRow.model_validate(row)
+    return Case.model_validate(row)
 
 
 def _first(error: ValidationError | InputError) -> Reason:
     """The first fault of a row, in the order of the inputs."""
     if isinstance(error, InputError):
         return (str(error.field) or None), reason_of(error)
-    faults = faults_of(error.errors(include_url=False), CaseRow.model_fields)
-    order = list(CaseRow.model_fields)
+    faults = faults_of(error.errors(include_url=False), Case.model_fields)
+    order = list(Case.model_fields)
     fault = min(faults, key=lambda one: order.index(one.path[0]) if one.path[0] in order else -1)
     return str(fault.path[0])[:80], fault.reason
 

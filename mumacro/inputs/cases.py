@@ -111,9 +111,9 @@ class Cases(NamedTuple):
         if kind is None and not any(isinstance(text, np.ndarray) for text in texts.values()):
             kind, texts = kind_of(**texts), {}
         fields = _fields(texts) if kind is None else kind.fields
+        strange = {} if kind is None else _strange_amplitude(values, kind)
         columns, given, std, ends = _numbers(values, fields)
         std |= _deviations(values, fields, std)
-        strange = {} if kind is None else _strange_amplitude(values, kind)
         given |= strange | texts
         shape = _shape_of(columns, std, given)
         for part in (columns, std, given):
@@ -297,7 +297,8 @@ def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _spread(option: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The deviations of the option ``std`` as columns."""
+    """The deviations of the option ``std`` as columns; none of them says that all inputs are
+    exact."""
     if not isinstance(option, Mapping):
         raise InputError("std", option, "a mapping of inputs to their deviations")
     for name in option:
@@ -305,7 +306,7 @@ def _spread(option: Any, values: Mapping[str, Any]) -> dict[str, Any]:
             raise InputError("std", name, f"of {', '.join(DEVIATIONS.values())}")
         if f"std_{name}" in values:
             raise InputError(f"std_{name}", option[name], "given once")
-    return {f"std_{name}": value for name, value in option.items()}
+    return {f"std_{name}": value for name, value in option.items()} or {"std_mu0": 0.0}
 
 
 def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:

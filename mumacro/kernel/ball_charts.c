@@ -44,7 +44,7 @@ static double mu_entry_slope(double t, double root, double *of_root) {
     return root > 0.0 ? -0.5 * t / root * *of_root : HUGE_VAL;
 }
 
-/* (d ln entry / d root at root = sqrt(1 - t) - the same at 0, which is at_end) / root, for t >= 1/2:
+/* (d ln entry / d root at root = sqrt(1 - t) - that at 0, which is at_end) / root, for t >= 1/2,
  * by division of polynomials, so nothing cancels next to root = 0. */
 static double mu_entry_bend(double root, double at_end) {
     const double *c = MU_ENTRY[1], u = mu_fma1(2.0 * MU_SQRT2, root, -1.0);

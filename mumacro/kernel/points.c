@@ -92,11 +92,9 @@ typedef struct {
  *
  * With root = sqrt(1 - t), t the ray, it is -t/(2 root) times d q/d root = -MU_FOLD_SCALE q_a -
  * of_root per_z, where of_root is d ln entry/d root.  q is smooth in root without a linear term at
- * fixed y~, so at root = 0 that is zero wherever b is.  The polynomial of a cell has what it errs by
- * there; that is taken out at the same b, so that both are of one polynomial and root divides their
- * difference, as at the border.
- *
- * per_z: d q/d ln z, in falling powers of u. */
+ * fixed y~, so at root = 0 that is zero wherever b is.  The polynomial of a cell has what it errs
+ * by there; that is taken out at the same b, so that both are of one polynomial and root divides
+ * their difference, as at the border.  per_z: d q/d ln z, in falling powers of u. */
 static mu_across mu_across_rays(const double *cell, const mu_place *at, mu_spot spot,
                                 const double *block, const mu_turn *turn) {
     const double root = (turn->end - at->a) / turn->scale, t = 1.0 - root * root;

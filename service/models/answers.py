@@ -161,15 +161,6 @@ class Answered(BaseModel):
     api_version: str
 
 
-class RemarkRow(BaseModel):
-    """What is doubtful, for one case or many: outside the usual range, or not computed."""
-
-    row: str = Field(description="The kind of doubt")
-    field: str = Field(description="The input or output that is meant")
-    cases: int = Field(description="How many cases")
-    text: str
-
-
 class Understood(BaseModel):
     """What was understood of one input."""
 
@@ -187,6 +178,15 @@ class ModelRow(BaseModel):
     row: str = Field(description="Its name")
     text: str = Field(description="What it does here")
     effect: float | None = Field(description="Relative change of mu_macro; null: not known")
+
+
+class Remark(BaseModel):
+    """One doubt about the inputs or outputs, for one case or many."""
+
+    row: str = Field(description="The kind of doubt, such as units")
+    field: str = Field(description="The input or output that is meant")
+    cases: int = Field(description="How many cases it is about")
+    text: str = Field(description="A sentence on the first of them")
 
 
 _REMARKS = "What is doubtful; left out where nothing is"
@@ -210,7 +210,7 @@ class CaseAnswer(Result, Answered):
         None, description="Only if requested: what the model leaves out here"
     )
     digits: int | None = Field(None, description="With model: digits of mu_macro that k supports")
-    remarks: list[RemarkRow] | None = Field(None, description=_REMARKS)
+    remarks: list[Remark] | None = Field(None, description=_REMARKS)
     inputs: dict[str, Understood] | None = Field(None, description=_UNDERSTOOD)
 
 
@@ -232,7 +232,7 @@ class BatchAnswered(Answered):
         description="One entry per bad case, in order; the first 1000 of them"
     )
     n_errors: int = Field(description="Number of bad cases, listed or not")
-    remarks: list[RemarkRow] | None = Field(None, description=_REMARKS)
+    remarks: list[Remark] | None = Field(None, description=_REMARKS)
 
 
 class ColumnsAnswer(Columns, BatchAnswered):
@@ -397,7 +397,7 @@ class FitAnswer(Answered):
     reduced_chi2: float | None = Field(description="null: no point more than unknowns")
     solutions: list[Solution] = Field(description="All minima within 95 %, best first")
     warnings: list[str] = Field(description="What the points do not determine")
-    remarks: list[RemarkRow] | None = Field(
+    remarks: list[Remark] | None = Field(
         None, description="What is doubtful about the points; left out where nothing is"
     )
     contact: ContactName

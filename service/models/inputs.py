@@ -154,7 +154,7 @@ class OneCase(Strict):
         return _with_interval(_given(self))
 
 
-class Case(OneCase):
+class CaseInputs(OneCase):
     """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})

@@ -13,7 +13,7 @@ from ..understood import UNDERSTOOD
 from .inputs import (
     ALTERNATIVES,
     EXAMPLE,
-    Case,
+    CaseInputs,
     ContactColumn,
     DeviationColumn,
     DirectionColumn,
@@ -88,8 +88,10 @@ class InputStd(Strict):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """Those that are given, as the library names them: ``std_k`` and so on."""
-        return {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
+        """Those that are given, as the library names them: ``std_k`` and so on; none of them says
+        that the inputs are exact."""
+        given = {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
+        return given or {"std_mu0": 0.0}
 
 
 class StdColumns(Strict):
@@ -139,16 +141,11 @@ class Options(Outputs, Choice):
         return {} if self.std is None else self.std.columns
 
 
-class CaseRequest(Options, Case):
+class CaseRequest(Options, CaseInputs):
     """One case and the options of its answer."""
 
-    @property
-    def values(self) -> dict[str, Any]:
-        """All that the library takes."""
-        return self.inputs | self.words | self.deviations
 
-
-class CaseRow(Case):
+class Case(CaseInputs):
     """One case of a batch in rows."""
 
     contact: ContactName | None = optional(_CONTACT)
@@ -241,10 +238,6 @@ class BatchOptions(Deviations, Outputs):
 class CaseQuery(QueryOptions, OneCase):
     """One case and the options of its answer."""
 
-    @property
-    def values(self) -> dict[str, Any]:
-        """All that the library takes."""
-        return self.inputs | self.words | self.deviations
 
 
 class TextQuery(CaseQuery):

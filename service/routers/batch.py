@@ -115,7 +115,7 @@ def _ref(name: str) -> dict[str, str]:
 
 
 _BODY = {
-    "schema": {"anyOf": [_ref("CaseColumns"), {"type": "array", "items": _ref("CaseRow")}]},
+    "schema": {"anyOf": [_ref("CaseColumns"), {"type": "array", "items": _ref("Case")}]},
     "example": {**EXAMPLE, "v0": [0.01, 0.1]},
 }
 _ANSWER: Any = {

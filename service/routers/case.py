@@ -20,6 +20,8 @@ from ..understood import UNDERSTOOD, understood
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
+#: members of a case of which nothing but the default is asked
+_PLAIN = frozenset(("mu0", "Fz", "k", "y0", "omega", "f", "v0", "tolerance", "value"))
 _INTERVAL = frozenset(("k_range", *ENDS))
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
 _CACHED: Any = {
@@ -35,31 +37,35 @@ _CACHED: Any = {
 
 async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str, Any]:
     """The answer to a case."""
-    state = request.app.state
+    state, inputs = request.app.state, case.inputs
     table = state.tables.pick(case.tolerance)
-    work = partial(_answer, table.surrogate, case)
     more: dict[str, Any] = {}
     if case.include and UNDERSTOOD in case.include:
         more = {UNDERSTOOD: understood(case.model_dump())}
     try:
-        members, source = await state.work.question(work) if _is_large(case) else work()
+        if case.model_fields_set <= _PLAIN and _INTERVAL.isdisjoint(inputs):
+            answer = table.surrogate.evaluate(**inputs)
+            members, source = answer.to_dict(), answer.source_code
+        else:
+            work = partial(_answer_more, table.surrogate, case, inputs)
+            each = cost(case.outputs, (case.kind,), not _INTERVAL.isdisjoint(inputs))
+            large = case.model or each > _LARGE
+            members, source = await state.work.question(work) if large else work()
     except InputError as error:
         raise of_input(error, **more) from None
     state.metrics.case(table, source)
     return {**members, **more, **table.signature}
 
 
-def _is_large(case: CaseRequest | CaseQuery) -> bool:
-    interval = not _INTERVAL.isdisjoint(case.inputs)
-    return case.model or cost(case.outputs, (case.kind,), interval) > _LARGE
-
-
-def _answer(surrogate: Surrogate, case: CaseRequest | CaseQuery) -> tuple[dict[str, Any], int]:
-    """The members of the answer, and the code of its source."""
-    answer = surrogate.evaluate(**case.values, include=case.outputs)
+def _answer_more(
+    surrogate: Surrogate, case: CaseRequest | CaseQuery, inputs: dict[str, Any]
+) -> tuple[dict[str, Any], int]:
+    """The members of the answer with all that is asked beside the default, and the code of its
+    source."""
+    words = case.kind.names
+    answer = surrogate.evaluate(**inputs, **words, **case.deviations, include=case.outputs)
     members = answer.to_dict()
     if case.model:  # rows of docs/validity.md, and the digits that k supports
-        inputs, words = case.inputs, case.kind.names
         members[MODEL] = model_rows(surrogate, inputs, **words)
         members["digits"] = digits(k_effect(surrogate, inputs, **words))
     return members, answer.source_code

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from benchmarks.support.browser import RECORDED, START
 from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import contact_of
 from service.routers.page import ASSETS
+from tests.support.browser import RECORDED, START
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow

@@ -56,10 +56,8 @@ def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate,
             "k": f"{low}..{high}"
         }
     of_one = surrogate.evaluate(**{**case, "v0": V0[2]}, **options)
-    alone = {name: getattr(of_one, name) for name in names} | {
-        "table": answer["table"],
-        "api_version": "1",
-    }
+    alone = of_one.to_dict() | {"table": answer["table"], "api_version": "1"}
+    assert {name: alone[name] for name in names} == {name: getattr(of_one, name) for name in names}
     assert client.post(PATH, json=one).json() == client.get(PATH, params=of_query).json() == alone
     assert float(client.get(f"{PATH}.txt", params=of_query).text) == of_one.mu_macro
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import mumacro
-from benchmarks.support.serving import CASE
 from mumacro import Surrogate
 from mumacro.contacts.geometries import contact_of
 from mumacro.outputs import OUTPUTS
 from service.routers.questions import unit_at
 from tests.support.cases import Case
 from tests.support.comparing import close
+from tests.support.serving import CASE
 
 SOLVE = {
     "unknown": "y0",

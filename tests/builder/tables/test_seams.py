@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.support.seams import beside_seams, slopes_across_rays
 from builder.solver.ball import Springs
 from builder.tables.contacts import ball, slopes_of
 from builder.tables.verify import BESIDE_BORDER
@@ -11,6 +10,7 @@ from mumacro import Surrogate
 from mumacro.inputs.kind import BALL, SPRING, Kind
 from mumacro.table.atlas import BALL_CHARTS, CHARTS_OF, MIDDLE, QUANTITIES, Quantity
 from tests.support.cases import Array, opened
+from tests.support.seams import beside_seams, slopes_across_rays
 
 RING = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
 

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import fit_coverage
 from mumacro import InputError, Surrogate, fit
 from mumacro.inputs.kind import CONTACTS
 from tests.support.cases import Case
 from tests.support.comparing import close
+from tests.support.scripts import script
+
+fit_coverage = script("benchmarks.fit_coverage")
 
 RIG: Case = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
 V0 = np.geomspace(1e-3, 1.0, 20)

@@ -6,12 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import friction_models, measured, validation
 from mumacro import Surrogate, closed_forms
 from tests.support.comparing import close
+from tests.support.scripts import script
 
 pytest.importorskip("scipy")
 pyplot = pytest.importorskip("matplotlib.pyplot")
+friction_models, measured, validation = (
+    script(f"benchmarks.{name}") for name in ("friction_models", "measured", "validation")
+)
 
 
 @pytest.fixture(scope="module")
