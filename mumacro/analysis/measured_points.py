@@ -2,15 +2,17 @@
 :mod:`mumacro.analysis.fit`."""
 
 from collections.abc import Container, Mapping
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import check, columns_of, real, select
+from mumacro.inputs.cases import check, columns_of, select
+from mumacro.inputs.doubts import UNITS, Remark, remarks
 from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.names import unknown_name
+from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
@@ -27,16 +29,6 @@ _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their product
 def unknowns_beside(columns: Container[str]) -> list[str]:
     """The unknowns by default: k and mu0, or k alone where mu0 is a column."""
     return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
-
-
-class Remark(TypedDict):
-    """One doubt: the row of docs/validity.md, the input, how many points it is about, a
-    sentence."""
-
-    row: str
-    field: str
-    cases: int
-    text: str
 
 
 class Measured:
@@ -111,12 +103,21 @@ class Measured:
 
     def _read(self, data: dict[str, Any]) -> None:
         """Columns of one length, (n,), in SI."""
-        measured = {name: real(name, data.pop(name)) for name in ("mu_macro", STD) if name in data}
-        inputs = {**data, **dict.fromkeys(self.unknowns, 1.0)}
+        friction = read("mu_macro", data.pop("mu_macro"))
+        measured: dict[str, Any] = {"mu_macro": friction.si}
+        if STD in data:
+            measured[STD] = _number(STD, data.pop(STD))
+        elif friction.std is not None:
+            measured[STD] = friction.std
+        # labels are dropped: a fit is not labelled
+        values = {name: _number(name, x) for name, x in data.items()}
+        inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
+        self._has_f = inputs.get("f") is not None
         numbers = columns_of(inputs, self.kind)
         check(numbers, inputs.get("f"))
-        columns = {name: np.asarray(x, np.float64) for name, x in numbers.items()}
-        all_columns = {**columns, **measured}
+        all_columns = {
+            name: np.asarray(x, np.float64) for name, x in {**numbers, **measured}.items()
+        }
         lengths = {name: x.shape for name, x in all_columns.items() if x.ndim}
         if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in all_columns.values()):
             raise InputError("data", lengths, "columns of one length, or single values")
@@ -172,16 +173,17 @@ class Measured:
 
     def remarks(self) -> list[Remark]:
         """What is probably a wrong unit in the points."""
+        found = remarks(self.columns, self._has_f)
         doubtful = self.mu > _PERCENT
         if not doubtful.any():
-            return []
+            return found
         largest = float(self.mu.max())
         text = (
             f"mu_macro up to {largest:.4g}, and mu_macro above {_PERCENT:g} is rare: is it in per "
             "cent? Then name the column mu_macro [%], or divide by 100"
         )
         cases = int(np.count_nonzero(doubtful))
-        return [{"row": "units", "field": "mu_macro", "cases": cases, "text": text}]
+        return [{"row": UNITS, "field": "mu_macro", "cases": cases, "text": text}, *found]
 
     def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The inputs of :meth:`model` at other places: those given, the others as at all points."""
@@ -199,7 +201,7 @@ class Measured:
                 raise InputError(name, "a column", "left out: it is fitted")
             if name in inputs:
                 raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
-        given = {**given, **inputs}
+        given = {name: _number(name, value) for name, value in {**given, **inputs}.items()}
         if not given:
             return dict(self.columns)
         same = dict(self.columns)
@@ -242,6 +244,17 @@ class Measured:
         answer = self.surrogate.evaluate(**inputs, gradient=slopes)
         mu = np.asarray(answer.mu_macro)
         return mu, np.asarray(answer.gradient[name]) if slopes else np.zeros_like(mu)
+
+
+def _number(name: str, value: Any) -> Any:
+    """A number or an array in SI, as for :meth:`mumacro.Surrogate.evaluate`, without a deviation or
+    an interval."""
+    one = read(name, value)
+    if one.low is not None:
+        raise InputError(name, value, "one number, not an interval")
+    if one.std is not None:
+        raise InputError(name, value, NO_DEVIATION)
+    return one.si
 
 
 def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:

@@ -239,7 +239,6 @@ class CaseQuery(QueryOptions, OneCase):
     """One case and the options of its answer."""
 
 
-
 class TextQuery(CaseQuery):
     """One case and the value that is wanted of its answer."""
 

@@ -73,7 +73,10 @@ ARRAYS: dict[str, tuple[str, Kind]] = {
     "array": ("numpy", (lambda: {"y0": np.array([2e-6, 3e-6])}, {"y0": [2e-6, 3e-6]})),
     "texts": ("numpy", (lambda: {"y0": ["2um", 3e-6]}, {"y0": [2e-6, 3e-6]})),
     "masked": ("numpy", (lambda: {"y0": np.ma.array([2e-6, 3e-6])}, {"y0": [2e-6, 3e-6]})),
-    "pint array": ("pint", (lambda: {"y0": pint(np.array([2.0, 3.0]), "um")}, {"y0": [2e-6, 3e-6]})),
+    "pint array": (
+        "pint",
+        (lambda: {"y0": pint(np.array([2.0, 3.0]), "um")}, {"y0": [2e-6, 3e-6]}),
+    ),
     "list of pint": (
         "pint",
         (lambda: {"y0": [pint(2.0, "um"), pint(3e-3, "mm")]}, {"y0": [2e-6, 3e-6]}),
@@ -110,7 +113,7 @@ ARRAYS: dict[str, tuple[str, Kind]] = {
 }
 
 
-# --- entrances: a function of the case gives a number -----------------------------------------------
+# --- entrances: a function of the case gives a number ---------------------------------------------
 
 
 def surrogate() -> Any:
@@ -203,11 +206,7 @@ def judged(entrance: Callable[[Read], Any], kind: Kind, right: Callable[[Read], 
         named = _AMPLITUDE_OF.get(entrance, meant) if meant == "y0" else meant
         assert named in str(refused.value)
         return
-    try:
-        got = entrance(case)
-    except InputError as error:
-        assert any(error.field.startswith(name) for name in (*make(), "y, amplitude", "dx"))
-        return
+    got = entrance(case)
     np.testing.assert_allclose(np.asarray(got), np.asarray(right({**BASE, **meant})), rtol=1e-9)
 
 
@@ -242,7 +241,7 @@ def test_arrays_of_any_kind_are_understood(kind: str, entrance: str) -> None:
     judged(PYTHON[entrance], of_kind, PYTHON[entrance])
 
 
-# --- the command and HTTP ---------------------------------------------------------------------------
+# --- the command and HTTP -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", TEXTS)

@@ -12,7 +12,10 @@ def lines() -> list[str]:
         inputs = ", ".join(f"`{field.name}`" for field in INPUTS.values() if field.quantity == name)
         upper = dict.fromkeys(unit.partition("/")[0] for unit in quantity.units)
         lower = dict.fromkeys(unit.partition("/")[2] for unit in quantity.units)
-        if len(upper) * len(lower) in (len(quantity.units), len(quantity.units) + 4) and len(lower) > 2:
+        if (
+            len(upper) * len(lower) in (len(quantity.units), len(quantity.units) + 4)
+            and len(lower) > 2
+        ):
             first, second = ("`, `".join(filter(None, part)) for part in (upper, lower))
             units = f"one of `{first}` over one of `{second}`"
         else:

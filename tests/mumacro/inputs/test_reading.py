@@ -80,7 +80,18 @@ def test_an_interval_has_its_ends_and_their_geometric_middle() -> None:
 
 
 REFUSED = {
-    "y0": ["2 N", "4umpp", "1,000 um", "1000nm..2000nm", "", "x", "2um,90", "1..2", "5 g", "2 um rms"],
+    "y0": [
+        "2 N",
+        "4umpp",
+        "1,000 um",
+        "1000nm..2000nm",
+        "",
+        "x",
+        "2um,90",
+        "1..2",
+        "5 g",
+        "2 um rms",
+    ],
     "Fz": ["100 g", "10 N/m", "1,000"],
     "k": ["rigid ± 1", "0.8..1.2 ± 0.1", "2..1", "1e999", "0.8-1.2N/um", "soft", "1 ± -0.1"],
     "omega": ["20 kHz"],
@@ -194,7 +205,9 @@ DOUBTED = {
 
 
 @pytest.mark.parametrize(("name", "value"), [(n, v) for n, vs in DOUBTED.items() for v in vs])
-def test_what_is_unusual_is_remarked_on_for_one_case_and_in_columns(name: str, value: float) -> None:
+def test_what_is_unusual_is_remarked_on_for_one_case_and_in_columns(
+    name: str, value: float
+) -> None:
     [one] = remarks({**CASE, name: value})
     assert (one["row"], one["field"], one["cases"]) == ("units", name, 1)
     column = np.array([CASE[name], value, math.nan, value])
