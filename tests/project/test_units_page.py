@@ -1,8 +1,18 @@
 """The page of units is the table of units."""
 
+from collections.abc import Iterable
+
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.units import QUANTITIES
 from tests.support.places import ROOT
+
+
+def _code(unit: str) -> str:
+    return f"`{unit}`"
+
+
+def _listed(units: Iterable[str]) -> str:
+    return ", ".join(map(_code, units))
 
 
 def lines() -> list[str]:
@@ -10,17 +20,14 @@ def lines() -> list[str]:
     rows = ["| what | inputs | units |", "| --- | --- | --- |"]
     for name, quantity in QUANTITIES.items():
         inputs = ", ".join(f"`{field.name}`" for field in INPUTS.values() if field.quantity == name)
-        upper = dict.fromkeys(unit.partition("/")[0] for unit in quantity.units)
-        lower = dict.fromkeys(unit.partition("/")[2] for unit in quantity.units)
-        if (
-            len(upper) * len(lower) in (len(quantity.units), len(quantity.units) + 4)
-            and len(lower) > 2
-        ):
-            first, second = ("`, `".join(filter(None, part)) for part in (upper, lower))
-            units = f"one of `{first}` over one of `{second}`"
+        parts = [unit.partition("/") for unit in quantity.units if unit]
+        upper, lower = (dict.fromkeys(part[i] for part in parts if part[1]) for i in (0, 2))
+        if len(upper) > 4 and len(lower) > 4:
+            alone = [unit for unit in quantity.units if "/" not in unit]
+            units = f"{_listed(upper)} over {_listed(lower)}" + ", ".join(["", *map(_code, alone)])
         else:
-            units = ", ".join(f"`{unit}`" for unit in quantity.units if unit)
-        rows.append(f"| {name} | {inputs or 'angles of motions, materials'} | {units} |")
+            units = _listed(filter(None, quantity.units))
+        rows.append(f"| {name} | {inputs or 'phases, moduli'} | {units} |")
     return rows
 
 
