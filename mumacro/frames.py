@@ -159,8 +159,8 @@ def _plain(values: Mapping[str, Any], index: Any) -> dict[str, Any]:
 
 def _labelled(answer: Answer[Any], label: Callable[[Any, str], Any]) -> LabelledAnswer:
     """An answer of arrays with labels."""
-    numbers = [label(getattr(answer, name), name) for name in _ALWAYS]
-    labelled = LabelledAnswer(*numbers, None, answer.cases)
+    mu_macro, mu_ratio, bound, code = (label(getattr(answer, name), name) for name in _ALWAYS)
+    labelled = LabelledAnswer(mu_macro, mu_ratio, bound, code, cases=answer.cases)
     if answer._groups is not None:
         v, y, length = map(label, answer._groups, GROUPS)
         labelled._groups = v, y, length

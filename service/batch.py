@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import Answer, Remark, add
+from mumacro.answer import Answer, add
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named
+from mumacro.inputs.doubts import Remark
 from mumacro.kernel.arrays import Codes
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost

@@ -330,9 +330,9 @@ def _no_such_path(scope: Scope) -> str:
 def of_input(error: InputError, **members: Any) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
-    option, _, name = error.field.partition("_")
-    path = (option, name) if option == "std" and name else (error.field,)
-    return refused([FieldFault(path, reason_of(error), value)], **members)
+    name = error.field.removeprefix("std_")  # a deviation is a member of std
+    steps = (name,) if name == error.field else ("std", name)
+    return refused([FieldFault(steps, reason_of(error), value)], **members)
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:

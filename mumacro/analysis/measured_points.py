@@ -2,6 +2,7 @@
 :mod:`mumacro.analysis.fit`."""
 
 from collections.abc import Container, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,11 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.cases import check, columns_of, select
 from mumacro.inputs.doubts import UNITS, Remark, remarks
-from mumacro.inputs.fields import NAMES
+from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import NO_DEVIATION, read
+from mumacro.inputs.text_tables import Dialect, Table, Wanted, read_table
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
@@ -24,6 +26,27 @@ STD = "std"  # the column of standard deviations
 _SCATTER, _SHARE = 5.0, 0.05
 _PERCENT = 1.5  # mu_macro from which on it is asked if per cent are meant
 _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
+
+
+#: columns of a table of points, and the input whose units each has
+COLUMNS = {name: LIKE.get(name, name) for name in (*NAMES, AMPLITUDE)}
+COLUMNS |= {"mu_macro": "mu0", STD: "mu0"}
+_WANTED = Wanted(COLUMNS, (("v0",), ("mu_macro",)))
+
+
+def read_points(
+    source: Path | bytes,
+    dialect: Dialect = Dialect(),  # noqa: B008
+    most: int = 1_000_000,
+) -> Table:
+    """Measured points in a table as text, or in a workbook: a file or its bytes.
+
+    TextError tells what is wrong, and in which lines.
+
+    >>> read_points(b"v0 [mm/s],mu_macro\\n10,0.2\\n").columns
+    {'v0': array([0.01]), 'mu_macro': array([0.2])}
+    """
+    return read_table(source, _WANTED, dialect, most)
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:

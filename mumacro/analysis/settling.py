@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import ABSENT, WITHOUT_DEVIATION, Cases, named
+from mumacro.inputs.cases import ABSENT, Cases, named
 from mumacro.inputs.kind import kind_of
+from mumacro.inputs.reading import NO_DEVIATION
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.settling import REMAINING, decay
 from mumacro.surrogate import Surrogate
@@ -91,7 +92,7 @@ def settling(
     }
     cases = Cases.of(named(None, present), kind)
     for name in cases.std:
-        raise InputError(name, case[name], WITHOUT_DEVIATION)
+        raise InputError(name, case[name], NO_DEVIATION)
     periods, time, slip_path, error = decay(
         Evaluated(surrogate.tabulated, cases, "groups"), remaining
     )

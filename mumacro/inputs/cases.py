@@ -37,7 +37,7 @@ from mumacro.inputs.kind import (
     kind_of,
 )
 from mumacro.inputs.names import suggestion, unknown_name
-from mumacro.inputs.reading import NUMBERS, in_unit, read
+from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, in_unit, read
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
 
@@ -67,7 +67,6 @@ COLUMNS = (*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS)
 #: what a mapping may hold, too: options of one call
 OPTIONS = ("k_range", "std", "include", "gradient", "groups", "illegal")
 EXACT = "finite and >= 0, 0 where the input is exact"  # the bound of a deviation
-WITHOUT_DEVIATION = "without a deviation: only evaluate and its forms compute with deviations"
 
 
 class Cases(NamedTuple):
@@ -428,7 +427,7 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
             )
             raise InputError(name, case[name], bound)
     for name in case.keys() & {"std", *DEVIATIONS}:
-        raise InputError(name, case[name], WITHOUT_DEVIATION)
+        raise InputError(name, case[name], NO_DEVIATION)
     for name in case.keys() - {*kind.columns, *_AMPLITUDES, "k_range", *ENDS}:
         bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
         raise InputError(name, case[name], bound)
@@ -530,10 +529,10 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     """
     _strange_amplitude(values, kind, refuse=True)
     for name in values.keys() & {"std", *DEVIATIONS}:
-        raise InputError(name, values[name], WITHOUT_DEVIATION)
+        raise InputError(name, values[name], NO_DEVIATION)
     columns, _, std, ends = _numbers(values, kind.fields)
     for name in std:
-        raise InputError(name, values.get(name, values.get("f")), WITHOUT_DEVIATION)
+        raise InputError(name, values.get(name, values.get("f")), NO_DEVIATION)
     if ends is not None:
         raise InputError("k", values.get("k"), "one value, no interval")
     return columns
@@ -716,7 +715,7 @@ def real(name: str, value: Any) -> Array:
     interval."""
     quantity = read(name, value)
     if quantity.std is not None:
-        raise InputError(name, value, WITHOUT_DEVIATION)
+        raise InputError(name, value, NO_DEVIATION)
     if quantity.low is not None:
         raise InputError(name, value, "one value: only evaluate and its forms take intervals")
     return np.asarray(quantity.si)

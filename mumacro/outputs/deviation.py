@@ -48,7 +48,8 @@ def bent(cases: Evaluated, total: float) -> list[Remark]:
     }
     for i, (name, spread) in enumerate(spreads.items()):
         moved[name][2 * i : 2 * i + 2] += spread, -spread
-    mu = cases.beside(moved, 2 * len(spreads)).mu_macro.reshape(-1, 2) - cases.mu_macro
+    many = np.asarray(cases.beside(moved, 2 * len(spreads)).mu_macro)
+    mu = many.reshape(-1, 2) - cases.mu_macro
     remarks: list[Remark] = []
     for (name, spread), (up, down) in zip(spreads.items(), mu.tolist(), strict=True):
         straight = cases.gradient[name] * spread

@@ -13,11 +13,11 @@ from mumacro.answer import (
     Answer,
     AnswerWithGradient,
     IntervalAnswer,
-    Remark,
     add,
 )
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
+from mumacro.inputs.doubts import Remark
 from mumacro.inputs.kind import Kind
 from mumacro.kernel.arrays import Bools
 from mumacro.kernel.binding import Detail

@@ -62,7 +62,7 @@ def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
     return {"type": "string", "pattern": rf"^{digits}(\.[0-9]{{1,9}})?({of_unit})?$"}
 
 
-def _schema(name: str, positive: bool) -> dict[str, Any]:
+def _schema(name: str, positive: bool, example: float | None = None) -> dict[str, Any]:
     sign = "exclusiveMinimum" if positive else "minimum"
     number: dict[str, Any] = {"type": "number", sign: 0}
     if QUANTITY_OF[name] == "frequency":
@@ -70,23 +70,23 @@ def _schema(name: str, positive: bool) -> dict[str, Any]:
     kinds = [number, text_schema(QUANTITY_OF[name], positive)]
     if QUANTITY_OF[name] in ("stiffness", "pressure") and positive:
         kinds.append(RIGID)
-    return {"anyOf": kinds}
+    return {"anyOf": kinds, **({} if example is None else {"examples": [example]})}
 
 
-def _is(name: str, positive: bool) -> WithJsonSchema:
-    return WithJsonSchema(_schema(name, positive))
+def _is(name: str, positive: bool, example: float | None = None) -> WithJsonSchema:
+    return WithJsonSchema(_schema(name, positive, example))
 
 
 _CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
 # values of inputs: a text stays one
-Friction = Annotated[Positive, _CHECKED, _is("mu0", True)]
-Force = Annotated[Positive, _CHECKED, _is("Fz", True)]
-Stiffness = Annotated[Positive, _CHECKED, _is("k", True)]
-Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False)]
+Friction = Annotated[Positive, _CHECKED, _is("mu0", True, 0.3)]
+Force = Annotated[Positive, _CHECKED, _is("Fz", True, 10.0)]
+Stiffness = Annotated[Positive, _CHECKED, _is("k", True, 1e6)]
+Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False, 2e-6)]
 ForceAmplitude = Annotated[NotNegative, _CHECKED, _is("Fz_amplitude", False)]
 AngularFrequency = Annotated[NotNegative, _CHECKED, _is("omega", False)]
-Frequency = Annotated[Hertz, _CHECKED, _is("f", False)]
-Speed = Annotated[NotNegative, _CHECKED, _is("v0", False)]
+Frequency = Annotated[Hertz, _CHECKED, _is("f", False, 20e3)]
+Speed = Annotated[NotNegative, _CHECKED, _is("v0", False, 0.01)]
 #: a standard deviation, in the unit of its input
 Deviation = Annotated[
     NotNegative,
