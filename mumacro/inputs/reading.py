@@ -191,7 +191,8 @@ def in_unit(name: str, column: Any, unit: str) -> Any:
     kind = getattr(getattr(column, "dtype", None), "kind", "O")
     if _library(column) in ("pandas", "xarray", "dask") and kind in "fiub":
         return scale.si(column)
-    numbers = scale.si(np.asarray(read(name, column, quantity).si))
+    numbers: Any = np.asarray(read(name, column, quantity).si)
+    numbers = scale.si(numbers)
     if _library(column) == "pandas":
         return type(column)(numbers, index=column.index, name=column.name)
     return numbers
