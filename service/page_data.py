@@ -16,11 +16,11 @@ from mumacro.errors import InputError
 from mumacro.inputs.fields import INPUTS, LIKE
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRINGS_OF, kind_of
 from mumacro.inputs.units import UNITS_OF, Scale
+from mumacro.outputs import OUTPUTS
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIMES
 
 from . import __version__
-from .included import INCLUDABLE
 
 #: the content security policy of the page: no inline script, no inline style, nothing from another
 #: host
@@ -140,7 +140,7 @@ def _outputs_of(kind: tuple[str, str]) -> list[str]:
     return [
         name
         for name in ("groups", "limits", "gradient", "stick_fraction", "power", "settling")
-        if not INCLUDABLE[name].lacks.keys() & {*kind}
+        if not OUTPUTS[name].lacks.keys() & {*kind}
     ]
 
 

@@ -100,6 +100,7 @@ BOUNDS = {row.name: row.bound for row in _ROWS}
 QUANTITY_OF = {row.name: row.quantity for row in _ROWS} | {
     "mu_macro": "ratio",
     "target": "ratio",
+    "stiffness_exponent": "ratio",
     "tolerance": "ratio",
     "v_tilde": "ratio",
     "y_tilde": "ratio",

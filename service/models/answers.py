@@ -328,6 +328,44 @@ class SolveForAnswer(Solved, Answered):
     model: list[ModelRow] | None = Field(None, description=_MODEL)
 
 
+class MotionRoot(BaseModel):
+    """One value of the unknown of a motion."""
+
+    value: float = Field(description="The unknown [SI], a phase in degrees")
+    low: float = Field(description="From low ...")
+    high: float = Field(
+        description="... to high, the mean force is the target within its error estimate"
+    )
+    mean: float = quantity("The mean force over the mean load there", "-")
+    error_estimate: float = quantity("Estimated error of it", "-")
+
+
+class MotionTargetAnswer(BaseModel):
+    """All values that give one target of a motion."""
+
+    target: float
+    roots: list[MotionRoot] = Field(description="Ascending; there may be several")
+    reason: str | None = Field(None, description="Why there is no root")
+
+
+class SolveMotionAnswer(BaseModel):
+    """Answer to the inverse problem of a motion; it is computed, no table is read."""
+
+    unknown: str
+    unit: str
+    quantity: Literal["mu_macro", "mu_ratio"]
+    of: Literal["mu_macro", "mu_lateral"]
+    results: list[MotionTargetAnswer] = Field(description="One per target, in order")
+    range: list[float] = Field(description="The searched range [SI], of a phase in degrees")
+    reachable: Reachable
+    other_way: list[MotionTargetAnswer] | None = Field(
+        None,
+        description="For v0 without a root: with the phase of x turned by 180 degrees the body "
+        "moves the other way, at these speeds",
+    )
+    api_version: str
+
+
 class StiffnessAnswer(BaseModel):
     """What a contact of two bodies is; ``k`` and ``contact`` are those of a case."""
 

@@ -40,6 +40,7 @@ from .values import (
 MAX_TERMS = 10  # of one part of the motion
 # of a ball, whose hundreds of springs each follow every turn of the motion
 MOST_OF_A_BALL, LEAST_OF_A_BALL = 20, 1e-7
+MOTIONS_OF_A_SEARCH = 150  # about, of solve_motion
 # in times of a plain case, from random motions; within a factor of 10
 _COST, _COST_OF_A_TERM, _SPRINGS_OF_A_BALL = 4000.0, 400.0, 250.0
 
@@ -114,13 +115,23 @@ def _with_numbers(name: str, part: dict[str, Any], place: tuple[int, ...]) -> di
     return numbers
 
 
-_Oscillation = Annotated[
+Oscillation = Annotated[
     NotNegative | _Text | Harmonic | _Pair | _Listed, WrapValidator(_of_its_form)
 ]
-_FORMS = (
+FORMS = (
     'an amplitude, half of peak to peak; a text such as "2um@90deg"; an amplitude with its phase '
     f"in degrees; or a list of harmonics, at most {MAX_TERMS}. Left out: none"
 )
+
+
+def cost_of(contact: str, *parts: Any) -> float:
+    """Time of a motion, in times of a plain case: each term is followed through every turn of the
+    highest harmonic."""
+    terms = [one for part in parts if isinstance(part, list) for one in part]
+    plain = sum(isinstance(part, (float, tuple)) for part in parts)
+    highest: int = max([1, *(harmonic for harmonic, *_ in terms)])
+    cost = _COST + _COST_OF_A_TERM * highest * (1 + plain + len(terms))
+    return cost * (_SPRINGS_OF_A_BALL if contact == "ball" else 1.0)
 
 
 class MotionRequest(Strict):
@@ -152,10 +163,10 @@ class MotionRequest(Strict):
         "Frequency of the period [Hz], in place of omega"
     )
     v0: Speed = Field(description="Speed of the drag along x [m/s]")
-    x: _Oscillation | None = optional(f"Oscillation along the drag [m]: {_FORMS}")
-    y: _Oscillation | None = optional(f"Oscillation across it [m]: {_FORMS}")
-    normal: _Oscillation | None = optional(
-        f"Oscillation of the normal force [N], not of a ball: {_FORMS}"
+    x: Oscillation | None = optional(f"Oscillation along the drag [m]: {FORMS}")
+    y: Oscillation | None = optional(f"Oscillation across it [m]: {FORMS}")
+    normal: Oscillation | None = optional(
+        f"Oscillation of the normal force [N], not of a ball: {FORMS}"
     )
     contact: ContactName = Field(
         "spring",
@@ -183,14 +194,8 @@ class MotionRequest(Strict):
 
     @property
     def cost(self) -> float:
-        """Time of the answer, in times of a plain case: each term is followed through every turn
-        of the highest harmonic."""
-        parts = (self.x, self.y, self.normal)
-        terms: list[Any] = [x for part in parts if isinstance(part, list) for x in part]
-        plain = sum(isinstance(part, (float, tuple)) for part in parts)
-        highest: int = max([1, *(harmonic for harmonic, *_ in terms)])
-        cost = _COST + _COST_OF_A_TERM * highest * (1 + plain + len(terms))
-        return cost * (_SPRINGS_OF_A_BALL if self.contact == "ball" else 1.0)
+        """Time of the answer, in times of a plain case."""
+        return cost_of(self.contact, self.x, self.y, self.normal)
 
     @property
     def case(self) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import math
 from base64 import b64decode
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import (
@@ -17,6 +17,8 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails
 
+from mumacro.analysis.motion import PARTS
+from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.fields import QUANTITY_OF, STIFFNESS
@@ -36,10 +38,23 @@ from .inputs import (
     Strict,
     optional,
 )
+from .motion import FORMS, Oscillation
 from .options import Choice, Options, QueryOptions
-from .values import End, Length, Load, Modulus, NotNegative, fault
+from .values import End, Length, Load, Modulus, Ratio, fault, text_schema
 
 MAX_VALUES = 10_001  # of a law
+_OF_A_MOTION = ("mu0", "Fz", "k", "omega", "f", "v0", "contact")
+_NOT_OF_A_MOTION = (
+    "y0",
+    "Fz_amplitude",
+    "k_range",
+    "k_low",
+    "k_high",
+    "direction",
+    "include",
+    "std",
+    "stiffness_exponent",
+)
 MAX_TARGETS = 10_000
 MAX_POINTS = 1000  # of a fit, which scipy answers within seconds
 
@@ -49,7 +64,7 @@ _Whole = Annotated[
     Field(ge=2, le=MAX_VALUES),
     BeforeValidator(lambda n: int(n) if isinstance(n, float) and n.is_integer() else n),
 ]
-_Exponent = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+_Exponent = Annotated[Ratio, Field(ge=0, le=1)]
 _EXPONENT = (
     "For Fz only: k grows as Fz to this power, and Fz of the case is the load at which k holds; "
     "left out: 1/3 for a ball with Fz, else k is constant"
@@ -96,8 +111,16 @@ class LawQuery(QueryOptions, Sweep, OtherInputs):
     """mu_macro over a range of one input."""
 
 
+# its error names the field, so that no schema of numbers >= 0 is needed
+_TARGET: list[dict[str, Any]] = [{"type": "number"}, text_schema("ratio", False)]
+if TYPE_CHECKING:
+    Unknown = str
+else:
+    Unknown = Literal[(*get_args(Name), *(name for name in UNKNOWNS if "." in name))]
+
+
 class SolveForRequest(Options, OtherInputs):
-    """Which value of one input gives a wanted mu_macro."""
+    """Which value of one input gives a wanted mu_macro; with x, y or normal over any motion."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -107,25 +130,31 @@ class SolveForRequest(Options, OtherInputs):
     )
 
     k_range: Pair | None = optional(f"In place of k: {BOUND}")
-    unknown: Name = Field(description="The input to solve for, which is left out of the case")
+    unknown: Unknown = Field(
+        description="The input to solve for, which is left out of the case; of a motion also the "
+        "amplitude or the phase of a part"
+    )
     target: Annotated[
-        list[NotNegative],
+        list[Ratio],
         Field(min_length=1, max_length=MAX_TARGETS),
         BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
         WithJsonSchema(
             {
                 "anyOf": [
-                    {"type": "number", "minimum": 0},
+                    *_TARGET,
                     {
                         "type": "array",
-                        "items": {"type": "number", "minimum": 0},
+                        "items": {"anyOf": _TARGET},
                         "minItems": 1,
                         "maxItems": MAX_TARGETS,
                     },
                 ]
             }
         ),
-    ] = Field(description=f"Wanted value [-]: one, or a list of up to {MAX_TARGETS}")
+    ] = Field(
+        description=f"Wanted value [-]: one, or a list of up to {MAX_TARGETS}; of a motion it may "
+        "be negative"
+    )
     quantity: Literal["mu_macro", "mu_ratio"] = Field(
         "mu_macro",
         description="What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)",
@@ -134,11 +163,37 @@ class SolveForRequest(Options, OtherInputs):
         "Where to search [SI], or with units, ascending; left out: wherever it changes mu_macro"
     )
     stiffness_exponent: _Exponent | None = optional(_EXPONENT)
+    x: Oscillation | None = optional(f"Of a motion: oscillation along the drag [m]: {FORMS}")
+    y: Oscillation | None = optional(f"Of a motion: oscillation across it [m]: {FORMS}")
+    normal: Oscillation | None = optional(
+        f"Of a motion: oscillation of the normal force [N], not of a ball: {FORMS}"
+    )
+    of: Literal["mu_macro", "mu_lateral"] | None = optional(
+        "Of a motion: which mean force is the target; left out: mu_macro"
+    )
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether the question is about any motion."""
+        return "." in self.unknown or not self.model_fields_set.isdisjoint((*PARTS, "of"))
+
+    @property
+    def motion(self) -> dict[str, Any]:
+        """The motion that is asked about; InputError for what a motion does not have."""
+        given = {
+            name: value
+            for name in self.model_fields_set
+            if (value := getattr(self, name)) is not None
+        }
+        for name in _NOT_OF_A_MOTION:
+            if name in given:
+                raise InputError(name, None, "left out over a motion: x, y and normal say it")
+        return {name: value for name, value in given.items() if name in (*_OF_A_MOTION, *PARTS)}
 
 
 # --- stiffness ------------------------------------------------------------------------------------
 
-_Poisson = Annotated[float, Field(gt=-1, le=0.5, allow_inf_nan=False)]
+_Poisson = Annotated[Ratio, Field(gt=-1, le=0.5)]
 if TYPE_CHECKING:
     _Geometry = str
 else:

@@ -56,7 +56,7 @@ def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
     """The JSON Schema of a text, for clients: the library reads more than its pattern."""
     digits = r"[1-9][0-9]{0,8}" if positive else r"[0-9]{1,9}"
     known = QUANTITIES[quantity]
-    units = [unit for unit in known.such_as.replace(":", ",").replace(";", ",").split(", ")]
+    units = known.such_as.replace(":", ",").replace(";", ",").split(", ")
     of_unit = f" ?({'|'.join(unit for unit in units if unit in known.units)})"
     return {"type": "string", "pattern": rf"^{digits}(\.[0-9]{{1,9}})?({of_unit})?$"}
 
@@ -102,6 +102,13 @@ End = Annotated[
 Length = Annotated[Positive, _IN_SI, _is("radius", True)]
 Modulus = Annotated[Positive, _IN_SI, _is("E", True)]
 Load = Annotated[Positive, _IN_SI, _is("Fz", True)]
+#: a share or a coefficient, which may be in per cent
+Ratio = Annotated[
+    float,
+    Field(allow_inf_nan=False),
+    _IN_SI,
+    WithJsonSchema({"anyOf": [{"type": "number"}, text_schema("ratio", False)]}),
+]
 
 
 def interval_of(k: Any) -> tuple[float, float] | None:

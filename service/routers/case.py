@@ -41,7 +41,7 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     table = state.tables.pick(case.tolerance)
     more: dict[str, Any] = {}
     if case.include and UNDERSTOOD in case.include:
-        more = {UNDERSTOOD: understood(case.model_dump())}
+        more = {UNDERSTOOD: understood(case.model_dump(warnings=False))}
     try:
         if case.model_fields_set <= _PLAIN and _INTERVAL.isdisjoint(inputs):
             answer = table.surrogate.evaluate(**inputs)

@@ -17,14 +17,17 @@ from mumacro.answer import Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.fields import unit_of
+from mumacro.inputs.reading import read_one
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
 from mumacro.validity import load_rows
 
+from .. import API_VERSION
 from ..forms import listed
 from ..limits import Working
-from ..models.answers import LawAnswer, SolveForAnswer
+from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
+from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
 from ..models.questions import LawQuery, LawRequest, SolveForRequest
 from ..reading import Json, StrictRoute
@@ -163,25 +166,72 @@ _NO_LIMIT = 1e300
 
 @router.post(
     "/solve-for",
-    responses={200: {"model": SolveForAnswer}, **POST_PROBLEMS},
+    responses={200: {"model": SolveForAnswer | SolveMotionAnswer}, **POST_PROBLEMS},
     summary="The value of one input that gives a wanted mu_macro",
 )
 async def post_solve_for(question: SolveForRequest, tables: Loaded, work: Working) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the
-    range of mu_macro."""
+    range of mu_macro.  With ``x``, ``y`` or ``normal`` the question is about any motion."""
+    if question.is_motion:
+        cost = MOTIONS_OF_A_SEARCH * cost_of(
+            question.contact, question.x, question.y, question.normal
+        )
+        return await work.question(lambda: Json(_solved_motion(question)), cost)
     return await work.question(lambda: Json(_solved(question, tables)))
+
+
+def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
+    """The roots over a motion, which reads no table."""
+    motion, of = question.motion, question.of or "mu_macro"
+    unit = _unit_of_target(question)
+    solution = mumacro.solve_motion(
+        question.unknown,
+        [x * unit for x in question.target],
+        of=of,
+        within=None if question.range is None else (question.range[0], question.range[1]),
+        **motion,
+    )
+    reach = {"min": solution.reach.least / unit, "max": solution.reach.most / unit}
+    answer: dict[str, Any] = {
+        "unknown": question.unknown,
+        "unit": solution.unit,
+        "quantity": question.quantity,
+        "of": of,
+        "results": _motion_results(question, solution),
+        "range": [solution.reach.low, solution.reach.high],
+        "reachable": {**reach, "min_included": True, "max_included": True},
+        "api_version": API_VERSION,
+    }
+    if solution.other_way is not None:
+        answer["other_way"] = _motion_results(question, solution.other_way)
+    return answer
+
+
+def _motion_results(
+    question: SolveForRequest, solution: mumacro.MotionSolution
+) -> list[dict[str, Any]]:
+    results = []
+    for i, (target, roots) in enumerate(zip(question.target, solution.roots, strict=True)):
+        reason = {} if roots else {"reason": solution.reason(i)}
+        results.append({"target": target, "roots": [one._asdict() for one in roots], **reason})
+    return results
+
+
+def _unit_of_target(question: SolveForRequest) -> float:
+    """What a target is a multiple of: mu0, or 1."""
+    if question.quantity == "mu_macro":
+        return 1.0
+    if question.unknown == "mu0" or question.mu0 is None:
+        bound = "mu_macro where mu0 is the unknown or is left out"
+        raise InputError("quantity", question.quantity, bound)
+    return read_one("mu0", question.mu0)
 
 
 def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     table, case = tables.pick(question.tolerance), question.inputs
     _refuse_model(question)
     name = question.unknown
-    unit = 1.0
-    if question.quantity == "mu_ratio":
-        if question.unknown == "mu0" or question.mu0 is None:
-            bound = "mu_macro where mu0 is the unknown or is left out"
-            raise InputError("quantity", question.quantity, bound)
-        unit = question.mu0
+    unit = _unit_of_target(question)
     within = None if question.range is None else (question.range[0], question.range[1])
     solution = mumacro.solve_for(
         table.surrogate,

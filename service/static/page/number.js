@@ -51,7 +51,9 @@ export function numberPanel(store) {
       render(html`<output id="mu" for="fields">…</output>`, $("number"));
       return;
     }
-    const rows = answer.remarks ?? answer.model ?? [];
+    const remarks = answer.remarks ?? [];
+    const said = new Set(remarks.map(({ row }) => row));
+    const rows = [...remarks, ...(answer.model ?? []).filter(({ row }) => !said.has(row))];
     const { value, std } = numberOf(answer, store.state.digits === "all");
     const doubt = rows.find(({ row }) => row === "units");
     const warning = doubt ?? rows.find(({ row }) => row === "first order");
