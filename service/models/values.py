@@ -56,7 +56,7 @@ def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
     """The JSON Schema of a text, for clients: the library reads more than its pattern."""
     digits = r"[1-9][0-9]{0,8}" if positive else r"[0-9]{1,9}"
     known = QUANTITIES[quantity]
-    units = [unit for unit in known.such_as.replace(":", ",").replace(";", ",").split(", ")]
+    units = known.such_as.replace(":", ",").replace(";", ",").split(", ")
     of_unit = f" ?({'|'.join(unit for unit in units if unit in known.units)})"
     return {"type": "string", "pattern": rf"^{digits}(\.[0-9]{{1,9}})?({of_unit})?$"}
 

@@ -9,7 +9,7 @@ from mumacro.errors import TableError
 
 from .. import __version__
 from ..models.answers import TableAnswer
-from ..models.inputs import Positive, Strict
+from ..models.values import Positive, Strict
 from ..reading import Json, StrictRoute
 from ..tables import Loaded
 from . import GET_PROBLEMS, file_answer, problems, router_of
