@@ -148,7 +148,7 @@ def _serve(settings: Settings) -> int:
     if sys.stdout.isatty() and settings.port:  # 0: any free port, which the log names
         threading.Thread(target=_announce, args=(settings,), daemon=True).start()
     try:
-        with shared_counters() if settings.workers > 1 else nullcontext():
+        with shared_counters(settings.workers) if settings.workers > 1 else nullcontext():
             # By name, so that only worker processes import it, and not their parent.  It reads the
             # headers of proxies.
             uvicorn.run(

@@ -27,7 +27,7 @@ from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.inputs import Case
 from .models.options import CaseColumns, CaseRequest
-from .observe import Observe
+from .observe import Observe, Observer
 from .problems import HANDLERS, Failures
 from .routers import batch, case, contact, health, motion, page, questions, table
 from .security import HEALTH_PATHS, SCHEMES, Heads, Keys
@@ -73,7 +73,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     # answered meanwhile.
     gc.collect()
     gc.freeze()
-    yield {"settings": app.state.settings}
+    yield {"settings": app.state.settings, "observer": app.state.observer}
     app.state.work.close()
 
 
@@ -136,6 +136,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     }
     state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
     state.metrics = Metrics({*methods, *page.OPEN})
+    state.observer = Observer(state.metrics)
     keys = settings.keys()
     app.openapi = lambda: _described(app, closed=bool(keys))  # type: ignore[method-assign]
     # the last one is the outermost
@@ -145,7 +146,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Heads)
     app.add_middleware(Room)
     app.add_middleware(Failures)
-    app.add_middleware(Observe, metrics=state.metrics, trusted_proxies=settings.trusted_proxies)
+    app.add_middleware(
+        Observe, observer=state.observer, trusted_proxies=list(settings.trusted_proxies)
+    )
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,
