@@ -18,10 +18,10 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import RedirectResponse
-from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
+from .guide_pages import GuidePages
 from .limits import Room, Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
@@ -122,7 +122,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     opened = {*HEALTH_PATHS, *page.OPEN}
     if settings.guide is not None:
         app.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)
-        app.mount("/guide", StaticFiles(directory=settings.guide, html=True))
+        app.mount("/guide", GuidePages(settings.guide))
         opened.add("/guide")
     methods: dict[str, set[str]] = {}
     for route in app.routes:

@@ -9,6 +9,7 @@ solves nothing else: FastAPI's own reading of a case takes longer than its answe
 
 import json
 import string
+from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from functools import partial
@@ -22,7 +23,7 @@ from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.datastructures import ImmutableMultiDict
 
-from .limits import JSON, SMALL_BODY, only_json, read_body
+from .limits import JSON, SMALL_BODY, Work, only_json, read_body
 from .problems import FieldFault, ProblemKind, RequestError, invalid, refuse
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -37,8 +38,8 @@ _LISTS = frozenset(("include",))
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     members = dict(pairs)
     if len(members) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = [name for name in members if names.count(name) > 1]
+        times = Counter(name for name, _ in pairs)
+        twice = [name for name in members if times[name] > 1]
         refuse([FieldFault.of(name, "is given more than once") for name in twice])
     return members
 
@@ -93,7 +94,8 @@ async def small_body(request: Request) -> bytes:
     if headers.get(b"content-type") != JSON or b"content-encoding" in headers:
         only_json(headers)
     limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
-    body = bytes(await read_body(headers, request.receive, limit))
+    work: Work = request.app.state.work
+    body = bytes(await work.client(read_body(headers, request.receive, limit)))
     query = request.scope["query_string"]
     if query and (pairs := _pairs(query)):
         refuse(

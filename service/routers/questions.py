@@ -150,7 +150,7 @@ def unit_at(path: str) -> str:
     if member:
         model = getattr(answers, "".join(word.capitalize() for word in name.split("_")))
     extra: Any = model.model_fields[member or name].json_schema_extra
-    return str(extra["unit"])
+    return str(extra["x-unit"])
 
 
 # --- inverse --------------------------------------------------------------------------------------
