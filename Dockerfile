@@ -49,12 +49,10 @@ COPY tables tables
 COPY hatch_build.py pyproject.toml /build/
 COPY mumacro/kernel /build/mumacro/kernel
 # The kernel holds code for several processors and chooses when it is loaded: the image also runs on
-# other machines than the one that built it.  Its sources stay in this stage, apart from the three
-# headers that the library reads.  Every user of the container may read all files, whatever the
+# other machines than the one that built it.  Its sources stay in this stage.  Every user of the container may read all files, whatever the
 # umask of the checkout; no user may write them.
 RUN /build/venv/bin/python /build/hatch_build.py mumacro \
-    && find mumacro/kernel -name '*.[ch]' -not -name data.h -not -name records.h \
-        -not -name library.h -delete \
+    && rm mumacro/kernel/*.[ch] \
     && venv/bin/python -m compileall -q mumacro service \
     && chmod -R a+rX,go-w .
 

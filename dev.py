@@ -84,7 +84,11 @@ def current() -> dict[str, str]:
     """Digests of what each part of ``.venv`` is made from: sets of locks, the kernel and its
     sources."""
     kernel = sorted(
-        [*(ROOT / "mumacro" / "kernel").glob("*.[ch]"), *(ROOT / "mumacro").glob("_kernel.*")]
+        [
+            *(ROOT / "mumacro" / "kernel").glob("*.[ch]"),
+            *(ROOT / "mumacro" / "kernel").glob("_declarations.py"),
+            *(ROOT / "mumacro").glob("_kernel.*"),
+        ]
     )
     locks = {
         key: digest(*(ROOT / "requirements" / f"{name}.txt" for name in names))

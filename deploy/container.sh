@@ -120,13 +120,11 @@ healthy() {  # the HEALTHCHECK of the image, as the engine runs it
     return 1
 }
 
-# Kept are the three headers that the library reads when it is loaded.
 UNWANTED='
 import pathlib
-kept = {"data.h", "records.h", "library.h"}
 sources, others = {".c", ".h", ".cpp", ".hpp", ".a"}, {"f2py", "pip", "tests", "ziglang"}
 found = [str(path) for path in pathlib.Path("/app").rglob("*")
-         if path.suffix in sources and path.name not in kept or path.name in others]
+         if path.suffix in sources or path.name in others]
 print(*found, end="")'
 WRITABLE='
 import pathlib, tempfile

@@ -24,7 +24,7 @@ import orjson
 from benchmarks.measuring import ROOT, main, markdown, progress, sections
 from benchmarks.support.serving import CASE, Server, serving
 from mumacro.contacts.geometries import GEOMETRIES
-from mumacro.contacts.stiffness import AXES
+from mumacro.stiffness import AXES
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
 TOTAL, PART = 1_000_000, 1000  # requests; in a share of work

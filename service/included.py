@@ -17,13 +17,13 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.analysis.settling import settling as decay
-from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, ROUNDING
 from mumacro.table.atlas import SOURCES as _SOURCES
+from mumacro.validity import digits, k_effect, model_rows
 
 from .models.options import MODEL
 

@@ -241,7 +241,6 @@ class ProblemKind(Enum):
     INVALID_VALUE = 422, "The request holds invalid values"
     HEAD_TOO_LARGE = 431, "The head is too large", CLOSE
     UNEXPECTED = 500, "An unexpected error"
-    NOT_INSTALLED = 501, "This service lacks a package"
     NOT_READY = 503, "The service is not ready", {"Retry-After": "5"}
     OVERLOADED = 503, "The service is overloaded", {**CLOSE, "Retry-After": "1"}
     OUT_OF_MEMORY = 503, "The service has too little memory", {"Retry-After": "1"}

@@ -18,7 +18,6 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import check, without_interval
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
@@ -28,6 +27,7 @@ from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.text_tables import SEPARATORS
 from mumacro.inputs.units import belongs_to_value
 from mumacro.surrogate import Surrogate
+from mumacro.validity import Row, digits, k_effect
 
 ABOUT_INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:

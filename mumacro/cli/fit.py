@@ -13,7 +13,6 @@ import numpy as np
 
 from mumacro.analysis.fit import Fit, fit
 from mumacro.analysis.measured_points import STD, UNKNOWNS, unknowns_beside
-from mumacro.analysis.validity import digits
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, open_table
 from mumacro.errors import InputError
@@ -27,6 +26,7 @@ from mumacro.inputs.text_tables import (
     read_head,
     read_text,
 )
+from mumacro.validity import digits
 
 EXAMPLE = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\

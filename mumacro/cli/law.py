@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 from mumacro.analysis.approximations import approximations
 from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.validity import load_rows
 from mumacro.cli import common
 from mumacro.cli.common import CURVE, UsageError, as_json, in_columns, open_table, read_case
 from mumacro.inputs.fields import field_of, unit_of
 from mumacro.inputs.reading import read_one
+from mumacro.validity import load_rows
 
 EXAMPLE = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz' --along v0 0.1mm/s 1m/s"
 

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mumacro.analysis.validity import model_rows
 from mumacro.answer import BAND
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
 from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.surrogate import Surrogate
+from mumacro.validity import model_rows
 from mumacro.version import __version__
 
 EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz v0=10mm/s"

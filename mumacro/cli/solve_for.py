@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.solve_for import solve_for
-from mumacro.analysis.validity import load_rows
 from mumacro.cli import common
 from mumacro.cli.common import (
     CURVE,
@@ -19,6 +18,7 @@ from mumacro.cli.common import (
 from mumacro.inputs.fields import NAMES, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.reading import read_one
+from mumacro.validity import load_rows
 
 EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s' --target 0.15"
 

@@ -1,4 +1,4 @@
-"""The geometries of :mod:`mumacro.contacts.stiffness` by name, with arguments, units and meaning.
+"""The geometries of :mod:`mumacro.stiffness` by name, with arguments, units and meaning.
 
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
@@ -6,7 +6,11 @@ Command line, service and page derive their fields from :data:`GEOMETRIES` and :
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from mumacro.contacts.stiffness import (
+from mumacro.errors import InputError
+from mumacro.inputs.cases import real
+from mumacro.inputs.names import unknown_name
+from mumacro.inputs.reading import read_one
+from mumacro.stiffness import (
     AXES,
     Contact,
     Material,
@@ -14,10 +18,6 @@ from mumacro.contacts.stiffness import (
     hertz_ball,
     hertz_cylinder,
 )
-from mumacro.errors import InputError
-from mumacro.inputs.cases import real
-from mumacro.inputs.names import unknown_name
-from mumacro.inputs.reading import read_one
 
 
 class Argument(NamedTuple):

@@ -14,17 +14,15 @@ import mumacro
 from mumacro.analysis.fit import Fit, quantile
 from mumacro.analysis.measured_points import STD
 from mumacro.contacts.geometries import contact_of
-from mumacro.errors import missing
 from mumacro.inputs.fields import RIGID
 
 from .. import API_VERSION
 from ..limits import Working
 from ..models.answers import FitAnswer, StiffnessAnswer
 from ..models.questions import FitRequest, StiffnessRequest
-from ..problems import ProblemKind, RequestError
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
-from . import POST_PROBLEMS, problems, router_of
+from . import POST_PROBLEMS, router_of
 
 router = router_of("answers", StrictRoute)
 _CURVE = 200  # points of the fitted law
@@ -45,7 +43,7 @@ async def post_stiffness(contact: StiffnessRequest) -> Response:
 
 @router.post(
     "/fit",
-    responses={200: {"model": FitAnswer}, **POST_PROBLEMS, **problems(501)},
+    responses={200: {"model": FitAnswer}, **POST_PROBLEMS},
     summary="k and mu0 from measured points",
 )
 async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Response:
@@ -57,12 +55,9 @@ async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Respo
 
 def _fitted(table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]) -> dict[str, Any]:
     words: Any = measured.kind.names
-    try:
-        with warnings.catch_warnings():  # they are in the answer
-            warnings.simplefilter("ignore")
-            fit = mumacro.fit(columns, measured.unknowns, surrogate=table.surrogate, **words)
-    except ModuleNotFoundError as error:
-        raise RequestError(ProblemKind.NOT_INSTALLED, missing("fit", error)) from None
+    with warnings.catch_warnings():  # they are in the answer
+        warnings.simplefilter("ignore")
+        fit = mumacro.fit(columns, measured.unknowns, surrogate=table.surrogate, **words)
     members = {name: getattr(fit, name) for name in FitAnswer.model_fields if hasattr(fit, name)}
     return {
         **members,

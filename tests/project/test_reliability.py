@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from builder.solver.steady import Y_RANGE, solve
-from builder.solver.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer
 from mumacro.files import evaluate_files
@@ -174,26 +173,3 @@ def test_a_fault_loses_no_data(name: str) -> None:
     if what == "not tried":
         pytest.skip(report)
     assert what == "held", report
-
-
-@pytest.mark.slow
-def test_a_killed_build_resumes_to_the_same_data(tmp_path: Path) -> None:
-    assert "1 kills, 1 starts from finished parts" in faults.killed_builds(tmp_path, kills=1)
-
-
-@pytest.mark.slow
-def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Path) -> None:
-    v, y = np.full(60, 0.1), np.geomspace(0.1, 10.0, 60)
-    try:
-        with (
-            faults.small_disk(tmp_path, "16k") as disk,
-            Sweep(1, checkpoint=disk / "work.checkpoint") as sweep,
-        ):
-            sweep.solve("full", v[:20], y[:20])
-            files, many = faults.files_in(disk), np.geomspace(0.1, 10.0, 600)  # 29 kB of results
-            words = r"work\.checkpoint: finished work cannot be stored: No space left"
-            with pytest.raises(CheckpointError, match=words):
-                sweep.solve("full", many, many)
-            assert faults.files_in(disk) == files
-    except faults.NotTriedError as error:
-        pytest.skip(str(error))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES
+from mumacro.validity import digits, k_effect, model_rows
 from tests.support.cases import Case
 from tests.support.comparing import close
 

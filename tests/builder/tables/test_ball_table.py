@@ -1,4 +1,4 @@
-"""The table of a ball: its solver, its charts, its hidden corners, and a table without it."""
+"""The table of a ball: its solver, its charts and its hidden corners."""
 
 import dataclasses
 import itertools
@@ -20,7 +20,7 @@ from mumacro import InputError, Surrogate, closed_forms, surrogate
 from mumacro.inputs.kind import BALL
 from mumacro.kernel.binding import kernels
 from mumacro.table.atlas import BALL_CHARTS, MIDDLE, QUANTITY_NAMES, SLOW, STEEPEST, STEEPEST_Y
-from mumacro.table.netcdf import FORMAT_VERSION, WITHOUT_BALL, read_table, write_table
+from mumacro.table.netcdf import read_table, write_table
 from tests.support.cases import Array, opened
 from tests.support.comparing import close
 from tests.support.places import TABLES
@@ -341,26 +341,3 @@ def test_an_illegal_plain_number_is_refused(name: str, value: float) -> None:
         opened(COARSE).evaluate(**{**case, name: value}, contact="ball")
     with pytest.raises(InputError, match="v_tilde"):
         opened(COARSE).quantity("mu_ratio", -1.0, 0.5, contact="ball")
-
-
-# --- a table without a ball -----------------------------------------------------------------------
-
-
-def test_an_older_table_opens_and_names_the_remedy(tmp_path: Path) -> None:
-    whole = read_table(opened(1e-4).path)
-    kept = {name: x for name, x in whole.attributes.items() if not name.startswith("ball_")}
-    write_table(dataclasses.replace(whole, ball=[], attributes=kept), tmp_path / "old.nc")
-    old = Surrogate.open(tmp_path / "old.nc")
-    assert (old.attributes["format_version"], FORMAT_VERSION) == (WITHOUT_BALL, 5)
-    v, y = wide(500, 2)
-    np.testing.assert_array_equal(old.mu_ratio(v, y), opened(1e-4).mu_ratio(v, y))
-    for ask in (
-        lambda: old.quantity("mu_ratio", 0.1, 0.5, contact="ball"),
-        lambda: old.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1e5, v0=0.01, contact="ball"),
-    ):
-        with pytest.raises(InputError, match="builder"):
-            ask()
-    along = old.quantity("mu_ratio", 0.1, 0.5, contact="ball", direction="along")
-    assert along == opened(1e-4).quantity("mu_ratio", 0.1, 0.5, contact="ball", direction="along")
-    assert math.isnan(old.ball_tolerance)
-    assert old.ball_error_distribution == {}

@@ -12,7 +12,7 @@ import pytest
 
 from mumacro import InputError, Surrogate, stiffness
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
-from mumacro.contacts.stiffness import (
+from mumacro.stiffness import (
     AXES,
     Contact,
     Material,
