@@ -11,7 +11,6 @@ import json
 import string
 from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
-from contextlib import suppress
 from functools import partial
 from typing import Any
 from urllib.parse import parse_qsl
@@ -30,6 +29,7 @@ Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 # of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _LISTS = frozenset(("include",))
+_MOST_MEMBERS = 200  # of an object in a small body
 
 
 # --- JSON -----------------------------------------------------------------------------------------
@@ -54,18 +54,40 @@ _DECODER = json.JSONDecoder(
 
 
 def decode(text: bytes, large: bool = False) -> Any:
-    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later."""
+    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later.
+
+    Unless the text is ``large``, an object of far too many members is refused.
+    """
     if not text:
         raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
-    if not large:
-        with suppress(ValueError):  # _DECODER gives the reason
-            return jiter.from_json(text, catch_duplicate_keys=True)
     try:
-        return _DECODER.decode(text.decode())
+        if large:
+            return _DECODER.decode(text.decode())
+        try:
+            value = jiter.from_json(text, catch_duplicate_keys=True)
+        except ValueError:  # _DECODER gives the reason
+            value = _DECODER.decode(text.decode())
+        if text.count(b":") > _MOST_MEMBERS:
+            _few_members(value)
+        return value
     except RecursionError:
         raise RequestError(ProblemKind.MALFORMED_BODY, "the body is nested too deeply") from None
     except ValueError as error:
         raise RequestError(ProblemKind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
+
+
+def _few_members(value: Any, path: tuple[str | int, ...] = ()) -> None:
+    """Refuse an object of far more members than there are fields: a reason for each would take
+    long."""
+    if isinstance(value, dict):
+        if len(value) > _MOST_MEMBERS:
+            reason = f"has {len(value)} members; send only fields, of which no object has so many"
+            refuse([FieldFault(path, reason, value)])
+        for name, member in value.items():
+            _few_members(member, (*path, name))
+    elif isinstance(value, list):
+        for i, one in enumerate(value):
+            _few_members(one, (*path, i))
 
 
 #: Write JSON as bytes; numbers that are not finite become null.
@@ -244,7 +266,7 @@ def validated(model: Any, text: bytes) -> Any:
         members = decode(text)
         if not isinstance(members, dict):
             refuse([FieldFault((), "must be a JSON object", members)])
-        if error.errors()[0]["type"] != "json_invalid":
+        if error.error_count() > 1 or error.errors()[0]["type"] != "json_invalid":
             raise invalid(error, model, members) from None
         return of_members(model, members)  # such as half of a surrogate pair
     # one colon for each member: none is named twice, and there is no object within
