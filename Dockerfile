@@ -49,8 +49,8 @@ COPY tables tables
 COPY hatch_build.py pyproject.toml /build/
 COPY mumacro/kernel /build/mumacro/kernel
 # The kernel holds code for several processors and chooses when it is loaded: the image also runs on
-# other machines than the one that built it.  Its sources stay in this stage.  Every user of the container may read all files, whatever the
-# umask of the checkout; no user may write them.
+# other machines than the one that built it.  Its sources stay in this stage.  Every user of the
+# container may read all files, whatever the umask of the checkout; no user may write them.
 RUN /build/venv/bin/python /build/hatch_build.py mumacro \
     && rm mumacro/kernel/*.[ch] \
     && venv/bin/python -m compileall -q mumacro service \

@@ -8,7 +8,7 @@ get the same requests in turn, so that other load slows all of them; figures are
 rounds.
 """
 
-from benchmarks.measuring import FINEST, main, markdown, sections  # isort: split
+from tests.support.measuring import FINEST, main, markdown, sections  # isort: split
 
 import http.client
 import json
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from benchmarks.support.serving import CASE, Server, asking, connect, head, running, serving
+from tests.support.serving import CASE, Server, asking, connect, head, running, serving
 
 FIRST, CLIENT = ("taskset", "-c", "0"), {1}  # the processors of the servers and of the client
 ROUNDS, REQUESTS, CLIENTS = 5, 800, 16

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator, make_interp_spline
 
-from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
 from builder.solver.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
+from tests.support.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]

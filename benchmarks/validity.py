@@ -3,7 +3,7 @@
 python benchmarks/validity.py [--write]
 """
 
-from benchmarks.measuring import FINEST, IMAGES, main, markdown, quantity, sections  # isort: split
+from tests.support.measuring import FINEST, IMAGES, main, markdown, quantity, sections  # isort: split
 
 import math
 from typing import Any

@@ -6,6 +6,7 @@ import time
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,11 @@ class _Bar:
             print(line.rstrip(), file=sys.stderr)
 
 
+def _writer() -> None:
+    """Import what writes a table file: where it is missing, that is said before the work."""
+    import_module("netCDF4")
+
+
 def _place(out: Path, folder: bool = False) -> None:
     """Refuse a place for a result whose folder is missing, or a folder in place of a file."""
     if not out.parent.is_dir():
@@ -60,6 +66,7 @@ def _build(chosen: Namespace) -> str:
     from .tables.build import MAX_TOLERANCE, MIN_TOLERANCE, build_table, stages
 
     out, tolerance = chosen.out, chosen.tolerance
+    _writer()
     if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
         raise UsageError(
             f"--tolerance must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}"
@@ -98,6 +105,8 @@ def _verify(chosen: Namespace) -> int:
     from .tables.contacts import ball
     from .tables.verify import holds, verify, verify_ball
 
+    if chosen.write:
+        _writer()
     surrogate = Surrogate.open(chosen.table)
     tolerance = surrogate.tolerance
     with Sweep(chosen.workers) as sweep:

@@ -15,8 +15,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from http.client import HTTPException
 
-from benchmarks.measuring import main, markdown, sections
-from benchmarks.support.serving import CASE, Server, asking, connect, head, serving
+from tests.support.measuring import main, markdown, sections
+from tests.support.serving import CASE, Server, asking, connect, head, serving
 
 # the defaults; a few connections are left
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20

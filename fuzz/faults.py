@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from benchmarks.measuring import ROOT, main, markdown, sections
 from mumacro import Surrogate
+from tests.support.measuring import ROOT, main, markdown, sections
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}

@@ -19,8 +19,8 @@ from urllib.parse import urlencode
 
 import numpy as np
 
-from benchmarks.measuring import ROOT, main, markdown, sections
-from benchmarks.support.serving import CASE, Server, asking, serving
+from tests.support.measuring import ROOT, main, markdown, sections
+from tests.support.serving import CASE, Server, asking, serving
 
 BATCH = "/v1/mu-macro/batch"
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"

@@ -21,10 +21,10 @@ from urllib.parse import quote, urlencode
 
 import orjson
 
-from benchmarks.measuring import ROOT, main, markdown, progress, sections
-from benchmarks.support.serving import CASE, Server, serving
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.stiffness import AXES
+from tests.support.measuring import ROOT, main, markdown, progress, sections
+from tests.support.serving import CASE, Server, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
 TOTAL, PART = 1_000_000, 1000  # requests; in a share of work

@@ -16,7 +16,8 @@ from mumacro.version import __version__
 
 if _TYPE_CHECKING:
     from mumacro import closed_forms, plotting, stiffness, validity
-    from mumacro.analysis.fit import Fit, fit
+    from mumacro.analysis.fit import fit
+    from mumacro.analysis.fitted import Fit
     from mumacro.analysis.law import law
     from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.settling import settling
@@ -34,7 +35,7 @@ _PLACES = {
     "plotting": "plotting",
     "stiffness": "stiffness",
     "validity": "validity",
-    "Fit": "analysis.fit",
+    "Fit": "analysis.fitted",
     "fit": "analysis.fit",
     "law": "analysis.law",
     "Motion": "analysis.motion",

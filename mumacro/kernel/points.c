@@ -50,18 +50,28 @@ static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantit
     return out;
 }
 
-/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what
- * interpolation leaves out, is 64 at both edges and up to 8 between them. */
-MU_INLINE double mu_edge_share(double u) { return 1.0 / (1.0 + 7.0 * (1.0 - u * u)); }
-
-/* The same in the last cell below the border of (T_8' at w - T_8' at the border) / (1 - w): from
- * 1344 to 64. */
+/* As mu_edge_share in the last cell below the border, of (T_8' at w - T_8' at the border) / (1 - w):
+ * from 1344 to 64. */
 MU_INLINE double mu_border_share(double w) { return 1.0 / (1.0 + 10.0 * (1.0 - w)); }
 
 /* What errors of q and of its derivatives along a and b move a logarithmic slope by, per |factor|.
  */
 MU_INLINE double mu_slope_error(const double *errors, double of_factor, double of_a, double of_b) {
     return errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b);
+}
+
+/* Whether b is a function of v~/v~crit. */
+MU_INLINE int mu_follows_border(int block) {
+    switch (block) {
+        case MU_C_LOW:
+        case MU_C_TAIL:
+        case MU_B_LOW:
+        case MU_B_SLOW:
+        case MU_B_RING:
+            return 0;
+        default:
+            return !mu_is_corner(block);
+    }
 }
 
 /* Whether b ends at the border with a square root. */
@@ -92,11 +102,9 @@ typedef struct {
  *
  * With root = sqrt(1 - t), t the ray, it is -t/(2 root) times d q/d root = -MU_FOLD_SCALE q_a -
  * of_root per_z, where of_root is d ln entry/d root.  q is smooth in root without a linear term at
- * fixed y~, so at root = 0 that is zero wherever b is.  The polynomial of a cell has what it errs by
- * there; that is taken out at the same b, so that both are of one polynomial and root divides their
- * difference, as at the border.
- *
- * per_z: d q/d ln z, in falling powers of u. */
+ * fixed y~, so at root = 0 that is zero wherever b is.  The polynomial of a cell has what it errs
+ * by there; that is taken out at the same b, so that both are of one polynomial and root divides
+ * their difference, as at the border.  per_z: d q/d ln z, in falling powers of u. */
 static mu_across mu_across_rays(const double *cell, const mu_place *at, mu_spot spot,
                                 const double *block, const mu_turn *turn) {
     const double root = (turn->end - at->a) / turn->scale, t = 1.0 - root * root;
@@ -197,6 +205,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
         out.bound_v *= unsure;
         out.bound_y *= unsure;
     }
+    if (mu_follows_border(at->block)) out.bound_y += scale * fabs(along_b) * at->tilt.error;
     out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (!about->about.smooth_at_border && mu_has_edge(at->block)) {
         /* a root of the distance to the border: |1/sqrt(1 - d) - 1| <= d / (1 - d) for the error d

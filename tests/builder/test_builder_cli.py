@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -167,3 +168,17 @@ REFUSED: dict[str, tuple[str, ...]] = {
 def test_bad_arguments_are_refused_before_any_work(here: Run, words: str, repository: Path) -> None:
     refused(here(*words.split()), *REFUSED[words])
     assert not list(repository.glob("x.nc*"))
+
+
+def test_what_writes_tables_is_asked_for_before_any_work(
+    tmp_path: Path, tables_dir: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setitem(sys.modules, "netCDF4", None)
+    table = tables_dir / "mumacro-1e-4.nc"
+    for words in (
+        ["build", "--tolerance", "1e-4", "--out", str(tmp_path / "new.nc")],
+        ["verify", str(table), "--write"],
+    ):
+        assert main(words) == 1
+        assert "netCDF4 is not installed" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -16,22 +16,24 @@ from mumacro.closed_forms import outer
 from mumacro.files import evaluate_files
 from tests.support import cases as ordinary
 from tests.support.cases import Case
+from tests.support.scripts import script
 
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
-from fuzz import answers, faults, tables
-from fuzz.tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
+answers, faults, tables = map(script, ("fuzz.answers", "fuzz.faults", "fuzz.tables"))
+ANOTHER, HARMLESS, HOSTILE = tables.ANOTHER, tables.HARMLESS, tables.HOSTILE
+SMALLEST = tables.SMALLEST
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tables.Outcome]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Every hostile file, opened by another process that may use 256 MB."""
     return dict(zip(HOSTILE, tables.opened(tmp_path_factory.mktemp("hostile")), strict=True))
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_is_refused_before_memory_is_taken(
-    opened: dict[str, tables.Outcome], name: str
+    opened: dict[str, Any], name: str
 ) -> None:
     result = opened[name]
     assert result.what == (

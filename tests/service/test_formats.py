@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from benchmarks.support.serving import CASE
 from mumacro import Surrogate
+from tests.support.serving import CASE
 
 Row = dict[str, Any]
 BATCH = "/v1/mu-macro/batch"

@@ -9,10 +9,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.support.serving import CASE
 from mumacro.inputs.kind import SPRING
 from service import forms
 from service.problems import RequestError
+from tests.support.serving import CASE
 
 NUMBERS = st.one_of(st.floats(), st.integers(), st.sampled_from([1e308, -0.0, 5e-324, 10**400]))
 TEXTS = st.one_of(st.text(max_size=5), st.sampled_from(["rigid", "],", "},", '"', "\\", "1,5 mm"]))

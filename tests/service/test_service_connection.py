@@ -13,8 +13,8 @@ from typing import Any
 import orjson
 import pytest
 
-from benchmarks.support.serving import CASE, chunk, connect, head, to_end
 from mumacro import Surrogate
+from tests.support.serving import CASE, chunk, connect, head, to_end
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 GET = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"

@@ -7,7 +7,7 @@ from urllib.parse import urlencode
 
 import pytest
 
-from benchmarks.support.serving import CASE
+from tests.support.serving import CASE
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 FIVE = {name: value for name, value in CASE.items() if name != "v0"}

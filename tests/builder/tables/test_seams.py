@@ -1,25 +1,32 @@
 """Beside every seam of cells, on both sides: answers of every table, all quantities, slopes."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from benchmarks.support.seams import beside_seams, slopes_across_rays
 from builder.solver.ball import Springs
+from builder.solver.sweep import Sweep
+from builder.tables.build import build_table
 from builder.tables.contacts import ball, slopes_of
 from builder.tables.verify import BESIDE_BORDER
 from mumacro import Surrogate
 from mumacro.inputs.kind import BALL, SPRING, Kind
 from mumacro.table.atlas import BALL_CHARTS, CHARTS_OF, MIDDLE, QUANTITIES, Quantity
 from tests.support.cases import Array, opened
+from tests.support.seams import beside_border_seams, beside_seams, slopes_across_rays
 
 RING = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
 
 
 def drawn(table: Surrogate, kind: Kind, index: int, n: int) -> tuple[Array, Array]:
-    chart = CHARTS_OF[kind.contact][index]
-    block = (table.table.ball if kind == BALL else table.table.blocks)[index]
-    rng = np.random.default_rng([kind.contact, index])
-    v, y = beside_seams(rng, chart, block, table.border, n)
+    """Beside the seams of a block; those of the border where there is no such block."""
+    charts, rng = CHARTS_OF[kind.contact], np.random.default_rng([kind.contact, index])
+    if index == len(charts):
+        v, y = beside_border_seams(rng, table.table.border, table.border, n)
+    else:
+        block = (table.table.ball if kind == BALL else table.table.blocks)[index]
+        v, y = beside_seams(rng, charts[index], block, table.border, n)
     return (MIDDLE * v / MIDDLE, MIDDLE * y / MIDDLE) if kind == BALL else (v, y)
 
 
@@ -30,25 +37,40 @@ def apart(table: Surrogate, quantity: Quantity, v: Array, y: Array) -> Array:
     return np.asarray(np.abs(v / table.v_tilde_crit(y) - 1.0) > BESIDE_BORDER)
 
 
-@pytest.mark.parametrize("kind", [SPRING, BALL], ids=["spring", "ball"])
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
-def test_coarse_tables_are_within_their_bounds_of_the_finest(tolerance: float, kind: Kind) -> None:
-    """The finest table has digits to spare for both."""
-    table, fine = opened(tolerance), opened(1e-12)
-    for index, chart in enumerate(CHARTS_OF[kind.contact]):
-        v, y = drawn(table, kind, index, 8000)
+def assert_near_the_finest(table: Surrogate, kind: Kind, n: int) -> None:
+    """Values and slopes are within their bounds of those of the finest table, which has digits to
+    spare."""
+    fine, scale = opened(1e-12), MIDDLE if kind == BALL else 1.0
+    for index in range(len(CHARTS_OF[kind.contact]) + 1):
+        v, y = drawn(table, kind, index, n)
         for quantity in QUANTITIES:
             name = quantity.name
-            scale = MIDDLE if kind == BALL else 1.0
             (value, bound, _), (true, unsure, _) = (
                 s.quantity(name, scale * v, scale * y, **kind.names) for s in (table, fine)
             )
-            assert np.all(np.abs(value - true) <= bound + unsure), (chart.name, name)
+            assert np.all(np.abs(value - true) <= bound + unsure), (index, name)
             if kind == BALL and name != "mu_ratio":
                 continue  # slopes that no table gives
             here, truth = (slopes_of(s, kind, name, v, y) for s in (table, fine))
             off = np.abs(here[1:3] - truth[1:3]) > here[3:5] + truth[3:5]
-            assert not np.any(off & apart(table, quantity, v, y)), (chart.name, name)
+            assert not np.any(off & apart(table, quantity, v, y)), (index, name)
+
+
+@pytest.mark.parametrize("kind", [SPRING, BALL], ids=["spring", "ball"])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10])
+def test_tables_are_within_their_bounds_of_the_finest(tolerance: float, kind: Kind) -> None:
+    assert_near_the_finest(opened(tolerance), kind, 8000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [2e-9, 3e-5])
+def test_a_table_of_an_odd_tolerance_keeps_its_bounds(
+    tolerance: float, sweep: Sweep, tmp_path: Path
+) -> None:
+    """Its border has other cells than its blocks."""
+    table = build_table(tmp_path / "odd.nc", tolerance, sweep)
+    for kind in (SPRING, BALL):
+        assert_near_the_finest(table, kind, 100_000)
 
 
 @pytest.fixture(scope="module")

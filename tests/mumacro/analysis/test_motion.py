@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.motion import (
-    CASE,
-    L0,
-    beside_table,
-    deviations,
-    phase_sweep,
-    random_motions,
-    resting_motions,
-)
 from mumacro import Element, InputError, Motion, Surrogate, motion, settling
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close
+from tests.support.scripts import script
 
+benchmark = script("benchmarks.motion")
+CASE = benchmark.CASE
+L0 = benchmark.L0
+beside_table = benchmark.beside_table
+deviations = benchmark.deviations
+phase_sweep = benchmark.phase_sweep
+random_motions = benchmark.random_motions
+resting_motions = benchmark.resting_motions
 SCENE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
 COMMAND = "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=2cm/s"
 

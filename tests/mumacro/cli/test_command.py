@@ -403,6 +403,7 @@ def test_fit_is_the_librarys(
         assert answer["std"][name] == close(expected.std[name], rel=1e-6)
         assert answer["interval"][name] == close(list(expected.interval[name]), rel=1e-6)
     assert (answer["contact"], answer["warnings"]) == ("ball", list(expected.warnings))
+    assert answer.keys() == {*expected.to_dict(), "table"}
     monkeypatch.setattr(sys, "stdin", io.StringIO(path.read_text()))
     text = output_of(capsys, 0, "fit", "-", *words, "--unknown", *unknowns)
     assert [line.split()[0] for line in text.splitlines()[: len(unknowns)]] == list(unknowns)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from builder.tables.contacts import SolvedContact
-from mumacro.table.atlas import STEEPEST, Axis, Chart
-from mumacro.table.blocks import Block
+from mumacro.table.atlas import BORDER_PIECES, STEEPEST, Axis, Chart
+from mumacro.table.blocks import Block, BorderPiece
 from mumacro.table.polynomials import Border
 
 Array = NDArray[np.float64]
@@ -70,6 +70,24 @@ def beside_seams(
         v, y, _ = chart.point(a, b, border)
     inside = [(low <= x) & (x <= high) for x, (low, high) in ((v, V_RANGE), (y, Y_RANGE))]
     return v[inside[0] & inside[1]], y[inside[0] & inside[1]]
+
+
+def beside_border_seams(
+    rng: np.random.Generator, pieces: list[BorderPiece], border: Border, n: int
+) -> tuple[Array, Array]:
+    """The same of about ``n`` points whose y~ is beside a seam of the border's cells, which are not
+    those of the blocks: there the coordinates of stick-slip bend."""
+    amplitudes = []
+    for (_, axis, _), piece in zip(BORDER_PIECES, pieces, strict=True):
+        distance = 0.4 * 10.0 ** -rng.uniform(0.0, DECADES, n // len(pieces))
+        x = _beside(rng, axis, piece.cells, distance)
+        amplitudes.append(axis.amplitude(x[x > 0.0]))
+    y = np.concatenate(amplitudes)
+    y = y[(Y_RANGE[0] <= y) & (y <= Y_RANGE[1])]
+    s = rng.random(y.size)
+    edge = 10.0 ** -rng.uniform(0.0, DECADES, y.size)
+    ratio = np.select([s < 0.5, s < 0.7, s < 0.9], [np.sin(np.pi * s) ** 2, edge, 1.0 - edge], s)
+    return np.where(s > 0.95, 1.0 / ratio, ratio) * border(y), y
 
 
 # --- slopes beside the steepest ray ---------------------------------------------------------------
