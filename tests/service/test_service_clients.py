@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from benchmarks.support.serving import CASE, chunk, connect, to_end
 from service.app import create_app
 from service.settings import Settings
 from tests.support.places import ROOT, TABLES
+from tests.support.serving import CASE, chunk, connect, to_end
 
 SINGLE = "/v1/mu-macro"
 BODY = json.dumps(CASE).encode()
