@@ -453,7 +453,7 @@ class Failures:
                 fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
                 _log.exception("unexpected error", extra={"fields": fields})
             if begun:  # end the connection without the end of the answer
-                raise ClientDisconnect from error
+                raise ClientDisconnect from (error.__cause__ if _expected(error) else error)
             response = await handle(Request(scope, receive), error)
             await response(scope, receive, send)
 
