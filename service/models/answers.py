@@ -399,6 +399,28 @@ class FitAnswer(Answered):
     curve: FittedCurve | None = Field(
         description="null where other inputs than v0 vary, or v0 is 0 everywhere"
     )
+    read_as: str | None = Field(None, description="Of a table: how it was read")
+    skipped_lines: list[int] | None = Field(
+        None, description="Of a table: lines that are neither names nor units nor points"
+    )
+
+
+class PointsAnswer(BaseModel):
+    """What was read of a table of points, without a fit."""
+
+    columns: dict[str, list[float]] = Field(
+        description="By name, in the units of the table", examples=[{"v0": [1.0, 5.0]}]
+    )
+    units: dict[str, str] = Field(description="Of the columns", examples=[{"v0": "mm/s"}])
+    lines: list[int] = Field(description="The line of each point, from 1")
+    skipped_lines: list[int] = Field(
+        description="Lines that are neither names nor units nor points, and not empty"
+    )
+    read_as: str = Field(
+        description="How the table was read; empty for plain CSV",
+        examples=["tab, decimal comma, head in line 3, units in line 4"],
+    )
+    api_version: str
 
 
 # --- tables, health, problems ---------------------------------------------------------------------
