@@ -25,8 +25,7 @@ from .guide_pages import GuidePages
 from .limits import Room, Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
-from .models.inputs import Case
-from .models.options import CaseColumns, CaseRequest
+from .models.options import Case, CaseColumns, CaseRequest
 from .observe import Observe, Observer
 from .problems import HANDLERS, Failures
 from .routers import batch, case, contact, health, motion, page, questions, table

@@ -218,8 +218,12 @@ def invalid(
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
     """The faults of inputs of which one of several is required: the library would tell the first
     of them, when everything else is right."""
-    amplitude = AMPLITUDE if members.get("direction") == "normal" else "y0"
-    for names in (("k", "k_range", *ENDS), (amplitude,), ("omega", "f")):
+    direction = members.get("direction", "across")
+    one = isinstance(direction, str)  # else there is one for each case
+    amplitudes = ("y0", AMPLITUDE) if not one else ("y0",)
+    if one and direction == "normal":
+        amplitudes = (AMPLITUDE,)
+    for names in (("k", "k_range", *ENDS), amplitudes, ("omega", "f")):
         if all(members.get(name) is None for name in names):
             yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))
 
@@ -324,7 +328,9 @@ def _no_such_path(scope: Scope) -> str:
 def _of_input(error: InputError, _: Scope) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
-    return refused([FieldFault.of(error.field, reason_of(error), value)])
+    name = error.field.removeprefix("std_")  # a deviation is a member of std
+    steps = (name,) if name == error.field else ("std", name)
+    return refused([FieldFault(steps, reason_of(error), value)])
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:

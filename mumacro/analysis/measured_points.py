@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import by_name, check, columns_of, select
+from mumacro.inputs.cases import check, columns_of, select
 from mumacro.inputs.doubts import UNITS, Remark, remarks
 from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
@@ -134,7 +134,7 @@ class Measured:
             measured[STD] = friction.std
         # labels are dropped: a fit is not labelled
         values = {name: _number(name, x) for name, x in data.items()}
-        inputs = by_name(None, {**values, **dict.fromkeys(self.unknowns, 1.0)}, self.kind)
+        inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
         self._has_f = inputs.get("f") is not None
         numbers = columns_of(inputs, self.kind)
         check(numbers, inputs.get("f"))

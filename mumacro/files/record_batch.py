@@ -25,6 +25,7 @@ from mumacro.inputs.signs import Signs
 from mumacro.inputs.text_tables import Wanted
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
+from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
@@ -194,7 +195,7 @@ def answer_columns(
             batch.column(heading), name, signs or Signs(".", None), scale
         )
     cases = Cases.of(values, kind)
-    result = surrogate.answer(cases, gradient="d_mu_macro_d_mu0" in names)
+    result = surrogate.answer(cases, (GRADIENT,) if "d_mu_macro_d_mu0" in names else ())
     rejected = result.source_code < 0
     mask = rejected if rejected.any() else None
     source_code = np.where(rejected, 0, result.source_code).astype(np.int8)

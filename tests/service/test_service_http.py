@@ -281,7 +281,8 @@ def test_the_description_is_whole(client: Any) -> None:
     document = client.get("/openapi.json").json()
     schemas = document["components"]["schemas"]
     inputs = {*UNITS, "f", "Fz_amplitude"}
-    assert set(schemas["Case"]["properties"]) == {*inputs, "k_low", "k_high", "k_range"}
+    words = {"contact", "direction", "std", "k_low", "k_high", "k_range"}
+    assert set(schemas["Case"]["properties"]) == {*inputs, *words}
     assert set(schemas["CaseColumns"]["properties"]) == set(schemas["CaseRequest"]["properties"])
     assert all(
         f"[{UNITS[name]}]" in schemas["Case"]["properties"][name]["description"] for name in UNITS

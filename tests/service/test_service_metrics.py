@@ -101,7 +101,6 @@ def test_cases_are_counted_by_source_and_regime(
     assert {
         key: value for key, value in counters.items() if key[0] == "mumacro_cases_total"
     } == expected
-    # of the batch; bad lines are not counted here
     assert counters["mumacro_bad_cases_total", surrogate.id] == 4
     assert counters["mumacro_table_info", *sorted((surrogate.id, f"{surrogate.tolerance:g}"))] == 1
 

@@ -14,7 +14,7 @@ import pytest
 import mumacro
 from mumacro import Surrogate
 from mumacro.contacts.geometries import contact_of
-from service.included import INCLUDABLE
+from mumacro.outputs import OUTPUTS
 from service.routers.questions import unit_at
 from tests.support.cases import Case
 from tests.support.comparing import close
@@ -186,7 +186,7 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
 
 def test_every_quantity_has_its_unit_in_the_description(client: Any) -> None:
     for direction, amplitude in (("across", "y0"), ("normal", "Fz_amplitude")):
-        names = [name for name, one in INCLUDABLE.items() if direction not in one.lacks]
+        names = [name for name, one in OUTPUTS.items() if direction not in one.lacks]
         question = {**LAW, "y0": ..., amplitude: 1e-6, "direction": direction, "std": {"mu0": 0.01}}
         law = answered(client, "law", question, include=names)
         for name in names:

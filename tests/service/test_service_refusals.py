@@ -84,20 +84,15 @@ REFUSED = [
     *(("GET mu-macro", {"include": name}, "?include") for name in ("curvature", "")),
     *((f"POST {path}", {"include": ["std"]}, "#/std") for path in ("mu-macro", "mu-macro/batch")),
     *(
-        (f"POST {path}", {"include": ["groups"], "std": {}}, "#/std")
-        for path in ("mu-macro", "mu-macro/batch")
-    ),
-    *(
         ("POST mu-macro", {"include": ["std"], "std": {name: value}}, f"#/std/{name}")
         for name, value in (("mu0", -1), ("mu0", "0.1"), ("speed", 1))
     ),
     ("POST mu-macro", {"include": ["std"], "std": [1, 2]}, "#/std"),
     ("POST mu-macro", {"include": ["std"], "std": {"omega": 1.0, "f": 1.0}}, "#/std/f"),
     ("GET mu-macro", {"include": "std"}, "?std_mu0"),
-    ("GET mu-macro", {"std_v0": 1}, "?std_mu0"),
     ("GET mu-macro", {"include": "std", "std_v0": -1}, "?std_v0"),
     ("GET mu-macro", {"include": "std", "std_omega": 1.0, "std_f": 1.0}, "?std_f"),
-    ("POST mu-macro/batch?include=std", {}, "?std_mu0"),
+    ("POST mu-macro/batch?include=std", {}, "#/std"),
     # contact, direction, interval
     *(
         ("POST mu-macro", changed, f"#/{place}")
@@ -117,7 +112,7 @@ REFUSED = [
             ({**NORMAL, "include": ["power"]}, "include"),
             ({"direction": "along", "include": ["settling"]}, "include"),
             ({**RANGE, "include": ["std"], "std": {"v0": 1e-3}}, "include"),
-            ({**NORMAL, "include": ["std"], "std": {"y0": 1e-6}}, "std"),
+            ({**NORMAL, "std": {"y0": 1e-6}}, "std/y0"),
         )
     ),
     # columns
