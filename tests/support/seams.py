@@ -129,7 +129,8 @@ def slopes_across_rays(of: SolvedContact, v: Array, y: Array, crit: Array) -> tu
     for row, (line_v, line_y) in enumerate(lines if here.size else ()):
         at_v, at_y = np.broadcast_arrays(line_v, line_y)
         solved = of.solve(at_v, at_y)
-        each = of.noise("mu_ratio", at_v, at_y, solved, False).max(axis=1)
+        each = of.noise("mu_ratio", at_v, at_y, solved, False).max(axis=1) + 4e-16  # of the sum
+        level = solved["mu_ratio"][:, :1]  # which the weights cancel to their own digits only
         found = []
         for degree in (DEGREE, DEGREE - 1):
             powers = np.array([0, *range(2, degree + 1)])
@@ -137,7 +138,7 @@ def slopes_across_rays(of: SolvedContact, v: Array, y: Array, crit: Array) -> tu
             # d/d ln t = -t/(2 root) d/d root, over the way
             rise = powers * (root / way)[:, None] ** np.maximum(powers - 2, 0)
             share = (-0.5 * (1.0 - root * root) / way**2)[:, None] * (rise @ fit)
-            found.append((share * solved["mu_ratio"]).sum(axis=1))
+            found.append((share * (solved["mu_ratio"] - level)).sum(axis=1))
         slopes[row, here] = found[0] if row == 0 else -found[0]
         amplified = 2.0 * np.abs(share).sum(axis=1) * each
         noise[row, here] = amplified + np.abs(found[0] - found[1])

@@ -72,12 +72,9 @@ def test_tables_are_within_their_bounds_of_the_finest(tolerance: float, kind: Ki
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tolerance", [2e-9, 3e-5])
-def test_a_table_of_an_odd_tolerance_keeps_its_bounds(
-    tolerance: float, sweep: Sweep, tmp_path: Path
-) -> None:
-    """Its border has other cells than its blocks."""
-    table = build_table(tmp_path / "odd.nc", tolerance, sweep)
+def test_a_table_of_an_odd_tolerance_keeps_its_bounds(sweep: Sweep, tmp_path: Path) -> None:
+    """Its border has a seam beside y~ = 3, where the slope of the border is off by 1e-9."""
+    table = build_table(tmp_path / "odd.nc", 2e-9, sweep)
     for kind in (SPRING, BALL):
         assert_near_the_finest(table, kind, 100_000)
 
