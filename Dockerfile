@@ -33,9 +33,11 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # Sources and headers for compilers, and stubs for type checkers.
     && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' \
         -o -name '*.p[xy][xdi]' \) -delete \
-# Builders of Fortran and C extensions, which nothing here calls.
-    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/bin/f2py \
-        venv/lib/python3*/site-packages/numpy/distutils \
+# Of scipy what a fit needs: optimize and special, and what these import.
+    && cd venv/lib/python3*/site-packages/scipy \
+    && rm -rf cluster datasets differentiate fftpack integrate interpolate io misc ndimage odr \
+        signal stats \
+    && cd /app \
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after
 # linking.
     && if command -v strip >/dev/null; then \

@@ -129,7 +129,7 @@ healthy() {  # the HEALTHCHECK of the image, as the engine runs it
 
 UNWANTED='
 import pathlib
-sources, others = {".c", ".h", ".cpp", ".hpp", ".a"}, {"f2py", "pip", "tests", "ziglang"}
+sources, others = {".c", ".h", ".cpp", ".hpp", ".a"}, {"pip", "tests", "ziglang"}
 found = [str(path) for path in pathlib.Path("/app").rglob("*")
          if path.suffix in sources or path.name in others]
 print(*found, end="")'
