@@ -33,15 +33,10 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # Sources and headers for compilers, and stubs for type checkers.
     && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' \
         -o -name '*.p[xy][xdi]' \) -delete \
-# Builders of Fortran and C extensions, which nothing here calls.
-    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/bin/f2py \
-        venv/lib/python3*/site-packages/numpy/distutils \
-# Of Arrow what reads and writes streams and CSV: no network, no clouds, no Parquet, no datasets, no
-# second name of a library.
-    && cd venv/lib/python3*/site-packages/pyarrow \
-    && rm -rf include libarrow_flight* libarrow_python_flight* libarrow_python_parquet* \
-        libarrow_s3* libarrow_python.so libarrow_python.so.*.*.* _flight* _s3fs* _gcsfs* \
-        _azurefs* _hdfs* _orc* _substrait* _dataset* _parquet* _feather* \
+# Of scipy what a fit needs: optimize and special, and what these import.
+    && cd venv/lib/python3*/site-packages/scipy \
+    && rm -rf cluster datasets differentiate fftpack integrate interpolate io misc ndimage odr \
+        signal stats \
     && cd /app \
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after
 # linking.
@@ -56,12 +51,10 @@ COPY tables tables
 COPY hatch_build.py pyproject.toml /build/
 COPY mumacro/kernel /build/mumacro/kernel
 # The kernel holds code for several processors and chooses when it is loaded: the image also runs on
-# other machines than the one that built it.  Its sources stay in this stage, apart from the three
-# headers that the library reads.  Every user of the container may read all files, whatever the
-# umask of the checkout; no user may write them.
+# other machines than the one that built it.  Its sources stay in this stage.  Every user of the
+# container may read all files, whatever the umask of the checkout; no user may write them.
 RUN /build/venv/bin/python /build/hatch_build.py mumacro \
-    && find mumacro/kernel -name '*.[ch]' -not -name data.h -not -name records.h \
-        -not -name library.h -delete \
+    && rm mumacro/kernel/*.[ch] \
     && venv/bin/python -m compileall -q mumacro service \
     && chmod -R a+rX,go-w .
 

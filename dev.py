@@ -2,8 +2,8 @@
 """Commands that need an environment.
 
     python3 dev.py demo            start the service, send it one request, stop it
-    python3 dev.py test [ARGS]     every check, then every test but those marked peer (.ci/peers);
-                                   ARGS go to pytest, --quick leaves out the slow tests
+    python3 dev.py test [ARGS]     every check, then the tests that are not slow; --all adds those
+                                   marked slow, .ci/peers those marked peer; ARGS go to pytest
     python3 dev.py check           the checks without pytest
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until a signal stops it
@@ -84,7 +84,11 @@ def current() -> dict[str, str]:
     """Digests of what each part of ``.venv`` is made from: sets of locks, the kernel and its
     sources."""
     kernel = sorted(
-        [*(ROOT / "mumacro" / "kernel").glob("*.[ch]"), *(ROOT / "mumacro").glob("_kernel.*")]
+        [
+            *(ROOT / "mumacro" / "kernel").glob("*.[ch]"),
+            *(ROOT / "mumacro" / "kernel").glob("_declarations.py"),
+            *(ROOT / "mumacro").glob("_kernel.*"),
+        ]
     )
     locks = {
         key: digest(*(ROOT / "requirements" / f"{name}.txt" for name in names))
@@ -180,11 +184,8 @@ def test(*arguments: str) -> int:
     """Another ``-m`` replaces that of pyproject.toml; every processor runs a file at a time, with
     ``-n 0`` one."""
     failed = check()
-    chosen = [
-        word
-        for word in (*(() if "--quick" in arguments else ("-m", "not peer")), *arguments)
-        if word != "--quick"
-    ]
+    marks = ("-m", "not peer") if "--all" in arguments else ()
+    chosen = [*marks, *(word for word in arguments if word != "--all")]
     spread = ("-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder")  # see tests/conftest.py
     return run(PYTHON, "-m", "pytest", *spread, *chosen) or failed
 

@@ -1,7 +1,7 @@
-"""Compile mumacro/kernel into the shared object that the library opens: ``python hatch_build.py
-[FOLDER]``.
+"""Compile mumacro/kernel into the shared object that the library opens, and parse its declarations:
+``python hatch_build.py [FOLDER]``.
 
-Without FOLDER it is made in place.  hatchling calls the class below for wheels and editable
+Without FOLDER both are made in place.  hatchling calls the class below for wheels and editable
 installs.  The compiler is the one that CC names, else cc, clang or gcc, else the package ziglang,
 which then becomes a build dependency.  CFLAGS is not read: other flags give other bits.  Two
 variables change what is made:
@@ -113,6 +113,22 @@ def choose(platform: str | None) -> tuple[list[str], str]:
     return [sys.executable, "-m", "ziglang", "cc", *target, "-s"], platform or own_platform()
 
 
+def declare(folder: Path) -> Path:
+    """Parse what the shared object offers into a module that cffi's small half reads (its
+    out-of-line ABI mode): the parser would take as long at every start as all else together."""
+    from cffi import FFI
+
+    sources, path = ROOT / "mumacro" / "kernel", folder / "kernel" / "_declarations.py"
+    texts = ((sources / name).read_text("ascii") for name in ("data.h", "records.h", "library.h"))
+    lines = (line for text in texts for line in text.splitlines() if not line.startswith("#"))
+    ffi = FFI()
+    ffi.cdef("\n".join(lines))
+    ffi.set_source("mumacro.kernel._declarations", None)
+    path.parent.mkdir(exist_ok=True)
+    ffi.emit_python_code(str(path))
+    return path
+
+
 def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     """Compile into a folder; return the path of the shared object and its platform."""
     command, platform = choose(platform)
@@ -173,14 +189,21 @@ class KernelHook(BuildHookInterface[Any]):
         """Compile, in place or into a folder of its own that ends with the process."""
         if version == "editable":
             build(ROOT / "mumacro")
+            declare(ROOT / "mumacro")
             return
         self.folder = tempfile.TemporaryDirectory()
-        path, platform = build(Path(self.folder.name), os.environ.get("MUMACRO_BUILD_PLATFORM"))
-        build_data["force_include"][str(path)] = f"mumacro/{path.name}"
+        folder = Path(self.folder.name)
+        path, platform = build(folder, os.environ.get("MUMACRO_BUILD_PLATFORM"))
+        build_data["force_include"] |= {
+            str(made): f"mumacro/{made.relative_to(folder).as_posix()}"
+            for made in (path, declare(folder))
+        }
         build_data["force_include"] |= guide()
         build_data |= {"tag": f"py3-none-{platform}", "pure_python": False}
 
 
 if __name__ == "__main__":
-    path, platform = build(Path(sys.argv[1]).resolve() if sys.argv[1:] else ROOT / "mumacro")
+    place = Path(sys.argv[1]).resolve() if sys.argv[1:] else ROOT / "mumacro"
+    path, platform = build(place)
+    declare(place)
     print(f"{path} for {platform}, {path.stat().st_size} bytes")

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
 from benchmarks.speed_against_error import Contender, Line, draw, grid_axis, on_grid, plot
 from builder.solver.ball import Ball, Springs
 from mumacro import Surrogate
 from mumacro.table.atlas import MIDDLE
+from tests.support.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
 
 Array = NDArray[np.float64]
 FULL_GRIDS, QUICK_GRIDS = (64, 128, 256), (16, 24)

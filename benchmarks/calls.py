@@ -1,7 +1,7 @@
 """Time of one call, a point of large arrays, and a new process; beside scipy's elliptic integral
 and numpy."""
 
-from benchmarks.measuring import ROOT, best_of, main, markdown, quantity  # isort: split
+from tests.support.measuring import ROOT, best_of, main, markdown, quantity  # isort: split
 
 import statistics
 import subprocess
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ellipk
 
 import mumacro
-from benchmarks.support.serving import CASE
+from tests.support.serving import CASE
 
 SCALARS = {
     "scipy.special.ellipk(m), for comparison": "ellipk(0.5)",

@@ -4,22 +4,18 @@ thread, log-uniform points.
 python benchmarks/contacts.py
 """
 
-from benchmarks.measuring import main, markdown, sections  # isort: split
+from tests.support.measuring import main, markdown, sections  # isort: split
 
 import functools
 import timeit
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import Surrogate
 from mumacro.inputs.kind import Kind
 from mumacro.kernel import threads as shared_out
 
-Array = NDArray[np.float64]
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
-opened = functools.cache(Surrogate.open)
 KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
 
 
@@ -38,66 +34,6 @@ def costs() -> str:
             spring = spring or each
             rows.append((name, f"{tolerance:g}", f"{1e9 * each:.0f}", f"{each / spring:.1f}"))
     return markdown(("contact", "table", "ns", "springs"), rows)
-
-
-NAMES = ("mu_ratio", "power", "stick_fraction", "slope along v~", "slope along y~")
-
-
-def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
-    """Log-uniform over all of the legal range, and where rules err most: borders, corners, the
-    steepest ray."""
-    rng = np.random.default_rng(seed)
-
-    def decades(low: float, high: float) -> Array:
-        return 10.0 ** rng.uniform(low, high, count)
-
-    def beside(low: float, high: float) -> Array:
-        return np.asarray(1.0 + decades(low, high) * rng.choice([-0.99, 1.0], count))
-
-    y = decades(-12, 6)
-    pairs = [(y * decades(-25, 0), y)]
-    if along:
-        y = decades(-300, 279)
-        x = np.where(rng.random(count) < 0.5, decades(-12, -0.01), 1.0 - decades(-12, -0.01))
-        # reverse slip begins
-        first = 1.5 / (np.sqrt((1.0 - x) * (1.0 + x)) - x * np.arccos(x)) * beside(-12, 0)
-        pairs += [
-            (y * decades(-25, 0), y),
-            (x * first, first),
-            (first * (1.0 - decades(-15, 0)), first),
-        ]
-        pairs += [(near * decades(-25, 0), near) for near in (beside(-15, 0), 1.5 * beside(-15, 0))]
-    else:
-        border = opened(1e-12).v_tilde_crit
-        small, wide, high = decades(-6, 0.5), decades(-6, 6), decades(-1, 6)
-        pairs += [(decades(-25, 6), decades(-12, 6)), (decades(-300, 279), decades(-300, 279))]
-        pairs += [
-            (small * small * decades(-5, 2), small),
-            (decades(-25, 0.3), 1.5 * beside(-15, 0)),
-        ]
-        pairs += [(0.33516779066085 * wide * beside(-12, -0.5), wide)]
-        pairs += [(1.5 * border(high / 1.5) * beside(-12, -0.5), high)]
-        # the steepest ray enters where the ball begins to slide as a whole
-        near = decades(-0.2, 0.6)
-        pairs += [
-            (0.33516779066085 * near * beside(-9, -0.5), near),
-            (decades(-3, 0.2), 1.5 * decades(0.0, 0.25)),
-        ]
-    v, y = (np.concatenate(column) for column in zip(*pairs, strict=True))
-    return v, y
-
-
-def rows_of(s: Surrogate, v: Array, y: Array, direction: str) -> list[Array]:
-    """Rows (values, bounds) of :data:`NAMES` for a ball."""
-    kind: Any = {"contact": "ball", "direction": direction}
-    values = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
-    answer = s.evaluate(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y0=y, gradient=True, **kind)
-    with np.errstate(all="ignore"):
-        slopes = (
-            (answer.gradient[name] * x, answer.gradient_bound[name] * x)
-            for name, x in (("v0", v), ("y0", y))
-        )
-        return values + list(map(np.array, slopes))
 
 
 if __name__ == "__main__":

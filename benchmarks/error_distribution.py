@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from benchmarks import extended
-from benchmarks.measuring import main, markdown, quantity
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
 from builder.tables.contacts import spring
@@ -25,6 +23,8 @@ from mumacro import Surrogate
 from mumacro.kernel.arrays import Array
 from mumacro.table.atlas import QUANTITY_NAMES
 from mumacro.table.netcdf import RATIOS, error_distribution
+from tests.support import extended
+from tests.support.measuring import main, markdown, quantity
 
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
 SLOPES = ("slope_along_v", "slope_along_y")

@@ -5,7 +5,7 @@
 Each case computes the naive number too.
 """
 
-from benchmarks.measuring import main, markdown, progress, quantity, sections  # isort: split
+from tests.support.measuring import main, markdown, progress, quantity, sections  # isort: split
 
 import math
 from collections.abc import Callable

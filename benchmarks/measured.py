@@ -1,13 +1,15 @@
-"""Published measured friction beside the model: five speeds of one pair of steel, shaken along.
+"""Published measured friction beside the model: one pair of steel, dry and oiled, shaken along at
+five speeds.
 
 python benchmarks/measured.py [--only SECTION]     # also draws docs/img/measured.png
 
 The points are the printed numbers of one open article, with their source in
-tests/data/luo-2024.csv.  k is fitted by `mumacro.fit`; mu0 at each speed is the force without
-shaking over the weight.  Forces do not depend on the weight: mu0 Fz and k count alone.
+tests/data/luo-2024.csv (dry) and luo-2024-oil.csv.  k is fitted by `mumacro.fit`; mu0 at each speed
+is the force without shaking over the weight.  Forces do not depend on the weight: mu0 Fz and k
+count alone.
 """
 
-from benchmarks.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
+from tests.support.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
 
 import csv
 import warnings
@@ -21,7 +23,8 @@ from mumacro import Fit, Surrogate, fit, solve_for
 from mumacro.plotting import BLUE, GREY, INK, RED, finish
 
 Array = NDArray[np.float64]
-POINTS = ROOT / "tests" / "data" / "luo-2024.csv"
+DATA = ROOT / "tests" / "data"
+FILES = {"dry": "luo-2024.csv", "oil": "luo-2024-oil.csv"}
 FZ = 1.1 * 9.80665  # N, of the slider's weight; the article does not state the force
 RIG: dict[str, Any] = {"Fz": FZ, "y0": 0.35e-6, "f": 26e3}
 ALONG: dict[str, Any] = {"direction": "along"}
@@ -44,8 +47,8 @@ def table() -> Surrogate:
 
 
 @cache
-def points() -> Points:
-    with POINTS.open(encoding="utf-8") as lines:
+def points(surface: str = "dry") -> Points:
+    with (DATA / FILES[surface]).open(encoding="utf-8") as lines:
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     v0, without, shaken = (
         np.array([float(row[name]) for row in rows])
@@ -54,9 +57,9 @@ def points() -> Points:
     return Points(1e-3 * v0[1:], without[1:], shaken[1:], float(without[0]), float(shaken[0]))
 
 
-def fitted(contact: str, mu0: Any = None, unknowns: Any = None) -> Fit:
+def fitted(contact: str, mu0: Any = None, unknowns: Any = None, surface: str = "dry") -> Fit:
     """k, with mu0 of each speed unless something else is given; ``unknowns`` as in ``fit``."""
-    p = points()
+    p = points(surface)
     columns = {"v0": p.v0, "mu_macro": p.shaken / FZ}
     if unknowns is None:
         columns["mu0"] = p.without / FZ if mu0 is None else mu0
@@ -69,6 +72,28 @@ def force(contact: Any, k: Any, mu0: Any, v0: Any) -> Array:
     """Friction of the model [N]."""
     mu = table().evaluate(mu0=mu0, k=k, v0=v0, contact=contact, **ALONG, **RIG).mu_macro
     return np.asarray(FZ * mu)
+
+
+def each_alone(contact: str, surface: str = "dry") -> Array:
+    """k from each point alone [N/m]."""
+    p = points(surface)
+    return np.array(
+        [
+            solve_for(
+                table(),
+                "k",
+                shaken / FZ,
+                contact=contact,
+                mu0=without / FZ,
+                v0=v0,
+                **ALONG,
+                **RIG,
+            )
+            .roots[0][0]
+            .value
+            for v0, without, shaken in zip(p.v0, p.without, p.shaken, strict=True)
+        ]
+    )
 
 
 def forces() -> str:
@@ -107,26 +132,10 @@ def forces() -> str:
 def stiffness() -> str:
     """The fitted k, what single points give, and where the points are."""
     p, rows = points(), []
-    mu0 = p.without / FZ
     for contact in CONTACTS:
         solution = fitted(contact)
         k, (low, high) = solution.values["k"], solution.interval["k"]
-        case = {**RIG, "mu0": 0.0, "v0": 0.0}
-        each = np.array(
-            [
-                solve_for(
-                    table(),
-                    "k",
-                    p.shaken[i] / FZ,
-                    contact=contact,
-                    **ALONG,
-                    **{**case, "mu0": mu0[i], "v0": p.v0[i]},
-                )
-                .roots[0][0]
-                .value
-                for i in range(p.v0.size)
-            ]
-        )
+        each = each_alone(contact)
         y = k * RIG["y0"] / p.without
         rows.append(
             [
@@ -224,8 +233,46 @@ def trends() -> str:
     )
 
 
+def oiled() -> str:
+    """The oiled contact beside the model with the k that fits best, and k from each point alone."""
+    p = points("oil")
+    mu0 = p.without / FZ
+    fits = [fitted(c, surface="oil") for c in CONTACTS]
+    models = [force(c, f.values["k"], mu0, p.v0) for c, f in zip(CONTACTS, fits, strict=True)]
+    alone = [each_alone(c, "oil") / 1e6 for c in CONTACTS]
+    rows = [
+        [f"{1e3 * v0:g}", f"{without:.2f}", f"{shaken:.3f}"]
+        + [f"{column[i]:.2f}" for column in (*models, *alone)]
+        for i, (v0, without, shaken) in enumerate(zip(p.v0, p.without, p.shaken, strict=True))
+    ]
+    header = (
+        "v0 [mm/s]",
+        "not shaken [N]",
+        "shaken [N]",
+        "spring [N]",
+        "ball [N]",
+        "k of a spring [N/µm]",
+        "k of a ball [N/µm]",
+    )
+    ends = [
+        f"{f.values['k'] / 1e6:.1f} N/µm ({c}, 95 %: "
+        f"{f.interval['k'][0] / 1e6:.1f} to {f.interval['k'][1] / 1e6:.1f})"
+        for c, f in zip(CONTACTS, fits, strict=True)
+    ]
+    off = [np.abs(model - p.shaken).max() for model in models]
+    return " ".join(
+        [
+            f"{markdown(header, rows, 0)}\n\nThe k that fits best is {', '.join(ends)}. It is off",
+            f"by up to {off[0]:.2f} N (spring), {off[1]:.2f} N (ball). From each point alone k is",
+            f"{alone[0].min():.1f} to {alone[0].max():.1f} N/µm (spring),",
+            f"{alone[1].min():.1f} to {alone[1].max():.1f} N/µm (ball).",
+        ]
+    )
+
+
 def _draw() -> None:
-    """docs/img/measured.png: all forces on logarithmic axes, and the shaken ones alone."""
+    """docs/img/measured.png: all dry forces on logarithmic axes, the shaken ones alone, and the
+    oiled contact."""
     from matplotlib.figure import Figure
 
     p = points()
@@ -234,11 +281,14 @@ def _draw() -> None:
     spring, ball = (force(c, fitted(c).values["k"], mu0, v0) for c in CONTACTS)
     mean = np.full(p.v0.size, p.without.mean() / FZ)
     one = force("spring", fitted("spring", mean).values["k"], mean[0], v0)
-    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for axes in (left, right):
-        axes.plot(1e3 * v0, spring, color=BLUE, lw=2.0, label="one spring, $k$ fitted")
-        axes.plot(1e3 * v0, ball, color=BLUE, lw=2.0, ls="--", label="ball, $k$ fitted")
+    oil = points("oil")
+    mu0_oil = np.interp(np.log(v0), np.log(oil.v0), oil.without / FZ)
+    oiled = [force(c, fitted(c, surface="oil").values["k"], mu0_oil, v0) for c in CONTACTS]
+    figure = Figure(figsize=(12.0, 4.2), layout="constrained")
+    left, middle, right = figure.subplots(1, 3)
+    for axes, curves in ((left, (spring, ball)), (middle, (spring, ball)), (right, oiled)):
+        axes.plot(1e3 * v0, curves[0], color=BLUE, lw=2.0, label="one spring, $k$ fitted")
+        axes.plot(1e3 * v0, curves[1], color=BLUE, lw=2.0, ls="--", label="ball, $k$ fitted")
         axes.set_xscale("log")
         axes.set_xticks(1e3 * p.v0, [f"{1e3 * x:g}" for x in p.v0], minor=False)
         axes.set_xticks([], minor=True)
@@ -249,24 +299,28 @@ def _draw() -> None:
     left.plot(1e3 * p.v0, p.shaken, "o", color=INK, label="measured, shaken")
     left.set(yscale="log", ylabel="friction [N]", ylim=(1e-3, 6.0))
     left.set_yticks([0.001, 0.01, 0.1, 1.0], ["0.001", "0.01", "0.1", "1"])
-    right.plot(1e3 * v0, one, color=RED, lw=1.6, ls=":", label=r"one spring, one $\mu_0$")
-    right.plot(1e3 * p.v0, p.shaken, "o", color=INK)
-    right.set(ylabel="friction [N]", ylim=(0.0, 0.65))
-    finish(left, "not shaken, and shaken", legend=False)
-    finish(right, "shaken alone", legend=False)
+    middle.plot(1e3 * v0, one, color=RED, lw=1.6, ls=":", label=r"one spring, one $\mu_0$")
+    middle.plot(1e3 * p.v0, p.shaken, "o", color=INK)
+    middle.set(ylabel="friction [N]", ylim=(0.0, 0.65))
+    right.plot(1e3 * oil.v0, oil.without, "o", mfc="white", color=INK)
+    right.plot(1e3 * oil.v0, oil.shaken, "o", color=INK)
+    right.set(ylabel="friction [N]", ylim=(0.0, 4.0))
+    finish(left, "dry", legend=False)
+    finish(middle, "dry, shaken alone", legend=False)
+    finish(right, "oiled: not described", legend=False)
     figure.suptitle(
         f"Steel on steel, shaken along: $f$ = 26 kHz, $x_0$ = 0.35 µm, $F_z$ = {FZ:.4g} N",
         fontsize="medium",
     )
     handles = dict(zip(*reversed(left.get_legend_handles_labels()), strict=True))
-    handles |= dict(zip(*reversed(right.get_legend_handles_labels()), strict=True))
+    handles |= dict(zip(*reversed(middle.get_legend_handles_labels()), strict=True))
     figure.legend(
         list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False
     )
     figure.savefig(IMAGES / "measured.png", dpi=100, metadata={"Software": None})
 
 
-SECTIONS = sections(forces, stiffness, trends)
+SECTIONS = sections(forces, stiffness, trends, oiled)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS)

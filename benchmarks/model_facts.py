@@ -3,7 +3,7 @@
 python benchmarks/model_facts.py [--write]
 """
 
-from benchmarks.measuring import main, markdown, quantity, sections  # isort: split
+from tests.support.measuring import main, markdown, quantity, sections  # isort: split
 
 import math
 from typing import Any

@@ -10,9 +10,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.measuring import IMAGES
-from benchmarks.support import browser as driven
-from benchmarks.support.serving import serving
+from tests.support import browser as driven
+from tests.support.measuring import IMAGES
+from tests.support.serving import serving
 
 #: picture -> address, width and height of the screen
 PICTURES = {

@@ -7,7 +7,7 @@ threads; no case is stored.  Processor time is the sum over all threads: other w
 has little effect on it.
 """
 
-from benchmarks.measuring import main, markdown, quantity  # isort: split
+from tests.support.measuring import main, markdown, quantity  # isort: split
 
 from time import process_time
 from typing import Any

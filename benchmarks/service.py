@@ -8,7 +8,7 @@ get the same requests in turn, so that other load slows all of them; figures are
 rounds.
 """
 
-from benchmarks.measuring import FINEST, main, markdown, sections  # isort: split
+from tests.support.measuring import FINEST, main, markdown, sections  # isort: split
 
 import http.client
 import json
@@ -26,23 +26,12 @@ from typing import Any
 
 import numpy as np
 import orjson
-import pyarrow as pa
 
-from benchmarks.support.forms import BATCH, TYPES, as_csv, stream_of
-from benchmarks.support.serving import CASE, Server, asking, connect, head, running, serving
+from tests.support.serving import CASE, Server, asking, connect, head, running, serving
 
 FIRST, CLIENT = ("taskset", "-c", "0"), {1}  # the processors of the servers and of the client
 ROUNDS, REQUESTS, CLIENTS = 5, 800, 16
-KINDS = {
-    name: TYPES[form]
-    for name, form in (
-        ("columns", "json"),
-        ("rows", "json"),
-        ("lines", "ndjson"),
-        ("csv", "csv"),
-        ("arrow", "arrow"),
-    )
-}
+BATCH = "/v1/mu-macro/batch"
 
 
 def post(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
@@ -85,9 +74,9 @@ def read(raw: socket.socket) -> None:
         raise SystemExit(f"status {answer.status}: {text[:300]!r}")
 
 
-def batch(server: Server, kind: str, body: bytes) -> None:
+def batch(server: Server, body: bytes) -> None:
     with connect(server) as raw:
-        sending = threading.Thread(target=raw.sendall, args=(head(BATCH, len(body), kind) + body,))
+        sending = threading.Thread(target=raw.sendall, args=(head(BATCH, len(body)) + body,))
         sending.start()
         read(raw)
         sending.join()
@@ -144,19 +133,8 @@ def body_of(form: str, n: int) -> bytes:
     }
     if form == "columns":
         return orjson.dumps(table, option=orjson.OPT_SERIALIZE_NUMPY)
-    if form == "lines":
-        parts = (
-            {name: column[i : i + 1000] for name, column in table.items()}
-            for i in range(0, n, 1000)
-        )
-        return b"".join(
-            orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n" for part in parts
-        )
-    if form == "arrow":
-        return stream_of(pa.record_batch(table))
     columns = (column.tolist() for column in table.values())
-    rows = [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
-    return as_csv(rows).encode() if form == "csv" else orjson.dumps(rows)
+    return orjson.dumps([dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)])
 
 
 def batches() -> str:
@@ -165,18 +143,18 @@ def batches() -> str:
     rows, columns = [], body_of("columns", 100_000)
     settings = {"MUMACRO_MAX_BODY_BYTES": "1000000000", "MUMACRO_MAX_BATCH": "1000000"}
     with serving(FINEST, before=FIRST, ready=True, **settings) as own:
-        for form, kind in KINDS.items():
+        for form in ("columns", "rows"):
             body = body_of(form, 100_000)
-            batch(own, kind, body)
+            batch(own, body)
             speeds, ratios = [], []
             for _ in range(ROUNDS):
                 floor, before = arrays_of(columns), own.busy()
-                batch(own, kind, body)
+                batch(own, body)
                 took = own.busy() - before
                 speeds.append(0.1 / took)
                 ratios.append(2.0 * took / (floor + arrays_of(columns)))
-            waits = [f"{1e3 * longest(own, kind, body, 5):.0f}"]
-            waits.append(f"{1e3 * longest(own, kind, body_of(form, 1_000_000), 1):.0f}")
+            waits = [f"{1e3 * longest(own, body, 5):.0f}"]
+            waits.append(f"{1e3 * longest(own, body_of(form, 1_000_000), 1):.0f}")
             ratio = f"{statistics.median(ratios):.2f}"
             memory = f"{own.memory('VmHWM'):.0f}"
             rows.append((form, f"{statistics.median(speeds):.2g}", ratio, *waits, memory))
@@ -199,11 +177,11 @@ def arrays_of(columns: bytes) -> float:
     return time.process_time() - before
 
 
-def longest(server: Server, kind: str, body: bytes, number: int) -> float:
+def longest(server: Server, body: bytes, number: int) -> float:
     """The longest of the waits for ``/livez`` on new connections while batches are answered [s]."""
     with asking(server, 0.002) as waits:
         for _ in range(number):
-            batch(server, kind, body)
+            batch(server, body)
     return max(waits)
 
 

@@ -7,8 +7,8 @@ of the server underneath.  ``fastapi``: models in and out around the same table,
 import sys
 from typing import Any
 
-from benchmarks.measuring import FINEST
 from mumacro.inputs.fields import FIELDS
+from tests.support.measuring import FINEST
 
 
 def raw() -> Any:

@@ -7,8 +7,8 @@ import re
 import sys
 from pathlib import Path
 
-from benchmarks.measuring import IMAGES
 from mumacro.plotting import BLUE, GREY, INK, RED
+from tests.support.measuring import IMAGES
 
 PAGE = Path(__file__).resolve().parent.parent / "service" / "static" / "page" / "index.html"
 #: what is drawn of the sketch, and its words, three in a row

@@ -11,7 +11,7 @@ pi v~) a cycle in continuous sliding, so the cost grows as v~ falls; for the sam
 agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
 """
 
-from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
+from tests.support.measuring import best_of, main, markdown, quantity  # isort: split
 
 import math
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from builder.solver.steady import REGIMES
 from builder.solver.sweep import solve_chunk
+from mumacro import REGIMES
 
 PEER_LOW = 0.01  # smallest v~ of the marched points, so that marching ends
 RTOL, ATOL, AGREE = 1e-9, 1e-12, 1e-9

@@ -10,7 +10,6 @@ rounds; errors are against fresh solves.  A full run draws build/results/speed_a
 """
 
 # isort: split
-import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -22,9 +21,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator, make_interp_spline
 
-from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
 from builder.solver.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
+from tests.support.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
@@ -168,8 +167,7 @@ def speed_against_error(points: int, rounds: int, quick: bool) -> str:
     numba.set_num_threads(1)
     v, y = draw(points, seed=1)
     v_true, y_true = draw(2_000 if quick else 100_000, seed=2)
-    # which knows its solver
-    with Sweep(1, checkpoint=Path(tempfile.gettempdir(), "mumacro-benchmarks")) as sweep:
+    with Sweep(1) as sweep:
         progress("fresh solves")
         truth = sweep.solve("full", v_true, y_true)["mu_ratio"]
         methods = contenders(sweep, quick)

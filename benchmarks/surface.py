@@ -9,8 +9,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from benchmarks.measuring import IMAGES
 from mumacro import Surrogate
+from tests.support.measuring import IMAGES
 
 
 def draw(surrogate: Surrogate, out: Path) -> None:

@@ -18,8 +18,8 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from benchmarks.measuring import PAGES, ROOT, machine, main, markdown, progress, quantity
 from mumacro import Surrogate
+from tests.support.measuring import PAGES, ROOT, machine, main, markdown, progress, quantity
 
 HEADER = (
     "table",

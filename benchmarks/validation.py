@@ -6,7 +6,7 @@ A deviation is formula/exact - 1 unless the section states otherwise; exact is t
 1e-12 table where thousands of points are needed.
 """
 
-from benchmarks.measuring import FINEST, ROOT, main, markdown, quantity, sections  # isort: split
+from tests.support.measuring import FINEST, ROOT, main, markdown, quantity, sections  # isort: split
 
 import csv
 import math

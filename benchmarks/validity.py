@@ -3,7 +3,7 @@
 python benchmarks/validity.py [--write]
 """
 
-from benchmarks.measuring import FINEST, IMAGES, main, markdown, quantity, sections  # isort: split
+from tests.support.measuring import FINEST, IMAGES, main, markdown, quantity, sections  # isort: split
 
 import math
 from typing import Any
@@ -12,8 +12,8 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.analysis.settling import settling
-from mumacro.contacts.stiffness import Material, ball_on_flat, flat_punch
 from mumacro.plotting import INK
+from mumacro.stiffness import Material, ball_on_flat, flat_punch
 
 STEEL = Material(E=210e9, nu=0.3)
 RANGES = (

@@ -1,12 +1,12 @@
 """``python -m builder``: build, verify, query and export tables offline."""
 
 import math
-import shutil
 import sys
 import time
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,6 @@ from mumacro.cli.common import (
 )
 from mumacro.errors import missing
 from mumacro.kernel.threads import processors
-from mumacro.table.atomic import alone_in
 
 
 class _Bar:
@@ -49,6 +48,11 @@ class _Bar:
             print(line.rstrip(), file=sys.stderr)
 
 
+def _writer() -> None:
+    """Import what writes a table file: where it is missing, that is said before the work."""
+    import_module("netCDF4")
+
+
 def _place(out: Path, folder: bool = False) -> None:
     """Refuse a place for a result whose folder is missing, or a folder in place of a file."""
     if not out.parent.is_dir():
@@ -62,13 +66,13 @@ def _build(chosen: Namespace) -> str:
     from .tables.build import MAX_TOLERANCE, MIN_TOLERANCE, build_table, stages
 
     out, tolerance = chosen.out, chosen.tolerance
+    _writer()
     if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
         raise UsageError(
             f"--tolerance must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}"
         )
     _place(out)
-    checkpoint = out.with_name(out.name + ".checkpoint")
-    with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep:
+    with Sweep(chosen.workers) as sweep:
         surrogate = build_table(out, tolerance, sweep, _Bar(stages()))
     return as_json(
         {
@@ -79,32 +83,6 @@ def _build(chosen: Namespace) -> str:
             "n_solves": surrogate.attributes["n_solves"],
             "bytes": out.stat().st_size,
             "content_sha256": surrogate.checksum,
-        }
-    )
-
-
-def _ball(chosen: Namespace) -> str:
-    from mumacro.table.netcdf import write_table
-
-    from .solver.sweep import Sweep
-    from .tables.build import add_ball, ball_stages
-
-    surrogate, out = Surrogate.open(chosen.table), chosen.out or chosen.table
-    _place(out)
-    checkpoint = out.with_name(out.name + ".checkpoint")
-    with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep:
-        table = add_ball(surrogate.table, out, sweep, _Bar(ball_stages()))
-        write_table(table, out)
-    shutil.rmtree(checkpoint, ignore_errors=True)
-    attributes = table.attributes
-    return as_json(
-        {
-            "table": str(out),
-            "ball_tolerance": attributes["ball_tolerance"],
-            "ball_verified_max_abs_error": attributes["ball_verified_max_abs_error"],
-            "ball_verified_max_rel_error": attributes["ball_verified_max_rel_error"],
-            "bytes": out.stat().st_size,
-            "content_sha256": attributes["content_sha256"],
         }
     )
 
@@ -127,16 +105,17 @@ def _verify(chosen: Namespace) -> int:
     from .tables.contacts import ball
     from .tables.verify import holds, verify, verify_ball
 
+    if chosen.write:
+        _writer()
     surrogate = Surrogate.open(chosen.table)
     tolerance = surrogate.tolerance
     with Sweep(chosen.workers) as sweep:
         report = verify(surrogate, sweep, chosen.points, chosen.seed)
         whole = holds(report, tolerance)
-        if surrogate.table.ball:
-            springs = springs_for(surrogate.table, sweep)
-            of = ball(springs, surrogate.ball_tolerance, chosen.workers)
-            report["ball"] = verify_ball(surrogate, of, chosen.points, chosen.seed)
-            whole = whole and holds(report["ball"], surrogate.ball_tolerance)
+        springs = springs_for(surrogate.table, sweep)
+        of = ball(springs, surrogate.ball_tolerance, chosen.workers)
+        report["ball"] = verify_ball(surrogate, of, chosen.points, chosen.seed)
+        whole = whole and holds(report["ball"], surrogate.ball_tolerance)
     report |= {"tolerance": tolerance, "holds": whole}
     print(as_json(report))
     if not report["holds"]:
@@ -218,20 +197,13 @@ def _parser(prog: str) -> OneLineParser:
         "type": _whole(1, 1024),
         "help": "threads; default: %(default)s",
     }
-    one = command(
-        _build, "Build a table; a killed build resumes from OUT.checkpoint and gives the same data."
-    )
+    one = command(_build, "Build a table; it appears whole or not at all.")
     one.add_argument("--out", type=Path, required=True, help="the netCDF file to write")
     text = (
         "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: "
         "%(default)s"
     )
     one.add_argument("--tolerance", type=float, default=1e-8, help=text)
-    one.add_argument("--workers", **workers)
-    text = "Build the ball of a table anew, or the first time; its springs stay as they are."
-    one = command(_ball, text)
-    one.add_argument("table", type=Path, help="a table file")
-    one.add_argument("--out", type=Path, help="the file to write; default: the same")
     one.add_argument("--workers", **workers)
     one = command(_solve, "Solve the full model once and print the steady cycle as JSON.")
     one.add_argument(

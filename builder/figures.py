@@ -8,7 +8,6 @@ lines from the paper's formulas.  A figure is a function of a table that returns
 its first line is the title; one function draws them all.  Needs matplotlib, the extra ``figures``.
 """
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import MumacroError, Surrogate, closed_forms, plotting
+from mumacro import MumacroError, Surrogate, closed_forms, motion, plotting
 from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.law import law as friction_law
 from mumacro.kernel.arrays import Array
@@ -69,30 +68,24 @@ def _solve_border(y: NDArray[Any]) -> Array:
 
 
 def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """The steady cycle at v~ = ``v`` > 0, y~ = ``y`` [-], marched: an independent and simple method
-    for pictures.
-
-    With u = u_x + i u_y and w = v~ tau + i y~ sin tau, eqs. (9) to (12) are u' = w' during stick,
-    abs(u) < 1, and u' = (w' - u^2 conj(w')) / 2 on the circle.  A step of slip is the linear
-    fractional map of that equation for the mean w', which keeps to the circle and is right to
-    second order in the step.
+    """The steady cycle at v~ = ``v``, y~ = ``y`` [-], by :func:`mumacro.motion`.
 
     Parameters
     ----------
     v, y : float
         Dimensionless speed and amplitude [-].
     steps : int
-        Steps in a period.
+        Equal steps in a period.
 
     Returns
     -------
     tau : ndarray
-        Phase at the end of each step [rad], shape (steps,), from 0 to 2 pi.
+        Phase at the end of each step [rad], shape (steps,), to 2 pi.
     u : ndarray
         Force of the spring over mu0 Fz [-], along and across the sliding direction, shape (steps,
         2).
     sticks : ndarray of bool
-        Whether the foot rests in that step, shape (steps,).
+        Whether the foot rests there, shape (steps,).
 
     Examples
     --------
@@ -100,25 +93,9 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
     >>> round(float(u[:, 0].mean()), 4), round(float(sticks.mean()), 2)  # mu~, stick fraction
     (0.8064, 0.57)
     """
-    tau = np.linspace(0.0, 2.0 * math.pi, steps + 1)
-    moves = (v * tau[1] + 1j * np.diff(y * np.sin(tau))).tolist()
-    path, sticks = np.empty(steps, dtype=np.complex128), np.zeros(steps, dtype=np.bool_)
-    u, on_circle = 0j, False
-    for _ in range(math.ceil(3.0 / v)):  # the initial state decays after a drag of some l0
-        for i, move in enumerate(moves):
-            free = u + move
-            sticks[i] = abs(free) <= 1.0
-            if sticks[i]:
-                u = free
-            else:
-                u = (
-                    (u + 0.5 * move) / (1.0 + 0.5 * move.conjugate() * u)
-                    if on_circle
-                    else free / abs(free)
-                )
-            on_circle = not sticks[i]
-            path[i] = u
-    return tau[1:], path.view(np.float64).reshape(steps, 2), sticks
+    cycle = motion(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y=y, tolerance=1e-9).cycle(points=steps)
+    u = np.stack([cycle.Fx, cycle.Fy], axis=1)[1:]
+    return cycle.t[1:], u, np.hypot(*u.T) < 1.0 - 1e-9
 
 
 def _cycle(_: Surrogate) -> list[Panel]:

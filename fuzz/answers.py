@@ -16,9 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import extended
-from benchmarks.measuring import main, markdown, quantity, sections
-from benchmarks.support.driven import answered, hard, ordinary
 from builder.solver.ball import Springs
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
@@ -28,6 +25,9 @@ from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
 from mumacro.kernel.binding import CaseRows, kernels
 from mumacro.table.atlas import QUANTITY_NAMES
+from tests.support import extended
+from tests.support.driven import answered, hard, ordinary
+from tests.support.measuring import main, markdown, quantity, sections
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]

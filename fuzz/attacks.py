@@ -15,8 +15,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from http.client import HTTPException
 
-from benchmarks.measuring import main, markdown, sections
-from benchmarks.support.serving import CASE, Server, asking, connect, head, serving
+from tests.support.measuring import main, markdown, sections
+from tests.support.serving import CASE, Server, asking, connect, head, serving
 
 # the defaults; a few connections are left
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20
@@ -59,17 +59,6 @@ def strange_words(server: Server, share: float) -> None:
     words = ("rigid", None, "x" * 40)
     columns = (json.dumps({**CASE, "k": [word] * round(CASES * share)}).encode() for word in words)
     posted(server, "application/json", *columns)
-
-
-def idle_streams(server: Server, share: float) -> None:
-    def law() -> None:
-        case = {name: value for name, value in CASE.items() if name != "v0"}
-        status, _, _ = server.ask(
-            "POST", "/v1/law", json.dumps({**case, "start": 1e-4, "stop": 1.0})
-        )
-        assert status == 200, f"/v1/law: {status}"
-
-    hold_connections(server, share, head("/v1/mu-macro/batch", None, "application/x-ndjson"), law)
 
 
 def motions(server: Server, share: float) -> None:
@@ -141,7 +130,6 @@ ATTACKS: dict[str, Attack] = {
     "JSON of the smallest values and lists": brackets,
     "As many rows, and as long columns, as are allowed, with everything included": everything,
     "Columns of words and of nulls, which Python reads one by one": strange_words,
-    "Streams without a line; the question of a person is answered beside them": idle_streams,
     "Many at once ask for /openapi.json for the first time": descriptions,
     "Motions of a ball with high harmonics; a law is answered beside them": motions,
 }

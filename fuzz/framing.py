@@ -16,8 +16,8 @@ from functools import cache
 
 import h11
 
-from benchmarks.measuring import ROOT, main, markdown, sections
-from benchmarks.support.serving import CASE, Server, chunk, connect, serving, to_end
+from tests.support.measuring import ROOT, main, markdown, sections
+from tests.support.serving import CASE, Server, chunk, connect, serving, to_end
 
 TABLE, TOTAL = ROOT / "tables" / "mumacro-1e-4.nc", 200_000
 BODY = json.dumps(CASE).encode()

@@ -14,15 +14,15 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from http.client import HTTPConnection, HTTPException
 from itertools import cycle
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import urlencode
 
 import numpy as np
 
-from benchmarks.measuring import ROOT, main, markdown, sections
-from benchmarks.support.forms import BATCH, TYPES, WRITERS
-from benchmarks.support.serving import CASE, Server, asking, serving
+from tests.support.measuring import ROOT, main, markdown, sections
+from tests.support.serving import CASE, Server, asking, serving
 
+BATCH = "/v1/mu-macro/batch"
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
 CLIENTS, SERVERS = 8, 2
 RIG = {name: value for name, value in CASE.items() if name != "v0"}
@@ -34,16 +34,10 @@ class Question(NamedTuple):
     method: str
     path: str
     body: bytes | None = None
-    kind: str = TYPES["json"]
 
 
 def posted(path: str, **fields: object) -> Question:
     return Question("POST", path, json.dumps(fields).encode())
-
-
-def batch(form: str) -> Question:
-    text: Any = WRITERS[form](ROWS)
-    return Question("POST", BATCH, text if isinstance(text, bytes) else text.encode(), TYPES[form])
 
 
 SHORT = posted("/v1/mu-macro", **CASE, include=["gradient", "power"])
@@ -55,7 +49,6 @@ QUESTIONS = {
     "a ball": posted("/v1/mu-macro", **CASE, contact="ball"),
     "10,000 cases as columns": posted(BATCH, **CASE | {"v0": SPEEDS}),
     "1,000 rows as JSON": Question("POST", BATCH, json.dumps(ROWS).encode()),
-    **{f"1,000 rows as {form}": batch(form) for form in WRITERS},
     "a law": posted("/v1/law", **RIG, start=1e-4, stop=1.0),
     "an inverse": posted("/v1/solve-for", **RIG, unknown="v0", target=0.1),
     "a motion": posted(
@@ -79,7 +72,7 @@ QUESTIONS = {
 
 def ask(connection: HTTPConnection, question: Question) -> tuple[int, bytes]:
     connection.request(
-        question.method, question.path, question.body, {"Content-Type": question.kind}
+        question.method, question.path, question.body, {"Content-Type": "application/json"}
     )
     reply = connection.getresponse()
     return reply.status, reply.read()
@@ -159,9 +152,7 @@ def overload(minutes: float) -> str:
             name, question = ("one case", SHORT) if number == 0 else ("LONG", LONG)
             while not stop.is_set():
                 started = time.perf_counter()
-                status, headers, body = server.ask(
-                    question.method, question.path, question.body, {"Content-Type": question.kind}
-                )
+                status, headers, body = server.ask(question.method, question.path, question.body)
                 if number == 0:
                     waits.append(time.perf_counter() - started)
                 refused = status == 503 and headers["retry-after"] == "1"

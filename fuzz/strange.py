@@ -19,21 +19,18 @@ from itertools import islice
 from typing import Any, NamedTuple
 from urllib.parse import quote, urlencode
 
-import numpy as np
 import orjson
-import pyarrow as pa
 
-from benchmarks.measuring import ROOT, main, markdown, progress, sections
-from benchmarks.support.serving import CASE, Server, serving
 from mumacro.contacts.geometries import GEOMETRIES
-from mumacro.contacts.stiffness import AXES
+from mumacro.stiffness import AXES
+from tests.support.measuring import ROOT, main, markdown, progress, sections
+from tests.support.serving import CASE, Server, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
 TOTAL, PART = 1_000_000, 1000  # requests; in a share of work
 HANG_S = 1.0
 FINE = frozenset({200, 206, 304, 400, 401, 404, 405, 408, 413, 415, 416, 422})
-JSON, LINES, CSV = "application/json", "application/x-ndjson", "text/csv"
-ARROW = "application/vnd.apache.arrow.stream"
+JSON = "application/json"
 BATCH = "/v1/mu-macro/batch"
 
 
@@ -142,22 +139,6 @@ def document(chance: random.Random) -> tuple[str, Any]:
             ),
         )
     )
-
-
-def arrow(chance: random.Random) -> bytes:
-    n = chance.choice([0, 1, 3, 50])
-    rng = np.random.default_rng(chance.randrange(1 << 30))
-    kinds = [pa.float64()] * 8 + [pa.float32(), pa.int64(), pa.uint8(), pa.float16()]
-    columns = {name: 10.0 ** rng.uniform(-1, 1, n) for name in CASE}
-    arrays = {
-        name: pa.array(x, mask=x > 8.0).cast(chance.choice(kinds), safe=False)
-        for name, x in columns.items()
-    }
-    table, sink = pa.table(arrays), pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, table.schema) as writer:
-        for _ in range(chance.choice([1, 1, 2])):
-            writer.write_table(table)
-    return bytes(sink.getvalue().to_pybytes())
 
 
 #: texts that replace a value
@@ -321,47 +302,6 @@ def json_request(chance: random.Random) -> Request:
     return posted(path, JSON, text, chance)
 
 
-def lines_request(chance: random.Random) -> Request:
-    cases = [
-        {**case(chance), **({"v0": [0.1, 0.2]} if chance.random() < 0.2 else {})} for _ in range(20)
-    ]
-    texts = (
-        text_of(one, chance, chance.choice([0.0, 0.05]))
-        for one in cases[: chance.choice([0, 1, 2, 5, 20])]
-    )
-    lines = [text.encode("utf-8", "surrogatepass") for text in texts]
-    text = chance.choice([b"\n", b"\n", b"\r\n", b"\n\n", b"\r"]).join(lines) + chance.choice(
-        [b"", b"\n"]
-    )
-    return posted(BATCH, LINES, text, chance)
-
-
-def csv_request(chance: random.Random) -> Request:
-    names = list(CASE)
-    chance.shuffle(names)
-    if chance.random() < 0.2:
-        names[chance.randrange(6)] = chance.choice(NAMES)
-    rows = [",".join(f'"{name}"' if chance.random() < 0.1 else name for name in names)]
-    for _ in range(chance.choice([0, 1, 3, 20])):
-        row = [repr(value) for value in case(chance).values()]
-        if chance.random() < 0.2:
-            row[chance.randrange(6)] = chance.choice(
-                [*NUMBERS, "", '"', "rigid", '"0.1"', ";", "=1+1"]
-            )
-        rows.append(",".join(row))
-    text = chance.choice(["\n", "\r\n"]).join(rows).encode(
-        "utf-8", "surrogatepass"
-    ) + chance.choice([b"", b"\n"])
-    return posted(BATCH, CSV, text, chance)
-
-
-def arrow_request(chance: random.Random) -> Request:
-    text = arrow(chance)
-    if chance.random() < 0.1:
-        text = text[: chance.randrange(len(text))]
-    return posted(BATCH, ARROW, text, chance, 0.8)
-
-
 def of_table(chance: random.Random) -> list[tuple[str, str]]:
     return [chance.choice([("id", "mumacro-1e-4"), ("tolerance", "1e-3"), ("id", "../x")])][
         : chance.randrange(2)
@@ -474,10 +414,7 @@ def head_request(chance: random.Random) -> Request:
 
 
 KINDS: dict[str, tuple[int, Callable[[random.Random], Request]]] = {
-    "JSON": (35, json_request),
-    "lines": (15, lines_request),
-    "CSV": (10, csv_request),
-    "Arrow": (15, arrow_request),
+    "JSON": (75, json_request),
     "queries": (15, query_request),
     "methods, paths and headers": (10, head_request),
 }

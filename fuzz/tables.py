@@ -26,12 +26,12 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from benchmarks.measuring import ROOT, main, markdown, sections
 from mumacro import Surrogate, TableError
 from mumacro.table.atlas import BORDER_PIECES
 from mumacro.table.blocks import Table
 from mumacro.table.netcdf import parse_table, read_table, write_table
 from mumacro.table.polynomials import nodes
+from tests.support.measuring import ROOT, main, markdown, sections
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 STEP = 256  # bytes between truncations

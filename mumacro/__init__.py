@@ -1,35 +1,54 @@
 """Friction of a contact that oscillates across its sliding direction: a surrogate of the full
-stick-slip model."""
+stick-slip model.
+
+A name is imported when it is first used (PEP 562), so that a program loads what it needs and no
+more.  To add one: a line under ``TYPE_CHECKING``, which type checkers and editors read, one in
+``_PLACES``, and one in ``__all__``.
+"""
 
 import sys as _sys
+from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.errors import missing as _missing
+from mumacro.version import __version__
 
-try:
-    from mumacro import closed_forms, plotting
-    from mumacro import moved as _moved
-    from mumacro.analysis import validity
-    from mumacro.analysis.fit import Fit, fit
+if _TYPE_CHECKING:
+    from mumacro import closed_forms, plotting, stiffness, validity
+    from mumacro.analysis.fit import fit
+    from mumacro.analysis.fitted import Fit
     from mumacro.analysis.law import law
     from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.settling import settling
     from mumacro.analysis.solve_for import solve_for
     from mumacro.answer import Answer
-    from mumacro.contacts import stiffness
     from mumacro.contacts.element import Element
     from mumacro.surrogate import Surrogate
     from mumacro.table.atlas import REGIMES, SOURCES
-    from mumacro.version import __version__
-except ImportError as _error:
-    # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing; argv[0]
-    # is "-m" meanwhile.
-    if _sys.argv[:1] != ["-m"]:
-        raise
-    raise SystemExit(_missing("", _error)) from None
 
-open = Surrogate.open  # noqa: A001 (mumacro.open(), as users of other data libraries expect)
+    open = Surrogate.open  # noqa: A001 (mumacro.open(), as users of other data libraries expect)
+
+#: public name -> its module
+_PLACES = {
+    "closed_forms": "closed_forms",
+    "plotting": "plotting",
+    "stiffness": "stiffness",
+    "validity": "validity",
+    "Fit": "analysis.fitted",
+    "fit": "analysis.fit",
+    "law": "analysis.law",
+    "Motion": "analysis.motion",
+    "motion": "analysis.motion",
+    "settling": "analysis.settling",
+    "solve_for": "analysis.solve_for",
+    "Answer": "answer",
+    "Element": "contacts.element",
+    "Surrogate": "surrogate",
+    "open": "surrogate",
+    "REGIMES": "table.atlas",
+    "SOURCES": "table.atlas",
+}
 
 __all__ = [
     "REGIMES",
@@ -55,17 +74,32 @@ __all__ = [
     "validity",
 ]
 
-# the modules of the face can be imported by its names, wherever they stand
-_sys.modules |= {f"{__name__}.stiffness": stiffness, f"{__name__}.validity": validity}
-_sys.meta_path.append(_moved.Signposts)
-
+if _sys.argv[:1] == ["-m"]:
+    # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing
+    try:
+        _import_module("mumacro.surrogate")
+    except ImportError as _error:
+        raise SystemExit(_missing("", _error)) from None
 
 if not _TYPE_CHECKING:  # with it a type checker would accept any name
 
     def __getattr__(name: str) -> object:
-        """AttributeError; for a method of a surrogate it says how to call it."""
-        public = not name.startswith("_") and callable(getattr(Surrogate, name, None))
-        advice = f": use mumacro.open().{name}(...)" if public else ""
+        """Import a public name, which the module then holds.
+
+        AttributeError for any other; for a method of a surrogate it says how to call it.
+        """
+        if name in _PLACES:
+            module = _import_module(f"mumacro.{_PLACES[name]}")
+            place = module.Surrogate if name == "open" else module
+            value = module if _PLACES[name] == name else getattr(place, name)
+            globals()[name] = value
+            return value
+        advice = ""
+        if not name.startswith("_"):
+            from mumacro.surrogate import Surrogate
+
+            if callable(getattr(Surrogate, name, None)):
+                advice = f": use mumacro.open().{name}(...)"
         raise AttributeError(
             f"module 'mumacro' has no attribute {name!r}{advice}",
             name=name,

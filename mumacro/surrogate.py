@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal, NoReturn, Self, overload
+from typing import Any, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from mumacro import closed_forms, plotting
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.contacts.quadrature import put_driven
-from mumacro.errors import InputError, MumacroError, TableError
+from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
     ABSENT,
@@ -229,14 +229,12 @@ class Surrogate:
 
     @property
     def ball_tolerance(self) -> float:
-        """The tolerance of mu~ of a ball that is shaken across [-]; NaN for a table without a
-        ball."""
-        return float(self.table.attributes.get(f"{BALL_ATTRIBUTES}tolerance", math.nan))
+        """The tolerance of mu~ of a ball that is shaken across [-]."""
+        return float(self.table.attributes[f"{BALL_ATTRIBUTES}tolerance"])
 
     @property
     def ball_error_distribution(self) -> dict[str, dict[str, float]]:
-        """The same of a ball that is shaken across, without the border; empty for a table without
-        a ball."""
+        """The same of a ball that is shaken across, without the border."""
         return error_distribution(self.table, BALL_ATTRIBUTES)
 
     @property
@@ -395,13 +393,6 @@ class Surrogate:
                 )
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
-
-    def derivatives(self, *_: object, **__: object) -> NoReturn:
-        """Removed; the error names what replaces it."""
-        raise MumacroError(
-            "Surrogate.derivatives is gone: slopes(v_tilde, y_tilde, of) gives v~ d/dv~ and y~ "
-            "d/dy~, evaluate(..., gradient=True) the slopes by the six inputs"
-        )
 
     def quantity(
         self,
@@ -699,7 +690,7 @@ class Surrogate:
             cases is None
             and k_range is k_low is k_high is Fz_amplitude is ABSENT
             and (f is ABSENT or omega is ABSENT)
-            and (contact == "spring" or (contact == "ball" and self.table.ball))
+            and contact in ("spring", "ball")
             and direction == "across"
             and illegal in ILLEGAL
             and not unknown
@@ -829,13 +820,6 @@ class Surrogate:
             if kind.contact:
                 put_driven(self._data)
             return self._data
-        if not self.table.ball:
-            raise InputError(
-                "contact",
-                "ball",
-                f"spring: the table {self.path.name} has no ball, which a table of this program's "
-                "builder has; python -m builder ball adds it to a table",
-            )
         data = self._ball
         if data is None:
             rows = block_rows(self.table.ball, atlas.BALL_CHARTS)

@@ -1,14 +1,13 @@
-"""Many cases at once: one model of columns for every form of a body, answered slice by slice.
+"""Many cases at once: one model of columns for columns and rows, answered slice by slice.
 
-A form (``batch_forms/``) decodes a body to numbers, lists and arrays by name; :class:`CaseColumns`
-checks them; :class:`Batch` evaluates slices, so that memory stays small and other threads run
-between them; the form writes the slices.  A bad case spoils only itself.
+``forms.py`` reads a body as values, lists and arrays by name; :class:`CaseColumns` checks them;
+:class:`Batch` evaluates slices, so that memory stays small and other threads run between them;
+``forms.py`` writes the slices.  A bad case spoils only itself.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,34 +15,13 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
 from mumacro.kernel.arrays import Codes
 
+from .forms import SLICE, Body, Reason, too_large, write_columns, write_rows
 from .included import Outputs, Plan, answer_columns
 from .models.inputs import MAX_REASONS, Column
 from .models.options import MODEL, BatchOptions, CaseColumns
-from .problems import FieldFault, ProblemKind, RequestError, reason_of, refuse
-from .reading import of_members
+from .problems import FieldFault, reason_of, refuse
+from .reading import dump, of_members
 from .tables import LoadedTable, Tables
-
-#: the bad field, or None for the case as a whole, and why
-Reason = tuple[str | None, str]
-
-
-class Body(NamedTuple):
-    """What a form reads from a body."""
-
-    #: inputs by name: a number, a list, or an array in which infinity is a rigid contact; options
-    members: dict[str, Any]
-    #: why cases could not be read, by their index; they have a NaN
-    reasons: Mapping[int, Reason] = MappingProxyType({})
-    rows: bool = False  # whether the cases came one by one
-
-
-def too_large(max_batch: int) -> RequestError:
-    """The error for a batch with more cases than the settings allow."""
-    detail = (
-        f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it "
-        "as NDJSON"
-    )
-    return RequestError(ProblemKind.BATCH_TOO_LARGE, detail, max_batch=max_batch)
 
 
 def both(members: Mapping[str, Any], options: BatchOptions) -> dict[str, Any]:
@@ -65,7 +43,6 @@ class Batch:
     columns: dict[str, Any]  # numbers, and arrays (size,)
     size: int
     reasons: dict[int, Reason]
-    listed: bool  # whether any input came as a list
     rows: bool
     errors: list[dict[str, Any]] = field(default_factory=list)
     n_errors: int = 0
@@ -106,39 +83,33 @@ class Batch:
         Cases.of(by_name(None, _part(columns, 0, 0), plan.kind), plan.kind)
         in_query = options.tolerance is not None
         table = tables.pick(model.tolerance, True if in_query else None)
-        return cls(table, plan, columns, size, reasons, bool(lengths), body.rows, **more)
+        return cls(table, plan, columns, size, reasons, body.rows, **more)
 
-    def slices(self, step: int) -> Iterator[tuple[Outputs, Codes, list[str | None]]]:
-        """Outputs by path, source codes and reasons of ``step`` cases after another.
+    def write(self) -> Iterator[bytes]:
+        """The answer as JSON, piece by piece, in the form of the body."""
+        yield from (write_rows if self.rows else write_columns)(self._slices())
+        end = {"errors": self.errors, "n_errors": self.n_errors, **self.table.signature}
+        yield b"," + dump(end)[1:]
 
-        At least one slice, which is empty if there is no case.
-        """
-        for start in range(0, max(self.size, 1), step):
-            stop = min(start + step, self.size)
-            part = _part(self.columns, start, stop)
+    def _slices(self) -> Iterator[tuple[Outputs, Codes]]:
+        """Outputs by path and source codes, slice by slice; one empty slice if there is no case."""
+        for start in range(0, max(self.size, 1), SLICE):
+            part = _part(self.columns, start, min(start + SLICE, self.size))
             outputs, codes = answer_columns(self.table.surrogate, part, self.plan)
             self.count(self.table, codes)
-            yield outputs, codes, self._reasons(part, codes, start)
+            self._tell(part, codes, start)
+            yield outputs, codes
 
-    def _reasons(self, part: Mapping[str, Any], codes: Codes, start: int) -> list[str | None]:
-        texts: list[str | None] = [None] * codes.size
+    def _tell(self, part: Mapping[str, Any], codes: Codes, start: int) -> None:
+        """Add the bad cases of a slice to the errors."""
         bad = np.flatnonzero(codes < 0).tolist()
         if not bad:
-            return texts
+            return
         cases = Cases.of(by_name(None, part, self.plan.kind), self.plan.kind)
-        for index in bad:
-            self.n_errors += 1
-            texts[index] = "bad case"
-            if len(self.errors) < MAX_REASONS:
-                name, reason = self.reasons.get(start + index) or _reason(cases, index)
-                self.errors.append({"index": start + index, "field": name, "reason": reason})
-                texts[index] = f"{name or 'case'}: {reason}"
-        return texts
-
-    @property
-    def end(self) -> dict[str, Any]:
-        """What is said of the batch as a whole, after all slices."""
-        return {"errors": self.errors, "n_errors": self.n_errors, **self.table.signature}
+        self.n_errors += len(bad)
+        for index in bad[: MAX_REASONS - len(self.errors)]:
+            name, reason = self.reasons.get(start + index) or _reason(cases, index)
+            self.errors.append({"index": start + index, "field": name, "reason": reason})
 
 
 def _part(columns: Mapping[str, Any], start: int, stop: int) -> dict[str, Any]:
@@ -149,22 +120,3 @@ def _part(columns: Mapping[str, Any], start: int, stop: int) -> dict[str, Any]:
 def _reason(cases: Cases, index: int) -> Reason:
     error = cases.reason(index)
     return error.field, reason_of(error)
-
-
-class Form(NamedTuple):
-    """One form of a batch, by its media type."""
-
-    media_type: str
-    aliases: tuple[str, ...]
-    #: a body with so many cases at most, and the options of the query; raises RequestError
-    read: Callable[[bytearray, int, BatchOptions], Body]
-    #: the answer, piece by piece
-    write: Callable[[Batch], Iterator[bytes]]
-    body: dict[str, Any]  # described
-    answer: dict[str, Any]
-    streams: bool = False
-
-
-def text_form(description: str, **more: Any) -> dict[str, Any]:
-    """The description of a body or an answer that is no JSON."""
-    return {"schema": {"type": "string", "description": description, **more}}

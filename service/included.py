@@ -17,13 +17,13 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.analysis.settling import settling as decay
-from mumacro.analysis.validity import digits, k_effect, model_rows
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, by_name
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, ROUNDING
 from mumacro.table.atlas import SOURCES as _SOURCES
+from mumacro.validity import digits, k_effect, model_rows
 
 from .models.options import MODEL
 
@@ -31,6 +31,8 @@ SOURCES = tuple(_SOURCES)
 #: name of the regime of every source code
 REGIME_OF = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
 Outputs = dict[str, Any]  # by path
+#: outputs that are codes of a source
+CODED = ("regime", "source")
 
 
 @dataclass
@@ -287,7 +289,7 @@ def answer_columns(
         outputs, codes = _answer(surrogate, columns, plan)
     legal = codes >= 0
     for path, column in outputs.items():
-        if path not in ("regime", "source"):
+        if path not in CODED:
             outputs[path] = np.where(legal, column, np.nan)
     return outputs, codes
 
@@ -335,7 +337,4 @@ def names_of(path: str, codes: Codes) -> list[str | None]:
 
 def listed(outputs: Outputs) -> dict[str, list[Any]]:
     """Outputs of many cases as JSON lists them; NaN is written as null."""
-    return {
-        path: names_of(path, x) if path in ("regime", "source") else x.tolist()
-        for path, x in outputs.items()
-    }
+    return {path: names_of(path, x) if path in CODED else x.tolist() for path, x in outputs.items()}

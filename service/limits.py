@@ -1,13 +1,12 @@
 """Limits: the body of a request, slots for large requests, time.
 
-A request that may take longer than one case needs a slot and runs in a thread.  Batches and streams
+A request that may take longer than one case needs a slot and runs in a thread.  Batches
 share the slots of ``MUMACRO_MAX_BATCHES``; the questions of a person (law, solve-for, the page)
 have slots and threads of their own, and so have questions that may take longer than a person waits.
 """
 
 import asyncio
 import os
-import re
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -26,6 +25,7 @@ from .security import HEALTH_PATHS
 from .settings import Settings
 
 T = TypeVar("T")
+JSON = b"application/json"
 SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
 # largest cost without a thread, in times of a plain case: under half a millisecond
 AT_ONCE = 4000.0
@@ -35,24 +35,36 @@ LONG_QUESTIONS = 4  # of those that take longer, such as the motion of a ball: u
 LONG = 100.0 * AT_ONCE
 # that is added to the threads of batches and long questions: short requests are answered first
 _NICENESS = 5
-_OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
+_CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
 
 
-def form_of(headers: Mapping[bytes, bytes], forms: Mapping[str, T]) -> T:
-    """Of ``forms`` by media type the one of a body; without a Content-Type the first."""
-    media_type = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(forms))
-    media, _, parameters = media_type.partition(";")
-    form = forms.get(media.strip())
-    if form is None or (parameters and _OTHER_CHARSET.search(parameters)):
-        offer = ", ".join(forms)
-        detail = f"send {offer}, not {media_type[:80]}"
-        raise RequestError(ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": offer})
+def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
+    """Refuse a body that is not JSON in UTF-8, or is compressed; no Content-Type says JSON."""
+    media_type = headers.get(b"content-type", JSON).lower()
+    media, _, parameters = media_type.decode("latin-1").partition(";")
+    if media.strip().encode() != JSON or not _is_utf8(parameters):
+        shown = media_type[:80].decode("latin-1")
+        detail = f"send {JSON.decode()}, not {shown}{remedy and f'; {remedy}'}"
+        raise RequestError(
+            ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": JSON.decode()}
+        )
     if headers.get(b"content-encoding", b"identity").lower() != b"identity":
         detail = "send the body without Content-Encoding"
         raise RequestError(
             ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"}
         )
-    return form
+
+
+def _is_utf8(parameters: str) -> bool:
+    """Whether the parameters of a media type name no other character set.
+
+    >>> _is_utf8('version=1; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
+    (True, False)
+    """
+    named = (parameter.partition("=") for parameter in parameters.split(";"))
+    return all(
+        value.strip(' \t"') in _CHARSETS for name, _, value in named if name.strip() == "charset"
+    )
 
 
 async def read_body(
@@ -68,8 +80,8 @@ async def read_body(
     while True:
         if size > limit:
             remedy = (
-                "send many cases to /v1/mu-macro/batch, more as NDJSON without a "
-                "Content-Length, reading while you send"
+                "send many cases to /v1/mu-macro/batch, more in several requests, or give "
+                "`mumacro eval` a file"
             )
             raise RequestError(
                 ProblemKind.BODY_TOO_LARGE,

@@ -14,9 +14,9 @@ import numpy as np
 from mumacro import plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import BOUNDS, LIKE, POSITIVE, RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import BOUNDS, LIKE, POSITIVE, QUANTITY_OF, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRINGS_OF, kind_of
-from mumacro.inputs.units import UNITS_OF, Scale
+from mumacro.inputs.units import QUANTITIES, UNITS_OF, Scale
 from mumacro.surrogate import Surrogate
 
 from . import __version__
@@ -95,7 +95,11 @@ def names(guide: bool) -> dict[str, Any]:
         for name, one in GEOMETRIES.items()
     }
     arguments = {
-        name: {**one._asdict(), "units": _scales(one.units)} for name, one in ARGUMENTS.items()
+        name: {
+            **one._asdict(),
+            "units": _scales(QUANTITIES[QUANTITY_OF[name]].units) if one.unit else {},
+        }
+        for name, one in ARGUMENTS.items()
     }
     return {
         "inputs": inputs,

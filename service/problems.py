@@ -31,7 +31,8 @@ from mumacro.inputs.fields import BOUNDS, LIKE, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE
-from mumacro.inputs.units import number_hint, unknown_name
+from mumacro.inputs.names import unknown_name
+from mumacro.inputs.old_texts import number_hint
 
 from . import API_VERSION
 
@@ -240,7 +241,6 @@ class ProblemKind(Enum):
     INVALID_VALUE = 422, "The request holds invalid values"
     HEAD_TOO_LARGE = 431, "The head is too large", CLOSE
     UNEXPECTED = 500, "An unexpected error"
-    NOT_INSTALLED = 501, "This service lacks a package"
     NOT_READY = 503, "The service is not ready", {"Retry-After": "5"}
     OVERLOADED = 503, "The service is overloaded", {**CLOSE, "Retry-After": "1"}
     OUT_OF_MEMORY = 503, "The service has too little memory", {"Retry-After": "1"}

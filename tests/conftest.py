@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from benchmarks.support import browser as browsing
-from benchmarks.support import serving as servers
-from benchmarks.support.serving import Server
 from builder.solver.sweep import Sweep
 from mumacro import Surrogate
+from tests.support import browser as browsing
+from tests.support import serving as servers
 from tests.support.cases import CASE, Array, Case
+from tests.support.serving import Server
 
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
     from starlette.testclient import TestClient
@@ -120,7 +120,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 def open_page(
     live_server: Server, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[..., Any]]:
-    """Opens the page in a headless Chromium (benchmarks/support/browser.py), if installed."""
+    """Opens the page in a headless Chromium (tests/support/browser.py), if installed."""
     try:
         browser = browsing.start(tmp_path_factory.mktemp("browser"))
     except LookupError as error:

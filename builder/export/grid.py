@@ -49,19 +49,8 @@ FORMATS: dict[str, tuple[str, Callable[[Table], bytes] | None]] = {
 }
 
 
-#: removed format -> what does its work
-GONE = {
-    "mat": "csv, or the netCDF file itself, which MATLAB and Octave read",
-    "modelica": "fmu, or csv for a table of your own",
-    "parquet": "csv",
-    "wasm": "c, which clang and zig compile for WebAssembly",
-}
-
-
 def check_format(name: str) -> None:
     """ExportError with the list of formats where ``name`` is none of them."""
-    if name in GONE:
-        raise ExportError(f"format {name!r} is gone: use {GONE[name]}")
     if name not in FORMATS:
         raise ExportError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")
 

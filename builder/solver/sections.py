@@ -16,12 +16,14 @@ import math
 
 import numpy as np
 
+from mumacro.closed_forms import BORDER_CONSTANT
+
 from . import slip as model
 from .compiled import solver_kernel
 from .slip import OK, rechart, slip
 from .stick import stick_end
 
-BORDER_SLOPE = 0.4765728  # v~crit / sqrt(y~) for y~ -> infinity
+BORDER_SLOPE = BORDER_CONSTANT**-0.5  # v~crit / sqrt(y~) for y~ -> infinity
 NOT_CONVERGED = 10
 ANGLE_SECTION, TIME_SECTION = 0, 1
 

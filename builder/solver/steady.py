@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.errors import InputError
+from mumacro.table.atlas import REGIMES
 
 from . import slip as model
 from .compiled import solver_kernel
@@ -33,8 +34,7 @@ from .sections import (
 from .series import ORDER
 from .slip import OK, rechart, slip
 
-CONTINUOUS, STICK_SLIP = 0, 1
-REGIMES = ("continuous", "stick_slip")
+CONTINUOUS, STICK_SLIP = map(REGIMES.index, ("continuous", "stick_slip"))
 
 _LOST = (
     "the solver failed here, which is a defect of the solver: use a v~ that differs in the "

@@ -1,24 +1,19 @@
-"""Nodes to solved values: in parallel and resumable.
+"""Nodes to solved values, in parallel.
 
 Work is cut into chunks of points; a chunk is a pure function of its inputs, so the values do not
-depend on how many workers there are or on whether a build was interrupted.
+depend on how many workers there are.
 """
 
-import hashlib
-import io
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array
-from mumacro.table.atomic import write_whole
 
 from . import steady
-from .compiled import solver_kernel, source_digest
+from .compiled import solver_kernel
 from .slip import OK
 
 CHUNK = 128  # points; about 10 ms of work
@@ -34,10 +29,6 @@ _MU, _DEFICIT, _ERROR, _STATUS = map(
 
 class SolveError(MumacroError):
     """A node could not be solved; the message states which and what to do."""
-
-
-class CheckpointError(MumacroError):
-    """Finished work cannot be stored."""
 
 
 @solver_kernel
@@ -68,20 +59,11 @@ def solve_chunk(kind: str, points: Array) -> Array:
 
 
 class Sweep:
-    """Solves arrays of points and counts them.
+    """Solves arrays of points, in so many threads (the solver releases the interpreter lock), and
+    counts them."""
 
-    Parameters
-    ----------
-    workers : int
-        Threads on this machine (the solver releases the interpreter lock).
-    checkpoint : Path, optional
-        Folder for finished sweeps; a later build with the same nodes reads them instead of solving
-        again.
-    """
-
-    def __init__(self, workers: int = 1, checkpoint: Path | None = None) -> None:
+    def __init__(self, workers: int = 1) -> None:
         self.n_solves = 0
-        self.checkpoint = checkpoint
         self.workers = workers
         self._pool = ThreadPoolExecutor(max_workers=workers)
 
@@ -110,11 +92,9 @@ class Sweep:
         )
         steady.check_range(v, y, eta)
         points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
-        out = (
-            self._run(kind, points)
-            if self.checkpoint is None
-            else self._from_checkpoint(self.checkpoint, kind, points)
-        )
+        chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
+        done = self._pool.map(lambda chunk: solve_chunk(kind, chunk), chunks)
+        out = np.concatenate([np.empty((0, len(COLUMNS))), *done])
         self.n_solves += points.shape[0]
         failed = np.flatnonzero(out[:, _STATUS] != OK)
         if failed.size:
@@ -125,31 +105,3 @@ class Sweep:
             )
             raise SolveError(text + steady.ADVICE[status])
         return {name: out[:, i].reshape(v.shape) for i, name in enumerate(COLUMNS)}
-
-    def _run(self, kind: str, points: Array) -> Array:
-        chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
-        done = self._pool.map(lambda c: solve_chunk(kind, c), chunks)
-        return np.concatenate([np.empty((0, len(COLUMNS))), *done])
-
-    def _from_checkpoint(self, folder: Path, kind: str, points: Array) -> Array:
-        """What the checkpoint holds of these points; else they are solved and stored."""
-        # the digest of the sources: results of another version of the solver are not reused
-        text = (source_digest() + kind).encode() + np.ascontiguousarray(
-            points, dtype="<f8"
-        ).tobytes()
-        file = folder / f"{kind}-{hashlib.sha256(text).hexdigest()[:32]}.npy"
-        with suppress(OSError, ValueError, EOFError):  # a damaged file is solved again
-            out: Array = np.load(file, allow_pickle=False)
-            if out.shape == (points.shape[0], len(COLUMNS)):
-                return out
-        out, content = self._run(kind, points), io.BytesIO()
-        np.save(content, out)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            write_whole(file, content.getvalue())
-        except OSError as error:
-            why = f"{folder}: finished work cannot be stored: {error.strerror or error}"
-            raise CheckpointError(
-                f"{why}; repair that and give the same command again: it resumes"
-            ) from error
-        return out

@@ -4,7 +4,6 @@ provenance."""
 import dataclasses
 import json
 import math
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -331,9 +330,8 @@ def write_verified(path: Path, report: dict[str, Any]) -> None:
     other number of it changes."""
     table = read_table(path)
     table.attributes |= verified_attributes(report, table.quantities)
-    if "ball" in report:
-        stated = verified_attributes(report["ball"], table.quantities)
-        table.attributes |= {f"{BALL}{name}": x for name, x in stated.items()}
+    stated = verified_attributes(report["ball"], table.quantities)
+    table.attributes |= {f"{BALL}{name}": x for name, x in stated.items()}
     write_table(table, path)
 
 
@@ -370,6 +368,4 @@ def _finish(
     }
     table = add_ball(table, out, sweep, progress)
     write_table(table, out)
-    if sweep.checkpoint is not None:
-        shutil.rmtree(sweep.checkpoint, ignore_errors=True)
     return Surrogate.open(out)

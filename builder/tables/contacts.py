@@ -18,7 +18,6 @@ from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import MIDDLE, Chart
 from mumacro.table.blocks import Block, Table
-from mumacro.table.polynomials import Border
 
 from ..solver.ball import Ball, Springs, points_for
 from ..solver.sweep import Sweep
@@ -58,8 +57,6 @@ class SolvedContact(NamedTuple):
     sloped: tuple[str, ...]
     #: times those of the charts: v~ and y~ of the contact as a whole
     scale: float
-    #: v~crit of one spring with far more digits than a table's, where the errors of that count
-    border: Border | None
 
     def blocks(self, table: Table) -> list[Block]:
         """Its blocks in a table."""
@@ -114,7 +111,7 @@ def spring(sweep: Sweep) -> SolvedContact:
         return sweep.solve("continuous" if continuous else "full", v, y, eta)
 
     return SolvedContact(
-        SPRING, atlas.CHARTS, solve, solver_noise, solver_noise, atlas.QUANTITY_NAMES, 1.0, None
+        SPRING, atlas.CHARTS, solve, solver_noise, solver_noise, atlas.QUANTITY_NAMES, 1.0
     )
 
 
@@ -136,7 +133,6 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> SolvedC
         _no_noise,
         ("mu_ratio",),
         MIDDLE,
-        springs.fine.border,
     )
 
 

@@ -154,56 +154,8 @@ def block_errors(surrogate: Surrogate, of: SolvedContact, n: int, seed: int) -> 
             surrogate, stating, of, index, np.random.default_rng([seed, index]), n
         )
         _, _, *exact = solve_nodes(of, index, finer((block.a.size, block.b.size)), surrogate.border)
-        cells = cell_errors(of, index, block, *exact)
-        chart = of.charts[index]
-        if of.border is not None and chart.b.name in _FROM_BORDER and chart.a.name != "inverse_y":
-            for name in of.sloped:
-                bends = _bends(surrogate, of, of.border, index, name)
-                cells[name][:, 1] += bends.max(axis=(1, 3)).ravel()
-        errors_of_blocks.append(BlockErrors(*errors, cells))
+        errors_of_blocks.append(BlockErrors(*errors, cell_errors(of, index, block, *exact)))
     return errors_of_blocks
-
-
-#: coordinates that are a function of v~/v~crit
-_FROM_BORDER = ("ln_rho", "s", "s_root")
-BESIDE = 24  # steps of the border between two points of a cell
-
-
-def _bends(surrogate: Surrogate, of: SolvedContact, true: Border, index: int, name: str) -> Array:
-    """What a slope along a is off by, over its share, because the table's border is not the true
-    one, (cells a, POINTS, cells b, POINTS).
-
-    That border is in the coordinate along b and has cells and pieces of its own: what a block
-    tabulates bends where they meet, between the nodes of the block and those of the finer
-    interpolant.  A slope at a fixed v~ is then off by the error of the border's slope times the
-    slope along ln v~.
-    """
-    chart, block = of.charts[index], of.blocks(surrogate.table)[index]
-    a, b = (_Along(axis, n, 2) for axis, n in zip((chart.a, chart.b), block.cells, strict=True))
-    steps = a.x[:, :1] + np.linspace(0.0, 1.0, BESIDE * (POINTS - 1) + 1) * a.wide[:, None]
-    at = np.clip(chart.a.to_file(steps.ravel()), chart.a.low, chart.a.high)
-    y = np.maximum(chart.a.amplitude(at), 1e-60)
-    off = np.log(surrogate.border(y) / true(y)).reshape(steps.shape)
-    step = a.wide / (BESIDE * (POINTS - 1))
-    slope = np.abs(np.diff(off, axis=1)) / np.where(step > 0.0, step, np.inf)[:, None]
-    ends = np.searchsorted(np.linspace(-1.0, 1.0, steps.shape[1] - 1), _AT)
-    low, high = (np.clip(ends + side * BESIDE, 0, slope.shape[1]) for side in (-1, 1))
-    around = np.stack([slope[:, i:j].max(axis=1) for i, j in zip(low, high, strict=True)], axis=1)
-    file_a, file_b = (
-        np.clip(axis.to_file(x.x.ravel()), axis.low, axis.high)
-        for axis, x in ((chart.a, a), (chart.b, b))
-    )
-    v, y, eta = chart.point(file_a[:, None], file_b[None, :], surrogate.border)
-    v, y, eta = (x.ravel() for x in np.broadcast_arrays(v, y, eta))
-    code, lively = QUANTITY_NAMES.index(name), v > 0.0
-    along, scale = np.zeros(v.size), np.ones(v.size)
-    along[lively] = of.slopes(surrogate, name, v[lively], y[lively])[1]
-    scale[lively] = kernels[-1].forms(
-        code, index, v[lively], y[lively], eta[lively], of.kind.contact
-    )[1]
-    moved = np.abs(np.divide(along, scale, out=np.zeros(v.size), where=scale != 0.0))
-    wide = (*a.x.shape, *b.x.shape)
-    return np.asarray(moved.reshape(wide) * (around / a.shares)[:, :, None, None])
 
 
 def _value_errors(

@@ -15,16 +15,13 @@ from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
+from mumacro.table.atlas import STEEPEST_Y
 
 #: regime -> the border at which it begins or ends
 BORDER_NAMES = {
     "reverse_slip": "border of reverse slip",
     "continuous": "border of continuous sliding",
 }
-# y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls
-# strictly from 2 to 1/2 (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on
-# either side.
-_Y_CLOSEST = 1.290791
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,10 @@ def border_crossings(
     if curve.case.get("k") == math.inf or 0.0 in curve.case.values() or curve.proportional:
         return ()
     low = max(low, TINY)  # at 0 nothing oscillates or slides
-    middle = low if along in EVERYWHERE or direction != "across" else curve.where(_Y_CLOSEST)
+    # On a ray v~/v~crit(y~) is smallest at STEEPEST_Y, where d ln v~crit / d ln y~ = 1.  The slope
+    # falls strictly from 2 to 1/2 (20,001 places from 1e-6 to 1e12), so the border is crossed at
+    # most once on either side.
+    middle = low if along in EVERYWHERE or direction != "across" else curve.where(STEEPEST_Y)
     edges = np.array([low, middle, high] if low < middle < high else [low, high])
     pairs = []
     for regime in ("continuous", "reverse_slip"):

@@ -2,158 +2,29 @@
 of what the points do not determine.
 
 mu_macro = mu0 mu~(p) with p = k/mu0: at each p the best mu0 follows from a linear equation, so that
-one scan of p sees every minimum, the limits of a soft and of a rigid contact, and the ranges that
-the points allow.  Each minimum is then refined by :func:`scipy.optimize.least_squares`.  Needs
-scipy, a plot matplotlib.
+one profile of chi2 over p (:mod:`mumacro.analysis.profile`) has every minimum, the limits of a soft
+and of a rigid contact, and the ranges that the points allow.  Needs scipy, a plot matplotlib.
 """
 
 import functools
 import math
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from mumacro import plotting
-from mumacro.analysis.measured_points import HARDLY, STD, UNKNOWNS, Measured
-from mumacro.errors import InputError, missing
-from mumacro.inputs.cases import real
+from mumacro.analysis.fitted import Fit, quantile
+from mumacro.analysis.measured_points import HARDLY, STD, Measured
+from mumacro.analysis.profile import Goal, Profile
+from mumacro.errors import InputError
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
-CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
-_PER_DECADE, _MOST_NODES = 10, 600  # of the scan
-
-
-@dataclass(frozen=True)
-class Fit:
-    """k and mu0 of a contact, fitted to measured points.
-
-    Attributes
-    ----------
-    values : dict
-        k [N/m] and mu0 [-], those that were unknown; k is infinite where a rigid contact fits best.
-    std : dict
-        Their standard deviations; infinite where the points do not determine a value.
-    covariance : ndarray
-        (unknowns, unknowns), in the order of ``values``.  Without standard deviations of the points
-        it is scaled by the scatter about the fit.
-    interval : dict of tuple
-        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.  Of
-        several solutions they cover all, while ``std`` and ``covariance`` are those of the best
-        one.
-    residuals : ndarray
-        Measured mu_macro minus the fit's [-], (n,).
-    chi2, reduced_chi2 : float
-        Sum of squared residuals over their variances (1 by default); the same over the degrees of
-        freedom, NaN without any.
-    solutions : tuple of dict
-        All minima that the points allow within 95 %, best first, each with values and ``chi2``.
-    warnings : tuple of str
-        Each names a value that the points do not determine, or a doubt about the fit.
-    contact, direction : str
-        Of the contact that was fitted.
-    points : dict of ndarray
-        The inputs [SI] of each point, (n,), the unknown ones left out; ``mu_macro``, and ``std``
-        where given.
-    """
-
-    values: dict[str, float]
-    std: dict[str, float]
-    covariance: Array
-    interval: dict[str, tuple[float, float]]
-    residuals: Array
-    chi2: float
-    reduced_chi2: float
-    solutions: tuple[dict[str, float], ...]
-    warnings: tuple[str, ...]
-    contact: str
-    direction: str
-    points: dict[str, Array]
-    _problem: Measured = field(repr=False, compare=False)
-
-    def predict(self, **inputs: ArrayLike) -> tuple[Array, Array]:
-        """mu_macro of the fit [-] and its standard deviation, at inputs [SI] that replace those of
-        the points."""
-        columns = {
-            **self._problem.columns,
-            **{name: real(name, value) for name, value in inputs.items()},
-        }
-        mu, slopes = self._problem.model(self.values, columns)
-        # a rigid contact has no slope along k
-        covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
-        rows = np.stack([slopes[name] for name in self.values], axis=-1)
-        return mu, np.sqrt(np.einsum("...i,ij,...j", rows, covariance, rows))
-
-    def plot(self, ax: Any = None) -> Any:
-        """Points, fit and its 95 % band over the input that varies most; returns matplotlib's axes.
-
-        Each set of the other inputs has a curve; more than 8 of them have no legend.  Where each
-        point has a set of its own, such as its mu0, one line joins the fit at the points.
-        """
-        inputs = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
-        along = max(inputs, key=lambda name: (np.unique(inputs[name]).size, name == "v0"))
-        x, names = inputs[along], [name for name in self._problem.columns if name != along]
-        sets, member = np.unique([self.points[name] for name in names], axis=1, return_inverse=True)
-        if sets.shape[1] == x.size > 1:
-            return self._plot_each(along, ax)
-        low = x[x > 0.0].min(initial=math.inf)
-        fine = np.geomspace(low, x.max(), 300) if low < math.inf else x
-        width = quantile(None if STD in self.points else x.size - len(self.values))
-        curves = []
-        for i, row in enumerate(sets.T):
-            in_set = member.ravel() == i
-            set_labels = [
-                f"{name} = {x:.4g}"
-                for name, x, all_ in zip(names, row, sets, strict=True)
-                if np.ptp(all_) > 0.0
-            ]
-            x_curve = np.unique(np.concatenate([fine, x[in_set]]))
-            mu, deviation = self.predict(**{along: x_curve}, **dict(zip(names, row, strict=True)))
-            bars = self.points[STD][in_set] if STD in self.points else None
-            label, mu_measured = ", ".join(set_labels) or "fit", self.points["mu_macro"][in_set]
-            curves.append(
-                plotting.Curve(label, x[in_set], mu_measured, bars, x_curve, mu, width * deviation)
-            )
-        return plotting.plot_fit(along, curves, self._title(), ax)
-
-    def _plot_each(self, along: str, ax: Any) -> Any:
-        """The same where each point has its own other inputs, such as mu0: one line."""
-        order = np.argsort(self.points[along])
-        x, mu_measured = self.points[along][order], self.points["mu_macro"][order]
-        mu, deviation = (column[order] for column in self.predict())
-        std = self.points.get(STD)
-        width = quantile(None if std is not None else x.size - len(self.values))
-        bars, label = None if std is None else std[order], "fit, at the inputs of each point"
-        curve = plotting.Curve(label, x, mu_measured, bars, x, mu, width * deviation)
-        return plotting.plot_fit(along, [curve], self._title(), ax)
-
-    def _title(self) -> str:
-        return f"{', '.join(self._value_texts())}; {self.contact}, {self.direction}"
-
-    def _value_texts(self) -> list[str]:
-        units = {"k": " N/m", "mu0": ""}
-        return [
-            f"{name} = {x:.4g} ± {self.std[name]:.2g}{units[name]}"
-            for name, x in self.values.items()
-        ]
-
-    def __repr__(self) -> str:
-        has_std = STD in self.points
-        scatter = (
-            f"reduced chi2 {self.reduced_chi2:.3g}"
-            if has_std
-            else f"scatter {math.sqrt(self.reduced_chi2):.2g}"
-        )
-        summary = f"{self.residuals.size} points, {scatter}, {self.contact}"
-        lines = [
-            f"<Fit {', '.join(self._value_texts())}; {summary}>",
-            *(f"  warning: {text}" for text in self.warnings),
-        ]
-        return "\n".join(lines)
+_PER_DECADE, _MOST_NODES = 10, 600  # of the first samples
+# y~, for normal v~, at which a contact is so soft that friction is mu0 to 6 digits or more
+_SOFT = {"across": 1e-4, "along": 1e-6, "normal": 1e-6}
+_NARROW = 1e-6  # of an interval in logarithms, where chi2 is a parabola
 
 
 def fit(
@@ -221,119 +92,93 @@ def _bundled_surrogate() -> Surrogate:
     return Surrogate.open()
 
 
-@dataclass
-class _Scan:
-    """Profile of chi2 over the unknowns, (nodes,); chi2 rises with mu0 by ``rise`` (mu0 - best)^2
-    at fixed k/mu0."""
-
-    k: Array
-    mu0: Array
-    chi2: Array
-    rise: Array
-
-
 class _Minimum(NamedTuple):
-    """A minimum of chi2, refined from a node of the scan."""
+    """A minimum of chi2, at a sample of the profile."""
 
     chi2: float
     values: dict[str, float]
-    node: int
+    sample: int
 
 
 class _Problem(Measured):
     """The search for the unknowns at which the model fits the points best."""
 
-    def _scan(self) -> _Scan:
-        """Every legal k from so soft that friction is mu0 to rigid, the last node; or every mu0 of
-        a known k."""
-        if "k" not in self.unknowns:
-            mu0 = np.geomspace(0.2, 1e6, 7 * _PER_DECADE) * self.mu.max()
-            return self._scan_at(self.columns["k"][:1].repeat(mu0.size), mu0)
+    def _profile(self, allowed: Callable[[float], float]) -> Profile:
+        """Over k, over mu0 of a known k, or over k/mu0 with the best mu0; the last place of k is
+        rigid."""
+        has_factor = len(self.unknowns) == 2
+        along = self.unknowns[0]
+
+        def model(s: Array, slopes: bool) -> tuple[Array, Array]:
+            with np.errstate(over="ignore"):
+                x = np.exp(s)
+            mu, slope = self.at(along, x, np.ones(x.size) if has_factor else None, slopes)
+            steps = slope * np.where(np.isfinite(x), x, 0.0)[:, None]
+            return mu * self.weight, np.nan_to_num(steps, posinf=0.0, neginf=0.0) * self.weight
+
+        low, high = self._ends_of_mu0() if along == "mu0" else self._ends_of_k(has_factor)
+        low, high = np.clip([low, high], -650.0, 650.0)
+        nodes = int(np.clip((high - low) / math.log(10.0) * _PER_DECADE, 16, _MOST_NODES))
+        s = np.linspace(low, high, nodes)
+        rigid = [math.inf] if along == "k" else []
+        return Profile(model, self.weight * self.mu, has_factor, np.append(s, rigid), allowed)
+
+    def _ends_of_mu0(self) -> tuple[float, float]:
+        """Logarithms of a small and a large mu0, for a known k."""
+        top = math.log(self.mu.max())
+        return top + math.log(1e-3), top + math.log(1e6)
+
+    def _ends_of_k(self, per_mu0: bool) -> tuple[float, float]:
+        """Logarithms of k, or of k/mu0, so soft that friction is mu0 and as good as rigid."""
         force, omega, v0 = (self.columns[name] for name in ("Fz", "omega", "v0"))
         with np.errstate(all="ignore"):
             speed_length = v0 / omega
             amplitude = self.columns["y0"] if self.amplitude == "y0" else speed_length
             oscillates = (amplitude > 0.0) & (omega > 0.0)
             # v~ = 100, and 100 times y~/v~, where it slides; where it only rests y~ = 100
-            stiff = (
-                100.0
-                * (
-                    force
-                    / np.where(
-                        speed_length > 0.0,
-                        np.minimum(speed_length, speed_length / amplitude * speed_length),
-                        amplitude,
-                    )
-                )[oscillates]
+            length = np.where(
+                speed_length > 0.0,
+                np.minimum(speed_length, speed_length / amplitude * speed_length),
+                amplitude,
             )
-            ends = np.log([1e-3 * (force / amplitude)[oscillates].min(), stiff.max()])
-        low, high = np.clip(ends, -650.0, 650.0)
-        nodes = int(np.clip((high - low) / math.log(10.0) * _PER_DECADE, 16, _MOST_NODES))
-        p = np.append(np.exp(np.linspace(low, high, nodes)), math.inf)
-        if "mu0" not in self.unknowns:
-            return self._scan_at(
-                p * float(np.median(self.columns["mu0"])), np.full(p.size, math.nan)
-            )
-        ratio, w2 = self.at(p, np.ones(p.size)), self.weight**2
-        rise = (w2 * ratio**2).sum(axis=1)
-        mu0 = np.divide(
-            (w2 * ratio * self.mu).sum(axis=1), rise, out=np.zeros(p.size), where=rise > 0.0
-        )
-        return _Scan(p * np.maximum(mu0, 1e-300), mu0, self.chi2(mu0[:, None] * ratio), rise)
-
-    def _scan_at(self, k: Array, mu0: Array) -> _Scan:
-        return _Scan(k, mu0, self.chi2(self.at(k, mu0)), np.zeros(k.size))
+            soft = _SOFT[self.direction] * (force / amplitude)[oscillates].min()
+            stiff = 100.0 * (force / length)[oscillates].max()
+            mu0 = 1.0 if per_mu0 else float(np.median(self.columns["mu0"]))
+            low, high = np.log([soft, stiff]) + math.log(mu0)
+        return float(low), float(high)
 
     # --- solutions --------------------------------------------------------------------------------
 
     def solve(self) -> Fit:
-        """Scan, refine every minimum, and make the fit with its intervals and warnings."""
-        scan, size = self._scan(), float(((self.weight * self.mu) ** 2).sum())
-        if "k" in self.unknowns and np.ptp(scan.chi2) <= 1e-12 * size:
+        """Sample the profile of chi2, and make the fit with its intervals and warnings."""
+        size, dof = float(((self.weight * self.mu) ** 2).sum()), self.n - len(self.unknowns)
+        width = quantile(dof if self.std is None else None)
+
+        def variance_at(chi2: float) -> float:
+            rounding = 1e-30 * size  # of exact points: mu_macro has sixteen digits
+            if self.std is not None:
+                return 1.0
+            return max(chi2 / dof, rounding) if dof else math.inf
+
+        def barrier_at(chi2: float) -> float:
+            variance = variance_at(chi2)
+            return 1e-12 * size if math.isinf(variance) else max(variance, 1e-14 * size)
+
+        profile = self._profile(lambda chi2: chi2 + width**2 * barrier_at(chi2))
+        if "k" in self.unknowns and np.ptp(profile.at.chi2) <= 1e-12 * size:
             bound = (
                 "points in which k matters: up to a factor, every k fits these alike; vary v0 "
                 f"or {self.amplitude}"
             )
             raise InputError("data", f"{self.n} points", bound)
-        walled_chi2 = np.concatenate(([math.inf], scan.chi2, [math.inf]))
-        lowest = np.flatnonzero(
-            (walled_chi2[1:-1] < walled_chi2[:-2]) & (walled_chi2[1:-1] <= walled_chi2[2:])
-        )
-        minima = sorted((self._refine(scan, int(i)) for i in lowest), key=lambda m: m.chi2)
-        chi2, dof = minima[0].chi2, self.n - len(self.unknowns)
-        rounding = 1e-30 * size  # of exact points: mu_macro has sixteen digits
-        variance = 1.0 if self.std is not None else max(chi2 / dof, rounding) if dof else math.inf
-        width = quantile(dof if self.std is None else None)
-        barrier = 1e-12 * size if math.isinf(variance) else max(variance, 1e-14 * size)
-        solutions: list[_Minimum] = []
-        # A minimum within 95 % is a solution of its own if chi2 rises by at least one standard
-        # deviation on the way to every better solution; else it is a ripple of that one.
-        for minimum in minima:
-            ridges = (
-                scan.chi2[
-                    min(minimum.node, solution.node) : max(minimum.node, solution.node) + 1
-                ].max()
-                for solution in solutions
-            )
-            if minimum.chi2 - chi2 <= width**2 * barrier and all(
-                ridge > minimum.chi2 + barrier for ridge in ridges
-            ):
-                solutions.append(minimum)
-        values = solutions[0].values
+        solutions = self._solutions(profile, barrier_at)
+        chi2, values = solutions[0].chi2, solutions[0].values
+        variance = variance_at(chi2)
         logs = self._covariance(values, variance)
         scale = np.array([x if math.isfinite(x) else 1.0 for x in values.values()])
         covariance = np.where(np.isinf(logs), logs, logs * np.outer(scale, scale))
-        deviations = np.sqrt(np.diag(logs))
-        std = dict(zip(values, (scale * deviations).tolist(), strict=True))
-        interval = self._interval(scan, chi2, width, variance, values, deviations)
-        # any of the solutions may be the true contact: the interval covers them all
-        for solution in solutions[1:]:
-            half_widths = width * np.sqrt(np.diag(self._covariance(solution.values, variance)))
-            ends = _around(solution.values, half_widths)
-            interval = {
-                name: (min(low, ends[name][0]), max(high, ends[name][1]))
-                for name, (low, high) in interval.items()
-            }
+        std = dict(zip(values, (scale * np.sqrt(np.diag(logs))).tolist(), strict=True))
+        interval = self._interval(profile, solutions, width, variance)
         solution_dicts = tuple({**solution.values, "chi2": solution.chi2} for solution in solutions)
         points = {
             **self.columns,
@@ -350,39 +195,42 @@ class _Problem(Measured):
             chi2 / dof if dof else math.nan,
             solution_dicts,
             tuple(self._warnings(values, interval, solution_dicts, chi2, dof)),
+            tuple(self.remarks()),
             self.contact,
             self.direction,
             points,
             self,
         )
 
-    def _refine(self, scan: _Scan, node: int) -> _Minimum:
-        """The minimum beside a node of the scan."""
-        try:
-            from scipy.optimize import least_squares
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError(missing("fit", error), name=error.name) from None
-        values = {name: float(getattr(scan, name)[node]) for name in self.unknowns}
-        if not all(0.0 < x < math.inf for x in values.values()):
-            return _Minimum(float(scan.chi2[node]), values, node)
+    def _solutions(self, profile: Profile, barrier_at: Callable[[float], float]) -> list[_Minimum]:
+        """The minima that are allowed, best first.
 
-        def residuals(logs: Array) -> Array:
-            return self.weight * (self.model(self._values(logs), self.columns)[0] - self.mu)
+        A minimum is a solution of its own if chi2 rises by at least one standard deviation on the
+        way to every better solution; else it is a ripple of that one.
+        """
+        minima = [
+            _Minimum(float(profile.at.chi2[i]), self._values_at(profile, i), i)
+            for i in profile.lowest().tolist()
+            if profile.at.chi2[i] <= profile.limit
+        ]
+        minima.sort(key=lambda minimum: minimum.chi2)
+        barrier = barrier_at(minima[0].chi2)
+        solutions: list[_Minimum] = []
+        for minimum in minima:
+            ridges = (profile.ridge(minimum.sample, other.sample) for other in solutions)
+            if all(ridge > minimum.chi2 + barrier for ridge in ridges):
+                solutions.append(minimum)
+        return solutions
 
-        def slopes(logs: Array) -> Array:
-            return self._log_slopes(self._values(logs))
-
-        start = np.log(list(values.values()))
-        bounds = start - 2.5, start + 2.5
-        # It ends by the step alone: an unknown that the points hardly determine changes chi2 and
-        # its slope by next to nothing.
-        optimum = least_squares(residuals, start, slopes, bounds, xtol=1e-12, ftol=None, gtol=None)
-        if not np.isfinite(optimum.x).all():  # 0 / 0 in scipy, where no point depends on k
-            return _Minimum(float(scan.chi2[node]), values, node)
-        return _Minimum(2.0 * float(optimum.cost), self._values(optimum.x), node)
-
-    def _values(self, logs: Array) -> dict[str, float]:
-        return dict(zip(self.unknowns, np.exp(logs).tolist(), strict=True))
+    def _values_at(self, profile: Profile, sample: int) -> dict[str, float]:
+        """The unknowns at a sample."""
+        with np.errstate(over="ignore"):
+            x, factor = float(np.exp(profile.at.s[sample])), float(profile.at.factor[sample])
+        if len(self.unknowns) == 1:
+            return {self.unknowns[0]: x}
+        factor = max(factor, 1e-300)
+        values = {"k": x * factor, "mu0": factor}
+        return {name: values[name] for name in self.unknowns}
 
     def _log_slopes(self, values: Mapping[str, float]) -> Array:
         """d(weighted mu_macro) / d ln(unknown), (points, unknowns); 0 for an infinite k."""
@@ -408,39 +256,57 @@ class _Problem(Measured):
         return covariance
 
     def _interval(
-        self,
-        scan: _Scan,
-        chi2: float,
-        width: float,
-        variance: float,
-        values: Mapping[str, float],
-        deviations: Array,
+        self, profile: Profile, solutions: Sequence[_Minimum], width: float, variance: float
     ) -> dict[str, tuple[float, float]]:
-        """From the profile of chi2 where it has enough nodes, since an end may be open there; else
-        from the covariance."""
-        margin = width**2 * variance - (scan.chi2 - chi2)
-        inside = margin >= 0.0
-        if np.count_nonzero(inside) < 6 or math.isinf(variance):
-            return _around(values, width * deviations)
-        ranges = {
-            "k": (scan.k[inside], scan.k[inside]),
-            "mu0": (scan.mu0[inside], scan.mu0[inside]),
-        }
-        if len(self.unknowns) == 2:
-            mu0, k = scan.mu0[inside], scan.k[inside]
-            half_width = np.sqrt(margin[inside] / scan.rise[inside])
-            relative_width = half_width / mu0
-            low = k * np.where(relative_width < 1.0, 1.0 - relative_width, 0.0)
-            ranges = {
-                "k": (low, k * (1.0 + relative_width)),
-                "mu0": (np.maximum(mu0 - half_width, 0.0), mu0 + half_width),
+        """What the profile of chi2 allows; of exact points, or without a measure of the error, what
+        the covariance says.  Any of the solutions may be the true contact: it covers them all."""
+        half_widths = [
+            width * np.sqrt(np.diag(self._covariance(one.values, variance))) for one in solutions
+        ]
+        narrow = max(float(x.max()) for x in half_widths) < _NARROW
+        if narrow or math.isinf(variance):
+            each = [_around(one.values, x) for one, x in zip(solutions, half_widths, strict=True)]
+            return {
+                name: (min(x[name][0] for x in each), max(x[name][1] for x in each))
+                for name in self.unknowns
             }
-        ends = {
-            name: (float(ranges[name][0].min()), float(ranges[name][1].max())) for name in values
-        }
-        if "k" in ends and inside[0]:
-            ends["k"] = 0.0, ends["k"][1]
-        return ends
+        return self._allowed_ranges(profile)
+
+    def _allowed_ranges(self, profile: Profile) -> dict[str, tuple[float, float]]:
+        """Smallest and largest value of each unknown among the contacts that are allowed.
+
+        Where the first or last place is allowed there is no bound on that side: k is 0 or infinite.
+        """
+        at, inside = profile.at, profile.at.chi2 <= profile.limit
+        finite = np.isfinite(at.s)
+        low = dict.fromkeys(self.unknowns, math.inf)
+        high = dict.fromkeys(self.unknowns, 0.0)
+        if inside[finite].any():
+            found = profile.ends([goal for name in self.unknowns for goal in self._goals(name)])
+            for i, name in enumerate(self.unknowns):
+                low[name], high[name] = max(-found[2 * i], 0.0), found[2 * i + 1]
+        along = self.unknowns[0]
+        if inside[0]:
+            low[along] = 0.0
+        if inside[-1]:
+            high[along] = math.inf
+            low[along] = min(low[along], float(np.exp(at.s[finite][-1]) * at.factor[-1]))
+        if inside[-1] and len(self.unknowns) == 2:  # mu0 of the rigid contact
+            half_width = math.sqrt((profile.limit - at.chi2[-1]) / at.rise[-1])
+            low["mu0"] = min(low["mu0"], max(float(at.factor[-1]) - half_width, 0.0))
+            high["mu0"] = max(high["mu0"], float(at.factor[-1]) + half_width)
+        return {name: (low[name], high[name]) for name in self.unknowns}
+
+    def _goals(self, name: str) -> tuple[Goal, Goal]:
+        """The least and the largest value of an unknown at places of the profile."""
+        if len(self.unknowns) == 1:
+            return lambda s, _, __: -np.exp(s), lambda s, _, __: np.exp(s)
+        if name == "mu0":
+            return lambda _, mu0, off: off - mu0, lambda _, mu0, off: mu0 + off
+        return (
+            lambda s, mu0, off: np.exp(s) * np.minimum(off - mu0, 0.0),
+            lambda s, mu0, off: np.exp(s) * (mu0 + off),
+        )
 
     def _warnings(
         self,
@@ -505,12 +371,3 @@ def _around(values: Mapping[str, float], half_widths: Array) -> dict[str, tuple[
             )
             for (name, x), half_width in zip(values.items(), half_widths, strict=True)
         }
-
-
-def quantile(dof: int | None) -> float:
-    """Half width of a 95 % interval in standard deviations: of Student's t, or of the normal
-    distribution."""
-    from scipy.special import ndtri, stdtrit
-
-    share = 0.5 + 0.5 * CONFIDENCE
-    return float(ndtri(share) if dof is None or dof < 1 else stdtrit(dof, share))

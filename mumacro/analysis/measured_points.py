@@ -2,7 +2,7 @@
 :mod:`mumacro.analysis.fit`."""
 
 from collections.abc import Container, Mapping
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import by_name, check, columns_of, real, select
 from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
-from mumacro.inputs.units import unknown_name
+from mumacro.inputs.names import unknown_name
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
@@ -20,12 +20,23 @@ STD = "std"  # the column of standard deviations
 #: how far a point may lie outside of 0 <= mu_macro <= mu0: in standard deviations; where the
 #: points have none, as a share of mu0
 _SCATTER, _SHARE = 5.0, 0.05
+_PERCENT = 1.5  # mu_macro from which on it is asked if per cent are meant
 _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:
     """The unknowns by default: k and mu0, or k alone where mu0 is a column."""
     return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
+
+
+class Remark(TypedDict):
+    """One doubt: the row of docs/validity.md, the input, how many points it is about, a
+    sentence."""
+
+    row: str
+    field: str
+    cases: int
+    text: str
 
 
 class Measured:
@@ -165,6 +176,54 @@ class Measured:
             )
             _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
 
+    def remarks(self) -> list[Remark]:
+        """What is probably a wrong unit in the points."""
+        doubtful = self.mu > _PERCENT
+        if not doubtful.any():
+            return []
+        largest = float(self.mu.max())
+        text = (
+            f"mu_macro up to {largest:.4g}, and mu_macro above {_PERCENT:g} is rare: is it in per "
+            "cent? Then name the column mu_macro [%], or divide by 100"
+        )
+        cases = int(np.count_nonzero(doubtful))
+        return [{"row": "units", "field": "mu_macro", "cases": cases, "text": text}]
+
+    def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """The inputs of :meth:`model` at other places: those given, the others as at all points."""
+        names = [*self.columns, "f"]
+        for name in inputs:
+            if name in self.unknowns:
+                raise InputError(name, inputs[name], "left out: it is fitted")
+            if name not in names:
+                raise InputError(
+                    name, inputs[name], f"one of {', '.join(names)}; {unknown_name(name, names)}"
+                )
+        given = {} if cases is None else select("cases", cases, [*names, *self.unknowns])
+        for name in given:
+            if name in self.unknowns:
+                raise InputError(name, "a column", "left out: it is fitted")
+            if name in inputs:
+                raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
+        given = {**given, **inputs}
+        if not given:
+            return dict(self.columns)
+        same = dict(self.columns)
+        if "f" in given:
+            del same["omega"]
+            if "omega" in given:
+                same["omega"] = self.columns["omega"]  # both are given: refused with the inputs
+        for name, column in same.items():
+            if name in given:
+                continue
+            if np.unique(column).size > 1:
+                listed = ", ".join(given)
+                raise InputError(
+                    name, f"{listed} alone", f"given beside {listed}: it differs between the points"
+                )
+            given[name] = float(column[0])
+        return given
+
     # --- the model --------------------------------------------------------------------------------
 
     def model(
@@ -179,19 +238,16 @@ class Measured:
         }
         return answer.mu_macro, slopes
 
-    def chi2(self, model: Array) -> Array:
-        """Sum of the squared residuals of rows of mu_macro (..., n), each over its variance."""
-        return np.asarray(((self.weight * (self.mu - model)) ** 2).sum(axis=-1))
-
-    def at(self, k: Array, mu0: Array) -> Array:
-        """mu_macro at rows of the unknowns among k and mu0: (rows, points)."""
-        rows = {"k": k[:, None], "mu0": mu0[:, None]}
-        inputs: dict[str, Any] = {
-            **self.columns,
-            **self.kind.names,
-            **{name: rows[name] for name in self.unknowns},
-        }
-        return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
+    def at(
+        self, name: str, x: Array, mu0: Array | None = None, slopes: bool = True
+    ) -> tuple[Array, Array]:
+        """mu_macro at values ``x`` (m,) of one unknown, and its slope along it, zero unless asked
+        for: (m, n) each; at ``mu0`` (m,) where that is unknown, too."""
+        rows = {name: x[:, None]} | ({} if mu0 is None else {"mu0": mu0[:, None]})
+        inputs: dict[str, Any] = {**self.columns, **self.kind.names, **rows}
+        answer = self.surrogate.evaluate(**inputs, gradient=slopes)
+        mu = np.asarray(answer.mu_macro)
+        return mu, np.asarray(answer.gradient[name]) if slopes else np.zeros_like(mu)
 
 
 def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:

@@ -7,7 +7,7 @@ the cycle is the fixed point of the map of a period.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -20,11 +20,11 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import ABSENT, columns_of, real
 from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS
 from mumacro.inputs.kind import kind_of
+from mumacro.inputs.oscillation import read_oscillation
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
 
-MOST_HARMONIC = 1000
 TOLERANCES = 1e-9, 1e-2
 # of ways per radian, in units of mu0 Fz / k; below the last, rounding decides which way the drag
 # pulls
@@ -34,14 +34,6 @@ PARTS = ("x", "y", "normal")
 _SPRINGS = 64  # of a ball that is drawn
 _AT_ONCE = 16, 1  # cases of a thread, of springs and balls
 _KERNEL = kernels[-1]
-_FORM = (
-    "an amplitude, a pair (amplitude, phase in degrees), or a list of triples (harmonic, "
-    "amplitude, phase in degrees)"
-)
-WHOLE = (
-    f"a whole number from 1 to {MOST_HARMONIC}: other ratios have no period 2 pi/omega; give the "
-    "frequency of which all are multiples"
-)
 _LIFTS_OFF = "an oscillation that leaves a load > 0 at every moment: at 0 the contact lifts off"
 _STILL = "> 0, or x or y an oscillation: the friction of a contact that does not move is not fixed"
 _RIGID = "finite: a rigid contact is the limit of a large k; raise it until mu_macro stays the same"
@@ -208,8 +200,9 @@ def motion(
         Angular frequency [rad/s] or frequency [Hz], > 0, of the period.
     x, y, normal : array_like, tuple or list
         Oscillations along [m], across [m] and of the normal force [N].  Each is an amplitude (half
-        of peak to peak), a pair (amplitude, phase in degrees), or a list of triples (harmonic,
-        amplitude, phase), that is amplitude sin(harmonic omega t + phase).  Harmonics are whole
+        of peak to peak), a text such as "2um@90deg" or "2um, 3:0.4um@90deg", a pair (amplitude,
+        phase in degrees), or a list of triples (harmonic, amplitude, phase), that is amplitude
+        sin(harmonic omega t + phase).  Harmonics are whole
         numbers from 1 to 1000.  Phases beyond 360 count as what is left of them.
     contact : str
         "spring", or "ball" under a constant normal force.
@@ -281,30 +274,12 @@ def motion(
 
 def _terms(name: str, part: Any) -> Iterable[Term]:
     """The harmonics of one part of a motion; none for an amplitude 0."""
-    if isinstance(part, tuple) and len(part) == 2:
-        triples: Sequence[Any] = [(1, *part)]
-    elif isinstance(part, (list, tuple)) and all(isinstance(one, (list, tuple)) for one in part):
-        triples = part
-    else:
-        triples = [(1, part, 0.0)]
-    for triple in triples:
-        if not isinstance(triple, (list, tuple)) or len(triple) != 3:
-            raise InputError(name, part, _FORM)
-        harmonic, amplitude, phase = triple
-        try:
-            order = float(harmonic)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{name}, harmonic", harmonic, WHOLE) from error
-        if isinstance(harmonic, (str, bool)) or not (
-            order.is_integer() and 1.0 <= order <= MOST_HARMONIC
-        ):
-            raise InputError(f"{name}, harmonic", harmonic, WHOLE)
-        degrees = real(f"{name}, phase", phase)
+    for order, amplitude, degrees in read_oscillation(name, part):
+        size = np.asarray(amplitude, np.float64)
         with np.errstate(invalid="ignore"):
-            angle = np.deg2rad(np.fmod(degrees, 360.0))
-        size = real(f"{name}, amplitude", amplitude)
+            angle = np.deg2rad(np.fmod(np.asarray(degrees, np.float64), 360.0))
         if size.ndim or angle.ndim or size != 0.0 or not np.isfinite(angle):
-            yield Term(int(order), size, np.asarray(angle))
+            yield Term(order, size, np.asarray(angle))
 
 
 def _legal(scenes: Scenes, one: bool, frequency: str) -> Bools:

@@ -18,16 +18,18 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.validity import Row, digits, k_effect
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import check, without_interval
-from mumacro.inputs.fields import LIKE, NAMES, RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
+from mumacro.inputs.names import suggestion
+from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.text_tables import SEPARATORS
-from mumacro.inputs.units import read_number, read_range, scale_of, suggestion
+from mumacro.inputs.units import belongs_to_value
 from mumacro.surrogate import Surrogate
+from mumacro.validity import Row, digits, k_effect
 
-INPUTS = """\
+ABOUT_INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
   mu0    Coulomb friction coefficient [-], > 0
   Fz     normal force [N], > 0
@@ -65,10 +67,12 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault, with the choice that may have been meant, or
         with the example of the help where something is missing."""
-        if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
-            choices = [word.strip(" '") for word in wrong[3].split(",")]
-            near = difflib.get_close_matches(wrong[2].lower(), choices, n=1)
-            message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
+        fault, _, offer = message.rpartition(" (choose from ")
+        _, wrong, chosen = fault.rpartition(": invalid choice: ")
+        if wrong:
+            choices = [word.strip(" '") for word in offer.removesuffix(")").split(",")]
+            near = difflib.get_close_matches(chosen.strip("'").lower(), choices, n=1)
+            message = f"{fault}, did you mean {near[0]}?" if near else message
         message = message.replace("the following arguments are required", "missing")
         lines = (self.epilog or "").splitlines()
         example = next((line.strip() for line in lines if line.startswith("  mumacro ")), None)
@@ -221,7 +225,7 @@ def read_case(
         case[name] = math.nan
         try:
             case[name] = _read(name, text, one_k)
-        except ValueError as error:
+        except InputError as error:
             faults.append(str(error))
     if strange:
         verb = "is" if len(strange) == 1 else "are"
@@ -234,16 +238,17 @@ def read_case(
 
 
 def _read(name: str, text: str, one_k: str) -> float | tuple[float, float]:
-    """The value of an input, or the ends of k; ValueError where it is none, or out of bounds."""
-    if name == "k" and ".." in text:
-        ends = read_range(name, text)
+    """The value of an input, or the ends of k; InputError where it is none, or out of bounds."""
+    value = read(name, text)
+    if value.low is not None:
         if one_k:
-            raise ValueError(f"k={text}: {one_k}")
-        return ends
-    value = read_number(name, text)
-    field, in_model = ("omega", value * RAD_PER_CYCLE) if name == "f" else (name, value)
-    check({field: in_model}, value if name == "f" else None)
-    return value
+            raise InputError(name, text, f"one number: {one_k}")
+        return value.low, value.high
+    if value.std is not None:
+        raise InputError(name, text, NO_DEVIATION)
+    field, in_model = ("omega", value.si * RAD_PER_CYCLE) if name == "f" else (name, value.si)
+    check({field: in_model}, value.si if name == "f" else None)
+    return float(value.si)
 
 
 def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
@@ -261,13 +266,14 @@ def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
 def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
     """Name and value of each ``name=value``; a unit may stand apart; other words have no value."""
     pairs: list[tuple[str, str | None]] = []
-    for word in re.sub(r"\s*=\s*", "=", " ".join(words)).split():
+    text = " ".join(" ".join(words).split())
+    for word in text.replace(" =", "=").replace("= ", "=").split():
         name, equals, text = word.strip(",;").partition("=")
         last, value = pairs[-1] if pairs else ("", None)
         if equals:
             pairs.append((name, text))
-        elif value is not None and last in (*NAMES, *LIKE) and scale_of(last, name):
-            pairs[-1] = last, f"{value} {name}"
+        elif value is not None and last in INPUTS and belongs_to_value(word):
+            pairs[-1] = last, f"{value} {word.rstrip(',;')}"
         else:
             pairs.append((name, None))
     return pairs
@@ -323,16 +329,14 @@ def format_for(
     return f".{digits(k_effect(surrogate, case, contact, direction))}g"
 
 
-def read_values(
-    pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number
-) -> list[Any]:
+def read_values(pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any]) -> list[Any]:
     """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
     are none."""
     values, faults = [], []
     for name, text in pairs:
         try:
             values.append(read(name, text))
-        except ValueError as error:
+        except InputError as error:
             faults.append(str(error))
     if faults:
         raise UsageError("; ".join(dict.fromkeys(faults)))

@@ -29,7 +29,7 @@ examples:
   mumacro eval german.csv -o out.csv --sep ';' --decimal ,
   mumacro eval - -o - < cases.csv > out.csv
 
-A stopped run goes on when the same command is given again; the output has the same bytes.
+The output appears whole or not at all; an interrupted run leaves an older one as it is.
 exit codes: 0 every row evaluated, 3 some rows rejected, 1 could not run, 2 wrong arguments,
   130 interrupted
 """
@@ -81,9 +81,7 @@ def main(words: Sequence[str]) -> int:
         default=[],
         help="add d mu_macro / d input",
     )
-    parser.add_argument(
-        "--force", action="store_true", help="replace an output, delete the parts of another run"
-    )
+    parser.add_argument("--force", action="store_true", help="replace an output that exists")
     chosen = parser.parse_intermixed_args(words)
     surrogate = open_table(chosen.table)
     options = {
@@ -97,7 +95,6 @@ def main(words: Sequence[str]) -> int:
         TextColumn("{task.description}"),
         TimeRemainingColumn(),
     )
-    # a bar on a terminal, and lines above it; elsewhere lines alone
     bar = Progress(*bars, console=console, disable=not console.is_terminal)
     task = bar.add_task("", total=1.0)
 
@@ -118,7 +115,6 @@ def main(words: Sequence[str]) -> int:
                     surrogate,
                     sep=SEPARATORS[chosen.sep],
                     progress=progress,
-                    say=lambda text: console.print(f"mumacro eval: {text}"),
                     **options,
                 )
             counts = f"{done.answered:,} of {done.rows:,} rows evaluated with {surrogate.id}"
@@ -131,9 +127,8 @@ def main(words: Sequence[str]) -> int:
                 )
             else:
                 rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
-                resumed = f"; {done.resumed:,} were done already" if done.resumed else ""
-                print(f"{counts}: {done.out}{rejects}{resumed}")
+                print(f"{counts}: {done.out}{rejects}")
     except KeyboardInterrupt:
-        print("mumacro eval: stopped; the same command goes on", file=sys.stderr)
+        print("mumacro eval: interrupted; nothing was written", file=sys.stderr)
         return 130
     return 3 if done.rejected else 0

@@ -5,15 +5,14 @@ import math
 import sys
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mumacro.analysis.fit import Fit, fit
+from mumacro.analysis.fit import fit
+from mumacro.analysis.fitted import Fit
 from mumacro.analysis.measured_points import STD, UNKNOWNS, unknowns_beside
-from mumacro.analysis.validity import digits
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, open_table
 from mumacro.errors import InputError
@@ -27,6 +26,7 @@ from mumacro.inputs.text_tables import (
     read_head,
     read_text,
 )
+from mumacro.validity import digits
 
 EXAMPLE = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\
@@ -104,8 +104,7 @@ def run(words: Sequence[str]) -> str:
             + _text(result, chosen.digits)
         )
     if chosen.json:
-        whole = {field.name: getattr(result, field.name) for field in fields(result) if field.repr}
-        return as_json({**whole, "table": common.about(surrogate)})
+        return as_json({**result.to_dict(), "table": common.about(surrogate)})
     return _text(result, chosen.digits)
 
 
@@ -135,7 +134,9 @@ def _text(result: Fit, shown: int | None) -> str:
     for i, one in enumerate(result.solutions[1:], 2):
         values = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in result.values)
         rows.append((f"solution {i}", values))
-    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in result.warnings)])
+    doubts = [f"warning: {text}" for text in result.warnings]
+    doubts += [f"{remark['row']}: {remark['text']}" for remark in result.remarks]
+    return "\n".join([in_columns(rows), *doubts])
 
 
 def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> dict[str, Any]:

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 
 from mumacro.analysis.approximations import approximations
 from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.validity import load_rows
 from mumacro.cli import common
 from mumacro.cli.common import CURVE, UsageError, as_json, in_columns, open_table, read_case
 from mumacro.inputs.fields import field_of, unit_of
+from mumacro.inputs.reading import read_one
+from mumacro.validity import load_rows
 
 EXAMPLE = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz' --along v0 0.1mm/s 1m/s"
 
@@ -19,7 +20,7 @@ def run(words: Sequence[str]) -> str:
         "mu_macro over a range of one input, with the static value and the border of "
         "continuous sliding."
     )
-    epilog = f"{common.INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} -o law.png"
+    epilog = f"{common.ABOUT_INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} -o law.png"
     parser = common.question("law", description, epilog, "a case without the swept input", "*")
     text = "the swept input, its first and its last value, in its SI unit or with a unit"
     parser.add_argument(
@@ -37,7 +38,9 @@ def run(words: Sequence[str]) -> str:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
     (inner, scale), unit = field_of(along), unit_of(along)
     case = read_case(chosen.words, kind, **common.without_or_load(along))
-    start, stop = (scale * end for end in common.read_values((along, end) for end in ends))
+    start, stop = (
+        scale * end for end in common.read_values(((along, end) for end in ends), read_one)
+    )
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     surrogate = open_table(chosen.table)
     law = friction_law(

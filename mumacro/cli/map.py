@@ -15,7 +15,7 @@ def run(words: Sequence[str]) -> str:
         "The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case "
         "on it."
     )
-    epilog = f"{common.INPUTS}\nexample:\n  mumacro map -o map.png"
+    epilog = f"{common.ABOUT_INPUTS}\nexample:\n  mumacro map -o map.png"
     parser = common.question("map", description, epilog, "a case to mark, if any", "*")
     chosen = parser.parse_intermixed_args(words)
     if chosen.out is None:

@@ -1,7 +1,5 @@
 """``mumacro motion``: the friction under any periodic motion."""
 
-import math
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +9,7 @@ from mumacro.analysis.motion import motion as steady_cycle
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
 from mumacro.inputs.kind import CONTACTS
-from mumacro.inputs.units import UNITS_OF, Scale, read_quantity
+from mumacro.inputs.oscillation import read_oscillation
 
 EXAMPLE = "mumacro motion 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s' --x 1um@90deg --y 2um"
 _INPUTS = """\
@@ -23,10 +21,6 @@ inputs, each as name=value, in SI units or with a unit as in v0=1cm/s:
   v0     speed of the drag along x [m/s], >= 0
 an oscillation is amplitude@phase, of several harmonics a list such as 2um,3:0.4um@90deg
 """
-_UNITS = {"x": UNITS_OF["y0"], "y": UNITS_OF["y0"], "normal": UNITS_OF["Fz"]}
-_WORDS = {"x": "metres", "y": "metres", "normal": "newtons"}
-_ANGLES = {"deg": Scale(), "°": Scale(), "rad": Scale(180.0 / math.pi)}
-_TERM = re.compile(r"(?:([^:@]*):)?([^:@]+)(?:@([^:@]+))?")
 _ROWS = (
     ("mu_macro", "-", "mean force along / Fz"),
     ("mu_lateral", "-", "mean force across / Fz"),
@@ -37,32 +31,6 @@ _ROWS = (
     ("periods", "-", "until a disturbance has fallen to 1 %"),
 )
 _SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N"}
-
-
-def read_terms(name: str, text: str) -> list[tuple[float, float, float]]:
-    """Harmonic, amplitude [SI] and phase [degrees] of each part of ``text``.
-
-    >>> read_terms("y", "2um, 3:0.5um@90deg")
-    [(1.0, 2e-06, 0.0), (3.0, 5e-07, 90.0)]
-    """
-    terms = []
-    for part in text.split(","):
-        term = _TERM.fullmatch(part.strip())
-        if term is None:
-            raise ValueError(f"{name}={text}: write amplitude@phase, or harmonic:amplitude@phase")
-        harmonic, amplitude, phase = term.groups()
-        try:
-            order = 1.0 if harmonic is None else float(harmonic)
-        except ValueError:
-            raise ValueError(f"{name}={text}: the harmonic {harmonic!r} is no number") from None
-        terms.append(
-            (
-                order,
-                read_quantity(f"--{name}", amplitude, _WORDS[name], _UNITS[name]),
-                0.0 if phase is None else read_quantity("phase", phase, "degrees", _ANGLES),
-            )
-        )
-    return terms
 
 
 def run(words: Sequence[str]) -> str:
@@ -92,7 +60,7 @@ def run(words: Sequence[str]) -> str:
     if "y0" in case:
         raise UsageError("y0 is an option here: --y for across, --x for along the drag")
     texts = [(name, text) for name in PARTS if (text := getattr(chosen, name)) is not None]
-    parts = common.read_values(texts, read_terms)
+    parts = common.read_values(texts, read_oscillation)
     motion = steady_cycle(
         **case,
         **dict(zip((name for name, _ in texts), parts, strict=True)),

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mumacro.analysis.validity import model_rows
 from mumacro.answer import BAND
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
 from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.surrogate import Surrogate
+from mumacro.validity import model_rows
 from mumacro.version import __version__
 
 EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz v0=10mm/s"
@@ -26,7 +26,7 @@ ROW_OF_K = ("k is known", True)  # the answer for an interval tells that already
 
 def run(words: Sequence[str], description: str) -> str:
     """``mumacro 'mu0=0.3 ...'``; ``description`` is what the help says of the whole command."""
-    parser = OneLineParser(prog="mumacro", description=description + common.INPUTS)
+    parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
     parser.add_argument("--gradient", action="store_true", help="also d mu_macro / d input")
     parser.add_argument(

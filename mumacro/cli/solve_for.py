@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.solve_for import solve_for
-from mumacro.analysis.validity import load_rows
 from mumacro.cli import common
 from mumacro.cli.common import (
     CURVE,
@@ -18,6 +17,8 @@ from mumacro.cli.common import (
 )
 from mumacro.inputs.fields import NAMES, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.reading import read_one
+from mumacro.validity import load_rows
 
 EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s' --target 0.15"
 
@@ -36,7 +37,9 @@ def _target(text: str) -> float:
 def run(words: Sequence[str]) -> str:
     """``mumacro solve-for``."""
     description = "Every value of one input at which mu_macro is the target."
-    epilog = f"{common.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {EXAMPLE}"
+    epilog = (
+        f"{common.ABOUT_INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {EXAMPLE}"
+    )
     first = "unknown", {"choices": (*NAMES, AMPLITUDE), "help": "the unknown input"}
     parser = common.question("solve-for", description, epilog, "the other five inputs", first=first)
     parser.add_argument("--target", type=_target, required=True, help="wanted mu_macro [-]")
@@ -61,7 +64,8 @@ def run(words: Sequence[str]) -> str:
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
     ends = [
-        scale * end for end in common.read_values((unknown, text) for text in chosen.between or ())
+        scale * end
+        for end in common.read_values(((unknown, text) for text in chosen.between or ()), read_one)
     ]
     surrogate = open_table(chosen.table)
     solution = solve_for(

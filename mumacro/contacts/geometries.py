@@ -1,12 +1,16 @@
-"""The geometries of :mod:`mumacro.contacts.stiffness` by name, with arguments, units and meaning.
+"""The geometries of :mod:`mumacro.stiffness` by name, with arguments, units and meaning.
 
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from mumacro.contacts.stiffness import (
+from mumacro.errors import InputError
+from mumacro.inputs.cases import real
+from mumacro.inputs.names import unknown_name
+from mumacro.inputs.reading import read_one
+from mumacro.stiffness import (
     AXES,
     Contact,
     Material,
@@ -14,17 +18,13 @@ from mumacro.contacts.stiffness import (
     hertz_ball,
     hertz_cylinder,
 )
-from mumacro.errors import InputError
-from mumacro.inputs.cases import real
-from mumacro.inputs.units import UNITS_OF, Scale, read_quantity, unknown_name
 
 
 class Argument(NamedTuple):
-    """One argument: SI unit, units that a person may write, meaning, a value as a person writes it;
-    its only values, for a choice."""
+    """One argument: SI unit, meaning, a value as a person writes it; its only values, for a
+    choice."""
 
     unit: str
-    units: Mapping[str, Scale]
     meaning: str
     example: str
     choices: tuple[str, ...] = ()
@@ -39,32 +39,21 @@ class Geometry(NamedTuple):
     arguments: tuple[str, ...]
 
 
-_PASCAL = {
-    "Pa": Scale(),
-    "kPa": Scale(1e3),
-    "MPa": Scale(1e6),
-    "N/mm2": Scale(1e6),
-    "GPa": Scale(1e9),
-}
-_NUMBER = {"": Scale(), "-": Scale()}
 ARGUMENTS = {
-    "radius": Argument(
-        "m", UNITS_OF["y0"], "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)", "5mm"
-    ),
-    "length": Argument("m", UNITS_OF["y0"], "length of the cylinder", "10mm"),
-    "Fz": Argument("N", UNITS_OF["Fz"], "normal force", "10N"),
+    "radius": Argument("m", "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)", "5mm"),
+    "length": Argument("m", "length of the cylinder", "10mm"),
+    "Fz": Argument("N", "normal force", "10N"),
     "oscillation": Argument(
-        "", {}, "how the contact oscillates beside the axis of the cylinder", AXES[0], AXES
+        "", "how the contact oscillates beside the axis of the cylinder", AXES[0], AXES
     ),
-    "E": Argument("Pa", _PASCAL, "Young's modulus of the first body; rigid, or a number", "210GPa"),
-    "nu": Argument("-", _NUMBER, "its Poisson's ratio", "0.3"),
+    "E": Argument("Pa", "Young's modulus of the first body; rigid, or a number", "210GPa"),
+    "nu": Argument("-", "its Poisson's ratio", "0.3"),
     "E2": Argument(
         "Pa",
-        _PASCAL,
         "Young's modulus of the second body; left out, the bodies are of one material",
         "70GPa",
     ),
-    "nu2": Argument("-", _NUMBER, "its Poisson's ratio; left out, that of the first body", "0.33"),
+    "nu2": Argument("-", "its Poisson's ratio; left out, that of the first body", "0.33"),
 }
 #: arguments of every geometry; the first two are required
 BODIES = ("E", "nu", "E2", "nu2")
@@ -114,13 +103,9 @@ def contact_of(geometry: str, /, **arguments: Any) -> Contact:
 
 
 def read_argument(name: str, text: str) -> Any:
-    """The value of an argument in SI from text, as :func:`read_quantity`; ``rigid`` is an infinite
-    modulus.
+    """The value of an argument in SI from text; ``rigid`` is an infinite modulus.
 
     >>> read_argument("E", "210 GPa"), read_argument("radius", "5mm"), read_argument("E2", "rigid")
     (210000000000.0, 0.005, inf)
     """
-    argument = ARGUMENTS[name]
-    if argument.choices:
-        return text.strip()
-    return read_quantity(name, text, argument.meaning, argument.units, rigid=name in ("E", "E2"))
+    return text.strip() if ARGUMENTS[name].choices else read_one(name, text)

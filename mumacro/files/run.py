@@ -1,24 +1,11 @@
-"""A run over files of cases that can be killed at any moment: the same command goes on, and gives
-the same bytes.
+"""A run over files of cases.  The output appears whole or not at all."""
 
-While it runs, ``OUT.parts/log`` holds a line for the plan (inputs with checksums, options, table),
-and then the pieces of the output, each behind a note: size and checksum of the piece, the state
-after it, its rejects, and a checksum of the note itself.  Pieces that fit their notes are kept;
-the rest is done again.  ``OUT.run.json`` stays: it records how the output was made, so that the
-same command recognises it as complete.
-"""
-
-import hashlib
-import json
-import os
-import zlib
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -34,21 +21,19 @@ from mumacro.files.record_batch import (
 from mumacro.files.writing import Output, csv_lines
 from mumacro.inputs.kind import Kind, kind_of
 from mumacro.surrogate import Surrogate
-from mumacro.table.atomic import alone_in, put, write_whole
-from mumacro.version import __version__
+from mumacro.table.atomic import growing, to_disk
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run did: rows read, answered, rejected, and kept from an earlier run; the files
-    (``rejects`` is None without any)."""
+    """What a run did: rows read, answered and rejected; the files (``rejects`` is None without
+    any)."""
 
     rows: int
     answered: int
     rejected: int
     out: Path
     rejects: Path | None
-    resumed: int
 
 
 def evaluate_files(
@@ -64,9 +49,10 @@ def evaluate_files(
     direction: str = "across",
     force: bool = False,
     progress: Callable[[float, int, int], None] = lambda _share, _rows, _rejected: None,
-    say: Callable[[str], None] = lambda _text: None,
 ) -> Summary:
     """Evaluate every case of some files.
+
+    A run that fails or is interrupted leaves an older output as it is, and no other file.
 
     Parameters
     ----------
@@ -81,18 +67,15 @@ def evaluate_files(
     sep, decimal : str
         Between the cells of CSV, and within its numbers, read and written.
     force : bool
-        Replace an output that exists, and delete the parts of another run.
-    progress, say : callable
-        Called with the finished share, rows read and rejected; with one line about
-        what a resumed run keeps.
+        Replace an output that exists.
+    progress : callable
+        Called with the finished share, rows read and rejected.
 
     Raises
     ------
     FilesError
         An input or output that cannot be used, or an input that changed meanwhile; names it, with
         the remedy.
-    BusyError
-        Another run writes the same output.
 
     Examples
     --------
@@ -107,7 +90,7 @@ def evaluate_files(
         run = _Run(
             cases, Path(out), surrogate, rigid, include, sep, decimal, kind_of(contact, direction)
         )
-        return run.go(force, progress, say)
+        return run.go(force, progress)
     except (
         pa.ArrowException
     ) as error:  # no Parquet, or columns that are unlike or of a type that text cannot hold
@@ -145,17 +128,13 @@ class _Run:
         output_format, compressed = reading.format_of(out)
         if not output_format or out.is_dir():
             raise FilesError(f"{out}: must be the name of a file that ends in {reading.ENDINGS}")
-        self.out, self.parts, self.rejects, self.record = (
-            out.with_name(out.name + ending)
-            for ending in ("", ".parts", ".rejects.csv", ".run.json")
-        )
-        self.log, self.unfinished = self.parts / "log", self.parts / "made"
-        for output in (out, self.rejects, self.record, self.log, self.unfinished):
+        self.out, self.rejects = out, out.with_name(f"{out.name}.rejects.csv")
+        for output in (self.out, self.rejects):
             if output.exists() and any(output.samefile(path) for path in self.files):
                 raise FilesError(
                     f"{output}: is an input, and would be overwritten; give another -o"
                 )
-        self.checksums = [_checksum(path) for path in self.files]
+        self.begun = [_state_of(path) for path in self.files]
         self.verbatim = input_format == output_format != "parquet"
         self.source: reading.ParquetSource | reading.TextSource
         if input_format == "parquet":
@@ -186,146 +165,65 @@ class _Run:
         self.columns_read = input_headings if self.verbatim else self.source.schema.names
         fields = [*([] if self.verbatim else input_fields), *added_fields(names)]
         self.schema = pa.schema(fields, self.source.schema.metadata)
-        plan = {
-            "version": __version__,
-            "table": surrogate.checksum,
-            "inputs": [
-                [path.name, checksum]
-                for path, checksum in zip(self.files, self.checksums, strict=True)
-            ],
-            "options": [self.output, [*headings.items()], kind, names, reading.ROWS],
-        }
-        self.plan_line = json.dumps(plan).encode() + b"\n"
 
-    def go(
-        self, force: bool, progress: Callable[[float, int, int], None], say: Callable[[str], None]
-    ) -> Summary:
-        """Keep the sound pieces of an earlier run, do the rest, and put the files into place."""
-        with alone_in(self.parts):
-            if earlier := None if force else self._complete():
-                state = earlier
-                say(f"{self.out}: is complete already; nothing is left to do")
-            else:
-                earlier = self._begin(force, say)
-                state = earlier or _State()
-                try:
-                    # no flush to the disk here: after a loss of power the checksums show which
-                    # pieces are whole
-                    with self.log.open("ab") as log:
-                        for state, text, share in self._new_pieces(earlier):
-                            note = json.dumps([len(text), zlib.crc32(text), *state]).encode()
-                            log.write(b"%08x %b\n" % (zlib.crc32(note), note))
-                            log.write(text)
-                            log.flush()
-                            progress(share, state.rows, state.rejected)
-                except (
-                    FilesError,
-                    pa.ArrowException,
-                ):  # an input must be changed before this run can end
-                    self._clear()
-                    self._refuse_changed()  # first: a half-written input looks damaged
-                    raise
-                self._finish(state)
-            self._clear()
-        rows, rejected, rows_before = state.rows, state.rejected, earlier.rows if earlier else 0
-        return Summary(
-            rows,
-            rows - rejected,
-            rejected,
-            self.out,
-            self.rejects if rejected else None,
-            rows_before,
-        )
-
-    def _complete(self) -> _State | None:
-        """The last state of an earlier run of the same command, if its files are unchanged."""
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            record = json.loads(self.record.read_bytes())
-            state = _State(rows=record["rows"], rejected=record["rejected"])
-            return state if record == self._record(state) else None
-        return None
-
-    def _record(self, state: _State) -> dict[str, Any]:
-        """The content of ``OUT.run.json``: rows, the plan, and the checksums of the files."""
-        checksums = [
-            _checksum(path) for path in ([self.out, self.rejects] if state.rejected else [self.out])
-        ]
-        return {
-            "rows": state.rows,
-            "rejected": state.rejected,
-            "files": checksums,
-            "plan": json.loads(self.plan_line),
-        }
-
-    def _begin(self, force: bool, say: Callable[[str], None]) -> _State | None:
-        """Keep the sound pieces of an earlier run of the same command, or start anew."""
-        first_line = b""
-        with suppress(FileNotFoundError), self.log.open("rb") as log:
-            first_line = log.readline()
-        if first_line == self.plan_line:
-            (state, end), *_ = deque(
-                ((state, end) for state, _, end in self._sound_pieces()), 1
-            ) or [(None, len(first_line))]
-            remark = "; what follows them was cut or changed, and is done again" * (
-                end < self.log.stat().st_size
-            )
-            os.truncate(self.log, end)
-            rows, rejected = (state or _State())[2:4]
-            say(f"{self.parts}: {rows:,} rows are done already ({rejected:,} rejected){remark}")
-            return state
-        if first_line and not force:
-            plan, earlier_plan = json.loads(self.plan_line), json.loads(first_line)
-            differences = ", ".join(name for name in plan if earlier_plan.get(name) != plan[name])
-            raise FilesError(
-                f"{self.parts}: has parts of another run ({differences} differ); "
-                "--force deletes them"
-            )
+    def go(self, force: bool, progress: Callable[[float, int, int], None]) -> Summary:
+        """Evaluate piece by piece, and put the files into place."""
         for path in (self.out, self.rejects):
             if path.exists() and not force:
                 raise FilesError(f"{path}: exists already; --force replaces it")
-        self._clear()
-        write_whole(self.log, self.plan_line)
-        return None
+        state, rejects = _State(), None
+        with ExitStack() as files:  # which puts the rejects into place before the output
+            stream = files.enter_context(growing(self.out))
+            try:
+                with self.output.writing(stream, self.schema) as write:
+                    for state, piece, share in self._new_pieces():
+                        write(piece)
+                        if state.rejected:
+                            rejects = rejects or self._opened_rejects(files)
+                            rejects.write(state.rejects.encode("utf-8", "surrogateescape"))
+                        progress(share, state.rows, state.rejected)
+            except (FilesError, pa.ArrowException):
+                self._refuse_changed()  # first: a half-written input looks damaged
+                raise
+            to_disk(stream)  # which a full disk refuses, before the rejects are in place
+        if not state.rejected:
+            self.rejects.unlink(missing_ok=True)
+        return Summary(
+            state.rows,
+            state.rows - state.rejected,
+            state.rejected,
+            self.out,
+            self.rejects if state.rejected else None,
+        )
 
-    def _sound_pieces(self) -> Iterator[tuple[_State, bytes, int]]:
-        """The sound pieces of the log: the state after each, its text, and where it ends."""
-        with self.log.open("rb") as log:
-            log.readline()
-            while line := log.readline():
-                note = line[9:-1]
-                if line != b"%08x %b\n" % (zlib.crc32(note), note):
-                    return
-                size, checksum, *state = json.loads(note)
-                text = log.read(size)
-                if zlib.crc32(text) != checksum:
-                    return
-                yield _State(*state), text, log.tell()
+    def _opened_rejects(self, files: ExitStack) -> BinaryIO:
+        stream = files.enter_context(growing(self.rejects))
+        head = csv_lines([["file"] * (len(self.files) > 1) + REJECTS.names])
+        stream.write(head.encode())
+        return stream
 
-    def _new_pieces(self, state: _State | None) -> Iterator[tuple[_State, bytes, float]]:
-        """The pieces that follow a state, with the share of the input that is read; at the
-        beginning the head comes first."""
-        if state is None:
-            headings = csv_lines(
-                [[*(self.source.head if self.verbatim else ()), *self.schema.names]],
-                self.output.sep,
-            )
-            state = _State(rejects=csv_lines([["file"] * (len(self.files) > 1) + REJECTS.names]))
-            yield state, self.output.pack(headings) if self.output.format == "csv" else b"", 0.0
-        for file in range(state.file, len(self.files)):
-            state = state if file == state.file else state._replace(file=file, at=0)
-            for block in self.source.blocks(file, state.at, self.columns_read):
+    def _new_pieces(self) -> Iterator[tuple[_State, Any, float]]:
+        """The pieces of the output, with the state after each and the share of the input that is
+        read; the head comes first."""
+        state = _State()
+        if self.output.format == "csv":
+            headings = [*(self.source.head if self.verbatim else ()), *self.schema.names]
+            yield state, self.output.pack(csv_lines([headings], self.output.sep)), 0.0
+        for file in range(len(self.files)):
+            state = state._replace(file=file, at=0)
+            for block in self.source.blocks(file, 0, self.columns_read):
                 state, text = self._piece(state, block)
                 yield state, text, (file + block.share) / len(self.files)
         self._refuse_changed()
 
     def _refuse_changed(self) -> None:
-        for path, checksum in zip(self.files, self.checksums, strict=True):
-            if _checksum(path) != checksum:
+        for path, begun in zip(self.files, self.begun, strict=True):
+            if _state_of(path) != begun:
                 raise FilesError(
                     f"{path}: changed while it was read; give the command again"
                 ) from None
 
-    def _piece(self, state: _State, block: reading.Block) -> tuple[_State, bytes]:
+    def _piece(self, state: _State, block: reading.Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
         added, rejects, columns_in = answer_columns(block.batch, *self.evaluation)
         faults = {row: reason for row, *reason in rejects}
@@ -350,27 +248,8 @@ class _Run:
         text = self.output.piece(batch, texts if self.verbatim else None)
         return _State(state.file, state.at + n, state.rows + n, rejected, reject_lines), text
 
-    def _finish(self, state: _State) -> None:
-        """Put the files into place; a run that is stopped here does this again."""
-        if state.rejected:
-            with self.unfinished.open(
-                "w", encoding="utf-8", errors="surrogateescape", newline=""
-            ) as stream:
-                stream.writelines(state_before.rejects for state_before, *_ in self._sound_pieces())
-            put(self.unfinished, self.rejects)
-        else:
-            self.rejects.unlink(missing_ok=True)
-        self.output.whole(
-            self.unfinished, self.schema, (text for _, text, _ in self._sound_pieces() if text)
-        )
-        put(self.unfinished, self.out)
-        write_whole(self.record, json.dumps(self._record(state), indent=1).encode())
 
-    def _clear(self) -> None:
-        for path in (self.unfinished, self.log):
-            path.unlink(missing_ok=True)
-
-
-def _checksum(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def _state_of(path: Path) -> tuple[int, ...]:
+    """What shows whether a file has changed."""
+    is_now = path.stat()
+    return is_now.st_ino, is_now.st_size, is_now.st_mtime_ns

@@ -1,13 +1,12 @@
-"""Evaluated batches as pieces of a file: CSV, NDJSON, or Arrow streams, of which a Parquet file is
-made at the end."""
+"""Evaluated batches as pieces of a file: CSV, NDJSON or Parquet."""
 
 import csv
 import gzip
 import io
 import json
-from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, BinaryIO, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -41,14 +40,11 @@ class Output(NamedTuple):
         # without name and time, so that the same text gives the same bytes
         return gzip.compress(data, 6, mtime=0) if self.compressed else data
 
-    def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes:
-        """Rows as bytes; where ``texts`` has the unchanged input records, the columns stand behind
-        them."""
+    def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> Any:
+        """Rows as they are written, for Parquet the batch itself; where ``texts`` has the unchanged
+        input records, the columns stand behind them."""
         if self.format == "parquet":
-            sink = pa.BufferOutputStream()
-            with pa.ipc.new_stream(sink, batch.schema) as writer:
-                writer.write_batch(batch)
-            return bytes(sink.getvalue())
+            return batch
         cells = [
             self._cells(name, column)
             for name, column in zip(batch.schema.names, batch.columns, strict=True)
@@ -98,18 +94,15 @@ class Output(NamedTuple):
             return list(pc.fill_null(text, "null").to_pylist())
         return [json.dumps(cell) for cell in text.to_pylist()]
 
-    def whole(self, path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
-        """The file of all pieces; doubles in Parquet are written plainly, which is three times as
+    @contextmanager
+    def writing(self, stream: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[Any], object]]:
+        """What writes a piece; doubles in Parquet are written plainly, which is three times as
         fast."""
         if self.format != "parquet":
-            with path.open("wb") as stream:
-                stream.writelines(pieces)
+            yield stream.write
             return
-        dictionary_columns = [
-            field.name for field in schema if not pa.types.is_floating(field.type)
-        ]
+        words = [field.name for field in schema if not pa.types.is_floating(field.type)]
         with pa.parquet.ParquetWriter(
-            path, schema, use_dictionary=dictionary_columns, compression="snappy"
+            stream, schema, use_dictionary=words, compression="snappy"
         ) as writer:
-            for piece in pieces:
-                writer.write_table(pa.ipc.open_stream(piece).read_all())
+            yield writer.write_batch

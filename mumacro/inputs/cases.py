@@ -26,7 +26,7 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.k_range import BOUND, ENDS
 from mumacro.inputs.kind import AMPLITUDE, DIRECTIONS, LIFTS_OFF, SPRING, Kind
-from mumacro.inputs.units import unknown_name
+from mumacro.inputs.names import unknown_name
 from mumacro.kernel.arrays import Array, common_shape, flat
 
 

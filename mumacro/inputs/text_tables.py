@@ -7,21 +7,16 @@ import re
 from collections.abc import Mapping, Sequence
 
 from mumacro.inputs.fields import LIKE, is_rigid, unit_of
-from mumacro.inputs.units import (
-    PLAIN,
-    UNITS_OF,
-    Scale,
-    number_hint,
-    scale_of,
-    split_unit,
-    suggestion,
-)
+from mumacro.inputs.names import suggestion
+from mumacro.inputs.old_texts import PLAIN, number_hint
+from mumacro.inputs.units import UNITS_OF, Scale, scale_of, split_unit
 
 #: separators of the cells of CSV, by name
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"
 NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
-_SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
+# decimal sign -> a number that has it
+_SIGNED = {sign: re.compile(rf"[+-]?\d*[{sign}]\d+([eE][+-]?\d+)?") for sign in ".,"}
 
 
 def _advice(
@@ -58,7 +53,7 @@ def _detect(
     ]
 
     def cells_with(sign: str) -> int:
-        return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
+        return sum(_SIGNED[sign].fullmatch(cell) is not None for cell in cells)
 
     return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
 

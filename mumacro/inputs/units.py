@@ -1,12 +1,14 @@
-"""Numbers and units as text, read in SI; and hints for a text that cannot be read."""
+"""The table of units, and a unit as text: which scale it has, and what is meant by one that a
+quantity cannot have."""
 
-import difflib
+import functools
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from mumacro.inputs.fields import GAP, LIKE, NAMES, RAD_PER_CYCLE, SI, is_rigid
+from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, SI
+from mumacro.inputs.numbers import tidy
 
 
 class Scale(NamedTuple):
@@ -21,115 +23,296 @@ class Scale(NamedTuple):
         return value * self.times / self.over
 
 
+class Quantity(NamedTuple):
+    """What a value measures."""
+
+    unit: str  #: in SI
+    words: str  #: the unit in words, for errors such as "give metres"
+    units: Mapping[str, Scale]
+    such_as: str  #: some of the units, for messages
+
+    @property
+    def bound(self) -> str:
+        """What a text must be, as in "y0 must be ..."."""
+        where = "" if self.unit == "-" else f"in {self.words}: "
+        return f"{where}a plain number, or with a unit such as {self.such_as}"
+
+
 _LENGTH = {
     "m": Scale(),
+    "dm": Scale(over=1e1),
     "cm": Scale(over=1e2),
     "mm": Scale(over=1e3),
     "um": Scale(over=1e6),
-    "µm": Scale(over=1e6),
-    "μm": Scale(over=1e6),
     "nm": Scale(over=1e9),
     "pm": Scale(over=1e12),
+    "Å": Scale(over=1e10),
     "in": Scale(254.0, 1e4),
+    "ft": Scale(3048.0, 1e4),
+    "mil": Scale(254.0, 1e7),
 }
 _FORCE = {
     "N": Scale(),
-    "mN": Scale(over=1e3),
+    "pN": Scale(over=1e12),
+    "nN": Scale(over=1e9),
     "uN": Scale(over=1e6),
+    "mN": Scale(over=1e3),
+    "cN": Scale(over=1e2),
+    "daN": Scale(1e1),
     "kN": Scale(1e3),
     "MN": Scale(1e6),
+    "gf": Scale(9.80665, 1e3),
+    "kgf": Scale(9.80665),
     "lbf": Scale(4.4482216152605),
+    "ozf": Scale(4.4482216152605, 16.0),
+    "dyn": Scale(over=1e5),
 }
-_TIME = {"s": 1.0, "min": 60.0, "h": 3600.0}
-
-#: input -> unit -> scale; the only table of units
-UNITS_OF: dict[str, dict[str, Scale]] = {
-    "mu0": {"-": Scale(), "1": Scale(), "": Scale(), "%": Scale(over=1e2)},
-    "Fz": _FORCE,
-    "k": {
-        f"{force}/{length}": Scale(up.times * down.over, up.over * down.times)
-        for force, up in _FORCE.items()
-        for length, down in _LENGTH.items()
-    },
-    "y0": _LENGTH,
-    "omega": {
-        "rad/s": Scale(),
-        "1/s": Scale(),
-        "krad/s": Scale(1e3),
-        "rpm": Scale(RAD_PER_CYCLE, 60.0),
-        "1/min": Scale(RAD_PER_CYCLE, 60.0),
-        "deg/s": Scale(RAD_PER_CYCLE, 360.0),
-    },
-    "f": {
-        "Hz": Scale(),
-        "1/s": Scale(),
-        "mHz": Scale(over=1e3),
-        "kHz": Scale(1e3),
-        "MHz": Scale(1e6),
-    },
-    "v0": {
-        f"{length}/{time}": Scale(scale.times, scale.over * seconds)
-        for length, scale in {**_LENGTH, "km": Scale(1e3)}.items()
-        for time, seconds in _TIME.items()
-    },
+_TIME = {
+    "s": Scale(),
+    "ms": Scale(over=1e3),
+    "us": Scale(over=1e6),
+    "min": Scale(60.0),
+    "h": Scale(3600.0),
+}
+_FREQUENCY = {
+    "Hz": Scale(),
+    "mHz": Scale(over=1e3),
+    "kHz": Scale(1e3),
+    "MHz": Scale(1e6),
+    "GHz": Scale(1e9),
+    "1/s": Scale(),
+    "1/min": Scale(over=60.0),
+    "rpm": Scale(over=60.0),
 }
 
-# Lower case, without spaces and punctuation.  Only names that hardly mean anything else, since a
-# file whose column has one of them while the input itself is missing is refused.
-_SYNONYMS = {
-    "mu": "mu0",
-    "mus": "mu0",
-    "muk": "mu0",
-    "mucoulomb": "mu0",
-    "frictioncoefficient": "mu0",
-    "coefficientoffriction": "mu0",
-    "cof": "mu0",
-    "µ": "mu0",
-    "µ0": "mu0",
-    "μ": "mu0",
-    "μ0": "mu0",
-    "fn": "Fz",
-    "n": "Fz",
-    "force": "Fz",
-    "normalforce": "Fz",
-    "load": "Fz",
-    "normalload": "Fz",
-    "kx": "k",
-    "kt": "k",
-    "ktangential": "k",
-    "stiffness": "k",
-    "tangentialstiffness": "k",
-    "contactstiffness": "k",
-    "y": "y0",
-    "amplitude": "y0",
-    "ampl": "y0",
-    "amp": "y0",
-    "a": "y0",
-    "a0": "y0",
-    "w": "omega",
-    "om": "omega",
-    "ω": "omega",
-    "angularfrequency": "omega",
-    "angularvelocity": "omega",
-    "freq": "f",
-    "frequency": "f",
-    "hz": "f",
-    "f0": "f",
-    "v": "v0",
-    "vx": "v0",
-    "speed": "v0",
-    "velocity": "v0",
-    "slidingspeed": "v0",
-    "slidingvelocity": "v0",
-}
-_SYNONYMS |= {name.lower(): name for name in NAMES}
 
-_IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
-_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-_WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
-# an interval, as people write it
-_DASHED = re.compile(rf"({_NUMBER})\s*(?:-|–|to)\s*({_NUMBER})\s*(\D.*)?")
-PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
+def _over(upper: Mapping[str, Scale], lower: Mapping[str, Scale]) -> dict[str, Scale]:
+    """Every unit of ``upper`` over every unit of ``lower``."""
+    return {
+        f"{one}/{other}": Scale(up.times * down.over, up.over * down.times)
+        for one, up in upper.items()
+        for other, down in lower.items()
+    }
+
+
+#: what a value may measure -> its units; the only table of units
+QUANTITIES = {
+    "ratio": Quantity(
+        "-",
+        "a plain number",
+        {"-": Scale(), "1": Scale(), "": Scale(), "%": Scale(over=1e2), "‰": Scale(over=1e3)},
+        "%",
+    ),
+    "force": Quantity("N", "newtons", _FORCE, "N, mN, kN, gf, kgf, lbf"),
+    "stiffness": Quantity(
+        "N/m",
+        "newtons per metre",
+        _over(_FORCE, _LENGTH),
+        "N/m, N/mm, N/um, lbf/in: a force over a length",
+    ),
+    "length": Quantity("m", "metres", _LENGTH, "m, mm, um, nm, in, mil"),
+    "angular frequency": Quantity(
+        "rad/s",
+        "radians per second",
+        {
+            "rad/s": Scale(),
+            "1/s": Scale(),
+            "mrad/s": Scale(over=1e3),
+            "krad/s": Scale(1e3),
+            "Mrad/s": Scale(1e6),
+            "rpm": Scale(RAD_PER_CYCLE, 60.0),
+            "1/min": Scale(RAD_PER_CYCLE, 60.0),
+            "rad/min": Scale(over=60.0),
+            "deg/s": Scale(RAD_PER_CYCLE, 360.0),
+            "rev/s": Scale(RAD_PER_CYCLE),
+        },
+        "rad/s, krad/s, rpm, deg/s; a frequency in Hz is f",
+    ),
+    "frequency": Quantity("Hz", "hertz", _FREQUENCY, "Hz, kHz, MHz, rpm"),
+    "speed": Quantity(
+        "m/s",
+        "metres per second",
+        {**_over({**_LENGTH, "km": Scale(1e3)}, _TIME), "mph": Scale(44704.0, 1e5)},
+        "m/s, mm/s, um/s, mm/min, km/h",
+    ),
+    "angle": Quantity(
+        "deg",
+        "degrees",
+        {
+            "deg": Scale(),
+            "°": Scale(),
+            "rad": Scale(360.0, RAD_PER_CYCLE),
+            "mrad": Scale(360.0, 1e3 * RAD_PER_CYCLE),
+        },
+        "deg, rad",
+    ),
+    "pressure": Quantity(
+        "Pa",
+        "pascals",
+        {
+            "Pa": Scale(),
+            "kPa": Scale(1e3),
+            "MPa": Scale(1e6),
+            "GPa": Scale(1e9),
+            "TPa": Scale(1e12),
+            "N/m2": Scale(),
+            "N/mm2": Scale(1e6),
+            "kN/mm2": Scale(1e9),
+            "bar": Scale(1e5),
+            "psi": Scale(6894.757293168361),
+            "ksi": Scale(6894757.293168361),
+            "Mpsi": Scale(6894757293.168361),
+        },
+        "Pa, MPa, GPa, N/mm2, psi",
+    ),
+}
+#: input -> unit -> scale
+UNITS_OF = {name: QUANTITIES[QUANTITY_OF[name]].units for name in SI}
+
+# --- a unit as people and programs write it -------------------------------------------------------
+
+_PREFIXES = {
+    "": "",
+    "pico": "p",
+    "nano": "n",
+    "micro": "u",
+    "milli": "m",
+    "centi": "c",
+    "deci": "d",
+    "deca": "da",
+    "kilo": "k",
+    "mega": "M",
+    "giga": "G",
+    "tera": "T",
+}
+_BASES = {
+    "metre": "m",
+    "meter": "m",
+    "newton": "N",
+    "hertz": "Hz",
+    "pascal": "Pa",
+    "second": "s",
+    "radian": "rad",
+}
+#: names of a unit, in lower case -> its symbol
+_NAMED = {
+    f"{prefix}{base}{plural}": short + symbol
+    for prefix, short in _PREFIXES.items()
+    for base, symbol in _BASES.items()
+    for plural in ("", "s")
+} | {
+    "sec": "s",
+    "secs": "s",
+    "minute": "min",
+    "minutes": "min",
+    "hr": "h",
+    "hour": "h",
+    "hours": "h",
+    "micron": "um",
+    "microns": "um",
+    "angstrom": "Å",
+    "angstroms": "Å",
+    "inch": "in",
+    "inches": "in",
+    "foot": "ft",
+    "feet": "ft",
+    "mils": "mil",
+    "thou": "mil",
+    "kp": "kgf",
+    "gram_force": "gf",
+    "force_gram": "gf",
+    "force_kilogram": "kgf",
+    "kilogram_force": "kgf",
+    "kilopond": "kgf",
+    "force_pound": "lbf",
+    "pound_force": "lbf",
+    "force_ounce": "ozf",
+    "ounce_force": "ozf",
+    "dyne": "dyn",
+    "degree": "deg",
+    "degrees": "deg",
+    "percent": "%",
+    "pct": "%",
+    "permille": "‰",
+    "revolution": "rev",
+    "revolutions": "rev",
+    "turn": "rev",
+    "turns": "rev",
+    "revolutions_per_minute": "rpm",
+    "revolution_per_minute": "rpm",
+}
+_FACTOR = re.compile(r"([^\d^+-]+)\^?([+-]?\d)?", re.ASCII)
+_MU = str.maketrans("µμ", "uu")
+LONGEST = 80  # characters of a unit
+
+
+@functools.lru_cache(1024)
+def canonical(unit: str) -> str:
+    """A unit as the table writes it.
+
+    >>> [canonical(unit) for unit in ("mm s^-1", "mm/sec", "N·mm⁻¹", "newton / micrometer", "[N]")]
+    ['mm/s', 'mm/s', 'N/mm', 'N/um', 'N']
+    """
+    text = tidy(unit[:LONGEST]).translate(_MU).strip(" []()")
+    if text.lower() == "dimensionless":
+        return ""
+    text = text.replace("**", "^").replace(" per ", "/")
+    for times in "*·⋅.":
+        text = text.replace(times, " ")
+    powers: dict[str, int] = {}
+    for i, part in enumerate(text.split("/")):
+        for factor in part.replace("(", " ").replace(")", " ").split():
+            if factor == "1":
+                continue
+            match = _FACTOR.fullmatch(factor)
+            if match is None:
+                return text
+            name = match[1]
+            symbol = name if name in _SYMBOLS else _NAMED.get(name.lower(), name)
+            powers[symbol] = powers.get(symbol, 0) + int(match[2] or 1) * (-1 if i else 1)
+    upper, lower = (
+        " ".join(
+            f"{name}{abs(power) if abs(power) > 1 else ''}"
+            for name, power in powers.items()
+            if power * sign > 0
+        )
+        for sign in (1, -1)
+    )
+    return f"{upper or '1'}/{lower}" if lower else upper or text
+
+
+#: every symbol in the table, also within another
+_SYMBOLS = {
+    symbol
+    for quantity in QUANTITIES.values()
+    for unit in quantity.units
+    for symbol in unit.split("/")
+}
+
+
+# words of a value that stand apart: of its unit, of an interval, of how an amplitude was measured
+_WORDS = {"per", "to", "rms", "pp", "p-p", "pk-pk", "ptp", "peak", "peak-to-peak"}
+
+
+def belongs_to_value(word: str) -> bool:
+    """Whether a word behind a value is a part of it, such as a unit that stands apart.
+
+    >>> [belongs_to_value(word) for word in ("um", "±", "1.2", "/", "newtons", "fast")]
+    [True, True, True, True, True, False]
+    """
+    plain = word.translate(_MU).strip("[](),;")
+    return (
+        plain in _SYMBOLS
+        or plain.lower() in _NAMED
+        or plain.lower() in _WORDS
+        or any(sign in "0123456789±%°/^*·" for sign in plain)
+        or ".." in plain
+        or plain in ("+-", "-", "–")
+    )
+
+
+# closing bracket -> the one that opens it
+_OPENING = {"]": "[", ")": "("}
 
 
 def split_unit(column: str) -> tuple[str, str | None]:
@@ -139,171 +322,93 @@ def split_unit(column: str) -> tuple[str, str | None]:
     >>> split_unit("k [N/mm]"), split_unit("v0")
     (('k', 'N/mm'), ('v0', None))
     """
-    match = _IN_BRACKETS.fullmatch(column)
-    if match is None:
-        return column.strip(), None
-    return match[1], match[2] if match[2] is not None else match[3]
+    text = column.strip()
+    closing = text[-1:]
+    if closing not in _OPENING:
+        return text, None
+    name, opening, unit = text[:-1].rpartition(_OPENING[closing])
+    if not opening or closing in unit:
+        return text, None
+    return name.strip(), unit.strip()
 
 
 def scale_of(name: str, unit: str) -> Scale | None:
-    """The scale of a ``unit`` of the input ``name``; None for a unit that is not in the table.
+    """The scale of a ``unit`` of a value by its name; None for a unit that is not in the table.
 
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
     """
-    return _scale(UNITS_OF[LIKE.get(name, name)], unit)
+    return scale_in(QUANTITY_OF[name], unit)
 
 
-def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:
-    return units.get(unit.replace(" ", "").replace("·", ""))
+def scale_in(quantity: str, unit: str) -> Scale | None:
+    """The scale of a ``unit`` of a quantity; None for a unit that is not in the table."""
+    units = QUANTITIES[quantity].units
+    scale = units.get(unit)
+    return scale if scale is not None or len(unit) > LONGEST else units.get(canonical(unit))
 
 
-def suggestion(name: str, *, loosely: bool = True) -> str | None:
-    """The input that ``name`` probably stands for, in another case, by another name or
-    (``loosely``) misspelt; else None.
+# --- what is meant by a unit that a quantity cannot have ------------------------------------------
 
-    >>> [suggestion(name) for name in ("FZ", "F", "stiffness", "omga", "temperature")]
-    ['Fz', 'Fz', 'k', 'omega', None]
+_MASS = {
+    "mg": 1e-6,
+    "g": 1e-3,
+    "kg": 1.0,
+    "lb": 0.45359237,
+    "lbs": 0.45359237,
+    "oz": 0.028349523125,
+}
+_GRAVITY = 9.80665  # m/s^2
+_ACCELERATION = {"g": _GRAVITY, "m/s2": 1.0, "mm/s2": 1e-3}
+_WHOLE = ("peak to peak", "peaktopeak", "pkpk", "p2p", "ptp", "pp")
+_OTHER = {"angular frequency": "frequency", "frequency": "angular frequency"}
+_INPUT = {"frequency": "f", "angular frequency": "omega", "speed": "v0", "length": "y0"}
+
+
+def bound_of_unit(quantity: str, number: float, unit: str) -> str:
+    """What a value must be whose ``unit`` its quantity cannot have: as in "y0 must be ...", with
+    the number to give where it is clear what is meant.
+
+    >>> bound_of_unit("length", 4.0, "umpp"), bound_of_unit("force", 100.0, "g")
+    ('half of peak to peak: give 2um', 'a force: the weight of 100 g is 0.980665 N, give 0.980665N')
+    >>> bound_of_unit("angular frequency", 20.0, "kHz")
+    'in radians per second: did you mean f=20kHz?'
     """
-    if name.strip() == "F":  # a force; without case it would be the frequency f
-        return "Fz"
-    plain = re.sub(r"[\s_.\-~^*{}$\\]", "", name).lower()
-    if plain in _SYNONYMS:
-        return _SYNONYMS[plain]
-    if loosely and len(plain) > 1:
-        matches = difflib.get_close_matches(plain, _SYNONYMS, n=1, cutoff=0.75)
-        return _SYNONYMS[matches[0]] if matches else None
-    return None
-
-
-def unknown_name(name: str, allowed: Iterable[str]) -> str:
-    """Why an unknown name is refused, with the most similar one of those allowed.
-
-    >>> unknown_name("omga", ("omega", "f"))
-    'unknown field; did you mean omega? allowed: omega, f'
-    """
-    names = list(allowed)
-    nearest = suggestion(name[:80], loosely=False)
-    if nearest not in names:
-        nearest = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)
-    advice = f"did you mean {nearest}? " if nearest else ""
-    return f"unknown field; {advice}allowed: {', '.join(names)}"
-
-
-def number_hint(name: str, value: object) -> str:
-    """Why ``value`` is refused where the number of an input, or another number, should stand.
-
-    >>> number_hint("y0", "2um")
-    'must be a number: give metres, 2e-06'
-    >>> number_hint("y0", "2,5")
-    'must be a number with a decimal point: 2.5'
-    >>> number_hint("y0", "2")
-    'must be a number, not a text: leave out the quotes'
-    >>> number_hint("y0", True)
-    'must be a number'
-    """
-    if not isinstance(value, str):
-        return GAP if name == "k" and value is None else "must be a number"
-    text = value.strip()[:80]
-    if PLAIN.fullmatch(text):
-        number = float(text)
-        if math.isfinite(number):
-            return "must be a number, not a text: leave out the quotes"
-        return "must be a number, or rigid" if name == "k" else "must be finite"
-    if re.fullmatch(r"[+-]?\d+,\d+", text):
-        return f"must be a number with a decimal point: {text.replace(',', '.')}"
-    if name == "k" and ".." in text:
+    known, shown = QUANTITIES[quantity], unit.strip()[:LONGEST]
+    plain = "".join(sign for sign in shown.lower() if sign not in "-_. ()[]")
+    for ending in _WHOLE:
+        size = ending.replace(" ", "")
+        if plain.endswith(size) and quantity in ("length", "force"):
+            rest = plain.removesuffix(size)
+            mine = next((u for u in known.units if u.lower() == canonical(rest).lower()), None)
+            if mine is not None or not rest:
+                return f"half of peak to peak: give {0.5 * number:.12g}{mine or ''}"
+    if plain.endswith("rms") and quantity in ("length", "force"):
+        mine = next((u for u in known.units if u.lower() == canonical(plain[:-3]).lower()), None)
+        if mine is not None:
+            return (
+                f"the amplitude, of a sine {math.sqrt(2.0):.6g} times its rms value: give "
+                f"{math.sqrt(2.0) * number:.12g}{mine}"
+            )
+    key = canonical(shown)
+    if quantity == "force" and key in _MASS:
+        newtons = number * _MASS[key] * _GRAVITY
         return (
-            "must be a number, or rigid; an interval is k_range in JSON, columns k_low and "
-            "k_high in a file"
+            f"a force: the weight of {number:.12g} {key} is {newtons:.12g} N, give {newtons:.12g}N"
         )
-    match = _WITH_UNIT.fullmatch(text)
-    if match is None:
-        return "must be a number, or rigid" if name == "k" else "must be a number"
-    like = LIKE.get(name, name if name in SI else "mu0")  # another number is a plain one, too
-    words, scale = SI[like][1], scale_of(like, match[2])
-    if scale is None:
-        return f"must be a number without a unit: give {words}"
-    return f"must be a number: give {words}, {scale.si(float(match[1])):.12g}"
-
-
-def read_number(name: str, text: str) -> float:
-    """The value of an input from text, a number in SI or with a unit, in SI; ``rigid`` is an
-    infinite stiffness.
-
-    >>> read_number("y0", "2e-6"), read_number("k", "1 N/um")
-    (2e-06, 1000000.0)
-    >>> read_number("y0", "2 N")
-    Traceback (most recent call last):
-    ...
-    ValueError: y0=2 N: give metres as a plain number, or with a unit: m, cm, mm, um, ...
-    """
-    like = LIKE.get(name, name)
-    return read_quantity(name, text, SI[like][1], UNITS_OF[like], rigid=name == "k")
-
-
-def read_quantity(
-    name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False
-) -> float:
-    """As :func:`read_number`, of any quantity: ``words`` for its SI unit, its ``units``, whether
-    it may be ``rigid``."""
-    text = text.strip()
-    if rigid and is_rigid(text):
-        return math.inf
-    if PLAIN.fullmatch(text):
-        return float(text)
-    with_unit = _WITH_UNIT.fullmatch(text)
-    scale = _scale(units, with_unit[2].strip(" []()")) if with_unit else None
-    if with_unit and scale:
-        return scale.si(float(with_unit[1]))
-    if PLAIN.fullmatch(text.replace(",", ".")):
-        raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
-    if hint := _hint(name, text, units):
-        raise ValueError(f"{name}={text}: {hint}")
-    examples = ", ".join([unit for unit in units if unit][:4])
-    or_rigid = ", or rigid" if rigid else ""
-    raise ValueError(
-        f"{name}={text}: give {words} as a plain number, or with a unit: {examples}, ...{or_rigid}"
-    )
-
-
-def _hint(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
-    """A hint for a text that is no quantity: how an interval is written, a unit in another case, f
-    in place of omega.
-
-    >>> _hint("k", "0.8-1.2N/um", UNITS_OF["k"]), _hint("omega", "20kHz", UNITS_OF["omega"])
-    ('write an interval as k=0.8..1.2N/um', 'did you mean f=20kHz? omega is in rad/s')
-    """
-    if name == "k" and (ends := _DASHED.fullmatch(text)):
-        return f"write an interval as k={ends[1]}..{ends[2]}{ends[3] or ''}"
-    if not (match := _WITH_UNIT.fullmatch(text)):
-        return None
-    number, unit = match[1], match[2].replace(" ", "")
-    symbols = [symbol for symbol in units if symbol.lower() == unit.lower()]
-    partner = {"omega": "f", "f": "omega"}.get(name)
-    if symbols:
-        return f"did you mean {' or '.join(f'{number}{symbol}' for symbol in symbols)}?"
-    if partner and (
-        partner_unit := next(
-            (symbol for symbol in UNITS_OF[partner] if symbol.lower() == unit.lower()), None
-        )
-    ):
-        return f"did you mean {partner}={number}{partner_unit}? {name} is in {SI[name][0]}"
-    return None
-
-
-def read_range(name: str, text: str) -> tuple[float, float]:
-    """Both ends of ``low..high`` in SI; a unit behind the second end holds for both.  ValueError as
-    in read_number.
-
-    >>> read_range("k", "0.8..1.2 N/um")
-    (800000.0, 1200000.0)
-    """
-    low, _, high = text.partition("..")
-    plain = [PLAIN.fullmatch(end.strip()) for end in (low, high)]  # 1.2e6 is not 1.2 of a unit e6
-    if plain[0] and not plain[1] and (match := _WITH_UNIT.fullmatch(high.strip())):
-        low = f"{low} {match[2]}"
-    ends = read_number(name, low), read_number(name, high)
-    if not 0.0 < ends[0] < ends[1] < math.inf:
-        raise ValueError(f"{name}={text}: the ends of a range must be > 0, finite and ascending")
-    return ends
+    if quantity == "length" and key in _ACCELERATION:
+        peak = number * _ACCELERATION[key]
+        return f"a length: of an acceleration give {peak:.12g}/(2 pi f)^2 metres, f in hertz"
+    if quantity == "length" and (speed := QUANTITIES["speed"].units.get(key)) is not None:
+        return f"a length: of a velocity amplitude give {speed.si(number):.12g}/(2 pi f) metres"
+    if quantity == "speed" and (turns := QUANTITIES["angular frequency"].units.get(key)):
+        return f"a speed: give {turns.si(number):.12g} m/s times the radius in metres"
+    lower = key.lower()
+    if alike := [symbol for symbol in known.units if symbol and symbol.lower() == lower]:
+        meant = " or ".join(f"{number:.12g}{symbol}" for symbol in alike)
+        return f"in {known.words}: did you mean {meant}?"
+    if (other := _OTHER.get(quantity)) is not None:
+        units = QUANTITIES[other].units
+        if mine := next((symbol for symbol in units if symbol.lower() == lower), None):
+            return f"in {known.words}: did you mean {_INPUT[other]}={number:.12g}{mine}?"
+    return known.bound

@@ -15,6 +15,8 @@ static const double MU_ENTRY[2][MU_ENTRY_TERMS] = {
      -0.038102689360241436, 0.11833323088165966, -0.24887213010763057, 0.866208341352021},
 };
 
+#define MU_ENTRY_WAY 0.6652518899328603 /* -d sqrt(1 - t) / d ln entry at t = 1 */
+
 /* 0 < t <= 1, with sqrt(1 - t) where t >= 1/2. */
 MU_INLINE mu_lanes mu_entry(mu_lanes t, mu_mask half, mu_lanes root) {
     const mu_lanes u = mu_select(half, mu_fma(t, mu_all(4.0), mu_all(-1.0)),
@@ -44,6 +46,21 @@ static double mu_entry_slope(double t, double root, double *of_root) {
     return root > 0.0 ? -0.5 * t / root * *of_root : HUGE_VAL;
 }
 
+/* (d ln entry / d root at root = sqrt(1 - t) - that at 0, which is at_end) / root, for t >= 1/2,
+ * by division of polynomials, so nothing cancels next to root = 0. */
+static double mu_entry_bend(double root, double at_end) {
+    const double *c = MU_ENTRY[1], u = mu_fma1(2.0 * MU_SQRT2, root, -1.0);
+    const double level = at_end / (2.0 * MU_SQRT2);
+    double sum = c[0], quotient = -level * c[0], bend = quotient;
+    for (int i = 1; i < MU_ENTRY_TERMS - 1; ++i) { /* (slope - level sum) / (u + 1) */
+        quotient = (MU_ENTRY_TERMS - i) * c[i - 1] - level * c[i] - quotient;
+        bend = mu_fma1(bend, u, quotient);
+        sum = mu_fma1(sum, u, c[i]);
+    }
+    sum = mu_fma1(sum, u, c[MU_ENTRY_TERMS - 1]);
+    return 8.0 * bend / sum - 2.0 / (1.0 - root * root);
+}
+
 /* x^(1/6), then 2 MU_FOLD_KNOT - MU_FOLD_SCALE sqrt(1 - x) from x = 1/2 on: from the root of x or
  * of 1 - x. */
 MU_INLINE mu_lanes mu_folded(mu_mask half, mu_lanes root) {
@@ -68,11 +85,15 @@ MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_la
     const mu_lanes x = mu_select(slow, v / MU_SLOW, mu_select(ring, t, y));
     const mu_mask half = ~ring | MU_WHERE(x < 0.5);
     const mu_lanes root = mu_sqrt(mu_select(half, x, 1.0 - x));
-    const mu_lanes first = mu_folded(half, root);
     const mu_lanes entry =
         mu_entry(mu_select(ring, t, one), half & ring, mu_select(ring, root, zero));
+    const mu_lanes on_ray = y / entry, beyond = mu_higher(on_ray - 1.0, zero);
+    /* where the last digits of t have y~ beyond the entry, the ray gives way: at fixed y~ a quantity
+     * depends on root by its square only */
+    const mu_lanes nearer = mu_fma(beyond, mu_all(-MU_ENTRY_WAY), root);
+    const mu_lanes first = mu_folded(half, mu_select(half, root, mu_higher(nearer, zero)));
     /* second ones */
-    const mu_lanes way = mu_lower(y / entry, one), z = mu_select(ring, way, rho);
+    const mu_lanes way = mu_lower(on_ray, one), z = mu_select(ring, way, rho);
     const mu_mask half_z = MU_WHERE(z < 0.5);
     const mu_lanes root_z = mu_sqrt(mu_select(slides, one, mu_select(half_z, z, 1.0 - z)));
     const mu_lanes second = mu_folded(half_z, root_z),
@@ -120,7 +141,7 @@ static void mu_place_ball_corner(mu_place *at) {
 
 /* The place of any point with V > 0, Y > 0, both finite; MU_B_FAST has no coordinates. */
 static mu_place mu_locate_ball(const mumacro_data *data, double v, double y) {
-    mu_place at = {MU_B_FAST, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_place at = {MU_B_FAST, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {0.0, 0.0}};
     double ln_y;
     at.v = v;
     at.y = y;
@@ -179,7 +200,7 @@ static mu_turn mu_turn_of_ball_corner(const mu_place *at) {
 }
 
 MU_INLINE mu_turn mu_turn_of_ball(const mu_place *at) {
-    mu_turn out = {0.0, 1.0, 1.0, -at->tilt, 0.0, 0.0, 1.0, -at->tilt, MU_SQRT2, 1.0};
+    mu_turn out = {0.0, 1.0, 1.0, -at->tilt.slope, 0.0, 0.0, 1.0, -at->tilt.slope, MU_SQRT2, 1.0};
     switch (at->block) {
         case MU_B_RING:
             return mu_turn_of_ring(at);
@@ -201,7 +222,7 @@ MU_INLINE mu_turn mu_turn_of_ball(const mu_place *at) {
             out.end = 2.0 * MU_FOLD_KNOT;
             out.scale = MU_FOLD_SCALE;
             out.b_v = mu_fold_slope(at->b);
-            out.b_y = -at->tilt * out.b_v;
+            out.b_y = -at->tilt.slope * out.b_v;
             return out;
         case MU_B_S_MID:
             out.a_y = at->a;
@@ -216,7 +237,7 @@ MU_INLINE mu_turn mu_turn_of_ball(const mu_place *at) {
     if (!mu_is_sliding_block(at->block)) {
         const double root = mu_max(MU_SQRT2 - at->b, 1e-9);
         out.b_v = at->b < 0.5 * MU_SQRT2 ? 0.5 * at->b : 0.5 * (1.0 - root * root) / root;
-        out.b_y = -at->tilt * out.b_v;
+        out.b_y = -at->tilt.slope * out.b_v;
     }
     return out;
 }

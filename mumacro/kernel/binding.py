@@ -1,9 +1,10 @@
 """The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
 
 It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``,
-``records.h`` and ``library.h``.  A call runs without the interpreter's lock.  There is a kernel for
-every instruction level of the processor; the best one is used, and those with fused multiply-add
-(AVX2, AVX-512, NEON) give the same bits.
+``records.h`` and ``library.h``, which hatch_build.py has parsed into ``_declarations.py``.  A call
+runs without the interpreter's lock.  There is a kernel for every instruction level of the
+processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the
+same bits.
 """
 
 import sys
@@ -11,9 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
-import _cffi_backend  # type: ignore[import-untyped]
 import numpy as np
-from cffi import FFI
 
 from mumacro.kernel.arrays import Array, Codes
 
@@ -21,18 +20,30 @@ MOST_STEPS = 200_000  # of a period of a motion
 
 _HERE = Path(__file__).resolve().parent.parent
 _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
-_DECLARED = "".join(
-    (_HERE / "kernel" / name).read_text("ascii") for name in ("data.h", "records.h", "library.h")
-)
-_FFI = FFI()
-_FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
+
+
+def _opened() -> tuple[Any, Any]:
+    """cffi with the declarations, and the shared object."""
+    try:
+        from mumacro.kernel._declarations import ffi
+
+        return ffi, ffi.dlopen(str(_SHARED_OBJECT))
+    except (ImportError, OSError) as error:
+        if isinstance(error, ImportError) and error.name != "mumacro.kernel._declarations":
+            raise
+        raise ImportError(
+            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing or does not fit this "
+            f"machine ({error}): install a wheel for this platform, or build one with a C compiler "
+            "or the package ziglang: pip install ."
+        ) from None
+
+
+_FFI, _LIBRARY = _opened()
 _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "mumacro_case *"))
 _POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
 _COLUMNS = _FFI.typeof("mumacro_columns *")
 _NOTHING: Any = _FFI.NULL
-# of types that are resolved already, in half the time of the methods of FFI
-_resolved = _cffi_backend.FFI()
-_new, _from_buffer = _resolved.new, _resolved.from_buffer
+_new, _from_buffer = _FFI.new, _FFI.from_buffer
 
 
 def _numbers(array: Array | None) -> Any:
@@ -461,17 +472,5 @@ class Kernel:
         return out
 
 
-def _shared() -> Any:
-    try:
-        return _FFI.dlopen(str(_SHARED_OBJECT))
-    except OSError as error:
-        raise ImportError(
-            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing or does not fit this "
-            f"machine ({error}): install a wheel for this platform, or build one with a C compiler "
-            "or the package ziglang: pip install ."
-        ) from None
-
-
-_LIBRARY = _shared()
 #: the kernels that this processor can run, the best one last
 kernels = [Kernel(one) for one in map(_LIBRARY.mumacro_kernel_at, range(3)) if one != _NOTHING]

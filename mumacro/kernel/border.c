@@ -51,8 +51,18 @@ MU_INLINE double mu_border_value(const double *c, double u) {
     return mu_fma1(high, u4, mu_fma1(mu_fma1(c[4], u, c[5]), u2, mu_fma1(c[6], u, c[7])));
 }
 
-/* d ln v~crit / d ln y~ from the same cell: 2 for y~ -> 0, 1/2 for y~ -> infinity. */
-MU_INLINE double mu_border_slope(const double *pieces, const double *cell, double u, double y) {
+/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what
+ * interpolation leaves out, is 64 at both edges and up to 8 between them. */
+MU_INLINE double mu_edge_share(double u) { return 1.0 / (1.0 + 7.0 * (1.0 - u * u)); }
+
+/* d ln v~crit / d ln y~, and what it may be off by. */
+typedef struct {
+    double slope, error;
+} mu_tilt;
+
+/* The slope from the same cell: 2 for y~ -> 0, 1/2 for y~ -> infinity.  v~crit errs as T_8 does, so
+ * its slope errs most where two cells meet. */
+MU_INLINE mu_tilt mu_border_tilt(const double *pieces, const double *cell, double u, double y) {
     double value = cell[0], slope = 0.0;
     const int piece = y <= MU_Y_CONT   ? MU_BORDER_LOW
                       : y <= MU_Y_TAIL ? MU_BORDER_MID
@@ -61,18 +71,21 @@ MU_INLINE double mu_border_slope(const double *pieces, const double *cell, doubl
     const double weight = piece == MU_BORDER_LOW   ? 2.0 * y * y
                           : piece == MU_BORDER_MID ? 1.0
                                                    : -1.0 / y;
+    mu_tilt out;
     for (int i = 1; i < 8; ++i) {
         slope = mu_fma1(slope, u, value);
         value = mu_fma1(value, u, cell[i]);
     }
-    return (piece == MU_BORDER_LOW   ? 2.0
-            : piece == MU_BORDER_MID ? 0.0
-                                     : 0.5) +
-           weight * step * slope / value;
+    out.slope = (piece == MU_BORDER_LOW   ? 2.0
+                 : piece == MU_BORDER_MID ? 0.0
+                                          : 0.5) +
+                weight * step * slope / value;
+    out.error = 64.0 * mu_edge_share(u) * fabs(weight) * step * pieces[MU_PIECE_ERROR];
+    return out;
 }
 
-/* v~crit at 0 < y < infinity, with its slope and ln y~ where they are wanted. */
-static double mu_border(const mumacro_data *data, double y, double *slope, double *ln_y) {
+/* v~crit at 0 < y < infinity, with its tilt and ln y~ where they are wanted. */
+static double mu_border(const mumacro_data *data, double y, mu_tilt *tilt, double *ln_y) {
     const double *cell;
     double u, scale;
     if (y > MU_Y_TAIL) {
@@ -90,7 +103,7 @@ static double mu_border(const mumacro_data *data, double y, double *slope, doubl
         scale = mu_first(cells.scale);
         if (ln_y) *ln_y = mu_first(cells.ln_y);
     }
-    if (slope) *slope = mu_border_slope(data->pieces, cell, u, y);
+    if (tilt) *tilt = mu_border_tilt(data->pieces, cell, u, y);
     return scale * mu_border_value(cell, u);
 }
 

@@ -80,15 +80,36 @@ MU_INLINE mu_slope mu_cell_slopes(const double *cell, double u, double w) {
     return out;
 }
 
-/* (d/dw at w - d/dw at 1) / (w - 1) of the polynomial at u: a polynomial again, so
- * nothing cancels next to w = 1. */
-static double mu_cell_bend(const double *cell, double u, double w) {
-    double sum = 0.0, quotient = 0.0;
-    for (int k = 0; k < 6; ++k) { /* the power 7 - k of w */
-        double row = 0.0;
-        for (int i = 0; i < 8; ++i) row = mu_fma1(row, u, cell[8 * k + i]);
-        quotient += (7 - k) * row;
-        sum = mu_fma1(sum, w, quotient);
+/* (d/dw at w - d/dw at 1) / (w - 1) of a cell's polynomial: a polynomial again, so nothing cancels
+ * next to w = 1.  Its coefficients in falling powers of u, as in mu_rows. */
+MU_INLINE void mu_bends(const double *cell, double w, double *bends) {
+    for (int p = 0; p < MU_PARTS; ++p) {
+        mu_lanes sum = mu_all(0.0), quotient = mu_all(0.0);
+        for (int k = 0; k < 6; ++k) { /* the power 7 - k of w */
+            quotient = mu_fma(mu_all(7.0 - k), mu_load(cell + 8 * k + p * MU_LANES), quotient);
+            sum = mu_fma(sum, mu_all(w), quotient);
+        }
+        mu_store(bends + p * MU_LANES, sum);
     }
+}
+
+/* The same of a sum over falling powers of u. */
+MU_INLINE double mu_bend(const double *c, double u) {
+    double sum = 0.0, quotient = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        quotient = mu_fma1(7.0 - i, c[i], quotient);
+        sum = mu_fma1(sum, u, quotient);
+    }
+    return sum;
+}
+
+/* (c at u - c at 1) / (u - 1) of a sum over falling powers of u, and c at 1. */
+MU_INLINE double mu_rise(const double *c, double u, double *at_end) {
+    double sum = 0.0, quotient = 0.0;
+    for (int i = 0; i < 7; ++i) {
+        quotient += c[i];
+        sum = mu_fma1(sum, u, quotient);
+    }
+    *at_end = quotient + c[7];
     return sum;
 }

@@ -1,10 +1,10 @@
 /* The charts: which block a point belongs to, and its coordinates there. */
 
-/* A point in its block: coordinates (a, b), v~crit and d ln v~crit / d
- * ln y~; phi in the corner only. */
+/* A point in its block: coordinates (a, b), v~crit and its tilt; phi in the corner only. */
 typedef struct {
     int block;
-    double v, y, a, b, phi, crit, tilt;
+    double v, y, a, b, phi, crit;
+    mu_tilt tilt;
 } mu_place;
 
 /* The corner, where a and b are polar. */
@@ -109,7 +109,7 @@ static void mu_place_corner(mu_place *at) {
 
 /* The place of any point with v~ > 0, y~ > 0, both finite; MU_FAST has no coordinates. */
 static mu_place mu_locate(const mumacro_data *data, double v, double y) {
-    mu_place at = {MU_FAST, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_place at = {MU_FAST, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {0.0, 0.0}};
     double ln_y;
     at.v = v;
     at.y = y;
@@ -168,13 +168,13 @@ MU_INLINE double mu_speed_share(double v) {
 MU_INLINE mu_turn mu_turn_of_spring(const mu_place *at) {
     /* a is this power of y~; where it is 0, ln y~ */
     static const signed char power[MU_CHARTS] = {2, 0, 0, 0, -1, 2, 1, 0, 0, 0, 0, -1};
-    mu_turn out = {0.0, 1.0, 1.0, -at->tilt, 0.0, 0.0, 1.0, -at->tilt, MU_SQRT2, 1.0};
+    mu_turn out = {0.0, 1.0, 1.0, -at->tilt.slope, 0.0, 0.0, 1.0, -at->tilt.slope, MU_SQRT2, 1.0};
     if (at->block == MU_CORNER) return mu_turn_corner(at);
     if (power[at->block]) out.a_y = power[at->block] * at->a;
     if (at->block >= MU_S_LOW) {
         const double root = mu_max(MU_SQRT2 - at->b, 1e-9);
         out.b_v = at->b < 0.5 * MU_SQRT2 ? 0.5 * at->b : 0.5 * (1.0 - root * root) / root;
-        out.b_y = -at->tilt * out.b_v;
+        out.b_y = -at->tilt.slope * out.b_v;
     } else if (at->block == MU_C_LOW) {
         out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);
         out.b_y = 0.0;

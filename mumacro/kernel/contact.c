@@ -262,7 +262,11 @@ static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, 
     const double inside = y * (1.0 - 2.0 * MU_LINE_ROUNDING);
     mu_driven out = {mu_line_of_sliding(direction, v, y), 0.0, 0.0, 0.0, 0.0, 0.0}, near;
     const mu_line *line = &out.line;
-    if (line->source < 0 || y == 0.0 || v > y * (1.0 + 2.0 * MU_ROUNDING)) return out;
+    if (line->source < 0) {
+        out.bound = out.bound_v = out.bound_y = out.power_bound = out.stick_bound = NAN;
+        return out;
+    }
+    if (y == 0.0 || v > y * (1.0 + 2.0 * MU_ROUNDING)) return out;
     if (!(inside < y) && !(v < y)) { /* the last of the denormal numbers */
         out.bound = out.bound_v = out.bound_y = out.power_bound = 4.0 * y;
         out.stick_bound = 1.0;

@@ -88,7 +88,7 @@ static void mu_forms(int contact, int quantity, int place, int64_t n, const doub
     const int block = contact == MU_BALL ? MU_BALL_BLOCKS + place : place;
     const mu_form form = mu_form_in(block, quantity);
     for (int64_t i = 0; i < n; ++i) {
-        mu_place at = {block, v[i], y[i], 0.0, 0.0, 0.0, 0.0, 0.0};
+        mu_place at = {block, v[i], y[i], 0.0, 0.0, 0.0, 0.0, {0.0, 0.0}};
         if (mu_is_corner(block)) {
             at.phi = mu_normal_form_root(v[i], eta[i]);
             at.a = sqrt(MU_PI * v[i] / at.phi + 2.0 * at.phi * at.phi);

@@ -194,14 +194,15 @@ MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c
 
 /* A point of the chunk in its block. */
 MU_INLINE mu_place mu_place_of(const mumacro_data *data, const mu_chunk *c, int i, int slope) {
-    mu_place at = {(int)c->block[i], c->v[i], c->y[i], c->a[i], c->b[i], 0.0, c->crit[i], 0.0};
+    mu_place at = {(int)c->block[i], c->v[i],    c->y[i],   c->a[i], c->b[i], 0.0,
+                   c->crit[i],       {0.0, 0.0}};
     if (at.block == MU_CORNER)
         mu_place_corner(&at);
     else if (at.block == MU_B_CORNER)
         mu_place_ball_corner(&at);
     else if (slope)
         at.tilt =
-            mu_border_slope(data->pieces, data->border + 8 * c->border[i], c->local[i], c->y[i]);
+            mu_border_tilt(data->pieces, data->border + 8 * c->border[i], c->local[i], c->y[i]);
     return at;
 }
 

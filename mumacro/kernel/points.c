@@ -50,12 +50,8 @@ static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantit
     return out;
 }
 
-/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what
- * interpolation leaves out, is 64 at both edges and up to 8 between them. */
-MU_INLINE double mu_edge_share(double u) { return 1.0 / (1.0 + 7.0 * (1.0 - u * u)); }
-
-/* The same in the last cell below the border of (T_8' at w - T_8' at the border) / (1 - w): from
- * 1344 to 64. */
+/* As mu_edge_share in the last cell below the border, of (T_8' at w - T_8' at the border) / (1 - w):
+ * from 1344 to 64. */
 MU_INLINE double mu_border_share(double w) { return 1.0 / (1.0 + 10.0 * (1.0 - w)); }
 
 /* What errors of q and of its derivatives along a and b move a logarithmic slope by, per |factor|.
@@ -64,53 +60,72 @@ MU_INLINE double mu_slope_error(const double *errors, double of_factor, double o
     return errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b);
 }
 
+/* Whether b is a function of v~/v~crit. */
+MU_INLINE int mu_follows_border(int block) {
+    switch (block) {
+        case MU_C_LOW:
+        case MU_C_TAIL:
+        case MU_B_LOW:
+        case MU_B_SLOW:
+        case MU_B_RING:
+            return 0;
+        default:
+            return !mu_is_corner(block);
+    }
+}
+
 /* Whether b ends at the border with a square root. */
 MU_INLINE int mu_has_edge(int block) { return !mu_is_sliding_block(block) && !mu_is_corner(block); }
 
-/* d q / d ln x along b in the last cell below the border x = 1, without what is linear in root =
- * sqrt(1 - x); left is the way in b to the border. */
-MU_INLINE double mu_without_edge(const double *cell, mu_spot spot, double left, double step,
-                                 const mu_turn *turn) {
-    const double root = left / turn->scale;
-    return -2.0 * step * step * (1.0 - root * root) * mu_cell_bend(cell, spot.u, spot.w) *
-           (turn->scale * turn->scale);
+/* Whether x is in the last of the cells that end at end. */
+MU_INLINE int mu_is_last(double x, double end, double offset, double step) {
+    return mu_fma1(x, step, offset) >= (double)mu_whole_of(mu_fma1(end, step, offset));
 }
 
-/* A slope of q along ln v~ at fixed y~, across the rays, and what errors along a and b are
- * multiplied by. */
+/* d q / d ln x along b in the last cell below the border x = 1, without what is linear in root =
+ * sqrt(1 - x), in falling powers of u; left is the way in b to the border. */
+MU_INLINE void mu_without_edge(const double *cell, mu_spot spot, double left, double step,
+                               const mu_turn *turn, double *along) {
+    const double root = left / turn->scale;
+    const double factor = -2.0 * step * step * (1.0 - root * root) * (turn->scale * turn->scale);
+    mu_bends(cell, spot.w, along);
+    for (int i = 0; i < 8; ++i) along[i] *= factor;
+}
+
+/* What errors along a and b are multiplied by in a slope across the rays. */
 typedef struct {
     double slope, reach_a, reach_b;
 } mu_across;
 
-/* In the ring next to the steepest ray: q is smooth in root = sqrt(1 - t) without a linear term at
- * fixed y~, so the derivative along root at the steepest ray, which the interpolant has by its
- * error, is taken out, as at the border. per_z: d q / d ln z. */
-static mu_across mu_across_rays(const mumacro_cells *cells, const double *block, const mu_place *at,
-                                double q_a, double per_z) {
-    const double end = 2.0 * MU_FOLD_KNOT, root = mu_max((end - at->a) / MU_FOLD_SCALE, 1e-9),
-                 t = 1.0 - root * root;
-    const double z = mu_min(at->y / MU_STEEPEST_Y, 1.0);
-    const mu_mask half = z < 0.5 ? mu_all_whole(-1) : mu_all_whole(0);
-    const double b = mu_first(mu_folded(half, mu_all(sqrt(z < 0.5 ? z : 1.0 - z))));
-    const mu_spot spot = mu_find(block, cells->first, cells->cells, end, b);
-    const double *cell = cells->polynomials + 64 * spot.cell, step = block[MU_STEP_B];
-    const mu_slope slope = mu_cell_slopes(cell, spot.u, spot.w);
-    const mu_turn turn = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, end, MU_FOLD_SCALE};
-    const double last = (double)mu_whole_of(mu_fma1(end, step, block[MU_OFFSET_B]));
-    const double at_edge = mu_fma1(b, step, block[MU_OFFSET_B]) >= last
-                               ? mu_without_edge(cell, spot, end - b, step, &turn)
-                               : mu_fold_slope(b) * slope.q_b * 2.0 * step;
-    const double q_a_edge = slope.q_a * 2.0 * block[MU_STEP_A];
-    double of_root, of_edge;
+/* A slope of q along ln v~ at fixed y~ in the ring next to the steepest ray, that is across the
+ * rays.
+ *
+ * With root = sqrt(1 - t), t the ray, it is -t/(2 root) times d q/d root = -MU_FOLD_SCALE q_a -
+ * of_root per_z, where of_root is d ln entry/d root.  q is smooth in root without a linear term at
+ * fixed y~, so at root = 0 that is zero wherever b is.  The polynomial of a cell has what it errs
+ * by there; that is taken out at the same b, so that both are of one polynomial and root divides
+ * their difference, as at the border.  per_z: d q/d ln z, in falling powers of u. */
+static mu_across mu_across_rays(const double *cell, const mu_place *at, mu_spot spot,
+                                const double *block, const mu_turn *turn) {
+    const double root = (turn->end - at->a) / turn->scale, t = 1.0 - root * root;
+    const double of_u = 2.0 * block[MU_STEP_A] * turn->scale; /* -d u/d root */
+    double row[8], per_z[8], of_root, of_edge, at_edge, rise, bend;
     mu_across out;
+    mu_rows(cell, spot.w, row, per_z);
+    if (mu_is_last(at->b, turn->end, block[MU_OFFSET_B], block[MU_STEP_B]))
+        mu_without_edge(cell, spot, turn->end - at->b, block[MU_STEP_B], turn, per_z);
+    else
+        for (int i = 0; i < 8; ++i) per_z[i] *= mu_fold_slope(at->b) * 2.0 * block[MU_STEP_B];
     (void)mu_entry_slope(t, root, &of_root);
     (void)mu_entry_slope(1.0, 0.0, &of_edge);
-    out.slope =
-        0.5 * t / root * (MU_FOLD_SCALE * (q_a - q_a_edge) + of_root * per_z - of_edge * at_edge);
-    /* both ends have an error, and the way to the steepest ray goes through cells along b, too:
-     * four times either */
-    out.reach_a = 4.0 * mu_min(0.5 * MU_FOLD_SCALE * t / root, 0.5 * block[MU_STEP_A]);
-    out.reach_b = 8.0 * fabs(of_root) * mu_min(0.5 * t / root, block[MU_STEP_A]);
+    rise = mu_rise(per_z, spot.u, &at_edge);
+    bend = mu_entry_bend(root, of_edge);
+    out.slope = 0.5 * t * (bend * at_edge - of_u * (of_u * mu_bend(row, spot.u) + of_root * rise));
+    out.reach_a = mu_min(0.5 * turn->scale * t / mu_max(root, 1e-9), 0.5 * block[MU_STEP_A]);
+    /* an error of per_z changes by twice its largest at most, and by 64 times that per unit of u,
+     * as T_8 does */
+    out.reach_b =
+        0.5 * t * (fabs(bend) + fabs(of_root) * mu_min(2.0 / mu_max(root, 1e-9), 64.0 * of_u));
     return out;
 }
 
@@ -141,13 +156,14 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
          * v~/v~crit); the interpolant has one of the size of its error, which the chain rule would
          * divide by root.  Taken out of the last cell, where 1 - w = 2 step root, it leaves the
          * slope bounded. */
-        const double step = block[MU_STEP_B],
-                     last = (double)mu_whole_of(mu_fma1(turn.end, step, block[MU_OFFSET_B]));
+        const double step = block[MU_STEP_B];
         reach =
             mu_min(reach, 0.5 * step *
                               (turn.scale * turn.scale)); /* what it is one cell from the border */
-        if (mu_fma1(at->b, step, block[MU_OFFSET_B]) >= last) {
-            along_b = mu_without_edge(cell, spot, turn.end - at->b, step, &turn);
+        if (mu_is_last(at->b, turn.end, block[MU_OFFSET_B], step)) {
+            double along[8];
+            mu_without_edge(cell, spot, turn.end - at->b, step, &turn, along);
+            along_b = mu_by_halves(along, spot.u);
             along_b_y = turn.edge_y * along_b;
             along_b = turn.edge_v * along_b;
             share_b = mu_border_share(spot.w);
@@ -155,20 +171,16 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     }
     along_a = turn.a_v * q_a;
     along_a_y = turn.a_y * q_a;
-    if (at->block == MU_B_RING) {
-        const double per_z = along_b_y / turn.edge_y,
-                     last = (double)mu_whole_of(
-                         mu_fma1(turn.end, block[MU_STEP_A], block[MU_OFFSET_A]));
-        if (mu_fma1(at->a, block[MU_STEP_A], block[MU_OFFSET_A]) >= last) {
-            const mu_across rays = mu_across_rays(cells, block, at, q_a, per_z);
-            along_a = rays.slope;
-            along_a_y = -rays.slope;
-            along_b = 0.0;
-            along_b_y = per_z;
-            share_a = mu_border_share(spot.u);
-            more = scale * (errors[1] * share_a * rays.reach_a +
-                            errors[2] * share_b * reach * rays.reach_b);
-        }
+    if (at->block == MU_B_RING &&
+        mu_is_last(at->a, turn.end, block[MU_OFFSET_A], block[MU_STEP_A])) {
+        const mu_across rays = mu_across_rays(cell, at, spot, block, &turn);
+        along_a = rays.slope;
+        along_a_y = -rays.slope;
+        along_b = 0.0;
+        along_b_y /= turn.edge_y;
+        share_a = mu_border_share(spot.u);
+        more = scale * (errors[1] * share_a * rays.reach_a +
+                        errors[2] * share_b * reach * rays.reach_b);
     }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
     out.along_v = form.base_v + factor * (form.factor_v * slope.q + along_a + along_b);
@@ -193,6 +205,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
         out.bound_v *= unsure;
         out.bound_y *= unsure;
     }
+    if (mu_follows_border(at->block)) out.bound_y += scale * fabs(along_b) * at->tilt.error;
     out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (!about->about.smooth_at_border && mu_has_edge(at->block)) {
         /* a root of the distance to the border: |1/sqrt(1 - d) - 1| <= d / (1 - d) for the error d

@@ -8,7 +8,6 @@ import functools
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import numpy as np
@@ -72,6 +71,8 @@ def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: 
         for part in parts:
             work(part)
         return
+    from concurrent.futures import ThreadPoolExecutor  # one case starts sooner without
+
     with ThreadPoolExecutor(min(workers, len(parts)), thread_name_prefix="mumacro") as pool:
         for _ in pool.map(work, parts):
             pass

@@ -1,20 +1,10 @@
-"""Files that are either complete or absent, and folders that one process has locked."""
+"""Files that are either complete or absent."""
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-
-from mumacro.errors import MumacroError
-
-try:
-    import fcntl
-except ImportError:  # Windows: two processes are not distinguished
-    fcntl = None  # type: ignore[assignment]
-
-
-class BusyError(MumacroError):
-    """Another process is writing the same output."""
+from typing import BinaryIO
 
 
 def sync_folder(folder: Path) -> None:
@@ -28,61 +18,51 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def put(growing: Path, path: Path) -> None:
-    """Bring a whole file to the disk, then give it its name."""
-    with growing.open("r+b") as stream:
-        os.fsync(stream.fileno())
-    os.replace(growing, path)
-    sync_folder(path.parent)
-
-
-def write_whole(path: Path, content: bytes, mode: int = 0o644) -> None:
-    """Write a file under another name beside its place, to the disk, and rename it.
-
-    OSError leaves nothing behind, and an older file stays.
-    """
-    import tempfile  # only writing needs it: reading a table starts sooner without
-
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".growing")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        Path(name).chmod(mode)
-        put(Path(name), path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+def to_disk(stream: BinaryIO) -> None:
+    """Flush a file to the disk."""
+    stream.flush()
+    os.fsync(stream.fileno())
 
 
 @contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """Make a folder and have it to oneself, or BusyError; one that is empty at the end goes away.
+def growing(path: Path) -> Iterator[BinaryIO]:
+    """A file to be written within the block; at its end it is on the disk, whole, and takes the
+    place of an older one.
 
-    The system releases it when the process ends, in any way.
+    An exception leaves nothing behind, and an older file stays.  On Linux the new file has no name
+    before its end: a killed process leaves nothing, either.
     """
-    while True:
-        folder.mkdir(exist_ok=True)
-        if fcntl is None:
-            handle = None
-            break
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(handle)
-            raise BusyError(
-                f"{folder}: another process is at work here; wait for it, or stop it"
-            ) from None
-        except OSError:  # a file system without locks
-            break
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(handle), folder.stat()):
-                break
-        os.close(handle)  # its owner has removed it since
+    name = path.with_name(f".{path.name}.{os.urandom(4).hex()}.growing")
+    handle = _without_name(path.parent)
+    stream: BinaryIO = name.open("xb") if handle is None else os.fdopen(handle, "wb")
     try:
-        yield
-    finally:
-        with suppress(OSError):
-            folder.rmdir()
-        if handle is not None:
-            os.close(handle)
+        with stream:
+            yield stream
+            to_disk(stream)
+            if handle is not None:
+                # a descriptor of the source, whichever it is, makes Python follow the link
+                os.link(f"/proc/self/fd/{handle}", name, src_dir_fd=handle)
+        os.replace(name, path)
+    except BaseException:
+        name.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def _without_name(folder: Path) -> int | None:
+    """A new file without a name in a folder; None where the system or its disk has none."""
+    if not hasattr(os, "O_TMPFILE") or not Path("/proc/self/fd").is_dir():
+        return None
+    try:
+        return os.open(folder, os.O_TMPFILE | os.O_WRONLY, 0o666)
+    except OSError:  # of the folder itself, too: opening by name tells it
+        return None
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file that is complete or absent.
+
+    OSError leaves nothing behind, and an older file stays.
+    """
+    with growing(path) as stream:
+        stream.write(content)

@@ -62,7 +62,7 @@ class Table:
     error_estimate: Array
     v_tilde_crit: Array
     attributes: dict[str, Any] = field(default_factory=dict)
-    #: the blocks of a ball in the order of ``atlas.BALL_CHARTS``; none in an older table
+    #: the blocks of a ball in the order of ``atlas.BALL_CHARTS``; none before they are built
     ball: list[Block] = field(default_factory=list)
 
     @property

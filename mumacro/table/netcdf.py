@@ -2,8 +2,8 @@
 reading.
 
 docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
-the blocks inside, those of a ball in ``border/ball``, which a file of format 3 has not. The netCDF
-library writes, and is not thread-safe: a lock is held while it works.
+the blocks inside, those of a ball in ``border/ball``. The netCDF library writes, and is not
+thread-safe: a lock is held while it works.
 For reading see ``mumacro.table.hdf5``.
 """
 
@@ -24,7 +24,6 @@ from mumacro.table.blocks import BY_NAME, Block, BorderPiece, Table, names_in
 from mumacro.table.polynomials import nodes
 
 FORMAT_VERSION = 5
-WITHOUT_BALL = 3  # the version of a file that has no ball
 # More is refused before memory is taken; of the largest table that the builder makes:
 MOST_BYTES = 16 * 2**20  # of a file: 425 kB
 MOST_NUMBERS = 200_000  # of a variable: 14,641
@@ -54,20 +53,15 @@ _PLAIN = {
 BALL = "ball_"  # before the names of attributes at the root that tell of a ball
 #: the statistics of bound over error in the attribute ``verified_bound_over_error``
 RATIOS = ("least", "median", "largest")
-#: of every contact that a table has; others may be missing
+#: of every contact; others may be missing
 _STATED = ("tolerance", "verified_max_abs_error", "verified_max_rel_error")
 CELL_AXES = ("quantity", "cell", "derivative")
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
 
 
-def _version(table: Table) -> int:
-    return FORMAT_VERSION if table.ball else WITHOUT_BALL
-
-
 def _contacts(table: Table) -> list[tuple[Sequence[atlas.Chart], list[Block]]]:
-    """The charts and blocks of every contact that a table has."""
-    contacts: list[tuple[Sequence[atlas.Chart], list[Block]]] = [(atlas.CHARTS, table.blocks)]
-    return [*contacts, (atlas.BALL_CHARTS, table.ball)] if table.ball else contacts
+    """The charts and blocks of every contact."""
+    return [(atlas.CHARTS, table.blocks), (atlas.BALL_CHARTS, table.ball)]
 
 
 def _digest(table: Table) -> str:
@@ -84,7 +78,7 @@ def _digest(table: Table) -> str:
                 else repr(part).encode()
             )
 
-    put("mumacro", _version(table), float(table.attributes["tolerance"]))
+    put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
     put(*(getattr(table, name) for name in _PLAIN))
     for geometry, piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
         put(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
@@ -221,7 +215,7 @@ def write_table(table: Table, path: str | Path) -> str:
     import tempfile  # only writing needs it: reading a table starts sooner without
 
     path = Path(path)
-    table.attributes["format_version"] = np.int32(_version(table))
+    table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
     try:
         image = _image(table)
@@ -320,14 +314,11 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
             "not a mumacro table: format_version, tolerance or content_sha256 is missing"
         )
     version = root.attribute("format_version")
-    if not any(np.array_equal(version, one) for one in (WITHOUT_BALL, FORMAT_VERSION)):
-        raise root.refuse(
-            f"format version {version}, this program reads {WITHOUT_BALL} and {FORMAT_VERSION}"
-        )
+    if not np.array_equal(version, FORMAT_VERSION):
+        raise root.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
     attributes = root.attributes()
-    contacts = ("", BALL) if np.array_equal(version, FORMAT_VERSION) else ("",)
     for name in (
-        *(f"{of}{name}" for of in contacts for name in _STATED),
+        *(f"{of}{name}" for of in ("", BALL) for name in _STATED),
         *(key for key in attributes if key.removeprefix(BALL).startswith("verified_max_")),
     ):
         if not root.numbers(name, 1)[0] > 0.0:
@@ -398,11 +389,9 @@ def _read(root: hdf5.Group) -> Table:
     ]
     blocks = [_block(below_blocks.group(chart.name), chart, names) for chart in atlas.CHARTS]
     _add_cell_errors(below_blocks, blocks, names)
-    ball = []
-    if np.array_equal(attributes["format_version"], FORMAT_VERSION):
-        below_ball = below_border.group("ball")
-        ball = [_block(below_ball.group(chart.name), chart, names) for chart in atlas.BALL_CHARTS]
-        _add_cell_errors(below_ball, ball, names)
+    below_ball = below_border.group("ball")
+    ball = [_block(below_ball.group(chart.name), chart, names) for chart in atlas.BALL_CHARTS]
+    _add_cell_errors(below_ball, ball, names)
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         shape = tuple(plain[axis].size for axis in axes) if axes else None

@@ -50,7 +50,10 @@ def chebyshev_coefficients(values: Array) -> Array:
     out = np.asarray(values, dtype=np.float64)
     for axis in range(out.ndim):
         matrix = coefficient_matrix(out.shape[axis])
-        out = np.moveaxis(np.tensordot(matrix, out, axes=(1, axis)), 0, axis)
+        rows = matrix[:, None] @ np.moveaxis(out, axis, 0).reshape(
+            len(matrix), -1
+        )  # as in cells_2d
+        out = np.moveaxis(rows.reshape(np.moveaxis(out, axis, 0).shape), 0, axis)
     return out
 
 
@@ -125,17 +128,16 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from 7 down to
     0.
     """
-    matrix_a = interpolation_matrix(values.shape[0], cell_positions(a, cells[0])[1])
-    matrix_b = interpolation_matrix(values.shape[1], cell_positions(b, cells[1])[1])
-    local = (matrix_a @ chebyshev_coefficients(values) @ matrix_b.T).reshape(
-        cells[0], WIDTH, cells[1], WIDTH
+    # Cell by cell: for larger products BLAS starts threads, which take more time than they save.
+    along_a, along_b = (
+        interpolation_matrix(n, cell_positions(axis, count)[1]).reshape(count, WIDTH, n)
+        for axis, n, count in zip((a, b), values.shape, cells, strict=True)
     )
-    mean = local.mean(axis=(1, 3))
-    power = np.einsum(
-        "pi,aibj,qj->abqp", _TO_POWERS, local - mean[:, None, :, None], _TO_POWERS, optimize=True
-    )
+    local = (along_a @ chebyshev_coefficients(values))[:, None] @ along_b.transpose(0, 2, 1)
+    mean = local.mean(axis=(2, 3))
+    power = _TO_POWERS @ (local - mean[:, :, None, None]) @ _TO_POWERS.T
     power[:, :, -1, -1] += mean
-    return np.asarray(power, dtype=np.float64).reshape(-1, WIDTH, WIDTH)
+    return np.asarray(power).reshape(-1, WIDTH, WIDTH).transpose(0, 2, 1)
 
 
 def _join_patches(patches: Sequence[Array]) -> Array:

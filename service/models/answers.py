@@ -177,6 +177,15 @@ class ModelRow(BaseModel):
     effect: float | None = Field(description="Relative change of mu_macro; null: not known")
 
 
+class Remark(BaseModel):
+    """One doubt about the inputs, such as a wrong unit."""
+
+    row: str = Field(description="The row of the assumptions that it belongs to")
+    field: str = Field(description="The input that is doubted")
+    cases: int = Field(description="How many cases it is about")
+    text: str = Field(description="A sentence on the first of them")
+
+
 class Result(OneOrMany[Number, Regime, str]):
     """Answer to one case."""
 
@@ -378,8 +387,15 @@ class FitAnswer(Answered):
     reduced_chi2: float | None = Field(description="null: no point more than unknowns")
     solutions: list[Solution] = Field(description="All minima within 95 %, best first")
     warnings: list[str] = Field(description="What the points do not determine")
+    remarks: list[Remark] | None = Field(
+        None, description="What is doubtful about the points; left out where nothing is"
+    )
     contact: ContactName
     direction: DirectionName
+    points: dict[str, list[float | Literal["rigid"] | None]] = Field(
+        description="What was fitted to, in SI: the known inputs of each point, mu_macro, and std "
+        "where it was given"
+    )
     curve: FittedCurve | None = Field(
         description="null where other inputs than v0 vary, or v0 is 0 everywhere"
     )

@@ -23,7 +23,7 @@ from pydantic_core import PydanticCustomError
 
 from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, is_rigid, refusal
 from mumacro.inputs.k_range import BOUND
-from mumacro.inputs.units import number_hint
+from mumacro.inputs.old_texts import number_hint
 from mumacro.kernel.arrays import Array
 
 #: what a case may hold, in the order in which it is described

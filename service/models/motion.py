@@ -14,9 +14,10 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from mumacro.analysis.motion import MOST_HARMONIC, TOLERANCES, WHOLE
+from mumacro.analysis.motion import TOLERANCES
 from mumacro.errors import InputError
 from mumacro.inputs.kind import ContactName
+from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE
 
 from .answers import Number, Numbers, quantity
 from .inputs import (

@@ -23,7 +23,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.fields import STIFFNESS, is_rigid
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
-from mumacro.inputs.units import number_hint
+from mumacro.inputs.old_texts import number_hint
 
 from .inputs import (
     EXAMPLE,

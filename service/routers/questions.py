@@ -14,10 +14,10 @@ import mumacro
 from mumacro.analysis.law import Law
 from mumacro.analysis.solve_for import Solution
 from mumacro.analysis.stiffening import Stiffening
-from mumacro.analysis.validity import load_rows
 from mumacro.errors import InputError
 from mumacro.inputs.fields import field_of, unit_of
 from mumacro.kernel.arrays import Array
+from mumacro.validity import load_rows
 
 from ..included import Plan, answer_columns, listed, nested
 from ..limits import Working

@@ -1,8 +1,8 @@
 """``python -m builder`` beyond the simple cases: complete builds, failures during work, help."""
 
-import dataclasses
 import json
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -64,33 +64,12 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     assert report["bytes"] == out.stat().st_size
     assert report["n_solves"] == opened.attributes["n_solves"]
     assert report["n_solves"] > 10_000
-    # no checkpoint, no partial file
+    # no partial file
     assert [path.name for path in tmp_path.iterdir()] == ["rough.nc"]
 
     verified = run_builder("verify", out, "--points", 300, "--seed", 5)
     assert verified.returncode == 0, verified.stderr
     assert {"holds": True, "not_covered": 0}.items() <= json.loads(verified.stdout).items()
-
-
-@pytest.mark.slow
-def test_ball_gives_a_table_a_ball_and_leaves_its_springs(
-    run_builder: Run, tables_dir: Path, tmp_path: Path
-) -> None:
-    whole = read_table(tables_dir / "mumacro-1e-4.nc")
-    attributes = {name: x for name, x in whole.attributes.items() if not name.startswith("ball_")}
-    old, new = tmp_path / "old.nc", tmp_path / "new.nc"
-    write_table(dataclasses.replace(whole, ball=[], attributes=attributes), old)
-    done = run_builder("ball", old, "--out", new)
-    assert done.returncode == 0, done.stderr
-    report, opened = json.loads(done.stdout), Surrogate.open(new)
-    assert report["ball_verified_max_abs_error"] <= report["ball_tolerance"]
-    assert report["ball_tolerance"] == opened.ball_tolerance
-    v, y = 0.3, 0.7
-    assert opened.quantity("mu_ratio", v, y) == Surrogate.open(old).quantity("mu_ratio", v, y)
-    assert opened.quantity("mu_ratio", v, y, contact="ball")[0] == close(
-        Surrogate.open().quantity("mu_ratio", v, y, contact="ball")[0], abs=1e-4
-    )
-    assert [*tmp_path.glob("*.checkpoint")] == []
 
 
 def test_verify_stores_what_it_finds_only_when_asked(
@@ -189,3 +168,17 @@ REFUSED: dict[str, tuple[str, ...]] = {
 def test_bad_arguments_are_refused_before_any_work(here: Run, words: str, repository: Path) -> None:
     refused(here(*words.split()), *REFUSED[words])
     assert not list(repository.glob("x.nc*"))
+
+
+def test_what_writes_tables_is_asked_for_before_any_work(
+    tmp_path: Path, tables_dir: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setitem(sys.modules, "netCDF4", None)
+    table = tables_dir / "mumacro-1e-4.nc"
+    for words in (
+        ["build", "--tolerance", "1e-4", "--out", str(tmp_path / "new.nc")],
+        ["verify", str(table), "--write"],
+    ):
+        assert main(words) == 1
+        assert "netCDF4 is not installed" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

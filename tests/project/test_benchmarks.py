@@ -1,7 +1,6 @@
 """The scripts of benchmarks/: each runs, its tables are right, and results are stored where they
 belong."""
 
-import importlib
 import re
 import subprocess
 import sys
@@ -10,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from benchmarks import measuring, tables_readme
+from tests.support import measuring
 from tests.support.cases import Capture
 from tests.support.places import ROOT
+from tests.support.scripts import script as loaded
 
 Row = dict[str, str]
 
@@ -71,14 +71,14 @@ def test_a_result_is_put_between_its_markers(
 def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
     page = (ROOT / "tables" / "README.md").read_text("utf-8")
     section = page.split("<!-- begin tables -->")[1].split("<!-- end tables -->")[0]
-    assert tables_readme.tables(build=False, workers=2).strip() in section
+    assert loaded("benchmarks.tables_readme").tables(build=False, workers=2).strip() in section
 
 
 SLOW = {"model", "angles", "stiffness", "cusp", "creep"}
 SECTIONS = [
     pytest.param(section, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
     for script in ("validation", "validity", "model_facts", "hard_cases")
-    for name, section in importlib.import_module(f"benchmarks.{script}").SECTIONS.items()
+    for name, section in loaded(f"benchmarks.{script}").SECTIONS.items()
 ]
 
 

@@ -10,15 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import error_distribution, extended, validation, validity
 from mumacro import Surrogate, __version__
 from mumacro.analysis.approximations import APPROXIMATIONS, BORDERS, borders
 from tests.project.test_benchmarks import tables
+from tests.support import extended
 from tests.support.comparing import close
 from tests.support.documents import PAGES
 from tests.support.places import ROOT
+from tests.support.scripts import script
 
 DOCS = ROOT / "docs"
+error_distribution, validation, validity = (
+    script(f"benchmarks.{name}") for name in ("error_distribution", "validation", "validity")
+)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(
     r"^```.*?^```$|^(?:    .*\n)+|<!-- begin .*?<!-- end|`[^`\n]+`|<!--.*?-->",

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.support.serving import CASE as SERVED
 from mumacro import Surrogate, motion
 from tests.support.comparing import close
+from tests.support.serving import CASE as SERVED
 
 CASE = {**SERVED, "omega": 2 * math.pi * 20e3}
 

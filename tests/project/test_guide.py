@@ -20,7 +20,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.support.serving import CASE, running
 from tests.project.test_wheel import CORE, build
 from tests.support.comparing import close
 from tests.support.documents import (
@@ -34,6 +33,7 @@ from tests.support.documents import (
     plain,
 )
 from tests.support.places import ROOT
+from tests.support.serving import CASE, running
 
 posix = pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
 
@@ -51,7 +51,8 @@ sys.exit(0 if result.attempted and not result.failed else 1)
 INSTALLS = {"bare": "pip install .", "service": "pip install '.[service]'"}
 #: the file that runs a command, perhaps with smaller numbers, and the words there that do
 ELSEWHERE = {
-    "python3 dev.py test": (".ci/run", "python3 dev.py test"),
+    "python3 dev.py test": ("dev.py", 'if "--all" in arguments'),  # by dev.py test --all
+    "python3 dev.py test --all": (".ci/run", "python3 dev.py test --all"),
     "python3 dev.py wheels": (".ci/run", "python3 dev.py wheels"),
     "python3 dev.py check": ("dev.py", "failed = check()"),  # by dev.py test
     "python3 dev.py docs": ("dev.py", "return docs() or"),  # by dev.py wheels
@@ -85,13 +86,18 @@ ELSEWHERE = {
         "tests/mumacro/analysis/test_measured.py",
         "measured.SECTIONS",
     ),
+    "python benchmarks/friction_models.py": (
+        "tests/mumacro/analysis/test_measured.py",
+        "friction_models.elements()",
+    ),
+    "nice python benchmarks/fit_coverage.py": (
+        "tests/mumacro/analysis/test_fitting.py",
+        "fit_coverage.SET_UPS",
+    ),
+    "mumacro fit --json": ("tests/mumacro/cli/test_command.py", '*words, "--json")'),
     "python benchmarks/error_distribution.py": (
         "tests/project/test_benchmarks.py",
         '"error_distribution --share',
-    ),
-    "python -m builder ball TABLE": (
-        "tests/builder/test_builder_cli.py",
-        'run_builder("ball", old, "--out", new)',
     ),
     "python -m builder verify TABLE --write": (
         "tests/builder/test_builder_cli.py",
@@ -107,7 +113,7 @@ ELSEWHERE = {
     ),
     "python benchmarks/tables_readme.py": (
         "tests/project/test_benchmarks.py",
-        "tables_readme.tables(",
+        '"benchmarks.tables_readme").tables(',
     ),
     "gcc -O2 -c mumacro.c mumacro_table.c && gfortran mumacro.f90 friction.f90 mumacro.o "
     "mumacro_table.o -lm": ("tests/builder/export/test_c_languages.py", '"mumacro.f90"'),
@@ -264,7 +270,9 @@ def venv(folder: Path) -> Path:
 def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What ``pip install .`` gives in a copy of this tree."""
     folder = tmp_path_factory.mktemp("bare")
-    unwanted = shutil.ignore_patterns(".*", "build", "dist", "_kernel.*", "__pycache__", "tests")
+    unwanted = shutil.ignore_patterns(
+        ".*", "build", "dist", "_kernel.*", "_declarations.py", "__pycache__", "tests"
+    )
     shutil.copytree(ROOT, folder / "tree", ignore=unwanted)
     programs = venv(folder / "venv")
     # the tested versions, probably in pip's cache

@@ -1,5 +1,7 @@
-"""The layout of the sources that ruff does not see: no line is longer than 100 characters."""
+"""The layout of the sources: no line that ruff does not see is longer than 100 characters; tests,
+benchmarks and fuzz share tests/support and import nothing else from each other."""
 
+import ast
 from pathlib import Path
 
 import pytest
@@ -42,3 +44,29 @@ SOURCES = [
 def test_no_line_is_longer_than_100_characters(path: Path) -> None:
     lines = path.read_text("utf-8").splitlines()
     assert [number for number, line in enumerate(lines, 1) if len(line) > 100] == []
+
+
+#: folder -> what a script of it may import of these three
+SHARED = {
+    "benchmarks": ("benchmarks", "tests.support"),
+    "fuzz": ("fuzz", "tests.support"),
+    "tests": ("tests",),
+    "tests/support": ("tests.support",),
+}
+SCRIPTS = [(folder, path) for folder in SHARED for path in sorted((ROOT / folder).rglob("*.py"))]
+
+
+@pytest.mark.parametrize(
+    ("folder", "path"), SCRIPTS, ids=lambda part: str(part).removeprefix(f"{ROOT}/")
+)
+def test_benchmarks_fuzz_and_tests_share_tests_support_alone(folder: str, path: Path) -> None:
+    modules = []
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            modules += [f"{node.module}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.Import):
+            modules += [alias.name for alias in node.names]
+    ours = [name for name in modules if name.startswith(("benchmarks.", "fuzz.", "tests."))]
+    assert [
+        name for name in ours if not f"{name}.".startswith(tuple(f"{x}." for x in SHARED[folder]))
+    ] == []

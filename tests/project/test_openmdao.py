@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.support.serving import CASE
 from mumacro import InputError, Surrogate
 from mumacro.inputs.fields import FIELDS
+from tests.support.serving import CASE
 
 om = pytest.importorskip(
     "openmdao.api", reason="openmdao of requirements/peers.txt is not installed"

@@ -160,7 +160,8 @@ def test_dev_py_sees_a_changed_c_source(
     monkeypatch.setattr(dev, "ROOT", tmp_path)
     kernel = tmp_path / "mumacro" / "kernel"
     kernel.mkdir(parents=True)
-    for path in ("hatch_build.py", "mumacro/kernel/kernel.c", "mumacro/_kernel.so"):
+    made = ("mumacro/_kernel.so", "mumacro/kernel/_declarations.py")
+    for path in ("hatch_build.py", "mumacro/kernel/kernel.c", *made):
         (tmp_path / path).write_text(path)
     shutil.copytree(repository / "requirements", tmp_path / "requirements")
     digests = {dev.current()["kernel"]}
@@ -171,10 +172,11 @@ def test_dev_py_sees_a_changed_c_source(
         lambda: (kernel / "new.h").write_text("new"),
         lambda: (tmp_path / "hatch_build.py").write_text("other flags"),
         lambda: (tmp_path / "mumacro" / "_kernel.so").unlink(),
+        lambda: (kernel / "_declarations.py").unlink(),
     ):
         change()
         digests.add(dev.current()["kernel"])
-    assert len(digests) == 5
+    assert len(digests) == 6
 
 
 @pytest.mark.slow
@@ -188,6 +190,7 @@ def test_the_source_distribution_builds_and_its_tests_collect(
         opened.extractall(tmp_path, filter="data")
     source = tmp_path / archive.name.removesuffix(".tar.gz")
     assert not list((source / "mumacro").glob("_kernel.*"))
+    assert not list((source / "mumacro").rglob("_declarations.py"))
     done = python(source, BUILD)
     assert done.returncode == 0, done.stderr
     command = [sys.executable, "-m", "pytest", "--collect-only", "-m", "", "-rs"]
@@ -231,7 +234,8 @@ LACKS += [
 def test_one_line_says_what_is_missing(
     repository: Path, tmp_path: Path, module: Any, lacks: Any, message: Any
 ) -> None:
-    ignored = shutil.ignore_patterns("__pycache__", *(["_kernel.*"] if lacks == "kernel" else []))
+    made = ["_kernel.*", "_declarations.py"] if lacks == "kernel" else []
+    ignored = shutil.ignore_patterns("__pycache__", *made)
     for name in {"mumacro", module}:
         shutil.copytree(repository / name, tmp_path / name, ignore=ignored)
     # without site-packages: the standard library alone

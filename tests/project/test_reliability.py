@@ -11,28 +11,29 @@ import numpy as np
 import pytest
 
 from builder.solver.steady import Y_RANGE, solve
-from builder.solver.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer
 from mumacro.files import evaluate_files
 from tests.support import cases as ordinary
 from tests.support.cases import Case
+from tests.support.scripts import script
 
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
-from fuzz import answers, faults, tables
-from fuzz.tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
+answers, faults, tables = map(script, ("fuzz.answers", "fuzz.faults", "fuzz.tables"))
+ANOTHER, HARMLESS, HOSTILE = tables.ANOTHER, tables.HARMLESS, tables.HOSTILE
+SMALLEST = tables.SMALLEST
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tables.Outcome]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Every hostile file, opened by another process that may use 256 MB."""
     return dict(zip(HOSTILE, tables.opened(tmp_path_factory.mktemp("hostile")), strict=True))
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_is_refused_before_memory_is_taken(
-    opened: dict[str, tables.Outcome], name: str
+    opened: dict[str, Any], name: str
 ) -> None:
     result = opened[name]
     assert result.what == (
@@ -174,26 +175,3 @@ def test_a_fault_loses_no_data(name: str) -> None:
     if what == "not tried":
         pytest.skip(report)
     assert what == "held", report
-
-
-@pytest.mark.slow
-def test_a_killed_build_resumes_to_the_same_data(tmp_path: Path) -> None:
-    assert "1 kills, 1 starts from finished parts" in faults.killed_builds(tmp_path, kills=1)
-
-
-@pytest.mark.slow
-def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Path) -> None:
-    v, y = np.full(60, 0.1), np.geomspace(0.1, 10.0, 60)
-    try:
-        with (
-            faults.small_disk(tmp_path, "16k") as disk,
-            Sweep(1, checkpoint=disk / "work.checkpoint") as sweep,
-        ):
-            sweep.solve("full", v[:20], y[:20])
-            files, many = faults.files_in(disk), np.geomspace(0.1, 10.0, 600)  # 29 kB of results
-            words = r"work\.checkpoint: finished work cannot be stored: No space left"
-            with pytest.raises(CheckpointError, match=words):
-                sweep.solve("full", many, many)
-            assert faults.files_in(disk) == files
-    except faults.NotTriedError as error:
-        pytest.skip(str(error))

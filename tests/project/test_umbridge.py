@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.support.serving import CASE
+from tests.support.serving import CASE
 
 pytestmark = pytest.mark.slow
 POINT, LONG = [list(CASE.values())], [[*CASE.values(), 1.0]]

@@ -149,6 +149,7 @@ def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(
             archive.read(name).decode() for name in names if name.endswith(".dist-info/WHEEL")
         )
     assert len([name for name in names if name.startswith("mumacro/_kernel.")]) == 1
+    assert "mumacro/kernel/_declarations.py" in names
     sources = {
         f"mumacro/kernel/{path.name}" for path in (repository / "mumacro" / "kernel").iterdir()
     }

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from benchmarks.support.browser import START
 from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from mumacro.inputs.units import UNITS_OF
 from service.app import create_app
 from service.settings import Settings
+from tests.support.browser import START
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow

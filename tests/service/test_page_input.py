@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from benchmarks.support.browser import START
 from mumacro import Surrogate
+from tests.support.browser import START
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow

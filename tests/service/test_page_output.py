@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from benchmarks.support.browser import RECORDED, START
 from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import contact_of
 from service.routers.page import ASSETS
+from tests.support.browser import RECORDED, START
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -35,7 +35,8 @@ def test_it_loads_and_shows_the_known_value(
     assert page.text("#regime") == "stick slip"
     assert page.text("#model") == (
         "One model: one spring of stiffness k, oscillation across the sliding direction. It was "
-        "compared with one published set of measured points, shaken along."
+        "compared with two published sets of points, shaken along: it describes the dry contact, "
+        "not the oiled one."
     )
     assert page.text("#known").startswith("10\xa0% more or less of k changes µ by")
     assert page.find("#known").is_displayed()

@@ -2,9 +2,10 @@
 
 import pytest
 
-from benchmarks.support.serving import Server
-from fuzz import attacks, framing, strange
+from tests.support.scripts import script
+from tests.support.serving import Server
 
+attacks, framing, strange = map(script, ("fuzz.attacks", "fuzz.framing", "fuzz.strange"))
 SHARE = 0.2
 MOST_MB, MOST_S = 512, 2.0  # the aim for the wait is 0.25 s, on a machine that does nothing else
 

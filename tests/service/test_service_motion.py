@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 import mumacro
-from benchmarks.support.serving import asking
 from mumacro.kernel.threads import processors
 from service.limits import LONG_QUESTIONS
 from service.models.motion import LEAST_OF_A_BALL, MAX_TERMS, MOST_OF_A_BALL, MotionRequest
 from tests.support.cases import Case
+from tests.support.serving import asking
 
 PATH = "/v1/motion"
 RIG: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}

@@ -136,7 +136,8 @@ function showAnswer({ inputs, ...reply }) {
     : "";
   $("model").textContent =
     `One model: ${kind}, ${about.choices.direction[direction]}. ` +
-    "It was compared with one published set of measured points, shaken along.";
+    "It was compared with two published sets of points, shaken along: it describes the dry " +
+    "contact, not the oiled one.";
   const rows = reply.model ?? [];
   const [units, spread] = ["units", "k is known"].map((name) =>
     rows.find(({ row }) => row === name),

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.support.serving import CASE
 from builder.export.grid import export_table
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
 from tests.support import compilers
 from tests.support.cases import Case, tables
 from tests.support.comparing import close
+from tests.support.serving import CASE
 
 pytestmark = pytest.mark.slow
 

@@ -13,7 +13,7 @@ import pytest
 
 from builder.__main__ import main
 from builder.export.c import ExportError
-from builder.export.grid import FORMATS, GONE, export_table
+from builder.export.grid import FORMATS, export_table
 from mumacro.errors import TableError
 from mumacro.table.blocks import Table
 from mumacro.table.netcdf import read_table
@@ -98,10 +98,6 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
     [
         (["pyproject.toml", "--format", "csv"], 1, "pyproject.toml"),
         (["x.nc", "--format", "xls"], 2, "--format"),
-        *(
-            (["x.nc", "--format", kind], 2, f"--format {kind!r} is gone: use {GONE[kind]}")
-            for kind in GONE
-        ),
         (["x.nc"], 2, "--format"),
         ([str(PATH), "--format", "csv", "--out", "."], 2, "--out"),
     ],
@@ -129,7 +125,6 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path) -
     copy, folder = Path(shutil.copy(PATH, tmp_path / "table.nc")), tmp_path / "folder.h"
     folder.mkdir()
     for path, kind, out, error, words in (
-        *((PATH, kind, f"x.{kind}", ExportError, "is gone: use") for kind in GONE),
         (PATH, "xls", "x.xls", ExportError, "xls"),
         (tmp_path / "none.nc", "csv", "x.csv", TableError, "no such file"),
         (copy, "csv", "table.nc", ExportError, "is the table itself"),

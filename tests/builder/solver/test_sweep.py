@@ -1,5 +1,4 @@
-"""Many solves at once: the same numbers for any division of the work, resumed after a stop, and no
-missing points."""
+"""Many solves at once: the same numbers for any division of the work, and no missing points."""
 
 import math
 import os
@@ -73,49 +72,6 @@ def test_a_point_that_fails_is_named_with_advice(monkeypatch: pytest.MonkeyPatch
     with Sweep(1) as sweep, pytest.raises(SolveError) as caught:
         sweep.solve("full", np.array([0.1, 0.2, 0.3]), np.array([0.5, 0.5, 0.5]))
     assert str(caught.value) == f"2 of 3 points failed, first v~=0.2, y~=0.5: {ADVICE[NO_STICK]}"
-
-
-def test_finished_work_is_kept_and_taken_up_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    v, y = points(50)
-    folder = tmp_path / "work.checkpoint"
-    with Sweep(1, checkpoint=folder) as sweep:
-        expected = sweep.solve("full", v, y)
-    assert len(list(folder.iterdir())) == 1
-
-    def not_again(*_: object) -> None:
-        raise AssertionError("solved again")
-
-    with Sweep(1, checkpoint=folder) as sweep:
-        monkeypatch.setattr(sweep, "_run", not_again)
-        solved = sweep.solve("full", v, y)
-        assert sweep.n_solves == 50  # the count is the same, resumed or not
-        with pytest.raises(AssertionError, match="solved again"):
-            sweep.solve("continuous", v, y)
-        with pytest.raises(AssertionError, match="solved again"):
-            sweep.solve("full", v * (1.0 + 1e-15), y)
-        monkeypatch.setattr(module, "source_digest", lambda *_: "of another program")
-        with pytest.raises(AssertionError, match="solved again"):
-            sweep.solve("full", v, y)
-    assert all(np.array_equal(solved[name], expected[name]) for name in COLUMNS)
-
-
-@pytest.mark.parametrize("damage", [b"", b"no array", b"\x93NUMPY\x01\x00", None])
-def test_a_damaged_checkpoint_is_solved_again(tmp_path: Path, damage: bytes | None) -> None:
-    v, y = points(20)
-    folder = tmp_path / "work.checkpoint"
-    with Sweep(1, checkpoint=folder) as sweep:
-        expected = sweep.solve("full", v, y)["mu_ratio"]
-        (file,) = folder.iterdir()
-        whole = file.read_bytes()
-        if damage is None:
-            np.save(file, np.zeros((3, 2)))  # an array, of another shape
-        else:
-            file.write_bytes(damage)
-        assert np.array_equal(sweep.solve("full", v, y)["mu_ratio"], expected)
-    assert file.read_bytes() == whole
-    assert list(folder.iterdir()) == [file]
 
 
 @pytest.mark.parametrize(("place", "pattern"), compiled.SOURCES)

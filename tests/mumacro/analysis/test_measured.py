@@ -6,12 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import measured, validation
 from mumacro import Surrogate, closed_forms
 from tests.support.comparing import close
+from tests.support.scripts import script
 
 pytest.importorskip("scipy")
 pyplot = pytest.importorskip("matplotlib.pyplot")
+friction_models, measured, validation = (
+    script(f"benchmarks.{name}") for name in ("friction_models", "measured", "validation")
+)
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +45,30 @@ def test_the_sentences_have_the_figures_of_the_scripts(
     assert len(matches) == 2
     assert [text for text in matches if text not in page] == []
     assert "k has only an upper bound" in printed["trends"]
+    oiled = re.search("The k that fits best is .*", printed["oiled"])
+    assert oiled is not None
+    assert oiled[0] in page
+
+
+def test_friction_elements_on_their_page_are_those_of_the_script(repository: Path) -> None:
+    page = (repository / "docs" / "how-to" / "friction-models.md").read_text("utf-8")
+    assert friction_models.elements() in page
+    # sliding all the time, or slipping far, all elements are alike
+    for v_tilde, y_tilde in ((1.0, 0.3), (0.3, 30.0)):
+        mu = friction_models.table().evaluate(
+            mu0=1.0, Fz=1.0, k=1.0, omega=1.0, y0=y_tilde, v0=v_tilde, direction="along"
+        )
+        assert friction_models.dahl(v_tilde, y_tilde) == close(mu.mu_macro, abs=2e-3)
+
+
+def test_no_single_stiffness_describes_the_oiled_contact() -> None:
+    p = measured.points("oil")
+    for contact in ("spring", "ball"):
+        k = measured.fitted(contact, surface="oil").values["k"]
+        model = measured.force(contact, k, p.without / measured.FZ, p.v0)
+        assert np.abs(model - p.shaken).max() > 0.9
+        alone = measured.each_alone(contact, "oil")
+        assert alone.max() > 10.0 * alone.min()
 
 
 def test_one_stiffness_serves_five_speeds_where_rigid_contact_is_far_off() -> None:

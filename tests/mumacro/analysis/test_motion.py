@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.motion import (
-    CASE,
-    L0,
-    beside_table,
-    deviations,
-    phase_sweep,
-    random_motions,
-    resting_motions,
-    slow_motions,
-)
 from mumacro import Element, InputError, Motion, Surrogate, motion, settling
 from mumacro.analysis.motion import SLOWEST
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close
+from tests.support.scripts import script
 
+benchmark = script("benchmarks.motion")
+CASE = benchmark.CASE
+L0 = benchmark.L0
+beside_table = benchmark.beside_table
+deviations = benchmark.deviations
+phase_sweep = benchmark.phase_sweep
+random_motions = benchmark.random_motions
+resting_motions = benchmark.resting_motions
+slow_motions = benchmark.slow_motions
 SCENE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
 COMMAND = "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=2cm/s"
 
@@ -586,9 +586,10 @@ BAD: tuple[tuple[dict[str, Any], str, str], ...] = (
 WRONG: tuple[tuple[dict[str, Any], str, str], ...] = (
     ({"y": [(1.5, 1e-6, 0.0)]}, "y, harmonic", "whole number"),
     ({"y": [(0, 1e-6, 0.0)]}, "y, harmonic", "whole number"),
-    ({"y": [("2", 1e-6, 0.0)]}, "y, harmonic", "whole number"),
+    ({"y": [("two", 1e-6, 0.0)]}, "y, harmonic", "whole number"),
     ({"y": [(1, 1e-6)]}, "y", "triples"),
-    ({"y": "2um"}, "y, amplitude", "real number"),
+    ({"y": "2N"}, "y, amplitude", "in metres"),
+    ({"y": "2um,90"}, "y", "2um@90deg"),
     ({"y": None}, "y, amplitude", "real number"),
     ({"normal": 3.0, "contact": "ball"}, "normal", "contact radius"),
     ({"contact": "cube"}, "contact", "spring, ball"),
@@ -687,12 +688,12 @@ def test_the_command_has_the_librarys_answer(capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ((COMMAND, "--y", "2N"), "give metres"),
-        ((COMMAND, "--y", "2um@90N"), "give degrees"),
-        ((COMMAND, "--y", "2um@"), "amplitude@phase"),
+        ((COMMAND, "--y", "2N"), "y, amplitude"),
+        ((COMMAND, "--y", "2um@90N"), "y, phase"),
+        ((COMMAND, "--y", "2um@"), "2um@90deg"),
         ((COMMAND, "--y", "1.5:2um"), "whole number"),
-        ((COMMAND, "--y", "a:2um"), "is no number"),
-        ((COMMAND, "--normal", "2um"), "give newtons"),
+        ((COMMAND, "--y", "a:2um"), "y, harmonic"),
+        ((COMMAND, "--normal", "2um"), "normal, amplitude"),
         ((COMMAND, "--normal", "10N"), "lifts off"),
         ((COMMAND, "--normal", "1N", "--contact", "ball"), "contact radius"),
         ((f"{COMMAND} y0=2um",), "--y"),

@@ -86,6 +86,26 @@ def test_any_groups_have_an_answer_or_none(pair: Any) -> None:
     ).all()
 
 
+@every_pair
+def test_what_is_illegal_in_an_array_has_neither_value_nor_bound(pair: Any) -> None:
+    words, fields, case = as_kind(CASE, pair)
+    table = opened(1e-4)
+    v, y = np.array([(0.1, -1.0), (-1.0, 0.5), (np.nan, 0.5), (0.1, np.nan)]).T
+    names = QUANTITY_NAMES if pair[1] != "normal" else ("mu_ratio", "stick_fraction")
+    for name in names:
+        value, bound, source = table.quantity(name, v, y, **words)
+        assert np.isnan([value, bound]).all(), name
+        assert np.all(source == -1), name
+    for field, bad in itertools.product(fields, (-1.0, np.nan)):
+        answer = table.evaluate(
+            {**case, field: np.array([bad, case[field]])}, **words, gradient=True
+        )
+        rows = [answer.mu_macro, answer.mu_ratio, answer.error_bound, answer.length_scale]
+        rows += [*answer.gradient.values(), *answer.gradient_bound.values()]
+        assert np.isnan([row[0] for row in rows]).all(), field
+        assert not np.isnan([row[1] for row in rows]).any(), field
+
+
 @every_other_pair
 def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table: Surrogate, pair: Any) -> None:
     words, _, case = as_kind(CASE, pair)

@@ -2,7 +2,7 @@
 than that.
 
 The reference is evaluated with more digits, and for a ball with more springs
-(``benchmarks/extended.py``).
+(``tests/support/extended.py``).
 """
 
 from typing import Any
@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import extended
-from benchmarks.support.driven import answered, hard, ordinary
 from mumacro import Surrogate
+from tests.support import extended
 from tests.support.cases import Array, opened, tables
+from tests.support.driven import answered, hard, ordinary
 
 table = tables(1e-7)
 needs_digits = pytest.mark.skipif(

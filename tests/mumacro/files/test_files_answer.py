@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
-from benchmarks.support.serving import CASE  # noqa: E402
 from mumacro import InputError, Surrogate  # noqa: E402 (after pyarrow was looked for)
 from mumacro.files import ANSWERS, FilesError, answer  # noqa: E402
 from mumacro.files.record_batch import find_columns  # noqa: E402
+from tests.support.serving import CASE  # noqa: E402
 
 NAMES = (*CASE,)
 GAP = "is missing; write rigid or a number"

@@ -19,9 +19,9 @@ from tests.support.cases import Capture, Case, opened
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
-from benchmarks.support.forms import as_csv, as_ndjson  # noqa: E402
 from mumacro.cli.main import main  # noqa: E402
 from mumacro.files import ANSWERS, evaluate_files, reading  # noqa: E402
+from tests.support.forms import as_csv, as_ndjson  # noqa: E402
 
 NAMES, TABLE = ("mu0", "Fz", "k", "y0", "omega", "v0"), opened(1e-12)
 HEADER = ",".join(NAMES)

@@ -10,8 +10,6 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks.contacts import NAMES as BALL_NAMES
-from benchmarks.contacts import hard_points, rows_of
 from builder.solver.sweep import Sweep
 from builder.tables.measure import fast_from
 from builder.tables.quantities import solver_noise
@@ -28,6 +26,8 @@ from mumacro.table.atlas import (
 )
 from tests.support.cases import UNIT, Array, Case, opened, tables
 from tests.support.comparing import close
+from tests.support.hard_points import NAMES as BALL_NAMES
+from tests.support.hard_points import hard_points, rows_of
 
 KINDS = list(CASES)
 Ask = Callable[[Surrogate, Array, Array], Any]  # values and bounds

@@ -2,7 +2,6 @@
 size and contents."""
 
 import csv
-import importlib
 import json
 import math
 from pathlib import Path
@@ -27,6 +26,7 @@ from mumacro.table.netcdf import read_table
 from tests.support.cases import Array, tables
 from tests.support.comparing import close
 from tests.support.places import ROOT
+from tests.support.scripts import script
 
 #: the most bytes of a file
 BYTES = {
@@ -121,9 +121,7 @@ def test_the_reference_lies_within_tolerance_and_bounds(table: Surrogate, refere
 
 def test_the_check_values_for_ports_are_made_by_their_script_of_references() -> None:
     pytest.importorskip("mpmath")
-    assert (
-        CHECK_VALUES.read_text("utf-8") == importlib.import_module("benchmarks.check_values").text()
-    )
+    assert CHECK_VALUES.read_text("utf-8") == script("benchmarks.check_values").text()
 
 
 def test_a_table_meets_the_check_values_of_six_inputs_within_its_bounds(table: Surrogate) -> None:

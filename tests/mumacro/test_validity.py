@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate
-from mumacro.analysis.validity import ROWS, digits, k_effect, model_rows
+from mumacro.validity import ROWS, digits, k_effect, model_rows
 from tests.support.cases import Case
 from tests.support.comparing import close
 

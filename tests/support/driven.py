@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import extended
-from benchmarks.contacts import hard_points
 from mumacro import Surrogate
+from tests.support import extended
+from tests.support.hard_points import hard_points
 
 Array = NDArray[np.float64]
 # v~ = v0 and y~ = y0, to the last digit

@@ -1,0 +1,256 @@
+"""What a fit of measured points says: :class:`Fit`, from :func:`mumacro.fit`."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mumacro import plotting
+from mumacro.analysis.measured_points import STD, UNKNOWNS, Measured, Remark
+from mumacro.errors import missing
+from mumacro.inputs.fields import RIGID, unit_of
+from mumacro.kernel.arrays import Array
+
+CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
+_CURVE = 200  # points of the fitted law
+
+
+class Prediction(NamedTuple):
+    """Friction that a fit predicts, in the shape of the inputs."""
+
+    mu_macro: Any  #: [-]
+    std: Any  #: its standard deviation, from the covariance of the fit [-]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """k and mu0 of a contact, fitted to measured points.
+
+    Attributes
+    ----------
+    values : dict
+        k [N/m] and mu0 [-], those that were unknown; k is infinite where a rigid contact fits best.
+    std : dict
+        Their standard deviations; infinite where the points do not determine a value.
+    covariance : ndarray
+        (unknowns, unknowns), in the order of ``values``.  Without standard deviations of the points
+        it is scaled by the scatter about the fit.
+    interval : dict of tuple
+        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.  Of
+        several solutions they cover all, while ``std`` and ``covariance`` are those of the best
+        one.
+    residuals : ndarray
+        Measured mu_macro minus the fit's [-], (n,).
+    chi2, reduced_chi2 : float
+        Sum of squared residuals over their variances (1 by default); the same over the degrees of
+        freedom, NaN without any.
+    solutions : tuple of dict
+        All minima that the points allow within 95 %, best first, each with values and ``chi2``.
+    warnings : tuple of str
+        Each names a value that the points do not determine, or a doubt about the fit.
+    remarks : tuple of dict
+        What is doubtful about the points, as ``remarks`` of an answer: row, field, cases, text.
+    contact, direction : str
+        Of the contact that was fitted.
+    points : dict of ndarray
+        The inputs [SI] of each point, (n,), the unknown ones left out; ``mu_macro``, and ``std``
+        where given.
+    """
+
+    values: dict[str, float]
+    std: dict[str, float]
+    covariance: Array
+    interval: dict[str, tuple[float, float]]
+    residuals: Array
+    chi2: float
+    reduced_chi2: float
+    solutions: tuple[dict[str, float], ...]
+    warnings: tuple[str, ...]
+    remarks: tuple[Remark, ...]
+    contact: str
+    direction: str
+    points: dict[str, Array]
+    _problem: Measured = field(repr=False, compare=False)
+
+    def predict(self, cases: Any = None, /, **inputs: Any) -> Prediction:
+        """mu_macro of the fit and its standard deviation, at the points or at other inputs.
+
+        Parameters
+        ----------
+        cases : mapping, DataFrame, Arrow table or Dataset, optional
+            Inputs by name, as for :meth:`mumacro.Surrogate.evaluate`; other columns are ignored.
+        **inputs : float or array_like
+            The same by keyword: Fz, y0, omega or f, v0, and k or mu0 where that was known.  What is
+            left out is that of the points.
+
+        Returns
+        -------
+        Prediction
+            ``mu_macro`` and ``std``; numbers for one case.
+
+        Raises
+        ------
+        InputError
+            An input that was fitted or is none; one that is left out and differs between the
+            points; a value out of bounds.
+
+        Examples
+        --------
+        >>> import mumacro
+        >>> measured = {"v0": [0.002, 0.01, 0.05, 0.2], "mu_macro": [0.1, 0.22, 0.28, 0.3]}
+        >>> found = mumacro.fit(measured, Fz=10.0, y0=4e-7, f=20e3)
+        >>> at_lower_frequency = found.predict(v0=0.02, f=10e3)
+        >>> f"{at_lower_frequency.mu_macro:.3f} ± {at_lower_frequency.std:.3f}"
+        '0.266 ± 0.003'
+        """
+        columns = self._problem.elsewhere(cases, inputs)
+        mu, slopes = self._problem.model(self.values, columns)
+        # a rigid contact has no slope along k
+        covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
+        rows = np.stack([np.asarray(slopes[name]) for name in self.values], axis=-1)
+        std = np.sqrt(np.einsum("...i,ij,...j", rows, covariance, rows))
+        if not np.ndim(mu):
+            return Prediction(float(mu), float(std))
+        return Prediction(np.asarray(mu), std)
+
+    def curve(self) -> dict[str, Array] | None:
+        """The fitted law over v0 with its 95 % band: v0 [m/s], mu_macro, low and high [-], (n,);
+        None where other inputs vary, too, or v0 is 0 everywhere."""
+        inputs = dict(self._problem.columns)
+        v0 = inputs.pop("v0")
+        moving = v0[v0 > 0.0]
+        if any(np.unique(x).size > 1 for x in inputs.values()) or not moving.size:
+            return None
+        fine = np.unique(np.concatenate([np.geomspace(moving.min(), moving.max(), _CURVE), v0]))
+        mu, std = self.predict(v0=fine)
+        half_width = self._width() * std
+        return {
+            "v0": fine,
+            "mu_macro": mu,
+            "low": np.maximum(mu - half_width, 0.0),
+            "high": mu + half_width,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON of a fit, on the command line and over HTTP, without table and
+        api_version: lists in place of arrays, the word rigid for an infinite k, None for another
+        number that is not finite."""
+        members = {
+            "values": self.values,
+            "std": self.std,
+            "covariance": self.covariance,
+            "interval": self.interval,
+            "residuals": self.residuals,
+            "chi2": self.chi2,
+            "reduced_chi2": self.reduced_chi2,
+            "solutions": self.solutions,
+            "warnings": self.warnings,
+            **({"remarks": self.remarks} if self.remarks else {}),
+            "contact": self.contact,
+            "direction": self.direction,
+            "points": self.points,
+            "curve": self.curve(),
+        }
+        # an infinite deviation of k is no rigid contact
+        worded = ("values", "interval", "solutions", "points")
+        return {name: _plain(part, name in worded) for name, part in members.items()}
+
+    def _width(self) -> float:
+        """Half width of a 95 % interval in standard deviations."""
+        has_std = STD in self.points
+        return quantile(None if has_std else self.residuals.size - len(self.values))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Points, fit and its 95 % band over the input that varies most; returns matplotlib's axes.
+
+        Each set of the other inputs has a curve; more than 8 of them have no legend.  Where each
+        point has a set of its own, such as its mu0, one line joins the fit at the points.
+        """
+        inputs = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
+        along = max(inputs, key=lambda name: (np.unique(inputs[name]).size, name == "v0"))
+        x, names = inputs[along], [name for name in self._problem.columns if name != along]
+        sets, member = np.unique([self.points[name] for name in names], axis=1, return_inverse=True)
+        if sets.shape[1] == x.size > 1:
+            return self._plot_each(along, ax)
+        low = x[x > 0.0].min(initial=math.inf)
+        fine = np.geomspace(low, x.max(), 300) if low < math.inf else x
+        width = self._width()
+        curves = []
+        for i, row in enumerate(sets.T):
+            in_set = member.ravel() == i
+            set_labels = [
+                f"{name} = {x:.4g} {unit_of(name)}".removesuffix(" -")
+                for name, x, all_ in zip(names, row, sets, strict=True)
+                if np.ptp(all_) > 0.0
+            ]
+            x_curve = np.unique(np.concatenate([fine, x[in_set]]))
+            mu, deviation = self.predict(**{along: x_curve}, **dict(zip(names, row, strict=True)))
+            bars = self.points[STD][in_set] if STD in self.points else None
+            label, mu_measured = ", ".join(set_labels) or "fit", self.points["mu_macro"][in_set]
+            curves.append(
+                plotting.Curve(label, x[in_set], mu_measured, bars, x_curve, mu, width * deviation)
+            )
+        return plotting.plot_fit(along, curves, self._title(), ax)
+
+    def _plot_each(self, along: str, ax: Any) -> Any:
+        """The same where each point has its own other inputs, such as mu0: one line."""
+        order = np.argsort(self.points[along])
+        x, mu_measured = self.points[along][order], self.points["mu_macro"][order]
+        mu, deviation = (column[order] for column in self.predict())
+        std = self.points.get(STD)
+        width = self._width()
+        bars, label = None if std is None else std[order], "fit, at the inputs of each point"
+        curve = plotting.Curve(label, x, mu_measured, bars, x, mu, width * deviation)
+        return plotting.plot_fit(along, [curve], self._title(), ax)
+
+    def _title(self) -> str:
+        return f"{', '.join(self._value_texts())}; {self.contact}, {self.direction}"
+
+    def _value_texts(self) -> list[str]:
+        units = {"k": " N/m", "mu0": ""}
+        return [
+            f"{name} = {x:.4g} ± {self.std[name]:.2g}{units[name]}"
+            for name, x in self.values.items()
+        ]
+
+    def __repr__(self) -> str:
+        has_std = STD in self.points
+        scatter = (
+            f"reduced chi2 {self.reduced_chi2:.3g}"
+            if has_std
+            else f"scatter {math.sqrt(self.reduced_chi2):.2g}"
+        )
+        summary = f"{self.residuals.size} points, {scatter}, {self.contact}"
+        lines = [
+            f"<Fit {', '.join(self._value_texts())}; {summary}>",
+            *(f"  warning: {text}" for text in self.warnings),
+            *(f"  {remark['row']}: {remark['text']}" for remark in self.remarks),
+        ]
+        return "\n".join(lines)
+
+
+def _plain(part: Any, worded: bool, name: str = "") -> Any:
+    """Numbers, texts, lists and dicts for JSON; where ``worded`` an infinite k is the word
+    rigid."""
+    if isinstance(part, Mapping):
+        return {key: _plain(entry, worded, key) for key, entry in part.items()}
+    if isinstance(part, np.ndarray):
+        part = part.tolist()
+    if isinstance(part, (list, tuple)):
+        return [_plain(entry, worded, name) for entry in part]
+    if isinstance(part, float) and not math.isfinite(part):
+        return RIGID if worded and name == "k" and part == math.inf else None
+    return part
+
+
+def quantile(dof: int | None) -> float:
+    """Half width of a 95 % interval in standard deviations: of Student's t, or of the normal
+    distribution."""
+    try:
+        from scipy.special import ndtri, stdtrit
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(missing("fit", error), name=error.name) from None
+    share = 0.5 + 0.5 * CONFIDENCE
+    return float(ndtri(share) if dof is None or dof < 1 else stdtrit(dof, share))

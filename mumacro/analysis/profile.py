@@ -1,0 +1,229 @@
+"""The least chi2 over a curve of contacts, sampled where it matters: its minima, and the range that
+the points allow.
+
+A contact on the curve has a place s, the logarithm of k, of mu0 or of k/mu0.  Its friction at n
+points is a row of n numbers, so the contacts form a line in n dimensions, and chi2 is the square of
+the distance to the measured point.  Where k and mu0 are both unknown friction is mu0 mu~(k/mu0):
+mu0 is a factor of the row, and the best factor follows from a linear equation.
+
+Between two samples the line is close to their chord.  A chord has one nearest place, in closed
+form, and the slopes at its ends tell how far the line may leave it.  So a chord is halved only
+while the line may come near the measured point and leave the chord by more than matters there.
+A valley is found however narrow it is, as long as the slopes at the samples on both sides show the
+turn.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mumacro.kernel.arrays import Array, Bools, Places
+
+_ROUNDS = 40
+_NARROWEST = 1e-6  # of a chord that is halved, in s
+_RIPPLE = 1e-9  # a dip of chi2 that is no minimum, as a share of what is allowed
+_FINE = 0.1  # of a chord's error: what it may change chi2, as a share of what is allowed
+_ZOOM, _ZOOMS = 9, 3  # places and rounds of the search for the end of an interval
+_INSIDE = 32  # places at least in the ranges that are allowed
+
+#: s (m,), whether slopes are asked for -> friction over its standard deviation, and its slope along
+#: s or zero: (m, n) each
+Model = Callable[[Array, bool], tuple[Array, Array]]
+#: places, factors and half widths of the factors (m,) -> what is to be as large as possible (m,)
+Goal = Callable[[Array, Array, Array], Array]
+
+
+class Samples(NamedTuple):
+    """The curve at places ``s`` (m,), ascending; the last may be infinite."""
+
+    s: Array
+    rows: Array  #: friction over its standard deviation, without the factor (m, n)
+    slopes: Array  #: their slopes along s (m, n)
+    factor: Array  #: the best factor, 1 where there is none (m,)
+    chi2: Array  #: (m,)
+    tilt: Array  #: d chi2 / d s (m,)
+    rise: Array  #: chi2 rises with the factor by rise (factor - best)^2; infinite without one (m,)
+
+
+class Profile:
+    """Least chi2 over the places of a curve.
+
+    Parameters
+    ----------
+    model : callable
+    measured : ndarray
+        Friction over its standard deviation (n,).
+    has_factor : bool
+        Whether each row may be multiplied by a factor >= 0, the second unknown.
+    s : ndarray
+        First places (m,), ascending.
+    allowed : callable
+        The chi2 up to which a contact is allowed, from the least chi2.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        measured: Array,
+        has_factor: bool,
+        s: Array,
+        allowed: Callable[[float], float],
+    ) -> None:
+        self._model, self._measured, self._has_factor = model, measured, has_factor
+        self._allowed = allowed
+        self.at = self.samples(s)
+        self._refine()
+        self._insert(self._minima())
+        self._refine()
+
+    @property
+    def limit(self) -> float:
+        """The chi2 up to which a contact is allowed."""
+        return self._allowed(float(self.at.chi2.min()))
+
+    def samples(self, s: Array, slopes: bool = True) -> Samples:
+        """The curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""
+        rows, steps = self._model(s, slopes)
+        squares = (rows**2).sum(axis=1)
+        factor: Array = np.ones(s.size)
+        rise: Array = np.full(s.size, np.inf)
+        if self._has_factor:
+            rise = squares
+            along = np.maximum(rows @ self._measured, 0.0)
+            factor = np.divide(along, squares, out=np.zeros(s.size), where=squares > 0.0)
+        off = self._measured - factor[:, None] * rows
+        chi2 = np.nan_to_num((off**2).sum(axis=1), nan=np.inf)
+        tilt = -2.0 * factor * (off * steps).sum(axis=1)
+        return Samples(s, rows, steps, factor, chi2, tilt, rise)
+
+    def lowest(self) -> Places:
+        """The samples that are minima."""
+        walled = np.concatenate(([np.inf], self.at.chi2, [np.inf]))
+        return np.flatnonzero((walled[1:-1] < walled[:-2]) & (walled[1:-1] <= walled[2:]))
+
+    def ridge(self, one: int, other: int) -> float:
+        """The largest chi2 on the way from one sample to another."""
+        return float(self.at.chi2[min(one, other) : max(one, other) + 1].max())
+
+    # --- sampling ---------------------------------------------------------------------------------
+
+    def _insert(self, s: Array) -> None:
+        s = np.setdiff1d(s, self.at.s)
+        if not s.size:
+            return
+        places = np.searchsorted(self.at.s, s)
+        self.at = Samples(
+            *(
+                np.insert(old, places, new, axis=0)
+                for old, new in zip(self.at, self.samples(s), strict=True)
+            )
+        )
+
+    def _refine(self) -> None:
+        for _ in range(_ROUNDS):
+            near, error, width = self._chords()
+            limit = self.limit
+            reach = np.sqrt(limit)
+            tolerance = _FINE * (limit - self.at.chi2.min()) / reach if reach > 0.0 else 0.0
+            halved = (near - error < reach) & (error > tolerance) & (width > _NARROWEST)
+            if not halved.any():
+                return
+            self._insert(self.at.s[:-1][halved] + 0.5 * width[halved])
+
+    def _chords(self) -> tuple[Array, Array, Array]:
+        """Of each chord: the distance of the measured point, how far the line may leave it, and its
+        width; (m - 1,) each."""
+        a, b = self.at.rows[:-1], self.at.rows[1:]
+        chord, width = b - a, np.diff(self.at.s)
+        m = self._measured
+        with np.errstate(all="ignore"):
+            if self._has_factor:
+                am, cm = a @ m, chord @ m
+                aa, ac, cc = ((x * y).sum(axis=1) for x, y in ((a, a), (a, chord), (chord, chord)))
+                t = (cm * aa - am * ac) / (am * cc - cm * ac)
+            else:
+                t = ((m - a) * chord).sum(axis=1) / (chord**2).sum(axis=1)
+            inner = a + np.clip(np.nan_to_num(t), 0.0, 1.0)[:, None] * chord
+            factor: Array = np.ones(width.size)
+            if self._has_factor:
+                factor = np.nan_to_num(np.maximum(inner @ m, 0.0) / (inner**2).sum(axis=1))
+            near = np.sqrt(((m - factor[:, None] * inner) ** 2).sum(axis=1))
+            near = np.fmin(near, np.sqrt(np.minimum(self.at.chi2[:-1], self.at.chi2[1:])))
+            # a corner between straight ends leaves the chord by half of the larger difference
+            off = [
+                np.sqrt(((width[:, None] * end - chord) ** 2).sum(axis=1))
+                for end in (self.at.slopes[:-1], self.at.slopes[1:])
+            ]
+            largest = np.maximum(self.at.factor[:-1], self.at.factor[1:])
+            error = 0.5 * largest * np.fmax(*off)
+        width = np.where(np.isfinite(width), width, 0.0)
+        return near, np.where(width > 0.0, error, 0.0), width
+
+    def _minima(self) -> Array:
+        """Where chi2 turns from falling to rising, if that is allowed and more than a ripple."""
+        near, error, width = self._chords()
+        ripple = _RIPPLE * (self.limit - self.at.chi2.min())
+        depth = self.at.tilt[:-1] * width, self.at.tilt[1:] * width
+        turns = (depth[0] < -ripple) & (depth[1] > ripple)
+        turns &= near - error < np.sqrt(self.limit)
+        return self._zeros(np.flatnonzero(turns), lambda at: at.tilt, 1e-13, slopes=True)
+
+    def _zeros(
+        self, chords: Places, of: Callable[[Samples], Array], tolerance: float, slopes: bool
+    ) -> Array:
+        """Places in the chords at which a quantity passes through zero."""
+        from scipy.optimize import brentq
+
+        s, f = self.at.s.tolist(), of(self.at).tolist()
+
+        def zero(i: int) -> float:
+            known = {s[i]: f[i], s[i + 1]: f[i + 1]}  # computed again, they may differ by rounding
+
+            def value(place: float) -> float:
+                if place in known:
+                    return float(known[place])
+                return float(of(self.samples(np.array([place]), slopes))[0])
+
+            return float(brentq(value, s[i], s[i + 1], xtol=tolerance, rtol=1e-14))
+
+        return np.array([zero(i) for i in chords.tolist()])
+
+    # --- ranges -----------------------------------------------------------------------------------
+
+    def ends(self, goals: Sequence[Goal]) -> list[float]:
+        """The largest value of each goal over all contacts that are allowed, at finite places."""
+        inside = self.at.chi2 <= self.limit
+        s = self._allowed_places(inside)
+        at = self.samples(s, slopes=False)
+        starts = [int(np.argmax(self._values(goal, at))) for goal in goals]
+        low = np.array([s[max(i - 1, 0)] for i in starts])
+        high = np.array([s[min(i + 1, s.size - 1)] for i in starts])
+        best = [float(self._values(goal, at)[i]) for goal, i in zip(goals, starts, strict=True)]
+        for _ in range(_ZOOMS if self._has_factor else 0):  # else the ends are borders
+            places = np.linspace(low, high, _ZOOM, axis=1)
+            at = self.samples(places.ravel(), slopes=False)
+            for i, goal in enumerate(goals):
+                values = self._values(goal, at)[i * _ZOOM : (i + 1) * _ZOOM]
+                j = int(np.argmax(values))
+                best[i] = max(best[i], float(values[j]))
+                low[i], high[i] = places[i, max(j - 1, 0)], places[i, min(j + 1, _ZOOM - 1)]
+        return best
+
+    def _values(self, goal: Goal, at: Samples) -> Array:
+        spare = self.limit - at.chi2
+        half_width = np.sqrt(np.maximum(spare, 0.0) / at.rise)
+        # places at the border of what is allowed miss it by a rounding error
+        allowed = spare >= -1e-9 * self.limit
+        return np.where(allowed, goal(at.s, at.factor, half_width), -np.inf)
+
+    def _allowed_places(self, inside: Bools) -> Array:
+        """Finite places that are allowed, ascending: the samples, their borders, and some
+        between."""
+        finite, limit = np.isfinite(self.at.s), self.limit
+        crossed = np.flatnonzero((inside[:-1] != inside[1:]) & finite[1:])
+        borders = self._zeros(crossed, lambda at: at.chi2 - limit, 1e-9, slopes=False)
+        s = np.unique(np.concatenate([self.at.s[inside & finite], borders]))
+        parts = 1 + _INSIDE // max(s.size, 1)
+        between = np.linspace(s[:-1], s[1:], parts, endpoint=False).ravel()
+        return np.unique(np.concatenate([s, between]))

@@ -1,0 +1,173 @@
+"""What is probably a wrong unit or a wrong order of magnitude: remarks beside an answer, for one
+case and for many.
+
+A value outside its usual range (:attr:`mumacro.inputs.fields.Field.usual`) is answered and remarked
+on, never refused; so is a contact whose length l0 = mu0 Fz / k, or whose groups v~ and y~, no
+contact has.  A rigid contact is answered with what it assumes.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, TypedDict
+
+import numpy as np
+
+from mumacro.inputs.fields import BOUNDS, INPUTS, NOT_NEGATIVE, RAD_PER_CYCLE
+from mumacro.kernel.arrays import Array, Bools
+
+UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
+LONGEST = 1e-2  # [m], of l0
+FURTHEST = 1e4  # of v~ and y~
+_LARGE = {"k": 1e9, "y0": 1e-4, "v0": 1.0}  # of contacts that are shaken
+_SMALL_LOAD = 1e-2  # [N]
+_USUAL = {name: INPUTS[name].usual for name in ("mu0", "Fz", "k", "y0", "omega", "v0")}
+_USUAL["Fz_amplitude"] = INPUTS["Fz_amplitude"].usual
+
+
+class Remark(TypedDict):
+    """One remark: the row of docs/validity.md, the input, how many cases it is about, a sentence
+    on the first of them."""
+
+    row: str
+    field: str
+    cases: int
+    text: str
+
+
+def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]:
+    """The remarks on cases, at most one for each input, and one on rigid contacts.
+
+    Parameters
+    ----------
+    columns : mapping
+        The six inputs in SI by name, numbers or arrays that broadcast; an input that a case does
+        not have, such as y0 of one whose normal force oscillates, is left out, or NaN there.
+    frequency : bool
+        Whether the inputs had ``f`` in place of ``omega``: then that is named.
+
+    Examples
+    --------
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+    >>> remarks(case)
+    []
+    >>> [remark] = remarks({**case, "k": 1.0})
+    >>> remark["field"], remark["text"]
+    ('k', 'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 1 in N/m?')
+    """
+    if _usual(columns):
+        return []
+    given = {name: np.asarray(column, np.float64) for name, column in columns.items()}
+    shape = np.broadcast_shapes(*(column.shape for column in given.values()))
+    six = dict.fromkeys(_USUAL, np.broadcast_to(math.nan, shape)) | {
+        name: np.broadcast_to(column, shape) for name, column in given.items()
+    }
+    found: dict[str, Remark] = {}
+    told: Bools = np.zeros(shape, np.bool_)
+    with np.errstate(all="ignore"):
+        for field, where in (*_out_of_range(six), *_groups_out_of_range(six)):
+            new = np.asarray(where & ~told)  # one reason for each case
+            if not new.any():
+                continue
+            told |= new
+            first = int(np.flatnonzero(new)[0])
+            at = {name: float(column.flat[first]) for name, column in six.items()}
+            name, text = _sentence(field, at, frequency)
+            if name in found:
+                found[name]["cases"] += int(np.count_nonzero(new))
+            else:
+                cases = int(np.count_nonzero(new))
+                found[name] = {"row": UNITS, "field": name, "cases": cases, "text": text}
+        rigid = np.asarray(np.isposinf(six["k"]) & _oscillates(six))
+        return [*found.values(), *([_of_rigid(six, rigid)] if rigid.any() else [])]
+
+
+def _usual(columns: Mapping[str, Any]) -> bool:
+    """Whether one case in plain numbers gives nothing to remark on, found in a microsecond."""
+    mu0, load, k, y0, omega, v0 = map(columns.get, ("mu0", "Fz", "k", "y0", "omega", "v0"))
+    if not (type(mu0) is type(load) is type(k) is type(y0) is type(omega) is type(v0) is float):
+        return False
+    force = mu0 * load
+    return bool(
+        1e-3 <= mu0 <= 2.0
+        and 1e-6 <= load <= 1e6
+        and 1.0 <= k <= 1e12
+        and 0.0 < y0 <= 2e-2
+        and y0 >= 1e-12
+        and _USUAL["omega"][0] <= omega <= _USUAL["omega"][1]
+        and 0.0 <= v0 <= 300.0
+        and force <= LONGEST * k
+        and y0 * k <= FURTHEST * force
+        and v0 * k <= FURTHEST * force * omega
+    )
+
+
+def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
+    """Every input, and where it is outside its usual range; a rigid contact, zero where it is
+    legal, and NaN are not."""
+    for name, (least, most) in _USUAL.items():
+        column = six[name]
+        outside = ((column < least) | (column > most)) & np.isfinite(column)
+        if BOUNDS[name] == NOT_NEGATIVE:
+            outside &= column != 0.0
+        yield name, outside
+
+
+def _groups_out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
+    """l0, y~ and v~, and where no contact has them."""
+    length = six["mu0"] * six["Fz"] / six["k"]
+    moves = _oscillates(six) & np.isfinite(six["k"])
+    yield "l0", np.asarray((length > LONGEST) & np.isfinite(six["k"]))
+    yield "y~", np.asarray((six["y0"] / length > FURTHEST) & moves)
+    yield "v~", np.asarray((six["v0"] / six["omega"] / length > FURTHEST) & moves)
+
+
+def _oscillates(six: Mapping[str, Array]) -> Bools:
+    return np.asarray(((six["y0"] > 0.0) | (six["Fz_amplitude"] > 0.0)) & (six["omega"] > 0.0))
+
+
+def _sentence(what: str, case: Mapping[str, float], frequency: bool) -> tuple[str, str]:
+    """The input that is doubted, and why, of one case."""
+    length = case["mu0"] * case["Fz"] / case["k"] if case["k"] else math.inf
+    if what == "l0":
+        return "k", f"l0 = mu0 Fz / k = {length:.3g} m, above 1 cm: is {_value('k', case)}?"
+    if what == "y~":
+        name = _largest(case, "y0")
+        group = case["y0"] / length
+        return name, f"y~ = y0 k / (mu0 Fz) = {group:.3g}, {_CONTACTS}: is {_value(name, case)}?"
+    if what == "v~":
+        name = _largest(case, "v0")
+        group = case["v0"] / case["omega"] / length
+        formula = "v~ = v0 k / (mu0 Fz omega)"
+        return name, f"{formula} = {group:.3g}, {_CONTACTS}: is {_value(name, case)}?"
+    value, name = case[what], what
+    if what == "omega" and frequency:
+        value, name = value / RAD_PER_CYCLE, "f"
+    field = INPUTS[name]
+    least, most = field.usual
+    unit = "" if field.unit == "-" else f" {field.unit}"
+    usual = f"up to {most:g}{unit}" if least == 0.0 else f"{least:g} to {most:g}{unit}"
+    asked = f"is it in {field.words}" if unit else "is it a number, not per cent"
+    return name, f"{name} = {value:.6g}{unit}, usual is {usual}: {asked}?"
+
+
+_CONTACTS = "contacts have 0.01 to 100"
+
+
+def _value(name: str, case: Mapping[str, float]) -> str:
+    return f"{name} = {case[name]:.6g} in {INPUTS[name].unit}"
+
+
+def _largest(case: Mapping[str, float], other: str) -> str:
+    """The input, of those that make a group large, which is furthest from what contacts have."""
+    excess = {name: case[name] / _LARGE[name] for name in (other, "k")}
+    excess["Fz"] = _SMALL_LOAD / case["Fz"]
+    return max(excess, key=lambda name: excess[name])
+
+
+def _of_rigid(six: Mapping[str, Array], rigid: Bools) -> Remark:
+    """What a rigid contact assumes, with the stiffness that must be far exceeded for it."""
+    text = "rigid: the contact does not stretch before it slips"
+    stiffest = float(np.fmax.reduce((six["mu0"] * six["Fz"] / six["y0"])[rigid]))
+    if math.isfinite(stiffest):
+        text += f"; holds for k far above mu0 Fz / y0 = {stiffest:.3g} N/m, a softer one differs"
+    return {"row": STIFFNESS, "field": "k", "cases": int(np.count_nonzero(rigid)), "text": text}

@@ -1,0 +1,153 @@
+"""Numbers as people and instruments write them, read from text: decimal point or comma, thousands
+signs, Fortran's exponent, powers of ten."""
+
+import re
+
+#: other signs for the same: minus and dashes of typography, blanks that do not break, µ
+_SIGNS = str.maketrans("−–﹣－⁺⁻   \t\n\r’", "---" + "-" + "+-" + "      '", "\u200b\ufeff")
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
+#: a number at the start of a text: digits with signs between them, an exponent
+NUMBER = re.compile(
+    r"[+-]?(?:\d[\d.,']*|[.,]\d+)(?:(?: \d{3}(?!\d))+(?:[.,]\d+)?)?(?:[eEdD][+-]?\d+)?", re.ASCII
+)
+_PLAIN = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+_WORDS = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
+_POWER = re.compile(r" ?[x×*·⋅] ?10\^?([+-]?\d{1,3})", re.ASCII)
+_RAISED = re.compile(r"(?<=10)\^[+-]?\d{1,3}", re.ASCII)
+_TEN = re.compile(r"([+-]?)10\^([+-]?\d{1,3})", re.ASCII)
+# digits in groups of three behind one sign
+_GROUPS = re.compile(r"\d{1,3}([.,' ])\d{3}(?:\1\d{3})*", re.ASCII)
+TOO_LARGE = "is beyond double range"
+
+
+def tidy(text: str) -> str:
+    """A text with one sign for each meaning, and single blanks.
+
+    >>> tidy(" −1,5 × 10⁻⁶ ")
+    '-1,5 × 10^-6'
+    """
+    if text.isascii():
+        return " ".join(text.split())
+    raised, out = False, []
+    for sign in text:
+        if sign in "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻":
+            out.append("^" * (not raised))
+            raised = True
+        else:
+            raised = False
+        out.append(sign)
+    return " ".join("".join(out).translate(_SUPERSCRIPTS).translate(_SIGNS).split())
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number as a program writes it, such as ``-1.5e3``, ``nan`` or ``inf``."""
+    return bool(_PLAIN.fullmatch(text) or _WORDS.fullmatch(text))
+
+
+def read_number(text: str, decimal: str = "") -> float:
+    """The number in a text; ValueError with the reason where it is none, or may be one of two.
+
+    ``decimal`` is the decimal sign where it is known; else it is the point, and a comma that
+    cannot be a thousands sign.
+
+    >>> read_number("1.0D-3"), read_number("2,5"), read_number("1,234.5"), read_number("1.234,5")
+    (0.001, 2.5, 1234.5, 1234.5)
+    >>> read_number("1.000", ",")
+    1000.0
+    >>> read_number("1,000")
+    Traceback (most recent call last):
+    ValueError: may be 1000 or 1.0: write one of them
+    """
+    text = tidy(text)
+    if (ten := _TEN.fullmatch(text)) is not None:
+        return _double(f"{ten[1]}1e{ten[2]}")
+    power = ""
+    if " " in text or "x" in text or not text.isascii() or "*" in text:
+        match = NUMBER.match(text)
+        times = _POWER.fullmatch(text, match.end()) if match else None
+        if match is not None and times is not None:
+            text, power = match[0], f"e{times[1]}"
+    if _PLAIN.fullmatch(text) and (decimal != "," or "." not in text):
+        return _double(text + power)
+    if _WORDS.fullmatch(text):
+        return float(text)
+    return _double(_with_point(text, decimal) + power)
+
+
+def _double(text: str) -> float:
+    """The double of a plain number; too many digits must not pass for an infinite stiffness."""
+    try:
+        value = float(text.replace("D", "e").replace("d", "e"))
+    except ValueError:
+        raise ValueError("must be a number") from None
+    if value in (float("inf"), float("-inf")):
+        raise ValueError(TOO_LARGE)
+    return value
+
+
+def _with_point(text: str, decimal: str) -> str:
+    """A number with a decimal point and no other sign between its digits."""
+    sign, body = (text[0], text[1:]) if text[:1] in "+-" and text else ("", text)
+    digits, exponent = body, ""
+    for mark in "eEdD":
+        if mark in body:
+            digits, _, exponent = body.partition(mark)
+            exponent = f"e{exponent}"
+            break
+    digits = digits.strip()
+    for blank in (" ", "'"):  # these stand between thousands only
+        if blank in digits:
+            whole, point, rest = _split(digits, decimal)
+            if not _GROUPS.fullmatch(whole):
+                raise ValueError("must be a number")
+            digits = f"{whole.replace(blank, '')}{'.' if point else ''}{rest}"
+            return f"{sign}{digits}{exponent}"
+    if decimal:
+        other = "," if decimal == "." else "."
+        whole, point, rest = _split(digits, decimal)
+        if other in whole:
+            if not _GROUPS.fullmatch(whole) or whole.startswith("0"):
+                raise ValueError(f"must be a number such as 0{decimal}5")
+            whole = whole.replace(other, "")
+        if other in rest or decimal in rest:
+            raise ValueError(f"must be a number such as 0{decimal}5")
+        return f"{sign}{whole}{'.' if point else ''}{rest}{exponent}"
+    point = max(".,", key=digits.rfind)
+    other = "," if point == "." else "."
+    if other in digits:  # 1,234.5: the last sign is the decimal one
+        whole, _, rest = digits.rpartition(point)
+        if point in whole or not _GROUPS.fullmatch(whole):
+            raise ValueError("must be a number")
+        return f"{sign}{whole.replace(other, '')}.{rest}{exponent}"
+    if digits.count(point) > 1:
+        if not _GROUPS.fullmatch(digits):
+            raise ValueError("must be a number")
+        return f"{sign}{digits.replace(point, '')}{exponent}"
+    if point == "," and _GROUPS.fullmatch(digits) and not digits.startswith("0") and not exponent:
+        whole, fraction = digits.replace(",", ""), float(digits.replace(",", "."))
+        raise ValueError(f"may be {sign}{whole} or {sign}{fraction!r}: write one of them")
+    return f"{sign}{digits.replace(point, '.')}{exponent}"
+
+
+def _split(digits: str, decimal: str) -> tuple[str, str, str]:
+    """The digits before and behind the decimal sign."""
+    if decimal:
+        return digits.partition(decimal)
+    return digits.partition(max(".,", key=digits.rfind))
+
+
+def split_number(text: str) -> tuple[float, str]:
+    """The number at the start of a tidy text, and what follows it; ValueError as
+    :func:`read_number`, also where the text does not begin with a number.
+
+    >>> split_number("1e6N/m"), split_number("2x10^-6 m"), split_number("1 000 N")
+    ((1000000.0, 'N/m'), (2e-06, 'm'), (1000.0, 'N'))
+    """
+    match = NUMBER.match(text)
+    if match is None:
+        raise ValueError("must be a number")
+    end = match.end()
+    more = _POWER.match(text, end) or _RAISED.match(text, end)
+    if more is not None:
+        end = more.end()
+    return read_number(text[:end]), text[end:].strip()

@@ -1,0 +1,127 @@
+"""One oscillation of a motion, of any form, read as harmonics: a number, a text such as
+``2um@90deg``, a pair, mappings, or a list of harmonics."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mumacro.errors import InputError
+from mumacro.inputs.fields import QUANTITY_OF
+from mumacro.inputs.names import unknown_name
+from mumacro.inputs.numbers import read_number
+from mumacro.inputs.reading import NO_DEVIATION, read
+
+MOST_HARMONIC = 1000
+WHOLE = (
+    f"a whole number from 1 to {MOST_HARMONIC}: other ratios have no period 2 pi/omega; give the "
+    "frequency of which all are multiples"
+)
+_FORM = (
+    'an amplitude, a text such as "2um@90deg" or "2um, 3:0.4um@90deg", a pair (amplitude, phase '
+    "in degrees), or a list of triples (harmonic, amplitude, phase in degrees)"
+)
+_MEMBERS = ("harmonic", "amplitude", "phase")
+#: harmonic, amplitude in SI, phase in degrees; both numbers or arrays
+Harmonic = tuple[int, Any, Any]
+
+
+def read_oscillation(name: str, value: Any) -> list[Harmonic]:
+    """The harmonics of x, y [m] or the normal force [N].
+
+    InputError names the part: ``x``, or ``x, harmonic``, ``x, amplitude``, ``x, phase``.
+
+    >>> read_oscillation("y", "2um, 3:0.5um@90deg")
+    [(1, 2e-06, 0.0), (3, 5e-07, 90.0)]
+    >>> read_oscillation("x", (1e-6, 90.0))
+    [(1, 1e-06, 90.0)]
+    >>> read_oscillation("x", {"amplitude": "1um", "phase": "1.5707963267948966 rad"})
+    [(1, 1e-06, 90.0)]
+    """
+    return [
+        (_harmonic(name, one[0]), _amplitude(name, one[1]), _phase(name, one[2]))
+        for one in _parts(name, value)
+    ]
+
+
+def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
+    """Harmonic, amplitude and phase of each part, as they came."""
+    if isinstance(value, str):
+        return _of_text(name, value)
+    if isinstance(value, Mapping):
+        return [_of_mapping(name, value)]
+    if isinstance(value, tuple) and len(value) == 2:
+        return [(1, *value)]
+    if isinstance(value, (list, tuple)) and all(
+        isinstance(one, (list, tuple, Mapping)) for one in value
+    ):
+        parts = [_of_mapping(name, one) if isinstance(one, Mapping) else one for one in value]
+        if any(len(one) != 3 for one in parts):
+            raise InputError(name, value, _FORM)
+        return [(one[0], one[1], one[2]) for one in parts]
+    return [(1, value, 0.0)]
+
+
+def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
+    """``harmonic:amplitude@phase``, of several harmonics separated by commas.
+
+    A comma without a harmonic behind it is a decimal sign.
+    """
+    pieces: list[str] = []
+    for piece in text.split(","):
+        if pieces and ":" not in piece:
+            pieces[-1] += f",{piece}"
+        else:
+            pieces.append(piece)
+    parts = []
+    for piece in pieces:
+        before, colon, rest = piece.rpartition(":")
+        amplitude, at, phase = rest.partition("@")
+        if ":" in before or "@" in phase or not amplitude.strip() or (at and not phase.strip()):
+            raise InputError(name, text, _FORM)
+        if "," in amplitude and not at:
+            shown = amplitude.partition(",")[0].strip()
+            try:
+                _amplitude(name, amplitude)
+            except InputError as error:
+                behind = amplitude.partition(",")[2].strip()
+                bound = f"an amplitude, and its phase behind @: did you mean {shown}@{behind}deg?"
+                raise InputError(name, text, bound) from error
+        parts.append((before.strip() if colon else 1, amplitude, phase if at else 0.0))
+    return parts
+
+
+def _of_mapping(name: str, value: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+    if unknown := [member for member in value if member not in _MEMBERS]:
+        raise InputError(
+            f"{name}, {unknown[0]}", value[unknown[0]], unknown_name(str(unknown[0]), _MEMBERS)
+        )
+    if value.get("amplitude") is None:
+        raise InputError(f"{name}, amplitude", None, "given")
+    return value.get("harmonic", 1), value["amplitude"], value.get("phase", 0.0)
+
+
+def _harmonic(name: str, value: Any) -> int:
+    try:
+        order = read_number(value) if isinstance(value, str) else float(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}, harmonic", value, WHOLE) from error
+    if isinstance(value, bool) or not (order.is_integer() and 1.0 <= order <= MOST_HARMONIC):
+        raise InputError(f"{name}, harmonic", value, WHOLE)
+    return int(order)
+
+
+def _amplitude(name: str, value: Any) -> Any:
+    return _plain(f"{name}, amplitude", value, QUANTITY_OF[name])
+
+
+def _phase(name: str, value: Any) -> Any:
+    return _plain(f"{name}, phase", value, "angle")
+
+
+def _plain(name: str, value: Any, quantity: str) -> Any:
+    """Numbers in SI without a deviation."""
+    one = read(name, value, quantity)
+    if one.std is not None and np.any(one.std):
+        raise InputError(name, value, NO_DEVIATION)
+    return one.si

@@ -1,0 +1,543 @@
+"""One value of one input, of any type, read in SI: a number, a text as a person types it, a value
+that carries a unit or a deviation, and arrays of all of these.
+
+Every entrance reads here: keywords, mappings, frames, files, command, query and JSON.  A value is
+understood or refused by its name, with the remedy.  Units and deviations are found by what values
+of pint, astropy, unyt, xarray and uncertainties can do; none of these packages is imported.
+"""
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from mumacro.errors import InputError
+from mumacro.inputs.fields import GAP, QUANTITY_OF, STIFFNESS, is_rigid
+from mumacro.inputs.k_range import BOUND
+from mumacro.inputs.numbers import split_number, tidy
+from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, canonical, scale_in
+
+#: types of one real number
+NUMBERS: Final = frozenset(
+    (float, int, bool, np.bool_, *(np.dtype(code).type for code in "efdbhilqBHILQ"))
+)
+A_NUMBER = "a real number or an array of them"
+LONGEST = 200  # characters of a value
+#: signs between a value and its deviation
+_DEVIATIONS = ("±", "+/-", "+-")
+# may be written as the word rigid, as an interval
+_OR_RIGID = ("stiffness", "pressure")
+_INTERVALS = ("k", "k_range")
+_ONE_NUMBER = "one number: k alone may be an interval; ask for both ends, one after the other"
+#: where an answer has no deviation of its own
+NO_DEVIATION = "without a deviation, which only an answer to given cases has"
+_NOT_BOTH = "an interval or a deviation, not both, and rigid alone"
+# of a unit that turns: without one of them 1/s is a frequency, with one of them it is none
+_ANGLES = ("rad", "deg", "°", "turn", "rev", "cycle", "rpm", "arc")
+
+
+class Value(NamedTuple):
+    """What was understood of one input, in SI; each number is a float, or an array of the shape of
+    the value."""
+
+    #: the value, of an interval its geometric middle; infinite where rigid
+    si: Any
+    std: Any = None  #: one standard deviation
+    low: Any = None  #: ends of an interval
+    high: Any = None
+    text: str | None = None  #: as it came, where it came as a text
+    unit: str | None = None  #: the unit that was understood; None: the number is in SI
+
+    def scaled(self, scale: Scale, unit: str) -> "Value":
+        """The same numbers, meant in a unit."""
+        si, std, low, high = (None if part is None else scale.si(part) for part in self[:4])
+        return Value(si, std, low, high, self.text, unit)
+
+
+def read(name: str, value: Any, quantity: str = "") -> Value:
+    """The value of an input, or of another argument, in SI.
+
+    Parameters
+    ----------
+    name : str
+        Of the input, for messages; :data:`mumacro.inputs.fields.QUANTITY_OF` has what it measures.
+    value : number, str, quantity, array_like
+        A number is in SI, a phase in degrees.  An array of numbers is not copied.
+    quantity : str
+        What it measures, for a name that is not in the list.
+
+    Raises
+    ------
+    InputError
+        No value, a unit that the input cannot have, a text that may mean two numbers.  Bounds are
+        not checked here.
+
+    Examples
+    --------
+    >>> read("y0", 2e-6), read("y0", "2 um").si, read("k", "rigid").si
+    (Value(si=2e-06, std=None, low=None, high=None, text=None, unit=None), 2e-06, inf)
+    >>> read("k", "1 ± 0.1 N/um").std, read("k", "0.8..1.2 N/um")[2:4]
+    (100000.0, (800000.0, 1200000.0))
+    """
+    of_type = type(value)
+    if of_type is float:
+        return Value(value)
+    if of_type in NUMBERS:
+        return Value(_double(name, value))
+    if of_type is np.ndarray and value.dtype.kind in "fiub":
+        array = value.astype(np.float64, copy=False)
+        return Value(array if array.ndim else float(array))
+    quantity = quantity or QUANTITY_OF.get(name, "ratio")
+    if of_type is str:
+        return _of_text(name, quantity, value)
+    whole, reasons = _read(name, value, quantity)
+    if reasons:
+        index, (entry, bound) = next(iter(reasons.items()))
+        raise InputError(name, entry, bound, index)
+    return whole
+
+
+def read_one(name: str, value: Any, quantity: str = "") -> float:
+    """As :func:`read`, where one number without a deviation is needed.
+
+    >>> read_one("radius", "5mm")
+    0.005
+    """
+    one = read(name, value, quantity)
+    if one.low is not None:
+        raise InputError(name, value, _ONE_NUMBER)
+    if np.ndim(one.si):
+        raise InputError(name, value, "one number")
+    if one.std is not None:
+        raise InputError(name, value, NO_DEVIATION)
+    return float(one.si)
+
+
+def read_column(name: str, values: Any, quantity: str = "") -> tuple[Value, dict[int, str]]:
+    """As :func:`read` for an array whose entries spoil only themselves: NaN where one is no value,
+    and the reason by its place in the flattened array.
+
+    >>> column, reasons = read_column("y0", [1e-6, "2um", "2 N", None])
+    >>> column.si.tolist(), [*reasons]
+    ([1e-06, 2e-06, nan, nan], [2, 3])
+    """
+    if type(values) is np.ndarray and values.dtype.kind in "fiub":
+        return read(name, values, quantity), {}
+    whole, reasons = _read(name, values, quantity or QUANTITY_OF.get(name, "ratio"))
+    missing = GAP if name == "k" else "is missing"
+    return whole, {
+        index: missing if entry is None or entry == "" else reason_of(bound)
+        for index, (entry, bound) in reasons.items()
+    }
+
+
+def reason_of(bound: str) -> str:
+    """The bound of an error as a sentence without its subject."""
+    return bound if bound.startswith(("is ", "must ")) else f"must be {bound}"
+
+
+def carries_unit(value: Any) -> bool:
+    """Whether a value, such as a quantity of pint or a labelled array with ``attrs["units"]``, says
+    its unit."""
+    return type(value) not in _WITHOUT_UNIT and _unit(value) is not None
+
+
+def without_unit(name: str, value: Any, quantity: str = "") -> Any:
+    """A labelled value that carries a unit as the same labels with numbers in SI; another value as
+    it is.  Chunks of Dask stay lazy.
+
+    InputError for a unit that the input cannot have.
+    """
+    if not carries_unit(value):
+        return value
+    library, quantity = _library(value), quantity or QUANTITY_OF.get(name, "ratio")
+    if library == "xarray":
+        unit = _unit(value)
+        scale = _known_scale(name, quantity, unit)
+        data = value.data
+        numbers = data if _own_unit(data) is None else _magnitude(data)
+        plain = value.copy(data=scale.si(numbers))
+        plain.attrs = {}
+        return plain
+    if library == "pandas":
+        numbers = read(name, value, quantity).si
+        return type(value)(numbers, index=value.index, name=value.name)
+    return value
+
+
+_WITHOUT_UNIT = NUMBERS | {str, list, tuple, dict, type(None), np.ndarray}
+
+
+# --- arrays ---------------------------------------------------------------------------------------
+
+Reasons = dict[int, tuple[object, str]]  # by place: the entry and its bound
+
+
+def _read(name: str, value: Any, quantity: str) -> tuple[Value, Reasons]:
+    """Any value that is no plain number, array of numbers or text."""
+    if value is None:
+        raise InputError(name, None, _gap(name))
+    if type(value) not in _WITHOUT_UNIT and (unit := _unit(value)) is not None:
+        return _of_quantity(name, value, unit, quantity)
+    if (pair := _uncertain(value)) is not None:
+        return Value(*pair), {}
+    if isinstance(value, np.ma.MaskedArray):
+        if value.dtype.kind in "fiub":
+            filled = np.ma.filled(value.astype(np.float64), math.nan)
+            return Value(filled if filled.ndim else float(filled)), {}
+        value = np.ma.filled(value.astype(object), None)
+    if isinstance(value, (list, tuple)):
+        shape, entries = _entries(name, value)
+        if NUMBERS.issuperset(map(type, entries)):
+            try:
+                return Value(np.array(entries, np.float64).reshape(shape)), {}
+            except OverflowError:
+                pass  # the entry beyond double range is found below
+        return _of_entries(name, entries, shape, quantity)
+    if isinstance(value, (str, bytes, Mapping, set, frozenset)):
+        if isinstance(value, str):
+            return _of_text(name, quantity, str(value)), {}
+        raise InputError(name, value, A_NUMBER)
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind in "fiub":
+            array = array.astype(np.float64, copy=False)
+            return Value(array if array.ndim else float(array)), {}
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(name, value, A_NUMBER) from None
+    if array.dtype.kind not in "OUT" or (array.ndim == 0 and array.item() is value):
+        return Value(_other_number(name, value)), {}
+    entries = array.ravel().tolist()
+    if not array.ndim:
+        return _of_entry(name, entries[0], quantity), {}
+    return _of_entries(name, entries, array.shape, quantity)
+
+
+def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any]]:
+    """Shape and entries of nested lists; InputError for lists of several lengths."""
+    if not any(isinstance(one, (list, tuple, np.ndarray)) for one in value):
+        return (len(value),), list(value)
+    try:
+        parts = [
+            (one.shape, one.ravel().tolist())
+            if isinstance(one, np.ndarray)
+            else _entries(name, one)
+            for one in value
+        ]
+    except (TypeError, RecursionError):
+        parts = [((), []), ((1,), [])]
+    if len({shape for shape, _ in parts}) > 1:
+        raise InputError(name, value, f"{A_NUMBER}, its lists of one length")
+    return (len(value), *parts[0][0]), [entry for _, entries in parts for entry in entries]
+
+
+def _of_entries(
+    name: str, entries: Sequence[Any], shape: tuple[int, ...], quantity: str
+) -> tuple[Value, Reasons]:
+    """Entries of several types, one after the other."""
+    si, reasons = np.full(len(entries), math.nan), Reasons()
+    more: dict[int, Value] = {}
+    for i, entry in enumerate(entries):
+        try:
+            one = _of_entry(name, entry, quantity)
+            si[i] = one.si
+        except InputError as error:
+            reasons[i] = entry, error.bound
+            continue
+        except (TypeError, ValueError):
+            reasons[i] = entry, A_NUMBER
+            continue
+        if one.std is not None or one.low is not None:
+            more[i] = one
+    std = low = high = None
+    if any(one.std is not None for one in more.values()):
+        std = np.zeros(si.size)  # a number has the deviation 0
+    if any(one.low is not None for one in more.values()):
+        low, high = si.copy(), si.copy()  # and is an interval of itself
+    for i, one in more.items():
+        if std is not None and one.std is not None:
+            std[i] = one.std
+        if low is not None and high is not None and one.low is not None:
+            low[i], high[i] = one.low, one.high
+    parts = [None if x is None else x.reshape(shape) for x in (si, std, low, high)]
+    return Value(parts[0], parts[1], parts[2], parts[3]), reasons
+
+
+def _of_entry(name: str, entry: Any, quantity: str) -> Value:
+    """One entry of an array; gaps, also those of pandas and of masks, are refused."""
+    if type(entry) is float:
+        return Value(entry)
+    if entry is None or entry is np.ma.masked or type(entry).__name__ in ("NAType", "NaTType"):
+        raise InputError(name, None, _gap(name))
+    one = read(name, entry, quantity)
+    if np.ndim(one.si):
+        raise InputError(name, entry, "one number in each place")
+    return one
+
+
+def _gap(name: str) -> str:
+    return STIFFNESS if name == "k" else A_NUMBER
+
+
+def _double(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # a whole number; it must not pass for a rigid contact
+        raise InputError(name, value, "within double range") from None
+
+
+def _other_number(name: str, value: Any) -> float:
+    """A number of another type, such as Decimal; complex numbers, times and bytes are none."""
+    if isinstance(value, (complex, np.complexfloating, np.generic, bytes)):
+        raise InputError(name, value, A_NUMBER)
+    try:
+        return _double(name, value)
+    except (TypeError, ValueError):
+        raise InputError(name, value, A_NUMBER) from None
+
+
+# --- values that carry a unit or a deviation ------------------------------------------------------
+
+
+def _library(value: Any) -> str:
+    return type(value).__module__.partition(".")[0]
+
+
+def _own_unit(value: Any) -> Any:
+    """The unit of a quantity of pint, astropy, unyt and others like them."""
+    for attribute in ("units", "unit"):
+        unit = getattr(value, attribute, None)
+        if unit is not None and not callable(unit):
+            return unit
+    return None
+
+
+def _unit(value: Any) -> Any:
+    """The unit that a value carries, None without one."""
+    library = _library(value)
+    if library not in ("xarray", "pandas"):
+        return _own_unit(value) if library != "numpy" else None
+    own = (
+        getattr(value.dtype, "units", None)
+        if library == "pandas" and hasattr(value, "dtype")
+        else _own_unit(getattr(value, "data", None))
+        if library == "xarray"
+        else None
+    )
+    if own is not None:
+        return own
+    attributes = getattr(value, "attrs", None) or {}
+    text = attributes.get("units", attributes.get("unit"))
+    return text if isinstance(text, str) and text.strip() else None
+
+
+def _magnitude(value: Any) -> Any:
+    """The number of a quantity, without its unit."""
+    for attribute in ("magnitude", "value", "values"):
+        number = getattr(value, attribute, None)
+        if number is not None and not callable(number):
+            return number
+    return np.asarray(value)
+
+
+def _numbers(value: Any) -> Any:
+    """What a value that carries a unit holds, without labels and unit."""
+    library = _library(value)
+    if library == "pandas":
+        array = value.array
+        return _magnitude(array.quantity) if hasattr(array, "quantity") else np.asarray(value)
+    if library == "xarray":
+        data = value.data
+        return np.asarray(data) if _own_unit(data) is None else _numbers(data)
+    return _magnitude(value)
+
+
+def _unit_text(unit: Any) -> str:
+    """A unit as text: short where its library can write it so."""
+    if isinstance(unit, str):
+        return unit
+    try:
+        return format(unit, "~C")  # of pint
+    except (TypeError, ValueError):
+        return str(unit)
+
+
+def _of_quantity(name: str, value: Any, unit: Any, quantity: str) -> tuple[Value, Reasons]:
+    """A value that carries a unit: by the table of units, or by its own library."""
+    text = _unit_text(unit)
+    scale = scale_in(quantity, text) or scale_in(quantity, str(unit))
+    if scale is None:
+        converted = _converted(value, text, QUANTITIES[quantity].unit, quantity)
+        if converted is None:
+            raise InputError(name, _shown(value, text), _bound(quantity, value, text))
+        scale, value = Scale(), converted
+    numbers = _numbers(value)
+    whole, reasons = _read_plain(name, numbers, quantity)
+    return whole.scaled(scale, canonical(text)), reasons
+
+
+def _read_plain(name: str, numbers: Any, quantity: str) -> tuple[Value, Reasons]:
+    if type(numbers) in NUMBERS or (type(numbers) is np.ndarray and numbers.dtype.kind in "fiub"):
+        return read(name, numbers, quantity), {}
+    return _read(name, numbers, quantity)
+
+
+def _converted(value: Any, text: str, unit: str, quantity: str) -> Any:
+    """A quantity that its own library has converted to an SI unit; None where it cannot be.
+
+    For a frequency libraries take a radian, and a turn, as a plain 1: a factor of 2 pi.
+    """
+    if not hasattr(value, "to"):
+        return None
+    turns = any(word in text.lower() for word in _ANGLES)
+    hertz = "hz" in text.lower() or "hertz" in text.lower()
+    if quantity in ("angular frequency", "angle") and (hertz or not turns):
+        return None
+    if quantity == "frequency" and turns:
+        return None
+    for target in (unit, "dimensionless", "") if unit == "-" else (unit,):
+        try:
+            return value.to(target)
+        except Exception:  # noqa: S112 (each library has errors of its own)
+            continue
+    return None
+
+
+def _known_scale(name: str, quantity: str, unit: Any) -> Scale:
+    """The scale of the unit of a labelled array, without its numbers."""
+    text = _unit_text(unit)
+    scale = scale_in(quantity, text) or scale_in(quantity, str(unit))
+    if scale is None and not isinstance(unit, str):
+        one = _converted(1.0 * unit, text, QUANTITIES[quantity].unit, quantity)
+        scale = None if one is None else Scale(float(_magnitude(one)))
+    if scale is None:
+        raise InputError(name, _shown(None, text), _bound(quantity, None, text))
+    return scale
+
+
+def _bound(quantity: str, value: Any, unit: str) -> str:
+    try:
+        number = float(_numbers(value))
+    except (TypeError, ValueError):
+        number = math.nan
+    if math.isnan(number):
+        return QUANTITIES[quantity].bound
+    return bound_of_unit(quantity, number, unit)
+
+
+def _shown(value: Any, unit: str) -> str:
+    """A quantity in a message."""
+    try:
+        return f"{float(_numbers(value)):.12g} {unit or 'without dimension'}"
+    except (TypeError, ValueError):
+        return f"a value in {unit or 'no unit'}"
+
+
+def _uncertain(value: Any) -> tuple[float, float] | None:
+    """Value and deviation of a number of the package uncertainties, or of one like it."""
+    nominal, deviation = (getattr(value, name, None) for name in ("nominal_value", "std_dev"))
+    if nominal is None or deviation is None or callable(deviation):
+        return None
+    return float(nominal), float(deviation)
+
+
+# --- texts ----------------------------------------------------------------------------------------
+
+
+@functools.lru_cache(4096)
+def _of_text(name: str, quantity: str, raw: str) -> Value:
+    """A value as a person types it."""
+    if len(raw) > LONGEST:
+        raise InputError(name, f"{raw[:40]}…", "a number, with or without a unit")
+    text = tidy(raw)
+    rigid = quantity in _OR_RIGID
+    if rigid and is_rigid(text):
+        return Value(math.inf, text=raw)
+    if text.lower().strip("+-") in ("inf", "infinity", "nan"):
+        return Value(float(text), text=raw)
+    if not text:
+        raise InputError(name, raw, _gap(name))
+    if rigid and "rigid" in text.lower() and any(mark in text for mark in (*_DEVIATIONS, "..")):
+        raise InputError(name, raw, _NOT_BOTH)
+    try:
+        for mark in _DEVIATIONS:
+            if mark in text:
+                if ".." in text:
+                    raise InputError(name, raw, _NOT_BOTH)
+                return _with_deviation(name, quantity, raw, text, mark)
+        if ".." in text or "…" in text:
+            return _interval(name, quantity, raw, text.replace("…", ".."))
+        number, unit = split_number(text)
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(name, raw, _of_no_number(quantity, str(error))) from None
+    scale = _scale_or_refuse(name, quantity, raw, number, unit)
+    return Value(scale.si(number), text=raw, unit=canonical(unit) if unit else None)
+
+
+def _of_no_number(quantity: str, reason: str) -> str:
+    """The bound where a text has no number, or may have two."""
+    known, reason = QUANTITIES[quantity], reason.removeprefix("must be ")
+    if reason != "a number":
+        return f"one number: it {reason}" if reason.startswith(("is ", "may ")) else reason
+    word = ", or rigid" if quantity in _OR_RIGID else ""
+    return f"a number [{known.unit}], or with a unit such as {known.such_as}{word}"
+
+
+def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: str) -> Scale:
+    if not unit:
+        return Scale()
+    scale = scale_in(quantity, unit)
+    if scale is not None:
+        return scale
+    if quantity == "stiffness" and unit.startswith(("-", "to ")):
+        try:
+            high, behind = split_number(unit.removeprefix("-").removeprefix("to ").strip())
+        except ValueError:
+            pass
+        else:
+            if not behind or scale_in(quantity, behind):
+                ends = f"{number:.12g}..{high:.12g}{behind}"
+                raise InputError(name, raw, f"a number; write an interval as {ends}")
+    raise InputError(name, raw, bound_of_unit(quantity, number, unit))
+
+
+def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) -> Value:
+    """``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``(1 ± 0.1) N/um``."""
+    together = text.startswith("(")
+    if together:
+        text = text[1:].replace(")", " ", 1)
+    left, _, right = text.partition(mark)
+    number, unit = split_number(left.strip())
+    deviation, behind = split_number(right.strip())
+    if deviation < 0.0 or not math.isfinite(deviation):
+        raise InputError(name, raw, "a number and a deviation >= 0")
+    relative = canonical(behind) == "%" and canonical(unit) != "%" and not together
+    if relative:
+        value = _scale_or_refuse(name, quantity, raw, number, unit).si(number)
+        return Value(value, abs(value) * deviation / 100.0, text=raw, unit=canonical(unit) or None)
+    scale = _scale_or_refuse(name, quantity, raw, number, unit or behind)
+    own = _scale_or_refuse(name, quantity, raw, deviation, behind or unit)
+    return Value(
+        scale.si(number), own.si(deviation), text=raw, unit=canonical(unit or behind) or None
+    )
+
+
+def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
+    """``0.8..1.2 N/um``; a unit behind the second end holds for both."""
+    if name not in _INTERVALS:
+        raise InputError(name, raw, _ONE_NUMBER)
+    left, _, right = text.partition("..")
+    low, unit = split_number(left.strip())
+    high, behind = split_number(right.strip(" ."))
+    ends = (
+        _scale_or_refuse(name, quantity, raw, low, unit or behind).si(low),
+        _scale_or_refuse(name, quantity, raw, high, behind or unit).si(high),
+    )
+    if not 0.0 < ends[0] <= ends[1] < math.inf:
+        raise InputError(name, raw, BOUND)
+    middle = min(max(math.sqrt(ends[0]) * math.sqrt(ends[1]), ends[0]), ends[1])
+    return Value(middle, None, *ends, raw, canonical(behind or unit) or None)

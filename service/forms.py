@@ -1,0 +1,310 @@
+"""JSON of a batch: its body, columns or rows, becomes columns; the answers become JSON again.
+
+jiter reads JSON fast, but no other thread runs meanwhile.  Long lists are therefore read slice by
+slice, and written so.  What jiter refuses, or what is shaped in another way, is left to Python's
+``json``: that is slow, lets other threads run, and gives the reason.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from itertools import chain
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import jiter
+import numpy as np
+from pydantic import ValidationError
+
+from mumacro.errors import InputError
+from mumacro.inputs.cases import by_name, columns_of
+from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.kind import Kind
+from mumacro.kernel.arrays import Codes
+
+from .included import CODED, Outputs, listed, names_of, nested
+from .models.inputs import MAX_REASONS, Case
+from .models.options import CaseColumns
+from .problems import FieldFault, ProblemKind, RequestError, faults_of, reason_of, refuse
+from .reading import decode, dump
+
+#: the bad field, or None for the case as a whole, and why
+Reason = tuple[str | None, str]
+
+MORE_CASES = "send several requests, or give `mumacro eval` a file, or use Dask"
+SLICE = 8192  # cases that are computed and written at a time
+_READ = 256 * 1024  # bytes of a list that are read at a time
+_KNOWN = len(CaseColumns.model_fields)  # names that a case or its columns may have
+
+
+class Body(NamedTuple):
+    """What a body holds."""
+
+    #: inputs by name: one value, a list, or an array of finite numbers; and options
+    members: dict[str, Any]
+    #: why cases could not be read, by their index; they have a NaN
+    reasons: Mapping[int, Reason] = MappingProxyType({})
+    rows: bool = False
+
+
+def too_large(max_batch: int) -> RequestError:
+    """The error for a batch with more cases than the settings allow."""
+    return RequestError(
+        ProblemKind.BATCH_TOO_LARGE,
+        f"a batch may have up to {max_batch} cases, this one has more: {MORE_CASES}",
+        max_batch=max_batch,
+    )
+
+
+def read(text: bytearray, max_batch: int, kind: Kind) -> Body:
+    """The cases and the options of a body: an object of columns, or a list of rows of this kind."""
+    try:
+        if _OPENS_LIST.match(text):
+            return Body(_columns_of(_list(text, _AFTER_ROW, max_batch), kind), rows=True)
+        return Body(dict(_members(text, max_batch)))
+    except (ValueError, InputError):
+        values = _slowly(text, max_batch)
+    if isinstance(values, list):
+        return _one_by_one(values, kind)
+    if not isinstance(values, dict):
+        refuse([FieldFault((), "must be an object of columns or a list of rows", values)])
+    return Body(values)
+
+
+def _slowly(text: bytearray, max_batch: int) -> Any:
+    """What Python's ``json`` reads, unless it holds more values than a batch may have.
+
+    Every value but the first of its list or object has a comma before it, every list or object a
+    bracket, every member of an object a colon.
+    """
+    most = max_batch + 64
+    objects = _count(text, b"{")
+    if _count(text, b",") > _KNOWN * most or _count(text, b"[") + objects > most:
+        raise too_large(max_batch)
+    if _count(text, b":") > _KNOWN * objects + 64:
+        detail = "the body has objects with more members than there are fields"
+        raise RequestError(ProblemKind.INVALID_VALUE, detail)
+    values = decode(bytes(text), large=True)
+    if isinstance(values, list) and len(values) > max_batch:
+        raise too_large(max_batch)
+    return values
+
+
+def _count(text: bytearray, character: bytes) -> int:
+    """How often a character stands in a text; ``text.count`` takes longer where it often does."""
+    codes = np.frombuffer(text, np.uint8)
+    parts = (codes[i : i + _READ] for i in range(0, codes.size, _READ))
+    return sum(int(np.count_nonzero(part == character[0])) for part in parts)
+
+
+# --- lists, slice by slice ------------------------------------------------------------------------
+
+_OPENS_LIST = re.compile(rb"[ \t\r\n]*\[")
+_AFTER_NUMBER = re.compile(rb",")
+_AFTER_ROW = re.compile(rb"(?<=\})[ \t\r\n]*,")
+
+
+def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> Iterator[list[Any]]:
+    """The values of a list in slices; ValueError where it cannot be read so.
+
+    A slice ends before a comma.  A comma within a text, or within a list in the list, leaves a
+    slice that is no JSON.
+    """
+    size = start = 0
+    while start < len(text):
+        end = comma.search(text, start + _READ, start + 2 * _READ)
+        if end is None and len(text) - start > 2 * _READ:
+            raise ValueError("no comma for long")
+        opening = b"[" if start else b""
+        between = text[start : end.start()] + b"]" if end else text[start:]
+        values = jiter.from_json(opening + between, catch_duplicate_keys=True)
+        if not values and (start or end):
+            raise ValueError("nothing beside a comma")
+        size += len(values)
+        if size > max_batch:
+            raise too_large(max_batch)
+        yield values
+        start = end.end() if end else len(text)
+
+
+def _numbers(values: list[Any]) -> Any:
+    """An array if all values are finite numbers, else the list."""
+    if {*map(type, values)} <= {float, int}:
+        with suppress(OverflowError):
+            array = np.array(values, np.float64)
+            if np.isfinite(array).all():
+                return array
+    return values
+
+
+def _joined(parts: list[Any]) -> Any:
+    """Arrays and lists as one array, or as one list."""
+    if all(isinstance(part, np.ndarray) for part in parts):
+        return np.concatenate(parts)
+    lists = (part if isinstance(part, list) else part.tolist() for part in parts)
+    return list(chain.from_iterable(lists))
+
+
+# --- columns --------------------------------------------------------------------------------------
+
+_TEXT = rb'"(?:[^"\\]|\\.)*+"'
+_SPACE = rb"[ \t\r\n]*+"
+_OPENS_OBJECT = re.compile(_SPACE + rb"\{")
+_MEMBER = re.compile(
+    _SPACE
+    + rb"(?P<name>" + _TEXT + rb")" + _SPACE + rb":" + _SPACE
+    + rb"(?P<value>\[[^\]]*+\]|\{[^{}]*+\}|" + _TEXT + rb'|[^ \t\r\n",\[\]{}]++)'
+    + _SPACE + rb"(?P<then>[,}])" + _SPACE,
+    re.DOTALL,
+)  # fmt: skip
+
+
+def _members(text: bytearray, max_batch: int) -> Iterator[tuple[str, Any]]:
+    """The members of an object; ValueError where it cannot be read so.
+
+    A bracket in a text, or a list in a list, ends a value too early: it is no JSON then.
+    """
+    opening = _OPENS_OBJECT.match(text)
+    start, then = (opening.end() if opening else 0), b","
+    names = set[str]()
+    while then == b",":
+        member = _MEMBER.match(text, start)
+        if member is None or len(names) > _KNOWN:
+            raise ValueError("no object of values and lists")
+        name, value = jiter.from_json(member["name"]), member["value"]
+        start, then = member.end(), member["then"]
+        if name in names:
+            raise ValueError("a name is given twice")
+        names.add(name)
+        if len(value) > _READ and value.startswith(b"["):
+            slices = _list(value, _AFTER_NUMBER, max_batch)
+            yield name, _joined([_numbers(values) for values in slices])
+        else:
+            yield name, jiter.from_json(value, catch_duplicate_keys=True)
+    if opening is None or start < len(text):
+        raise ValueError("not an object alone")
+
+
+# --- rows -----------------------------------------------------------------------------------------
+
+
+def _columns_of(slices: Iterable[list[Any]], kind: Kind) -> dict[str, Any]:
+    """Rows as columns; ValueError unless all have the same names, those of a case, and no null,
+    which says the same as no member."""
+    columns: dict[str, list[Any]] = {}
+    for rows in slices:
+        if not columns:
+            columns = {name: [] for name in _names_of_case(rows, kind)}
+        if not all(isinstance(row, dict) and row.keys() == columns.keys() for row in rows):
+            raise ValueError("rows of other names")
+        for name, parts in columns.items():
+            values = _numbers([row[name] for row in rows])
+            if isinstance(values, list) and None in values:
+                raise ValueError("a null")
+            parts.append(values)
+    return {name: _joined(parts) for name, parts in columns.items()}
+
+
+def _names_of_case(rows: list[Any], kind: Kind) -> list[str]:
+    """The names of the first row; ValueError where they make no case of this kind."""
+    if not rows or not isinstance(rows[0], dict):
+        raise ValueError("no row")
+    names = [*rows[0]]
+    columns_of(_with_k(by_name(None, dict.fromkeys(names, 1.0), kind)), kind)
+    if not {*names} <= {*kind.columns, *ENDS}:
+        raise ValueError("an unknown name")
+    return names
+
+
+def _with_k(inputs: dict[str, Any]) -> dict[str, Any]:
+    return {**inputs, "k": 1.0} if "k_low" in inputs else inputs
+
+
+def _one_by_one(rows: list[Any], kind: Kind) -> Body:
+    """Rows one by one: each is checked as one case, and a bad one gets its first reason."""
+    interval = any(isinstance(row, dict) and not _INTERVAL.isdisjoint(row) for row in rows)
+    stiffness = ENDS if interval else ("k",)
+    fields = [name for field in kind.fields for name in (stiffness if field == "k" else (field,))]
+    columns = {name: np.full(len(rows), np.nan) for name in fields}
+    reasons: dict[int, Reason] = {}
+    for i, row in enumerate(rows):
+        try:
+            inputs = _with_k(by_name(None, _case(row).inputs, kind))
+            values = columns_of(inputs, kind)
+            for name in fields:
+                columns[name][i] = (
+                    inputs[name]
+                    if name in inputs and name in ENDS
+                    else values.get(name, values["k"])
+                )
+        except (ValidationError, InputError) as error:
+            if len(reasons) < MAX_REASONS:
+                reasons[i] = _first(error)
+    return Body(dict(columns), reasons, rows=True)
+
+
+_INTERVAL = frozenset(("k_range", *ENDS))
+
+
+def _case(row: Any) -> Case:
+    if not isinstance(row, dict):
+        raise InputError("", row, "an object")
+    return Case.model_validate(row)
+
+
+def _first(error: ValidationError | InputError) -> Reason:
+    """The first fault of a row, in the order of the inputs."""
+    if isinstance(error, InputError):
+        return (str(error.field) or None), reason_of(error)
+    faults = faults_of(error.errors(include_url=False), Case.model_fields)
+    order = list(Case.model_fields)
+    fault = min(faults, key=lambda one: order.index(one.path[0]) if one.path[0] in order else -1)
+    return str(fault.path[0])[:80], fault.reason
+
+
+# --- answers --------------------------------------------------------------------------------------
+
+
+def write_columns(slices: Iterable[tuple[Outputs, Codes]]) -> Iterator[bytes]:
+    """An object of lists, piece by piece, without its closing brace."""
+    parts = [outputs for outputs, _ in slices]
+    yield from _object(nested({path: [part[path] for part in parts] for path in parts[0]}))
+
+
+def _object(tree: Mapping[str, Any]) -> Iterator[bytes]:
+    opening = b"{"
+    for name, value in tree.items():
+        yield opening + dump(name) + b":"
+        opening = b","
+        if isinstance(value, dict):
+            yield from _object(value)
+            yield b"}"
+        else:
+            yield from _array(name, value)
+
+
+def _array(name: str, parts: Iterable[Any]) -> Iterator[bytes]:
+    opening = b"["
+    for part in parts:
+        yield opening + dump(names_of(name, part) if name in CODED else part)[1:-1]
+        opening = b","
+    yield b"]"
+
+
+def write_rows(slices: Iterable[tuple[Outputs, Codes]]) -> Iterator[bytes]:
+    """An object with the list ``results``, null for a bad case, without its closing brace."""
+    opening = b'{"results":['
+    for outputs, codes in slices:
+        rows = _rows(nested(listed(outputs)))
+        results = [
+            row if code >= 0 else None for row, code in zip(rows, codes.tolist(), strict=True)
+        ]
+        yield opening + dump(results)[1:-1]
+        opening = b","
+    yield b"]"
+
+
+def _rows(tree: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Lists by name as a list of objects."""
+    columns = [_rows(value) if isinstance(value, dict) else value for value in tree.values()]
+    return [dict(zip(tree, values, strict=True)) for values in zip(*columns, strict=True)]

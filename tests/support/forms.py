@@ -1,0 +1,22 @@
+"""Cases written as text."""
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from typing import Any
+
+Row = dict[str, Any]
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """A head with the names of the first row, and the rows; None is an empty cell."""
+    text = io.StringIO()
+    csv.writer(text).writerows(
+        [list(rows[0]), *(["" if x is None else x for x in row.values()] for row in rows)]
+    )
+    return text.getvalue()
+
+
+def as_ndjson(rows: Sequence[Row]) -> str:
+    return "".join(json.dumps(row) + "\n" for row in rows)

@@ -1,0 +1,129 @@
+"""Points beside the seams of a table: where two of its cells meet, and where two blocks do.
+
+What an answer errs by jumps there, so a fault that needs two cells is found beside a seam and
+nowhere else.  Three ways to draw cover it: beside a seam along one coordinate, with the other
+anywhere; beside a seam along both; and beside a crossing of two seams at distances of the same
+size, which is where a strip along one seam ends at another.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from builder.tables.contacts import SolvedContact
+from mumacro.table.atlas import BORDER_PIECES, STEEPEST, Axis, Chart
+from mumacro.table.blocks import Block, BorderPiece
+from mumacro.table.polynomials import Border
+
+Array = NDArray[np.float64]
+#: decades of the distance to a seam, in cells
+DECADES = 8.0
+#: groups that are drawn: all of a ball's and of one spring's blocks but for their limits
+V_RANGE, Y_RANGE = (1e-13, 1e8), (1e-8, 1e10)
+
+
+def _in_file(axis: Axis, x: Array) -> Array:
+    """The table file's coordinate at evaluation's, within the block."""
+    at = axis.to_file(np.clip(x, *axis.span))
+    return np.asarray(np.clip(at, axis.low, axis.high), dtype=np.float64)
+
+
+def _beside(rng: np.random.Generator, axis: Axis, cells: int, distance: Array) -> Array:
+    """At ``distance`` in cells from any of the seams along an axis, on either side; its ends are
+    as likely as all seams between them."""
+    n = distance.size
+    at = np.where(rng.random(n) < 0.5, rng.integers(0, cells + 1, n), rng.choice([0, cells], n))
+    start, stop = axis.span
+    return _in_file(axis, start + (stop - start) * (at + rng.choice([-1, 1], n) * distance) / cells)
+
+
+def beside_seams(
+    rng: np.random.Generator, chart: Chart, block: Block, border: Border, n: int
+) -> tuple[Array, Array]:
+    """v~ and y~ of about ``n`` points beside the seams of a block's cells, of a ball those of its
+    middle spring."""
+    axes, cells = (chart.a, chart.b), block.cells
+
+    def distance(count: int) -> Array:
+        return np.asarray(0.4 * 10.0 ** -rng.uniform(0.0, DECADES, count))
+
+    def anywhere(axis: Axis, count: int) -> Array:
+        start, stop = axis.span
+        return _in_file(axis, start + (stop - start) * rng.random(count))
+
+    part = n // 4
+    drawn = [
+        [
+            _beside(rng, axis, count, distance(part)) if i in seams else anywhere(axis, part)
+            for i, (axis, count) in enumerate(zip(axes, cells, strict=True))
+        ]
+        for seams in ((0,), (1,), (0, 1))
+    ]
+    common = distance(part)
+    drawn.append(
+        [
+            _beside(rng, axis, count, common * 10.0 ** rng.uniform(-1.5, 0.0, part))
+            for axis, count in zip(axes, cells, strict=True)
+        ]
+    )
+    a, b = (np.concatenate(x) for x in zip(*drawn, strict=True))
+    with np.errstate(all="ignore"):
+        v, y, _ = chart.point(a, b, border)
+    inside = [(low <= x) & (x <= high) for x, (low, high) in ((v, V_RANGE), (y, Y_RANGE))]
+    return v[inside[0] & inside[1]], y[inside[0] & inside[1]]
+
+
+def beside_border_seams(
+    rng: np.random.Generator, pieces: list[BorderPiece], border: Border, n: int
+) -> tuple[Array, Array]:
+    """The same of about ``n`` points whose y~ is beside a seam of the border's cells, which are not
+    those of the blocks: there the coordinates of stick-slip bend."""
+    amplitudes = []
+    for (_, axis, _), piece in zip(BORDER_PIECES, pieces, strict=True):
+        distance = 0.4 * 10.0 ** -rng.uniform(0.0, DECADES, n // len(pieces))
+        x = _beside(rng, axis, piece.cells, distance)
+        amplitudes.append(axis.amplitude(x[x > 0.0]))
+    y = np.concatenate(amplitudes)
+    y = y[(Y_RANGE[0] <= y) & (y <= Y_RANGE[1])]
+    s = rng.random(y.size)
+    edge = 10.0 ** -rng.uniform(0.0, DECADES, y.size)
+    ratio = np.select([s < 0.5, s < 0.7, s < 0.9], [np.sin(np.pi * s) ** 2, edge, 1.0 - edge], s)
+    return np.where(s > 0.95, 1.0 / ratio, ratio) * border(y), y
+
+
+# --- slopes beside the steepest ray ---------------------------------------------------------------
+
+WAY = 0.12  # in root = sqrt(1 - t), from the steepest ray t = 1 on
+NODES = 0.5 - 0.5 * np.cos((np.arange(14) + 0.5) * np.pi / 14)  # of WAY
+DEGREE = 8
+
+
+def slopes_across_rays(of: SolvedContact, v: Array, y: Array, crit: Array) -> tuple[Array, Array]:
+    """Slopes of mu~ along ln v~ and ln y~ in the ring of a ball, (2, n), and what they may be wrong
+    by; infinitely wrong far from the steepest ray.
+
+    mu~ is smooth in root = sqrt(1 - t) without a linear term, at fixed v~ as at fixed y~.  A
+    polynomial in root has that slope however small root is, where differences have no step.
+    """
+    root = np.sqrt(np.maximum(1.0 - v / (STEEPEST * y), 0.0))
+    # not beyond the border, where it is smooth no longer
+    way = np.minimum(WAY, 0.35 * np.sqrt(np.maximum(1.0 - crit / (STEEPEST * y), 1e-300)))
+    ray = STEEPEST * (1.0 - (way[:, None] * NODES) ** 2)
+    lines = (ray * y[:, None], y[:, None]), (v[:, None], v[:, None] / ray)
+    usable = (root > 0.0) & (root < way) & (v > crit)
+    slopes, noise = np.empty((2, v.size)), np.full((2, v.size), np.inf)
+    for row, (line_v, line_y) in enumerate(lines):
+        at_v, at_y = np.broadcast_arrays(line_v, line_y)
+        solved = of.solve(at_v, at_y)
+        each = of.noise("mu_ratio", at_v, at_y, solved, False).max(axis=1)
+        found = []
+        for degree in (DEGREE, DEGREE - 1):
+            powers = np.array([0, *range(2, degree + 1)])
+            fit = np.linalg.pinv(NODES[:, None] ** powers)
+            # d/d ln t = -t/(2 root) d/d root, over the way
+            rise = powers * (root / way)[:, None] ** np.maximum(powers - 2, 0)
+            share = (-0.5 * (1.0 - root * root) / way**2)[:, None] * (rise @ fit)
+            found.append((share * solved["mu_ratio"]).sum(axis=1))
+        slopes[row] = found[0] if row == 0 else -found[0]
+        unsure = 2.0 * np.abs(share).sum(axis=1) * each + np.abs(found[0] - found[1])
+        noise[row, usable] = unsure[usable]
+    return slopes, noise
