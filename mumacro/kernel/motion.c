@@ -1046,8 +1046,9 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         out.level = level;
         out.error = 2.0 * limit;
         if (level > 0)
-            out.error = (m->drag > 0.0 ? 2.0 : 6.0) * mu_difference(&out, &last, m->marks) +
-                        3.0 * out.distance + rounding;
+            out.error =
+                (m->drag > 0.0 && !slow ? 2.0 : 6.0) * mu_difference(&out, &last, m->marks) +
+                3.0 * out.distance + rounding;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
         if (out.error <= tolerance || level == levels) return out;
         if (level > 0 && (out.distance > tolerance ||
