@@ -28,7 +28,7 @@ def costs() -> str:
         spring = 0.0
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
-            data = s.cells("mu_ratio", Kind(*kind))
+            data = s.tabulated.data("mu_ratio", Kind(*kind))
             ask = functools.partial(shared_out.values, 0, data, v, amplitude, threads=1, kind=kind)
             each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
             spring = spring or each

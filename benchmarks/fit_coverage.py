@@ -1,5 +1,5 @@
 """How often the 95 % intervals of `mumacro.fit` hold the true values: 40 set-ups, 400 draws of
-Gaussian noise each.
+Gaussian noise each; and whether exact points of random contacts give the contact.
 
 nice python benchmarks/fit_coverage.py     # minutes, on two cores; build/fit_coverage keeps results
 
@@ -26,6 +26,7 @@ from mumacro import InputError, Surrogate, fit
 Array = NDArray[np.float64]
 CACHE = ROOT / "build" / "fit_coverage"
 DRAWS, PROCESSES = 400, 2
+_EXACT = 400  # fits of exact points, of each contact and direction
 REGULAR = 0.95  # share of draws with one solution and closed intervals, in a set-up that has these
 _CODE = b"".join(
     (ROOT / "mumacro" / "analysis" / name).read_bytes() for name in ("fit.py", "profile.py")
@@ -147,6 +148,40 @@ def fitted(set_up: SetUp, mu_macro: Array) -> Any:
         )
 
 
+def random_contact(chance: np.random.Generator) -> tuple[dict[str, float], Array]:
+    """A contact in its rig by the names of ``evaluate``, and 3 to 8 speeds from creep to
+    sliding."""
+    mu0, force = chance.uniform(0.1, 0.8), 10.0 ** chance.uniform(-1.0, 2.0)
+    k, f = 10.0 ** chance.uniform(4.0, 8.0), 10.0 ** chance.uniform(1.0, 5.0)
+    y0 = 10.0 ** chance.uniform(-0.7, 1.0) * mu0 * force / k
+    low = chance.uniform(-4.0, -1.0)
+    high = chance.uniform(max(low + 0.7, -1.0), 0.5)
+    v0 = 2.0 * math.pi * f * y0 * np.geomspace(10.0**low, 10.0**high, int(chance.integers(3, 9)))
+    return {"mu0": mu0, "k": k, "Fz": force, "y0": y0, "f": f}, v0
+
+
+def exact() -> str:
+    """Fits of exact points of random contacts: how many give the contact."""
+    rows, surrogate = [], Surrogate.open()
+    for contact in ("spring", "ball"):
+        for direction in ("across", "along"):
+            chance = np.random.default_rng(48)
+            words: Any = {"contact": contact, "direction": direction}
+            found, off = 0, 0.0
+            for _ in range(_EXACT):
+                truth, v0 = random_contact(chance)
+                mu = np.asarray(surrogate.evaluate(**truth, v0=v0, **words).mu_macro)
+                rig = {name: truth[name] for name in ("Fz", "y0", "f")}
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    result = fit({"v0": v0, "mu_macro": mu}, **rig, **words)
+                errors = [abs(x / truth[name] - 1.0) for name, x in result.values.items()]
+                found += max(errors) < 1e-6
+                off = max(off, *errors)
+            rows.append([f"{contact}, {direction}", str(_EXACT), str(found), f"{off:.0e}"])
+    return markdown(("contact", "fits", "right to 1e-6", "largest relative error"), rows)
+
+
 def _tried(index: int) -> dict[str, Any]:
     """Of one set-up: shares of draws by unknown, and the processor time."""
     set_up = SET_UPS[index]
@@ -220,7 +255,7 @@ def coverage() -> str:
         "contact",
         "std",
         "points",
-        "y~",
+        "y0/l0",
         "noise/mu0",
         "k",
         "mu0",
@@ -243,7 +278,7 @@ def coverage() -> str:
     return "\n".join(text)
 
 
-SECTIONS = sections(coverage)
+SECTIONS = sections(coverage, exact)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS)

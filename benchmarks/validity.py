@@ -34,7 +34,7 @@ def partial_slip() -> str:
     for low, high in RANGES:
         y = np.geomspace(low, high, 121)
         v = np.geomspace(1e-3, 1e3, 561)[:, None]
-        change = np.abs(s.ratio_with_bound(v, y, contact="ball")[0] - s.mu_ratio(v, y))
+        change = np.abs(s.quantity("mu_ratio", v, y, contact="ball")[0] - s.mu_ratio(v, y))
         rows.append([f"{low:g} to {high:g}", quantity(float(change.max()))])
     return markdown(("y~", "largest difference of mu~, ball and one spring"), rows)
 

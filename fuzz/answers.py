@@ -198,7 +198,7 @@ def fresh_solves(table: Surrogate, share: float) -> Count:
             (v_low, v_high), (y_low, y_high) = V_RANGE, Y_RANGE
             solvable = (v_low <= v) & (v <= v_high) & (y_low <= y) & (y <= y_high)
             v, y, mu = v[solvable], y[solvable], a.mu_ratio[solvable]
-            _, bound, _ = table.ratio_with_bound(v, y)
+            _, bound, _ = table.quantity("mu_ratio", v, y)
             solved = sweep.solve("full", v, y)
             error = np.maximum(np.abs(mu - solved["mu_ratio"]) - solved["error_estimate"], 0.0)
             with np.errstate(all="ignore"):
@@ -213,7 +213,7 @@ def on_any_processor(table: Surrogate, share: float) -> Count:
         rows = []
         for kernel in (kernels[-1], kernels[0]):
             answers = CaseRows.empty((n,))
-            kernel.cases(table._data, list(cases.values()), answers, slice(0, n))
+            kernel.cases(table.tabulated.data(), list(cases.values()), answers, slice(0, n))
             rows.append(answers)
         here, there = rows
         change = np.abs(here.mu_macro - there.mu_macro)

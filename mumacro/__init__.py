@@ -22,6 +22,7 @@ if _TYPE_CHECKING:
     from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.settling import settling
     from mumacro.analysis.solve_for import solve_for
+    from mumacro.analysis.solve_motion import MotionSolution, solve_motion
     from mumacro.answer import Answer
     from mumacro.contacts.element import Element
     from mumacro.surrogate import Surrogate
@@ -42,6 +43,8 @@ _PLACES = {
     "motion": "analysis.motion",
     "settling": "analysis.settling",
     "solve_for": "analysis.solve_for",
+    "MotionSolution": "analysis.solve_motion",
+    "solve_motion": "analysis.solve_motion",
     "Answer": "answer",
     "Element": "contacts.element",
     "Surrogate": "surrogate",
@@ -58,6 +61,7 @@ __all__ = [
     "Fit",
     "InputError",
     "Motion",
+    "MotionSolution",
     "MumacroError",
     "Surrogate",
     "TableError",
@@ -70,6 +74,7 @@ __all__ = [
     "plotting",
     "settling",
     "solve_for",
+    "solve_motion",
     "stiffness",
     "validity",
 ]

@@ -1,13 +1,18 @@
 """The result of the surrogate for one case or many."""
 
-import copy
-from collections.abc import Callable
+import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
 from mumacro import plotting
 from mumacro.errors import MumacroError
+from mumacro.inputs.cases import Cases
+from mumacro.inputs.doubts import Remark
+from mumacro.inputs.doubts import remarks as doubts
+from mumacro.inputs.fields import RAD_PER_CYCLE
+from mumacro.inputs.kind import Kind
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 #: float for one case; for many an array of float64, or a labelled object in its place
@@ -20,17 +25,23 @@ else:
 
     Number = TypeVar("Number")
 
-# by code; the last entry is that of -1, an illegal case
-_REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)
+# by source code; the last entry is that of -1, an illegal case
 _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
 BAND = ("mu_macro_low", "mu_macro_high")  # of an interval of k
 GROUPS = ("v_tilde", "y_tilde", "length_scale")
+#: the paths of the answer when nothing else is asked for
+DEFAULT = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+TEXTS = ("regime", "source")
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
+_REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)[_REGIME_CODES]
 
 
 class Answer(Generic[Number]):
     """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the
     broadcast shape else.
+
+    ``answer["power.saved"]`` is an output by the path that it has in the JSON of one case: the
+    default ones, and those that ``include`` has asked for.
 
     Attributes
     ----------
@@ -44,28 +55,37 @@ class Answer(Generic[Number]):
         Block or closed form that gave the value, index into :data:`mumacro.SOURCES`; -1 for an
         illegal case.
     gradient : dict of str to float or ndarray, or None
-        d mu_macro / d input by field name, where requested; infinite for v0 at v0 = 0 on y~ = 1.
+        d mu_macro / d input by field name, where requested; infinite for v0 at v0 = 0 on y~ = 1,
+        0 for k where the contact is rigid.
     gradient_bound : dict of str to float or ndarray, or None
         Verified bounds of the absolute errors of ``gradient``.
+    outputs : dict of str to float or ndarray
+        What ``include`` has asked for, by path [SI]; NaN at an illegal case of an array, and where
+        there is no such number.
 
     Examples
     --------
     >>> from mumacro import Surrogate
-    >>> a = Surrogate.open().evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=0.01)
+    >>> a = Surrogate.open().evaluate(
+    ...     mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=0.01, include=("power",)
+    ... )
     >>> f"{a.mu_macro:.6f} {a.regime} {a.source}"
     '0.240467 stick_slip stick_slip_low'
+    >>> f"{a['power.oscillation']:.5f} W"
+    '0.01117 W'
     """
 
     __slots__ = (
-        "_border",
-        "_certain",
+        "_cases",
         "_groups",
-        "_look_up",
+        "_surrogate",
         "error_bound",
         "gradient",
         "gradient_bound",
         "mu_macro",
         "mu_ratio",
+        "outputs",
+        "remarks_on_outputs",
         "source_code",
     )
 
@@ -79,19 +99,23 @@ class Answer(Generic[Number]):
         error_bound: Number,
         source_code: Any,
         groups: tuple[Number, Number, Number] | None = None,
-        certain: Callable[[Any, Any], Any] | None = None,
-        look_up: Callable[[str, Any, Any], Any] | None = None,
-        border: Callable[..., Any] | None = None,
+        cases: Any = None,
+        surrogate: Any = None,
     ) -> None:
         self.mu_macro = mu_macro
         self.mu_ratio = mu_ratio
         self.error_bound = error_bound
         self.source_code = source_code
         self._groups = groups
-        self._certain = certain
-        self._look_up = look_up
-        self._border = border  # v~crit(y~) of this kind of contact
+        #: the cases; of one in plain numbers its kind, its six inputs, and whether f was given
+        self._cases: Cases | tuple[Kind, tuple[float, ...], bool] | None = cases
+        self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
+        self.outputs: Mapping[str, Any] = _NOTHING
+        #: where an output is missing or doubtful
+        self.remarks_on_outputs: list[Remark] = []
+
+    # --- by name ----------------------------------------------------------------------------------
 
     def _group(self, place: int) -> Number:
         if self._groups is None:
@@ -116,9 +140,9 @@ class Answer(Generic[Number]):
         return self._group(2)
 
     def _by_source(self, name: str, table: Any) -> Any:
-        """``table`` (sources + 1,) looked up at the source code; its last entry is that of -1."""
-        if self._look_up is not None and not isinstance(self.source_code, int):
-            return self._look_up(name, table, self.source_code)
+        """``table`` (sources + 1,) looked up at the source code; its last entry is that of -1.
+        ``name`` is that of the result, for labelled answers."""
+        del name
         return table[self.source_code]
 
     @property
@@ -135,21 +159,70 @@ class Answer(Generic[Number]):
         springs of a ball slide continuously and others do not; ``"reverse_slip"`` where an
         oscillation along slides backwards, too.
         """
-        return self._by_source("regime", _REGIME_NAMES[_REGIME_CODES])
-
-    @property
-    def regime_certain(self) -> Any:
-        """Whether the regime is the same for every v~crit within its bound: bool or ndarray of
-        bool; as v_tilde."""
-        if self._certain is None:
-            raise AttributeError("regime_certain needs the groups: evaluate(..., groups=True)")
-        return self._certain(self.v_tilde, self.y_tilde)
+        return self._by_source("regime", _REGIME_NAMES)
 
     @property
     def source(self) -> Any:
         """Name of the block or closed form that gave the value: str, or ndarray of shared str, made
         on request."""
         return self._by_source("source", _SOURCE_NAMES)
+
+    @property
+    def regime_certain(self) -> Any:
+        """Whether the regime is the same for every v~crit within its bound: bool or ndarray of
+        bool; as v_tilde."""
+        if self._groups is None:
+            raise AttributeError("regime_certain needs the groups: evaluate(..., groups=True)")
+        cases, shape = self.cases, np.shape(np.asarray(self.mu_macro))
+        kind = cases.kind if cases.codes is None else cases.codes.reshape(shape)
+        certain = self._surrogate.tabulated.certain(*self._groups[:2], kind)
+        return certain if shape else bool(certain)
+
+    @property
+    def paths(self) -> list[str]:
+        """The paths of all outputs, in the order of the JSON of one case."""
+        return [*DEFAULT, *(name for name in BAND if hasattr(self, name)), *self.outputs]
+
+    def __getitem__(self, path: str) -> Any:
+        """An output by its path; KeyError with the remedy for one that was not asked for."""
+        if path in self.outputs:
+            return self.outputs[path]
+        if path in DEFAULT or (path in BAND and hasattr(self, path)):
+            return getattr(self, path)
+        within = {
+            name.removeprefix(f"{path}."): x
+            for name, x in self.outputs.items()
+            if name.startswith(f"{path}.")
+        }
+        if not within:
+            raise KeyError(f"{path}: there is {', '.join(self.paths)}; more with include=(...)")
+        return within
+
+    # --- what was asked ---------------------------------------------------------------------------
+
+    @property
+    def cases(self) -> Cases:
+        """The cases that were evaluated."""
+        cases = self._cases
+        if isinstance(cases, Cases):  # a tuple, too
+            return cases
+        if cases is None:
+            raise AttributeError("these labelled cases are not kept")
+        kind, six, with_f = cases
+        columns: dict[str, Any] = dict(zip(kind.fields, map(float, six), strict=True))
+        given = {"f": columns["omega"] / RAD_PER_CYCLE} if with_f else {}
+        return Cases(kind, kind.fields, columns, (), given=given)
+
+    @property
+    def remarks(self) -> list[Remark]:
+        """What is doubtful, one remark for each input or output: ``row``, the kind of doubt;
+        ``field``; ``cases``, how many; ``text``.  Empty where nothing is."""
+        if self._cases is None:
+            return [*self.remarks_on_outputs]
+        cases = self.cases
+        return [*doubts(cases.columns, "f" in cases.given), *self.remarks_on_outputs]
+
+    # --- other forms ------------------------------------------------------------------------------
 
     def plot(self, axes: Any = None) -> Any:
         """The cases over (v~, y~), see ``mumacro.plotting.plot_cases``; of arrays only where groups
@@ -158,24 +231,33 @@ class Answer(Generic[Number]):
             np.ravel(np.asarray(x)) for x in (self.v_tilde, self.y_tilde, self.regime_code)
         )
         regimes = {name: code == i for i, name in enumerate(REGIMES)}
-        return plotting.plot_cases(v, y, regimes, self._border, axes)
+        return plotting.plot_cases(v, y, regimes, self._border(), axes)
 
-    def columns(self) -> dict[str, Any]:
-        """The results of each case by name: mu_macro first, then those that were requested beside
-        it."""
-        names = [
-            "mu_macro",
-            *(name for name in BAND if hasattr(self, name)),
-            "mu_ratio",
-            "regime",
-            "error_bound",
-        ]
-        names += ["source", *(GROUPS if self._groups is not None else ())]
-        slopes = {f"d_mu_macro_d_{name}": slope for name, slope in (self.gradient or {}).items()}
-        return {**{name: getattr(self, name) for name in names}, **slopes}
+    def _border(self) -> Any:
+        """v~crit(y~) of the kind of the cases; None where they are of several."""
+        cases = self._cases
+        kind = None if cases is None else self.cases.kind
+        if kind is None or self._surrogate is None:
+            return None
+        return lambda y_tilde: self._surrogate.v_tilde_crit(y_tilde, **kind.names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
+
+        Arrays are lists, and what is not finite is None.
+
+        >>> from mumacro import Surrogate
+        >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3, v0=0.01)
+        >>> [*Surrogate.open().evaluate(**case, include=("groups",)).to_dict()]
+        ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
+        """
+        members = nested({path: _listed(self[path]) for path in self.paths})
+        if said := self.remarks:
+            members["remarks"] = said
+        return members
 
     def to_frame(self) -> Any:
-        """The columns as a DataFrame of pandas, one row a case, in the order of ``ravel``;
+        """The outputs by path as a DataFrame of pandas, one row a case, in the order of ``ravel``;
         MumacroError without pandas.
 
         >>> from mumacro import Surrogate
@@ -188,11 +270,11 @@ class Answer(Generic[Number]):
             import pandas
         except ModuleNotFoundError:
             raise MumacroError("pandas is not installed: pip install pandas") from None
-        columns = self.columns().items()
+        columns = {path: self[path] for path in self.paths}
         return pandas.DataFrame(
             {
-                name: x if hasattr(x, "index") and hasattr(x, "dtype") else np.ravel(x)
-                for name, x in columns
+                path: x if hasattr(x, "index") and hasattr(x, "dtype") else np.ravel(x)
+                for path, x in columns.items()
             }
         )
 
@@ -201,8 +283,14 @@ class Answer(Generic[Number]):
         names += [name for name in BAND if hasattr(self, name)]
         names += GROUPS if self._groups is not None else ()
         names += ["gradient", "gradient_bound"] if self.gradient is not None else []
-        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
-        return f"{type(self).__name__}({values})"
+        values = [f"{name}={getattr(self, name)!r}" for name in names]
+        shown = {"groups", "gradient", "gradient_bound"}
+        more = {path: x for path, x in self.outputs.items() if path.partition(".")[0] not in shown}
+        values += [f"outputs={more!r}"] if more else []
+        return f"{type(self).__name__}({', '.join(values)})"
+
+
+_NOTHING: dict[str, Any] = {}
 
 
 class AnswerWithGradient(Answer[Number]):
@@ -229,17 +317,41 @@ class IntervalAnswer(AnswerWithGradient[Number]):
     mu_macro_high: Number
 
 
-def single(answer: Answer[Any]) -> Answer[float]:
-    """The answer of one case that an answer of arrays with one element holds."""
-    out = copy.copy(answer)
-    for name in ("mu_macro", "mu_ratio", "error_bound", *BAND):
-        if hasattr(out, name):
-            setattr(out, name, getattr(out, name).item())
-    out.source_code = int(out.source_code.item())
-    if out._groups is not None:
-        v, y, length = out._groups
-        out._groups = v.item(), y.item(), length.item()
-    for name in ("gradient", "gradient_bound"):
-        if (slopes := getattr(out, name)) is not None:
-            setattr(out, name, {field: slope.item() for field, slope in slopes.items()})
-    return out
+def add(remarks: list[Remark], remark: Remark) -> None:
+    """Add a remark to others, or its cases to one of the same row and field."""
+    for other in remarks:
+        if (other["row"], other["field"]) == (remark["row"], remark["field"]):
+            other["cases"] += remark["cases"]
+            return
+    remarks.append(remark)
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by path as JSON has them.
+
+    >>> nested({"mu_macro": 0.2, "power.saved": 1.0, "power.oscillation": 2.0})
+    {'mu_macro': 0.2, 'power': {'saved': 1.0, 'oscillation': 2.0}}
+    """
+    tree: dict[str, Any] = {}
+    for path, value in values.items():
+        name, _, member = path.partition(".")
+        if member:
+            tree.setdefault(name, {})[member] = value
+        else:
+            tree[name] = value
+    return tree
+
+
+def _listed(value: Any) -> Any:
+    """A number or an array of them for JSON: None where one is not finite; None for no text."""
+    if isinstance(value, str):
+        return value or None
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    array = np.asarray(value)
+    if array.dtype.kind == "f":
+        array = np.where(np.isfinite(array), array, None)  # type: ignore[call-overload]
+    elif array.dtype.kind in "OU":
+        texts = [x if isinstance(x, str) and x else None for x in array.ravel().tolist()]
+        array = np.array(texts, object).reshape(array.shape)
+    return array.tolist()

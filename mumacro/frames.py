@@ -13,15 +13,16 @@ import numpy as np
 
 from mumacro.answer import BAND, GROUPS, Answer, IntervalAnswer
 from mumacro.errors import InputError
-from mumacro.inputs.fields import PER_UNIT
-from mumacro.inputs.kind import AMPLITUDE, Kind
+from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, codes_of, library_of
+from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.kind import kind_of
+from mumacro.inputs.reading import without_unit
+from mumacro.outputs import MEMBERS, OUTPUTS
+from mumacro.outputs.evaluation import chosen
 from mumacro.table.atlas import REGIMES
 
-#: name -> units and long_name, as xarray and CF write them
-_ABOUT = {
-    "mu_macro": ("1", "macroscopic friction coefficient"),
-    "mu_ratio": ("1", "macroscopic over Coulomb friction coefficient"),
-    "error_bound": ("1", "bound of the absolute error of mu_macro"),
+#: what stands beside the outputs -> its unit and long name, as xarray and CF write them
+_BESIDE = {
     "source_code": (
         "1",
         "index of the block or closed form that gave the value, -1 for an illegal case",
@@ -29,17 +30,14 @@ _ABOUT = {
     "v_tilde": ("1", "dimensionless sliding speed"),
     "y_tilde": ("1", "dimensionless oscillation amplitude"),
     "length_scale": ("m", "mu0 Fz / k"),
-    "mu_macro_low": ("1", "smallest mu_macro over the interval of k"),
-    "mu_macro_high": ("1", "largest mu_macro over the interval of k"),
     "regime": ("1", ", ".join(REGIMES)),
     "regime_code": ("1", "index of the regime, -1 for an illegal case"),
     "regime_certain": ("1", "whether the regime is certain"),
     "source": ("1", "block or closed form that gave the value"),
-} | {
-    f"d_mu_macro_d_{name}{end}": (unit.replace("-", "1"), f"{term} of mu_macro along {name}")
-    for end, term in (("", "slope"), ("_bound", "bound of the absolute error of the slope"))
-    for name, unit in {**PER_UNIT, AMPLITUDE: PER_UNIT["Fz"]}.items()
 }
+_ALWAYS = ("mu_macro", "mu_ratio", "error_bound", "source_code")
+#: the slopes along k of attributes -> those of outputs: 0 and NaN where the contact is rigid
+_SLOPES_OF_K = {"slope of k": "gradient.k", "bound of the slope of k": "gradient_bound.k"}
 _DTYPES = {
     "source_code": np.int8,
     "regime_code": np.int8,
@@ -47,103 +45,186 @@ _DTYPES = {
     "source": object,
     "regime": object,
 }
-Evaluate = Callable[..., Any]
 Apply = Callable[[Callable[..., Any], Mapping[str, Any], Sequence[str]], list[Any]]
 
 
+class LabelledAnswer(IntervalAnswer[Any]):
+    """An answer whose attributes and outputs are Series, DataArrays or Dask arrays."""
+
+    __slots__ = ("_kinds", "_library")
+
+    _kinds: dict[str, Any]  # contact and direction, where they were given
+    _library: str
+
+    def _apply(self, function: Callable[..., Any], inputs: Mapping[str, Any], name: str) -> Any:
+        return _APPLY[self._library](lambda *arrays: [function(*arrays)], inputs, [name])[0]
+
+    def _by_source(self, name: str, table: Any) -> Any:
+        code = self.source_code
+        if self._library == "pandas" and table.dtype == object:
+            return _categories(table, code, name)
+        return self._apply(lambda codes: table[codes], {"source_code": code}, name)
+
+    @property
+    def regime_certain(self) -> Any:
+        """As in :class:`mumacro.Answer`."""
+        tabulated, kinds = self._surrogate.tabulated, self._kinds
+        columns = {name: x for name, x in kinds.items() if not isinstance(x, str)}
+
+        def certain(v: Any, y: Any, *arrays: Any) -> Any:
+            words = {**kinds, **dict(zip(columns, arrays, strict=True))}
+            return tabulated.certain(v, y, codes_of(words, v.shape) if arrays else kind_of(**words))
+
+        groups = {"v_tilde": self.v_tilde, "y_tilde": self.y_tilde}
+        return self._apply(certain, {**groups, **columns}, "regime_certain")
+
+
 def evaluate_labelled(
-    evaluate: Evaluate,
-    evaluate_on_one_thread: Evaluate,
-    certain: Callable[[Any, Any], Any],
-    cases: Any,
-    inputs: Mapping[str, Any],
-    kind: Kind,
-    interval: bool,
-    options: dict[str, Any],
+    surrogate: Any, cases: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool
 ) -> Any:
-    """:meth:`mumacro.Surrogate.evaluate` for labelled inputs, ``options`` are its other keywords.
+    """:meth:`mumacro.Surrogate.evaluate` for labelled inputs: ``values`` are those of ``cases`` and
+    of the keywords, by name.
 
-    ``evaluate`` evaluates arrays, ``evaluate_on_one_thread`` the parts that Dask and xarray hand
-    out, and ``certain`` says whether the regime at (v~, y~) is certain.
-
-    Returns an answer whose attributes are Series, DataArrays or Dask arrays, by their names, for
-    xarray with ``units`` and ``long_name``; for a DataFrame or Dataset of cases one of these, with
-    the columns mu_macro, mu_ratio, regime, error_bound and source (regime and source of pandas as
-    categories).  InputError for Series whose indexes differ, objects of two libraries in one call,
-    and what ``evaluate`` refuses.
+    Returns an answer whose attributes and outputs are Series, DataArrays or Dask arrays, by their
+    names, for xarray with ``units`` and ``long_name``; for a DataFrame or Dataset of cases one of
+    these, with a column for each output by its path (regime and source of pandas as categories).
+    InputError for Series whose indexes differ, objects of two libraries in one call, and what
+    ``evaluate`` refuses.
     """
-    arguments = dict(inputs)
-    library_by_name = {
-        name: type(value).__module__.partition(".")[0]
-        for name, value in {"": cases, **arguments}.items()
-    }
-    libraries = set(library_by_name.values()) & set(_APPLY)
+    of_cases = library_of(cases)
+    libraries = {*map(library_of, values.values()), of_cases} - {""}
     if "pandas" in libraries and len(libraries) > 1:
         raise InputError(
             "inputs", sorted(libraries), "objects of one library: pandas, or xarray and Dask"
         )
     library = next(name for name in _APPLY if name in libraries)
     if library != "pandas":  # Dask has its own threads
-        evaluate = evaluate_on_one_thread
-    if library_by_name[""] == "dask":
-        keywords = {name: value for name, value in inputs.items() if name not in cases.columns}
-        return _parts(evaluate, cases, {**options, **keywords})
-    for name, value in arguments.items():
+        surrogate = surrogate.on_one_thread()
+    if of_cases == "dask":
+        options = {"include": include, "illegal": "raise" if strict else "nan"}
+        keywords = {name: value for name, value in values.items() if name not in cases.columns}
+        return _parts(surrogate.evaluate, cases, {**options, **keywords})
+    for name, value in values.items():
         if hasattr(value, "to_dask_array"):
             raise InputError(
                 name, type(value).__name__, "a Dask array: .to_dask_array(lengths=True)"
             )
-    gradient, groups = options["gradient"], options["groups"] or options["gradient"]
-    slopes = (
-        [f"d_mu_macro_d_{name}{end}" for end in ("", "_bound") for name in kind.fields]
-        if gradient
-        else []
+    values = {name: without_unit(name, x) if library_of(x) else x for name, x in values.items()}
+    answer = (_of_pandas if library == "pandas" else _of_chunks)(
+        surrogate, values, include, strict, library
     )
-    names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *(BAND if interval else ())]
-    names += [*(GROUPS if groups else ()), *slopes]
-
-    def chunk(*values: Any) -> list[Any]:
-        answer = evaluate(dict(zip(arguments, values, strict=True)), **options)
-        rows = [*answer.gradient.values(), *answer.gradient_bound.values()] if gradient else []
-        return [getattr(answer, name) for name in names if name not in slopes] + rows
-
-    apply = _APPLY[library]
-    results = dict(zip(names, apply(chunk, arguments, names), strict=True))
-
-    def look_up(name: str, entries: Any, code: Any) -> Any:
-        if library == "pandas" and entries.dtype == object:
-            return _categories(entries, code, name)
-        return apply(lambda codes: [entries[codes]], {"source_code": code}, [name])[0]
-
-    def labelled_certain(v: Any, y: Any) -> Any:
-        groups_by_name = {"v_tilde": v, "y_tilde": y}
-        return apply(lambda v, y: [certain(v, y)], groups_by_name, ["regime_certain"])[0]
-
-    mu_macro, mu_ratio, bound, code = (results[name] for name in names[:4])
-    answer: Any = (IntervalAnswer if interval else Answer)(
-        mu_macro, mu_ratio, bound, code, look_up=look_up
-    )
-    for name in BAND if interval else ():
-        setattr(answer, name, results[name])
-    if groups:
-        answer._groups, answer._certain = (
-            (results["v_tilde"], results["y_tilde"], results["length_scale"]),
-            labelled_certain,
-        )
-    if gradient:
-        answer.gradient = {name: results[f"d_mu_macro_d_{name}"] for name in kind.fields}
-        answer.gradient_bound = {
-            name: results[f"d_mu_macro_d_{name}_bound"] for name in kind.fields
-        }
-    if library_by_name[""] not in ("pandas", "xarray"):
+    answer._library, answer._surrogate = library, surrogate
+    answer._kinds = {name: values[name] for name in KIND if name in values}
+    if of_cases not in ("pandas", "xarray"):
         return answer
-    shown = ("mu_macro", *(BAND if interval else ()), "mu_ratio", "regime", "error_bound", "source")
-    columns = {name: getattr(answer, name) for name in shown}
-    module = importlib.import_module(library_by_name[""])
-    return module.DataFrame(columns) if library == "pandas" else module.Dataset(columns)
+    columns = {path: answer[path] for path in answer.paths}
+    if library == "pandas":
+        frame = importlib.import_module("pandas").DataFrame(columns)
+        if remarks := answer.remarks:
+            frame.attrs["remarks"] = remarks
+        return frame
+    return importlib.import_module("xarray").Dataset(columns)
 
 
-def _parts(evaluate: Evaluate, cases: Any, options: dict[str, Any]) -> Any:
+def _of_pandas(
+    surrogate: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool, _: str
+) -> LabelledAnswer:
+    """Series become arrays, and the arrays of the answer Series."""
+    import pandas as pd
+
+    index = next(x.index for x in values.values() if isinstance(x, pd.Series))
+    arrays = _plain(values, index)
+    try:
+        cases = Cases.of(arrays, strict=strict)
+        answer = surrogate.answer(cases, chosen(include, cases))
+        return _labelled(answer, lambda x, name: pd.Series(x, index, name=name))
+    except InputError:
+        raise
+    except ValueError as error:
+        raise _not_alike(values) from error
+
+
+def _plain(values: Mapping[str, Any], index: Any) -> dict[str, Any]:
+    """Series and indexes as arrays; InputError for one that is not indexed as the others."""
+    import pandas as pd
+
+    for name, value in values.items():
+        if isinstance(value, pd.Series) and not value.index.equals(index):
+            raise InputError(name, "a Series", "indexed as the other inputs are: align them first")
+    return {
+        name: _without_gaps(x).to_numpy() if isinstance(x, (pd.Series, pd.Index)) else x
+        for name, x in values.items()
+    }
+
+
+def _labelled(answer: Answer[Any], label: Callable[[Any, str], Any]) -> LabelledAnswer:
+    """An answer of arrays with labels."""
+    mu_macro, mu_ratio, bound, code = (label(getattr(answer, name), name) for name in _ALWAYS)
+    labelled = LabelledAnswer(mu_macro, mu_ratio, bound, code, cases=answer.cases)
+    if answer._groups is not None:
+        v, y, length = map(label, answer._groups, GROUPS)
+        labelled._groups = v, y, length
+    for name in BAND:
+        if hasattr(answer, name):
+            setattr(labelled, name, label(getattr(answer, name), name))
+    for name in ("gradient", "gradient_bound"):
+        if (slopes := getattr(answer, name)) is not None:
+            of_field = {field: label(x, f"{name}.{field}") for field, x in slopes.items()}
+            setattr(labelled, name, of_field)
+    labelled.outputs = {path: label(x, path) for path, x in answer.outputs.items()}
+    labelled.remarks_on_outputs = answer.remarks_on_outputs
+    return labelled
+
+
+def _of_chunks(
+    surrogate: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool, library: str
+) -> LabelledAnswer:
+    """A function of arrays, applied to DataArrays or Dask arrays, chunk by chunk; the names of all
+    results are known before."""
+    arguments = {name: x for name, x in values.items() if library_of(x) or np.ndim(x)}
+    fixed = {name: x for name, x in values.items() if name not in arguments}
+    deviations = any(name in DEVIATIONS for name in values)
+    outputs = tuple(OUTPUTS[x] for x in OUTPUTS if x in include or (x == "std" and deviations))
+    direction = values.get("direction", "across")
+    fields = kind_of(direction=direction).fields if isinstance(direction, str) else ALL_FIELDS
+    paths = [path for output in outputs for path in output.paths(fields)]
+    gradient = any(output.name == "gradient" for output in outputs)
+    band = BAND if {*ENDS} & values.keys() else ()
+    names = [*_ALWAYS, *band]
+    names += [*(GROUPS if outputs else ()), *(_SLOPES_OF_K if gradient else ()), *paths]
+
+    def chunk(*columns: Any) -> list[Any]:
+        inputs = {**fixed, **dict(zip(arguments, columns, strict=True))}
+        cases = Cases.of(inputs, strict=strict)
+        answer = surrogate.answer(cases, chosen(include, cases))
+        if (cases.std and not deviations) or (cases.ends is not None and not band):
+            bound = "numbers: give deviations and intervals as arrays, std={...}, k_low and k_high"
+            raise InputError("inputs", "texts", bound)
+        found = dict(answer.outputs)
+        for name, path in _SLOPES_OF_K.items():
+            slopes = getattr(answer, path.removesuffix(".k"))
+            found[name] = None if slopes is None else slopes["k"]
+        return [found[name] if name in found else getattr(answer, name) for name in names]
+
+    results = dict(zip(names, _APPLY[library](chunk, arguments, names), strict=True))
+    answer = LabelledAnswer(*(results[name] for name in names[:4]))
+    for name in band:
+        setattr(answer, name, results[name])
+    if outputs:
+        answer._groups = results["v_tilde"], results["y_tilde"], results["length_scale"]
+    answer.outputs = {path: results[path] for path in paths}
+    if gradient:
+        answer.gradient, answer.gradient_bound = (
+            {field: results[f"{name}.{field}"] for field in fields} | {"k": results[of_k]}
+            for of_k, name in (
+                ("slope of k", "gradient"),
+                ("bound of the slope of k", "gradient_bound"),
+            )
+        )
+    return answer
+
+
+def _parts(evaluate: Callable[..., Any], cases: Any, options: dict[str, Any]) -> Any:
     """A DataFrame of Dask, part by part; one without rows is evaluated now, so that faults of its
     columns show."""
     import pandas as pd
@@ -153,6 +234,12 @@ def _parts(evaluate: Evaluate, cases: Any, options: dict[str, Any]) -> Any:
 
 
 # --- a function of arrays, applied to labelled objects: one result for each name ------------------
+
+
+def _about(name: str) -> dict[str, str]:
+    """Unit and long name of a result, as attributes of xarray."""
+    unit, meaning = _BESIDE[name] if name in _BESIDE else MEMBERS[_SLOPES_OF_K.get(name, name)]
+    return {"units": unit.replace("-", "1"), "long_name": meaning}
 
 
 def _dtypes(names: Sequence[str]) -> list[Any]:
@@ -181,9 +268,13 @@ def _call_aligned(call: Callable[[], Any], inputs: Mapping[str, Any]) -> list[An
     except InputError:
         raise
     except ValueError as error:
-        labels = {name: getattr(value, "sizes", np.shape(value)) for name, value in inputs.items()}
-        raise InputError("inputs", labels, "labelled and shaped alike: align them first") from error
+        raise _not_alike(inputs) from error
     return list(results) if isinstance(results, tuple) else [results]
+
+
+def _not_alike(inputs: Mapping[str, Any]) -> InputError:
+    labels = {name: getattr(value, "sizes", np.shape(value)) for name, value in inputs.items()}
+    return InputError("inputs", labels, "labelled and shaped alike: align them first")
 
 
 def _pandas(
@@ -191,20 +282,10 @@ def _pandas(
 ) -> list[Any]:
     import pandas as pd
 
-    series = {name: value for name, value in inputs.items() if isinstance(value, pd.Series)}
-    index = next((value.index for value in series.values()), None)
-    for name, value in series.items():
-        if not value.index.equals(index):
-            raise InputError(name, "a Series", "indexed as the other inputs are: align them first")
-    arrays_in = [
-        _without_gaps(x).to_numpy() if isinstance(x, (pd.Series, pd.Index)) else x
-        for x in inputs.values()
-    ]
-    arrays = _call_aligned(lambda: _on_arrays(function, names)(*arrays_in), inputs)
-    return _call_aligned(
-        lambda: tuple(pd.Series(x, index, name=n) for x, n in zip(arrays, names, strict=True)),
-        inputs,
-    )
+    index = next(value.index for value in inputs.values())
+    arrays = _on_arrays(function, names)(*inputs.values())
+    arrays = arrays if len(names) > 1 else (arrays,)
+    return [pd.Series(x, index, name=name) for x, name in zip(arrays, names, strict=True)]
 
 
 def _without_gaps(column: Any) -> Any:
@@ -241,7 +322,7 @@ def _xarray(
     )
     results = [array.rename(name) for array, name in zip(arrays, names, strict=True)]
     for array, name in zip(results, names, strict=True):
-        array.attrs = dict(zip(("units", "long_name"), _ABOUT[name], strict=True))
+        array.attrs = _about(name)
     return results
 
 

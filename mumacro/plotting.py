@@ -169,6 +169,33 @@ def plot_law(
     return axes
 
 
+def plot_roots(
+    name: str,
+    x: Array,
+    mean: Array,
+    of: str,
+    targets: Sequence[float],
+    roots: Sequence[float],
+    log: bool,
+    axes: Any = None,
+) -> Any:
+    """A mean force ``of`` a motion (n,) over values ``x`` (n,) of an input, whose axis is ``name``,
+    with targets and roots."""
+    axes = own(axes)
+    symbol = {"mu_macro": r"\mathrm{macro}", "mu_lateral": r"\mathrm{lateral}"}[of]
+    axes.plot(x, mean, color=BLUE, lw=2.0, label=rf"$\mu_{symbol}$")
+    for target in targets:
+        axes.axhline(target, lw=0.8, color=GREY)
+    for i, root in enumerate(roots):
+        label = "target" if not i else None
+        axes.plot(root, np.interp(root, x, mean), "o", color=RED, mec="white", label=label)
+    if log:
+        axes.set_xscale("log")
+    axes.set(xlabel=name, ylabel=rf"$\mu_{symbol}$ [-]", xlim=(x[0], x[-1]))
+    finish(axes, "")
+    return axes
+
+
 def plot_fit(along: str, curves: Sequence[Curve], title: str, axes: Any = None) -> Any:
     """Measured points, the fit and its band over the input ``along``; more than 8 curves have no
     legend."""

@@ -59,11 +59,13 @@ def _number(name: str, value: Any) -> float:
     return float(number)
 
 
-def _positive(**values: Any) -> None:
-    for name, value in values.items():
-        number = _number(name, value)
+def _positive(**values: Any) -> list[float]:
+    """The values as numbers in SI."""
+    numbers = {name: _number(name, value) for name, value in values.items()}
+    for name, number in numbers.items():
         if not SMALLEST <= number <= LARGEST:
             raise InputError(name, number, f"finite and > 0, from {SMALLEST:g} to {LARGEST:g}")
+    return [*numbers.values()]
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,12 @@ class Material:
     nu: float
 
     def __post_init__(self) -> None:
-        _positive(E=LARGEST if _number("E", self.E) == math.inf else self.E)
-        if not -1.0 < _number("nu", self.nu) <= 0.5:
+        E, nu = _number("E", self.E), _number("nu", self.nu)
+        _positive(E=LARGEST if math.inf == E else E)
+        if not -1.0 < nu <= 0.5:
             raise InputError("nu", self.nu, "> -1 and <= 0.5")
+        # as numbers in SI, where they came as texts
+        self.__dict__.update(E=E, nu=nu)
 
     @property
     def G(self) -> float:
@@ -114,7 +119,7 @@ class Contact:
 
     def length_scale(self, mu0: float, Fz: float) -> float:
         """l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""
-        _positive(mu0=mu0, Fz=Fz)
+        mu0, Fz = _positive(mu0=mu0, Fz=Fz)
         return mu0 * (Fz / self.k)
 
 
@@ -204,7 +209,7 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
 
 def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> Contact:
     """:func:`ball_on_flat`, whose warnings are in the result alone."""
-    _positive(radius=radius, Fz=Fz)
+    radius, Fz = _positive(radius=radius, Fz=Fz)
     modulus, shear = _moduli(first, second)
     a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
     cautions = _hertz_cautions(a, radius, first, second, 1.0 / 3.0)
@@ -232,7 +237,7 @@ def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> C
     >>> f"{contact.k:.3g} N/m"
     '3.8e+08 N/m'
     """
-    _positive(radius=radius, Fz=Fz)
+    radius, Fz = _positive(radius=radius, Fz=Fz)
     modulus, shear = _moduli(first, second)
     return Contact(
         8.0 * radius * shear, 2.0 * radius * modulus, radius, Fz / (math.pi * radius * radius)
@@ -298,7 +303,7 @@ def hertz_cylinder(
             f"{' or '.join(AXES)} the axis: its k is the one of the model",
         )
     along = oscillation == "along"
-    _positive(radius=radius, length=length, Fz=Fz)
+    radius, length, Fz = _positive(radius=radius, length=length, Fz=Fz)
     modulus, _ = _moduli(first, second)
     b = math.sqrt(4.0 * (Fz / length) * radius / (math.pi * modulus))
     cautions = _hertz_cautions(b, radius, first, second, 0.5)
@@ -346,8 +351,9 @@ def in_series(*stiffnesses: float) -> float:
     """
     if not stiffnesses:
         raise InputError("stiffnesses", stiffnesses, "at least one")
-    for value in stiffnesses:
-        if not _number("stiffness", value) > 0.0:
-            raise InputError("stiffness", value, "> 0")
-    total = sum(1.0 / value for value in stiffnesses)
+    numbers = [_number("stiffness", value) for value in stiffnesses]
+    for number in numbers:
+        if not number > 0.0:
+            raise InputError("stiffness", number, "> 0")
+    total = sum(1.0 / number for number in numbers)
     return math.inf if total == 0.0 else 1.0 / total

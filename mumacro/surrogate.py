@@ -1,59 +1,53 @@
-"""The surrogate for users.  Value, regime, source, gradient, power and stick fraction, each with
-its bound."""
+"""What users hold: a table, and the answers to cases and to points (v~, y~)."""
 
+import copy
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal, Self, overload
+from typing import Any, Literal, Self, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro import closed_forms, plotting
-from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
-from mumacro.contacts.quadrature import put_driven
+from mumacro import plotting
+from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer
 from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
     ABSENT,
-    NUMBERS,
-    NUMBERS_AND_ARRAYS,
+    DEVIATIONS,
+    Absent,
     Cases,
-    by_name,
     has_labels,
-    real,
+    named,
+    unknown,
 )
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
-from mumacro.inputs.kind import (
-    BALL,
-    SPRING,
-    ContactName,
-    DirectionName,
-    Kind,
-    kind_of,
-)
-from mumacro.kernel import threads as shared_out
+from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
+from mumacro.inputs.reading import NUMBERS, read
+from mumacro.inputs.signature import AnyCases, ManyCases, OneCase, OneInterval
 from mumacro.kernel.arrays import Array, common_shape, flat
-from mumacro.kernel.binding import Data, Detail, kernels
 from mumacro.kernel.threads import default_threads
+from mumacro.outputs import evaluation
+from mumacro.outputs.entry import Output
+from mumacro.outputs.evaluation import chosen, names_in
+from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
 from mumacro.table import atlas
-from mumacro.table.blocks import BorderPiece, Table
-from mumacro.table.bundled import bundled_tables
+from mumacro.table.blocks import Table
+from mumacro.table.bundled import bundled_table, bundled_tables
 from mumacro.table.netcdf import BALL as BALL_ATTRIBUTES
 from mumacro.table.netcdf import error_distribution, json_attributes, parse_table, read_image
-from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
 
-_KERNEL = kernels[-1]
-_SCALAR_KERNEL = kernels[:2][
-    -1
-]  # a single point does not fill the widest registers; the bits are the same
-_RATIO = _SCALAR_KERNEL.ratio
-_CODES = {name: code for code, name in enumerate(atlas.QUANTITY_NAMES)}
+_RATIO = SCALAR_KERNEL.ratio
 _FLOAT = np.dtype(np.float64)
 #: effects of an illegal value in an array
 ILLEGAL = ("nan", "raise")
+_WORDS = (Absent, str)
+_OPTIONS: dict[str, Any] = {"include": (), "gradient": False, "groups": False, "illegal": "nan"}
+_SHORT: dict[Any, Kind] = {ABSENT: SPRING, "spring": SPRING, "ball": BALL}
+_SLOPES = tuple(f"{name}.{field}" for name in ("gradient", "gradient_bound") for field in FIELDS)
 
 
 class Surrogate:
@@ -73,7 +67,6 @@ class Surrogate:
     def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
         if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
             raise InputError("threads", threads, "None or a whole number from 1 to 1024")
-        self._thread_limit = threads
         self._image: bytes | None = None
         self.path = Path(path)
         self.table = table
@@ -82,13 +75,10 @@ class Surrogate:
         self.checksum = str(table.attributes.get("content_sha256", ""))
         self.max_abs_error = float(table.attributes.get("verified_max_abs_error", math.nan))
         self.max_rel_error = float(table.attributes.get("verified_max_rel_error", math.nan))
-        self.border = Border(table.border)
-        _check_border(table.border, self.path)
-        self._data = Data(*self.border.arrays, block_rows(table.blocks), outer_cells())
-        self._data.put(atlas.MU, *quantity_cells(table.blocks, atlas.MU))
-        #: what the kernel reads of a ball that is shaken across; made on first use
-        self._ball: Data | None = None
-        self._pointer = self._data.pointer
+        #: the table as the kernel reads it
+        self.tabulated = Tabulated(table, self.path, threads)
+        self.border = self.tabulated.border
+        self._pointer = self.tabulated.pointer
 
     @classmethod
     def open(cls, table: str | Path | float | None = None, threads: int | None = None) -> Self:
@@ -116,7 +106,7 @@ class Surrogate:
         >>> Surrogate.open(1e-8).id
         'mumacro-1e-10'
         """
-        path = Path(table) if isinstance(table, (str, Path)) else _bundled_table(table)
+        path = Path(table) if isinstance(table, (str, Path)) else bundled_table(table)
         return cls._of_image(read_image(path), path, threads)
 
     @classmethod
@@ -134,7 +124,7 @@ class Surrogate:
             if bundled
             else (str(self.path), self._image or read_image(self.path))
         )
-        return _reopen, (path, self.checksum, self._thread_limit, image)
+        return _reopen, (path, self.checksum, self.tabulated.threads, image)
 
     def __repr__(self) -> str:
         return (
@@ -182,14 +172,15 @@ class Surrogate:
 
     def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
-        copy = object.__new__(type(self))
-        copy.__dict__.update(self.__dict__, _thread_limit=1)
-        return copy
+        other = copy.copy(self)
+        other.tabulated = self.tabulated.on_one_thread()
+        return other
 
     @property
     def threads(self) -> int:
         """Threads that a call from here divides a large array among."""
-        return default_threads() if self._thread_limit is None else self._thread_limit
+        limit = self.tabulated.threads
+        return default_threads() if limit is None else limit
 
     @property
     def id(self) -> str:
@@ -240,7 +231,7 @@ class Surrogate:
     @property
     def memory(self) -> int:
         """Bytes of the cells that an evaluation of mu~ of one spring reads."""
-        data = self._data
+        data = self.tabulated.data()
         return sum(
             array.nbytes
             for array in (data.border, data.pieces, data.blocks, *data.quantities[atlas.MU])
@@ -250,7 +241,7 @@ class Surrogate:
         """Compare known answers with the table; raises :class:`TableError` when one is off by more
         than its bound."""
         for v, y, expected in ((0.1, 0.5, KNOWN_STICK_SLIP), (2.0, 1.0, KNOWN_CONTINUOUS)):
-            mu, bound, _ = self.ratio_with_bound(v, y)
+            mu, bound, _ = self.quantity("mu_ratio", v, y)
             if not abs(mu - expected) <= bound + 1e-15:
                 raise TableError(
                     self.path,
@@ -295,17 +286,10 @@ class Surrogate:
             if mu == mu:
                 return mu
         v, y, shape = _flat_groups(v_tilde, y_tilde)
-        values = shared_out.alone(atlas.MU, self._data, v, y, self._thread_limit)
+        values = self.tabulated.ratios(v, y)
         if not shape and math.isnan(values[0]):
             raise _illegal(v, y)
         return _reshape(values, shape)
-
-    def ratio_with_bound(
-        self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
-    ) -> tuple[Any, Any, Any]:
-        """:meth:`quantity` of mu~: the value, the bound of its absolute error, and the source
-        code."""
-        return self.quantity("mu_ratio", v_tilde, y_tilde, **kind)
 
     def v_tilde_crit(
         self, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across"
@@ -326,7 +310,7 @@ class Surrogate:
         if type(y_tilde) is float and y_tilde >= 0.0 and kind == SPRING:
             return float(self.border(np.array((y_tilde,)))[0])
         _, y, shape = _flat_groups(0.0, y_tilde)
-        crit = _KERNEL.border(self._data, y, kind)
+        crit = self.tabulated.crit(y, kind)
         if not shape and math.isnan(crit[0]):
             raise InputError("y_tilde", float(y[0]), ">= 0 and < 1" if kind.normal else ">= 0")
         return _reshape(crit, shape)
@@ -337,28 +321,12 @@ class Surrogate:
 
         Slip turns v~ mu~ plus this power into heat.  An infinite amplitude gives infinite power.
         """
-        return self.power_with_bound(v_tilde, y_tilde, **kind)[0]
+        return self.quantity("power", v_tilde, y_tilde, **kind)[0]
 
     def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
         """Share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity` without
         bound."""
-        return self.stick_fraction_with_bound(v_tilde, y_tilde, **kind)[0]
-
-    def power_with_bound(
-        self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
-    ) -> tuple[Any, Any]:
-        """:meth:`power` and the bound of its absolute error."""
-        return self.quantity("power", v_tilde, y_tilde, **kind)[:2]
-
-    def stick_fraction_with_bound(
-        self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str
-    ) -> tuple[Any, Any]:
-        """:meth:`stick_fraction` and the bound of its absolute error.
-
-        At the border the bound is larger than elsewhere, on both sides: there the fraction is a
-        square root of the distance to v~crit, and v~crit is known to some digits only.
-        """
-        return self.quantity("stick_fraction", v_tilde, y_tilde, **kind)[:2]
+        return self.quantity("stick_fraction", v_tilde, y_tilde, **kind)[0]
 
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
@@ -375,24 +343,12 @@ class Surrogate:
         >>> f"{along_y:.3e}"     # eq. (31): -y~^2 / (2 (1 + v~^2))
         '-1.000e-05'
         """
-        data, (v, y, shape) = self._with(of, "of"), _flat_groups(v_tilde, y_tilde)
-        rows = shared_out.slopes(_CODES[of], data, v, y, self._thread_limit)
+        name = self._quantity("of", of)
+        v, y, shape = _flat_groups(v_tilde, y_tilde)
+        rows = self.tabulated.slopes(name, v, y)
         if not shape and math.isnan(rows.value[0]):
             raise _illegal(v, y)
         return tuple(_reshape(row, shape) for row in rows[: 5 if bounds else 3])
-
-    def _with(self, quantity: str, argument: str = "name") -> Data:
-        """The data that the kernel reads, with the cells of a quantity; made on first use."""
-        code = _CODES[quantity] if quantity in atlas.QUANTITY_NAMES else None
-        if code not in self._data.quantities:
-            if code is None or quantity not in self.table.quantities:
-                raise InputError(
-                    argument,
-                    quantity,
-                    f"one of {', '.join(self.table.quantities)}, which the table has",
-                )
-            self._data.put(code, *quantity_cells(self.table.blocks, code))
-        return self._data
 
     def quantity(
         self,
@@ -407,9 +363,10 @@ class Surrogate:
         SOURCES).
 
         ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors as
-        in :meth:`mu_ratio`. Of a ball the stick fraction is a share of the load, too.  For
-        direction "normal" ``y_tilde`` is Fz_amplitude/Fz [-], below 1; it has no power, because the
-        model does not know how far the load moves.
+        in :meth:`mu_ratio`.  Of a ball the stick fraction is a share of the load, too; at the
+        border its bound is larger than elsewhere, since there it is a square root of the distance
+        to v~crit.  For direction "normal" ``y_tilde`` is Fz_amplitude/Fz [-], below 1; it has no
+        power, because the model does not know how far the load moves.
 
         Examples
         --------
@@ -417,174 +374,68 @@ class Surrogate:
         >>> round(power, 6), bound < 1e-12, int(source)
         (0.012142, True, 5)
         """
-        data, kind = self._with(name), kind_of(contact, direction)
+        name, kind = self._quantity("name", name), kind_of(contact, direction)
         if not kind.direction and type(v_tilde) in NUMBERS and type(y_tilde) in NUMBERS:
-            code = _CODES[name]
-            if kind.contact:
-                data = self._data_of(kind, code)
-            try:
-                scalar = _SCALAR_KERNEL.value(
-                    data,
-                    code,
-                    v_tilde,  # type: ignore[arg-type]
-                    y_tilde,  # type: ignore[arg-type]
-                    kind.contact,
-                )
-                if scalar[2] >= 0:
-                    return scalar
-            except OverflowError:  # a whole number beyond double range
-                pass
+            with suppress(OverflowError):  # a whole number beyond double range
+                one = self.tabulated.value(name, v_tilde, y_tilde, kind)  # type: ignore[arg-type]
+                if one[2] >= 0:
+                    return one
         if kind.normal and name == "power":
-            raise InputError(
-                "direction",
-                direction,
-                "across or along for the power: the load's path is not modelled",
-            )
+            bound = "across or along for the power: the load's path is not modelled"
+            raise InputError("direction", direction, bound)
         v, y, shape = _flat_groups(v_tilde, y_tilde)
-        value, bound, source = shared_out.values(
-            _CODES[name], self._data_of(kind, _CODES[name]), v, y, self._thread_limit, kind
-        )
+        value, bound_, source = self.tabulated.values(name, v, y, kind)
         if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
             raise _illegal(v, y, ">= 0 and < 1" if kind.normal else finite)
-        return _reshape(value, shape), _reshape(bound, shape), _reshape(source, shape)
+        return _reshape(value, shape), _reshape(bound_, shape), _reshape(source, shape)
+
+    def _quantity(self, argument: str, name: Any) -> str:
+        """The name of a quantity that the table has."""
+        if not isinstance(name, str) or name not in self.table.quantities:
+            bound = f"one of {', '.join(self.table.quantities)}, which the table has"
+            raise InputError(argument, name, bound)
+        return name
 
     # --- dimensional ------------------------------------------------------------------------------
 
     @overload
-    def evaluate(
-        self,
-        cases: None = ...,
-        /,
-        *,
-        mu0: float,
-        Fz: float,
-        k: float | Literal["rigid"],
-        y0: float = ...,
-        Fz_amplitude: float = ...,
-        omega: float = ...,
-        f: float = ...,
-        v0: float,
-        contact: ContactName = ...,
-        direction: DirectionName = ...,
-        gradient: Literal[True],
-        groups: bool = ...,
-        illegal: Literal["nan", "raise"] = ...,
+    def evaluate(  # type: ignore[overload-overlap]
+        self, cases: None = ..., /, *, gradient: Literal[True], **case: Unpack[OneCase]
     ) -> AnswerWithGradient[float]: ...
 
     @overload
-    def evaluate(
-        self,
-        cases: None = ...,
-        /,
-        *,
-        mu0: float,
-        Fz: float,
-        k: float | Literal["rigid"],
-        y0: float = ...,
-        Fz_amplitude: float = ...,
-        omega: float = ...,
-        f: float = ...,
-        v0: float,
-        contact: ContactName = ...,
-        direction: DirectionName = ...,
-        gradient: Literal[False] = ...,
-        groups: bool = ...,
-        illegal: Literal["nan", "raise"] = ...,
+    def evaluate(  # type: ignore[overload-overlap]
+        self, cases: None = ..., /, *, gradient: Literal[False] = ..., **case: Unpack[OneCase]
     ) -> Answer[float]: ...
 
     @overload
-    def evaluate(
-        self,
-        cases: None = ...,
-        /,
-        *,
-        mu0: float,
-        Fz: float,
-        k_range: tuple[float, float],
-        y0: float = ...,
-        Fz_amplitude: float = ...,
-        omega: float = ...,
-        f: float = ...,
-        v0: float,
-        contact: ContactName = ...,
-        direction: DirectionName = ...,
-        gradient: bool = ...,
-        groups: bool = ...,
-        illegal: Literal["nan", "raise"] = ...,
+    def evaluate(  # type: ignore[overload-overlap]
+        self, cases: None = ..., /, *, gradient: bool = ..., **case: Unpack[OneInterval]
     ) -> IntervalAnswer[float]: ...
 
     @overload
     def evaluate(
         self,
-        cases: Mapping[str, Any] = ...,
+        cases: Mapping[str, Any] | None = ...,
         /,
         *,
-        mu0: ArrayLike = ...,
-        Fz: ArrayLike = ...,
-        k: ArrayLike = ...,
-        k_range: ArrayLike = ...,
-        k_low: ArrayLike = ...,
-        k_high: ArrayLike = ...,
-        y0: ArrayLike = ...,
-        Fz_amplitude: ArrayLike = ...,
-        omega: ArrayLike | None = ...,
-        f: ArrayLike | None = ...,
-        v0: ArrayLike = ...,
-        contact: ContactName = ...,
-        direction: DirectionName = ...,
         gradient: Literal[True],
-        groups: bool = ...,
-        illegal: Literal["nan", "raise"] = ...,
+        **columns: Unpack[ManyCases],
     ) -> AnswerWithGradient[Array]: ...
 
     @overload
     def evaluate(
         self,
-        cases: Mapping[str, Any] = ...,
+        cases: Mapping[str, Any] | None = ...,
         /,
         *,
-        mu0: ArrayLike = ...,
-        Fz: ArrayLike = ...,
-        k: ArrayLike = ...,
-        k_range: ArrayLike = ...,
-        k_low: ArrayLike = ...,
-        k_high: ArrayLike = ...,
-        y0: ArrayLike = ...,
-        Fz_amplitude: ArrayLike = ...,
-        omega: ArrayLike | None = ...,
-        f: ArrayLike | None = ...,
-        v0: ArrayLike = ...,
-        contact: ContactName = ...,
-        direction: DirectionName = ...,
         gradient: Literal[False] = ...,
-        groups: bool = ...,
-        illegal: Literal["nan", "raise"] = ...,
+        **columns: Unpack[ManyCases],
     ) -> Answer[Array]: ...
 
     @overload
-    def evaluate(
-        self,
-        cases: Any = ...,
-        /,
-        *,
-        mu0: Any = ...,
-        Fz: Any = ...,
-        k: Any = ...,
-        k_range: Any = ...,
-        k_low: Any = ...,
-        k_high: Any = ...,
-        y0: Any = ...,
-        Fz_amplitude: Any = ...,
-        omega: Any = ...,
-        f: Any = ...,
-        v0: Any = ...,
-        contact: str = ...,
-        direction: str = ...,
-        gradient: bool = ...,
-        groups: bool = ...,
-        illegal: str = ...,
-    ) -> Any: ...
+    def evaluate(self, cases: Any = ..., /, **inputs: Unpack[AnyCases]) -> Any: ...
 
     def evaluate(
         self,
@@ -602,19 +453,23 @@ class Surrogate:
         omega: Any = ABSENT,
         f: Any = ABSENT,
         v0: Any = ABSENT,
-        contact: str = "spring",
-        direction: str = "across",
+        contact: Any = ABSENT,
+        direction: Any = ABSENT,
+        include: Iterable[str] | str = (),
+        std: Mapping[str, Any] | None = None,
         gradient: bool = False,
         groups: bool = False,
         illegal: str = "nan",
-        **unknown: Any,
+        **more: Any,
     ) -> Any:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
         Parameters
         ----------
         cases : mapping, DataFrame (pandas, Dask, Polars), pyarrow.Table or xarray.Dataset, optional
-            The inputs by name, in place of keywords or beside them; other columns are ignored.
+            Inputs and options by name, in place of keywords or beside them.  Another name is
+            refused in a mapping; other columns of a frame, a table or a Dataset are ignored.  One
+            row of a frame, a Series, is one case.
         mu0 : array_like
             Coulomb friction coefficient [-], > 0.
         Fz : array_like
@@ -638,22 +493,27 @@ class Surrogate:
             frequency [Hz], >= 0, in its place.
         v0 : array_like
             Sliding speed [m/s], >= 0.
-        contact : str
+        contact : str or array_like
             "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip
-            is k = 8 a G*.
-        direction : str
+            is k = 8 a G*.  An array has one for each case, as has that of directions.
+        direction : str or array_like
             "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the
             force is Fz + Fz_amplitude cos(omega t), for a spring only.
-        gradient : bool
-            Also differentiate with respect to every input, with bounds.
-        groups : bool
-            Also keep v~, y~ and l0 of arrays, which takes a quarter of the time again; scalars and
-            gradients have them.
+        include : sequence of str
+            Outputs to compute beside mu_macro, by name: groups, limits, gradient, std,
+            stick_fraction, power, settling (:data:`mumacro.outputs.OUTPUTS`).  Each is in the
+            answer by its path, such as ``answer["power.saved"]``, with its bound.
+        std : mapping
+            Standard deviations of inputs by name, in their units, of independent errors; numbers or
+            arrays.  They imply the output std.  Columns of a frame are std_k and so on.
+        gradient, groups : bool
+            The same as these two names in ``include``: the slopes with respect to every input, with
+            bounds; v~, y~ and l0.
         illegal : str
             Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case,
             "raise" raises.
-        **unknown
-            Other names are refused.
+        **more
+            Deviations as ``std_k`` and so on; other names are refused.
 
         Returns
         -------
@@ -666,7 +526,7 @@ class Surrogate:
         ------
         InputError
             A scalar out of bounds; an input that is missing, unknown, given twice or not a number;
-            shapes that do not broadcast.
+            shapes that do not broadcast; an output that none of the cases has.
 
         Notes
         -----
@@ -684,203 +544,100 @@ class Surrogate:
         >>> a = s.evaluate(k_range=(0.8e6, 1.2e6), **case)
         >>> a.mu_macro_low < a.mu_macro < a.mu_macro_high
         True
+        >>> a = s.evaluate(k=1e6, include=("power",), std={"k": 1e5, "v0": 1e-3}, **case)
+        >>> f"{a['power.saved']:.6f} {a['std']:.4f} {a['std_share.k']:.2f}"
+        '0.005953 0.0117 0.92'
         """
-        inputs: dict[str, Any] = {}
         if (
-            cases is None
-            and k_range is k_low is k_high is Fz_amplitude is ABSENT
+            cases is std is None
+            and k_range is k_low is k_high is Fz_amplitude is direction is ABSENT
+            and type(contact) in _WORDS
+            and contact in _SHORT
             and (f is ABSENT or omega is ABSENT)
-            and contact in ("spring", "ball")
-            and direction == "across"
-            and illegal in ILLEGAL
-            and not unknown
+            and not (include or groups or more)
+            and illegal == "nan"
         ):
-            # Contacts across in plain numbers and arrays take this short way, which saves most of
-            # the time of a call.  Illegal inputs go the long way, which has the messages.
-            short = SPRING if contact == "spring" else BALL
-            rate, rate_name = (omega, "omega") if f is ABSENT else (f, "f")
-            types = {*map(type, (mu0, Fz, k, y0, rate, v0))}
-            if types <= NUMBERS:
+            # One case across in plain numbers takes this short way, in a third of the time.  What
+            # it cannot answer goes the long way, which has the messages.
+            six = (mu0, Fz, k, y0, omega if f is ABSENT else f, v0)
+            if {*map(type, six)} <= NUMBERS and not (gradient and k == math.inf):
                 with suppress(OverflowError):  # a whole number beyond double range
-                    angular = omega if f is ABSENT else RAD_PER_CYCLE * float(f)
-                    answer = self._scalar_answer((mu0, Fz, k, y0, angular, v0), gradient, short)
+                    answer = self._one(six, f is not ABSENT, gradient, _SHORT[contact])
                     if answer.source_code >= 0:
                         return answer
-            elif types <= NUMBERS_AND_ARRAYS:
-                inputs = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, rate_name: rate, "v0": v0}
-        kind = kind_of(contact, direction)
-        if illegal not in ILLEGAL:
-            raise InputError("illegal", illegal, '"nan" or "raise"')
-        if unknown:
-            name = min(unknown)
-            raise InputError(name, unknown[name], f"one of {', '.join(kind.fields)} or f")
-        if not inputs:
-            keywords = {
-                "mu0": mu0,
-                "Fz": Fz,
-                "k": k,
-                "k_range": k_range,
-                "k_low": k_low,
-                "k_high": k_high,
-                "y0": y0,
-                "Fz_amplitude": Fz_amplitude,
-                "omega": omega,
-                "f": f,
-                "v0": v0,
-            }
-            inputs = by_name(
-                cases, {name: x for name, x in keywords.items() if x is not ABSENT}, kind
-            )
-            if has_labels(cases, inputs):
-                options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
-                return evaluate_labelled(
-                    self.evaluate,
-                    self.on_one_thread().evaluate,
-                    functools.partial(self._certain, kind=kind),
-                    cases,
-                    inputs,
-                    kind,
-                    "k_low" in inputs,
-                    options,
-                )
-        return self.answer(Cases.of(inputs, kind, illegal == "raise"), gradient, groups)
+        keywords = {
+            "mu0": mu0,
+            "Fz": Fz,
+            "k": k,
+            "k_range": k_range,
+            "k_low": k_low,
+            "k_high": k_high,
+            "y0": y0,
+            "Fz_amplitude": Fz_amplitude,
+            "omega": omega,
+            "f": f,
+            "v0": v0,
+            "contact": contact,
+            "direction": direction,
+        }
+        keywords = {name: x for name, x in keywords.items() if x is not ABSENT}
+        options: dict[str, Any] = {
+            "include": include,
+            "gradient": gradient,
+            "groups": groups,
+            "illegal": illegal,
+        }
+        keywords |= {name: x for name, x in options.items() if x is not _OPTIONS[name]}
+        keywords |= {} if std is None else {"std": std}
+        for name in more.keys() - DEVIATIONS.keys():
+            raise unknown(name, more[name])
+        values = named(cases, keywords | more)
+        options = {name: values.pop(name, default) for name, default in _OPTIONS.items()}
+        if options["illegal"] not in ILLEGAL:
+            raise InputError("illegal", options["illegal"], '"nan" or "raise"')
+        strict = options["illegal"] == "raise"
+        shorthand = [name for name in ("gradient", "groups") if options[name]]
+        names = [*names_in(options["include"]), *shorthand]
+        if has_labels(values.values()):
+            return evaluate_labelled(self, cases, values, names, strict)
+        cases = Cases.of(values, strict=strict)
+        return self.answer(cases, chosen(names, cases))
 
-    def answer(self, cases: Cases, gradient: bool = False, groups: bool = False) -> Answer[Any]:
-        """:meth:`evaluate` of cases in their one form."""
-        kind, columns, shape = cases.kind, cases.columns, cases.shape or (1,)
-        if not cases.shape and not kind.direction and cases.ends is None:
-            return self._scalar_answer([*columns.values()], gradient, kind)
-        groups = groups or gradient or not cases.shape
-        detail: Detail = "gradient" if gradient else "groups" if groups else "values"
-        six, data = [*columns.values()], self._data_of(kind)
-        rows = shared_out.cases(data, six, shape, self._thread_limit, detail, kind)
-        answer: Answer[Any]
-        if cases.ends is not None:
-            low, high = cases.ends
-            six = [*{**columns, "k": low}.values()]
-            extremes = shared_out.intervals(data, six, high, self._thread_limit, kind)
-            answer = IntervalAnswer(
-                rows.mu_macro,
-                rows.mu_ratio,
-                np.maximum(rows.error_bound, extremes.error_bound.reshape(shape)),
-                rows.source,
-            )
-            answer.mu_macro_low = np.minimum(rows.mu_macro, extremes.low.reshape(shape))
-            answer.mu_macro_high = np.maximum(rows.mu_macro, extremes.high.reshape(shape))
-        else:
-            answer = (AnswerWithGradient if gradient else Answer)(
-                rows.mu_macro, rows.mu_ratio, rows.error_bound, rows.source
-            )
-        if groups:
-            answer._groups = rows.v_tilde, rows.y_tilde, rows.length_scale
-            answer._certain = (
-                self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
-            )
-            answer._border = functools.partial(self.v_tilde_crit, **kind.names)
-        if gradient:
-            answer.gradient = dict(zip(kind.fields, rows.gradient, strict=True))
-            answer.gradient_bound = dict(zip(kind.fields, rows.gradient_bound, strict=True))
-        return answer if cases.shape else single(answer)
-
-    def _scalar_answer(
-        self, six: Sequence[Any], gradient: bool, kind: Kind = SPRING
-    ) -> Answer[float]:
-        """The answer to one case across; NaN where it is illegal."""
-        certain, border, pointer = self._certain, self.v_tilde_crit, self._pointer
-        if kind.contact:
-            certain = functools.partial(self._certain, kind=kind)
-            border = functools.partial(self.v_tilde_crit, **kind.names)
-            pointer = self._data_of(kind).pointer
-        row = _SCALAR_KERNEL.one(pointer, six, gradient, kind.contact)
-        groups = (row.v_tilde, row.y_tilde, row.length_scale)
-        answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
-            row.mu_macro, row.mu_ratio, row.error_bound, row.source, groups, certain
-        )
-        answer._border = border
-        if gradient:
-            answer.gradient = dict(zip(FIELDS, row.gradient, strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, row.gradient_bound, strict=True))
+    def answer(
+        self, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
+    ) -> Answer[Any]:
+        """:meth:`evaluate` of cases in their one form, with outputs of
+        :func:`mumacro.outputs.evaluation.chosen`; ``groups`` keeps v~, y~ and l0, too."""
+        answer = evaluation.answer(self.tabulated, cases, outputs, groups)
+        answer._surrogate = self
         return answer
 
-    def evaluate_case(
-        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
-    ) -> tuple[float, float, float, int]:
-        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1
-        if illegal."""
-        row = _SCALAR_KERNEL.one(self._pointer, (mu0, Fz, k, y0, omega, v0), False)
-        return row.mu_macro, row.mu_ratio, row.error_bound, row.source
-
-    def cells(self, name: str, kind: Kind = SPRING) -> Data:
-        """What the kernel reads of a quantity of a kind, for callers of the kernel itself."""
-        return self._data_of(kind, _CODES[name]) if kind.contact else self._with(name)
-
-    def _data_of(self, kind: Kind, quantity: int = atlas.MU) -> Data:
-        """What the kernel reads of a kind; cells are cut on first use."""
-        if kind != BALL:
-            if kind.contact:
-                put_driven(self._data)
-            return self._data
-        data = self._ball
-        if data is None:
-            rows = block_rows(self.table.ball, atlas.BALL_CHARTS)
-            data = self._ball = Data(*self.border.arrays, rows, outer_cells())
-        if quantity not in data.quantities:
-            cells = quantity_cells(self.table.ball, quantity, atlas.BALL_CHARTS)
-            data.put(quantity, *cells)
-        return data
-
-    def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
-        """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~
-        together."""
-        v, y = np.asarray(v_tilde), np.asarray(y_tilde)
-        crit = _KERNEL.border(
-            self._data, np.atleast_1d(np.asarray(y, dtype=np.float64)), kind
-        ).reshape(y.shape)
-        margin = self.border.max_rel_error + 4.0 * atlas.ROUNDING
-        with np.errstate(all="ignore"):
-            # groups beyond double range are not near the border, or it cannot be decided
-            extreme = (y == 0.0) | ~np.isfinite(y) | ~np.isfinite(v) | (v == 0.0)
-            certain = np.where(extreme, ~np.isnan(v), np.abs(v - crit) > margin * crit)
-        return certain if certain.ndim else bool(certain)
+    def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
+        """The answer to one case across in plain numbers; NaN where it is illegal."""
+        if with_f:
+            six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
+        row = self.tabulated.one(six, gradient, kind.contact)
+        answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
+            row.mu_macro,
+            row.mu_ratio,
+            row.error_bound,
+            row.source,
+            (row.v_tilde, row.y_tilde, row.length_scale),
+            (kind, six, with_f),
+            self,
+        )
+        if gradient:
+            slopes, bounds = tuple(row.gradient), tuple(row.gradient_bound)
+            answer.gradient = dict(zip(FIELDS, slopes, strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, bounds, strict=True))
+            answer.outputs = dict(zip(_SLOPES, slopes + bounds, strict=True))
+        return answer
 
 
 # mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits
 # (tests/mumacro/test_surrogate.py solves them anew)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
-
-
-def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
-    """Refuse a stored border whose nodes are not near the formula for every y~, since it selects
-    the block of a case."""
-    for index, ((name, axis, _), piece) in enumerate(zip(atlas.BORDER_PIECES, pieces, strict=True)):
-        y = axis.amplitude(piece.nodes)
-        crit = piece.values * _KERNEL.border_scales(index, y)[0]
-        if not np.all(np.abs(crit / closed_forms.border_blend(y) - 1.0) < 0.01):
-            raise TableError(path, f"the nodes of border/{name} are not v~crit(y~)")
-
-
-def _bundled_table(tolerance: float | None) -> Path:
-    """The tightest bundled table, or the smallest that meets ``tolerance``."""
-    tables = {float(path.stem.removeprefix("mumacro-")): path for path in bundled_tables()}
-    if not tables:
-        raise TableError("mumacro-*.nc", "no table is bundled with this installation; name a file")
-    if tolerance is None:
-        return tables[min(tables)]
-    if (
-        isinstance(tolerance, bool)
-        or not isinstance(tolerance, (int, float))
-        or not tolerance > 0.0
-    ):
-        raise InputError("tolerance", tolerance, "a path, a tolerance > 0, or None")
-    sufficient = [candidate for candidate in tables if candidate <= tolerance]
-    if not sufficient:
-        raise InputError(
-            "tolerance",
-            tolerance,
-            f">= {min(tables):g}, the tightest bundled table, or the path of another",
-        )
-    return tables[max(sufficient)]
 
 
 @functools.cache  # a worker gets the same surrogate with every task
@@ -917,7 +674,9 @@ def _flat_groups(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, .
     if type(v_tilde) is np.ndarray is type(y_tilde) and v_tilde.dtype == y_tilde.dtype == _FLOAT:
         v, y = v_tilde, y_tilde
     else:
-        v, y = real("v_tilde", v_tilde), real("y_tilde", y_tilde)
+        v, y = (
+            np.asarray(read(name, x).si) for name, x in (("v_tilde", v_tilde), ("y_tilde", y_tilde))
+        )
     try:
         shape = common_shape((v, y))
     except ValueError as error:

@@ -16,7 +16,7 @@ from mumacro.analysis.measured_points import HARDLY
 from mumacro.analysis.settling import settling
 from mumacro.analysis.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
-from mumacro.inputs.cases import Cases, by_name, without_interval
+from mumacro.inputs.cases import Cases, without_interval
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
 from mumacro.inputs.kind import SPRINGS_OF, Kind, kind_of
 from mumacro.surrogate import Surrogate
@@ -183,7 +183,7 @@ def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
 
 def _six_inputs(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
     """The six inputs as numbers: omega from f, k infinite for a rigid contact."""
-    cases = Cases.of(by_name(None, case, kind), kind)
+    cases = Cases.of(case, kind)
     if cases.shape:
         shapes = {name: np.shape(value) for name, value in case.items()}
         raise InputError("case", shapes, "one case: numbers")

@@ -1,8 +1,9 @@
 """Many cases at once: one model of columns for columns and rows, answered slice by slice.
 
-``forms.py`` reads a body as values, lists and arrays by name; :class:`CaseColumns` checks them;
-:class:`Batch` evaluates slices, so that memory stays small and other threads run between them;
-``forms.py`` writes the slices.  A bad case spoils only itself.
+``forms.py`` reads a body as values, lists and arrays by name; :class:`CaseColumns` checks them, and
+they become the library's ``Cases``, once; :class:`Batch` evaluates slices of these, so that memory
+stays small and other threads run between them; ``forms.py`` writes the slices.  A bad case spoils
+only itself.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -11,12 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from mumacro.answer import Answer, add
 from mumacro.errors import InputError
-from mumacro.inputs.cases import Cases, by_name
+from mumacro.inputs.cases import Cases, named
+from mumacro.inputs.doubts import Remark
 from mumacro.kernel.arrays import Codes
+from mumacro.outputs.entry import Output
+from mumacro.outputs.evaluation import chosen, cost
 
 from .forms import SLICE, Body, Reason, too_large, write_columns, write_rows
-from .included import Outputs, Plan, answer_columns
 from .models.inputs import MAX_REASONS, Column
 from .models.options import MODEL, BatchOptions, CaseColumns
 from .problems import FieldFault, reason_of, refuse
@@ -35,17 +39,17 @@ def both(members: Mapping[str, Any], options: BatchOptions) -> dict[str, Any]:
 
 @dataclass
 class Batch:
-    """Cases, and how they are answered.  ``errors`` and ``n_errors`` grow while the slices are
-    taken."""
+    """Cases, and how they are answered.  ``errors``, ``n_errors`` and ``remarks`` grow while the
+    slices are taken."""
 
     table: LoadedTable
-    plan: Plan
-    columns: dict[str, Any]  # numbers, and arrays (size,)
-    size: int
+    cases: Cases
+    outputs: tuple[Output, ...]
     reasons: dict[int, Reason]
     rows: bool
     errors: list[dict[str, Any]] = field(default_factory=list)
     n_errors: int = 0
+    remarks: list[Remark] = field(default_factory=list)
     count: Callable[[LoadedTable, Codes], None] = lambda _table, _codes: None
 
     @classmethod
@@ -60,61 +64,65 @@ class Batch:
         }
         if any(length > max_batch for length in lengths.values()):
             raise too_large(max_batch)
-        model = of_members(CaseColumns, both(body.members, options))
-        if MODEL in (model.include or ()):
+        std = {name: x for name, x in body.members.items() if name.startswith("std_")}
+        members = {name: x for name, x in body.members.items() if name not in std}
+        model = of_members(CaseColumns, both(members, options))
+        if model.model:
             raise InputError("include", MODEL, f"without {MODEL}, which is for one case")
-        columns, reasons = model.columns, dict(body.reasons)
+        values, reasons = model.columns | std, dict(body.reasons)
         # the first bad input of a case, in the order of the inputs, is told
-        for name, column in columns.items():
+        for name, column in values.items():
             if isinstance(column, Column):
-                columns[name] = column.values
+                values[name] = column.values
                 for i, reason in column.reasons.items():
                     reasons.setdefault(i, (name, reason))
-        lengths = {name: len(x) for name, x in columns.items() if isinstance(x, np.ndarray)}
-        size = next(iter(lengths.values()), 1)
-        if wrong := [name for name, length in lengths.items() if length != size]:
+        lengths = {name: len(x) for name, x in values.items() if isinstance(x, np.ndarray)}
+        if len({*lengths.values()}) > 1:
+            size = next(iter(lengths.values()))
             shown = ", ".join(f"{name}: {length}" for name, length in lengths.items())
             reason = f"lists must have one length; given {shown}"
+            wrong = [name for name, length in lengths.items() if length != size]
             refuse([FieldFault.of(name, reason) for name in wrong])
-        if not lengths and "v0" in columns:  # else it is refused below
-            columns["v0"] = np.array([columns["v0"]])
-        plan = Plan.of(model, columns)
-        # relations between inputs are the same for all cases: an empty part shows whether they hold
-        Cases.of(by_name(None, _part(columns, 0, 0), plan.kind), plan.kind)
+        if not lengths and "v0" in values:  # else it is refused below
+            values["v0"] = np.array([values["v0"]])
+        cases = Cases.of(named(None, values))
+        outputs = chosen(model.outputs, cases)
         in_query = options.tolerance is not None
         table = tables.pick(model.tolerance, True if in_query else None)
-        return cls(table, plan, columns, size, reasons, body.rows, **more)
+        return cls(table, cases, outputs, reasons, body.rows, **more)
+
+    @property
+    def cost(self) -> float:
+        """The time of all cases, in times of a plain one."""
+        names = tuple(output.name for output in self.outputs)
+        return self.cases.size * cost(names, self.cases.kinds, self.cases.ends is not None)
 
     def write(self) -> Iterator[bytes]:
         """The answer as JSON, piece by piece, in the form of the body."""
-        yield from (write_rows if self.rows else write_columns)(self._slices())
-        end = {"errors": self.errors, "n_errors": self.n_errors, **self.table.signature}
-        yield b"," + dump(end)[1:]
+        yield from (write_rows if self.rows else write_columns)(self._answers())
+        end: dict[str, Any] = {"errors": self.errors, "n_errors": self.n_errors}
+        if self.remarks:
+            end["remarks"] = self.remarks
+        yield b"," + dump(end | self.table.signature)[1:]
 
-    def _slices(self) -> Iterator[tuple[Outputs, Codes]]:
-        """Outputs by path and source codes, slice by slice; one empty slice if there is no case."""
-        for start in range(0, max(self.size, 1), SLICE):
-            part = _part(self.columns, start, min(start + SLICE, self.size))
-            outputs, codes = answer_columns(self.table.surrogate, part, self.plan)
-            self.count(self.table, codes)
-            self._tell(part, codes, start)
-            yield outputs, codes
+    def _answers(self) -> Iterator[Answer[Any]]:
+        """The answers, slice by slice; one empty slice if there is no case."""
+        for start in range(0, max(self.cases.size, 1), SLICE):
+            part = self.cases.part(slice(start, start + SLICE))
+            answer = self.table.surrogate.answer(part, self.outputs)
+            self.count(self.table, answer.source_code)
+            self._tell(answer.source_code, start)
+            for remark in answer.remarks:
+                add(self.remarks, remark)
+            yield answer
 
-    def _tell(self, part: Mapping[str, Any], codes: Codes, start: int) -> None:
+    def _tell(self, codes: Codes, start: int) -> None:
         """Add the bad cases of a slice to the errors."""
         bad = np.flatnonzero(codes < 0).tolist()
-        if not bad:
-            return
-        cases = Cases.of(by_name(None, part, self.plan.kind), self.plan.kind)
         self.n_errors += len(bad)
-        for index in bad[: MAX_REASONS - len(self.errors)]:
-            name, reason = self.reasons.get(start + index) or _reason(cases, index)
-            self.errors.append({"index": start + index, "field": name, "reason": reason})
-
-
-def _part(columns: Mapping[str, Any], start: int, stop: int) -> dict[str, Any]:
-    """The columns of the cases from ``start`` to ``stop``."""
-    return {name: x[start:stop] if isinstance(x, np.ndarray) else x for name, x in columns.items()}
+        for index in (start + i for i in bad[: MAX_REASONS - len(self.errors)]):
+            name, reason = self.reasons.get(index) or _reason(self.cases, index)
+            self.errors.append({"index": index, "field": name, "reason": reason})
 
 
 def _reason(cases: Cases, index: int) -> Reason:

@@ -122,10 +122,16 @@ def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
 def faults_of(
     errors: Iterable[Any], allowed: Iterable[str], parameter: bool | None = None
 ) -> list[FieldFault]:
-    """Pydantic's errors as faults, one per place; ``allowed`` are the names that may be given."""
+    """Pydantic's errors as faults, one per place; ``allowed`` are the names that may be given.
+
+    Those that are not shown have no reason: to find one takes longer than to find the fault.
+    """
     faults: dict[tuple[str | int, ...], FieldFault] = {}
     for error in errors:
         path, value = error["loc"], error["input"]
+        if len(faults) >= MAX_FIELD_FAULTS:
+            faults.setdefault(path, FieldFault(path, ""))
+            continue
         cause = error.get("ctx", {}).get("error")
         if isinstance(cause, InputError):  # a relation: it names the input to change
             path, value = (*path, cause.field), _NO_VALUE
@@ -212,8 +218,12 @@ def invalid(
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
     """The faults of inputs of which one of several is required: the library would tell the first
     of them, when everything else is right."""
-    amplitude = AMPLITUDE if members.get("direction") == "normal" else "y0"
-    for names in (("k", "k_range", *ENDS), (amplitude,), ("omega", "f")):
+    direction = members.get("direction", "across")
+    one = isinstance(direction, str)  # else there is one for each case
+    amplitudes = ("y0", AMPLITUDE) if not one else ("y0",)
+    if one and direction == "normal":
+        amplitudes = (AMPLITUDE,)
+    for names in (("k", "k_range", *ENDS), amplitudes, ("omega", "f")):
         if all(members.get(name) is None for name in names):
             yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))
 
@@ -318,7 +328,9 @@ def _no_such_path(scope: Scope) -> str:
 def _of_input(error: InputError, _: Scope) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
-    return refused([FieldFault.of(error.field, reason_of(error), value)])
+    name = error.field.removeprefix("std_")  # a deviation is a member of std
+    steps = (name,) if name == error.field else ("std", name)
+    return refused([FieldFault(steps, reason_of(error), value)])
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:
@@ -447,7 +459,7 @@ class Failures:
                 fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
                 _log.exception("unexpected error", extra={"fields": fields})
             if begun:  # end the connection without the end of the answer
-                raise ClientDisconnect from error
+                raise ClientDisconnect from (error.__cause__ if _expected(error) else error)
             response = await handle(Request(scope, receive), error)
             await response(scope, receive, send)
 

@@ -70,7 +70,7 @@ class Springs:
         if lacking:
             reason = f"has no {', '.join(lacking)}: build this table anew, before any coarser one"
             raise TableError(fine.path, reason)
-        self.fine, self._data = fine, fine._data
+        self.fine, self._data = fine, fine.tabulated.data()
         self._cells = [
             np.ascontiguousarray(quantity_cells(fine.table.blocks, code)[0])
             for code in range(len(atlas.QUANTITIES))

@@ -75,7 +75,7 @@ class SolvedContact(NamedTuple):
 
     def places(self, surrogate: Surrogate, v: Array, y: Array) -> Codes:
         """The blocks of points (n,), their number where a closed form answers."""
-        data = surrogate.cells("mu_ratio", self.kind)
+        data = surrogate.tabulated.data("mu_ratio", self.kind)
         return kernels[-1].places(data, v, y, self.kind.contact)[0]
 
     def quantity(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Any:
@@ -98,7 +98,7 @@ def slopes_of(surrogate: Surrogate, kind: Kind, name: str, v: Array, y: Array) -
     """Value, slopes and their bounds there, rows (5, n)."""
     if kind == SPRING:
         return np.array(surrogate.slopes(v, y, name, bounds=True))
-    code, data = atlas.QUANTITY_NAMES.index(name), surrogate.cells(name, kind)
+    code, data = atlas.QUANTITY_NAMES.index(name), surrogate.tabulated.data(name, kind)
     return np.array(shared_out.slopes(code, data, MIDDLE * v, MIDDLE * y, None, kind.contact))
 
 

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.measured_points import STD, UNKNOWNS, Measured, Remark
+from mumacro.analysis.measured_points import STD, UNKNOWNS, Measured
 from mumacro.errors import missing
+from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import RIGID, unit_of
 from mumacro.kernel.arrays import Array
 

@@ -11,6 +11,7 @@ from mumacro.answer import Answer
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array
+from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
@@ -48,7 +49,8 @@ class InputCurve:
         inputs of the case.  InputError for a value out of bounds where ``strict``, else NaN."""
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         inputs = {**self.case, **k, self.unknown: x, **others}
-        return self.surrogate.answer(Cases.of(inputs, self.kind, strict), gradient, groups)
+        cases = Cases.of(inputs, self.kind, strict)
+        return self.surrogate.answer(cases, (GRADIENT,) if gradient else (), groups)
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""

@@ -2,15 +2,19 @@
 :mod:`mumacro.analysis.fit`."""
 
 from collections.abc import Container, Mapping
-from typing import Any, TypedDict
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import by_name, check, columns_of, real, select
-from mumacro.inputs.fields import NAMES
+from mumacro.inputs.cases import check, columns_of, select
+from mumacro.inputs.doubts import UNITS, Remark, remarks
+from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.names import unknown_name
+from mumacro.inputs.reading import NO_DEVIATION, read
+from mumacro.inputs.text_tables import Dialect, Table, Wanted, read_table
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
@@ -24,19 +28,30 @@ _PERCENT = 1.5  # mu_macro from which on it is asked if per cent are meant
 _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
 
 
+#: columns of a table of points, and the input whose units each has
+COLUMNS = {name: LIKE.get(name, name) for name in (*NAMES, AMPLITUDE)}
+COLUMNS |= {"mu_macro": "mu0", STD: "mu0"}
+_WANTED = Wanted(COLUMNS, (("v0",), ("mu_macro",)))
+
+
+def read_points(
+    source: Path | bytes,
+    dialect: Dialect = Dialect(),  # noqa: B008
+    most: int = 1_000_000,
+) -> Table:
+    """Measured points in a table as text, or in a workbook: a file or its bytes.
+
+    TextError tells what is wrong, and in which lines.
+
+    >>> read_points(b"v0 [mm/s],mu_macro\\n10,0.2\\n").columns
+    {'v0': array([0.01]), 'mu_macro': array([0.2])}
+    """
+    return read_table(source, _WANTED, dialect, most)
+
+
 def unknowns_beside(columns: Container[str]) -> list[str]:
     """The unknowns by default: k and mu0, or k alone where mu0 is a column."""
     return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
-
-
-class Remark(TypedDict):
-    """One doubt: the row of docs/validity.md, the input, how many points it is about, a
-    sentence."""
-
-    row: str
-    field: str
-    cases: int
-    text: str
 
 
 class Measured:
@@ -111,18 +126,21 @@ class Measured:
 
     def _read(self, data: dict[str, Any]) -> None:
         """Columns of one length, (n,), in SI."""
-        measured = {
-            name: real(name, np.asarray(data.pop(name)))
-            for name in ("mu_macro", STD)
-            if name in data
-        }
+        friction = read("mu_macro", data.pop("mu_macro"))
+        measured: dict[str, Any] = {"mu_macro": friction.si}
+        if STD in data:
+            measured[STD] = _number(STD, data.pop(STD))
+        elif friction.std is not None:
+            measured[STD] = friction.std
         # labels are dropped: a fit is not labelled
-        values = {name: x if x is None else np.asarray(x) for name, x in data.items()}
-        inputs = by_name(None, {**values, **dict.fromkeys(self.unknowns, 1.0)}, self.kind)
+        values = {name: _number(name, x) for name, x in data.items()}
+        inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
+        self._has_f = inputs.get("f") is not None
         numbers = columns_of(inputs, self.kind)
         check(numbers, inputs.get("f"))
-        columns = {name: np.asarray(x, np.float64) for name, x in numbers.items()}
-        all_columns = {**columns, **measured}
+        all_columns = {
+            name: np.asarray(x, np.float64) for name, x in {**numbers, **measured}.items()
+        }
         lengths = {name: x.shape for name, x in all_columns.items() if x.ndim}
         if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in all_columns.values()):
             raise InputError("data", lengths, "columns of one length, or single values")
@@ -178,16 +196,17 @@ class Measured:
 
     def remarks(self) -> list[Remark]:
         """What is probably a wrong unit in the points."""
+        found = remarks(self.columns, self._has_f)
         doubtful = self.mu > _PERCENT
         if not doubtful.any():
-            return []
+            return found
         largest = float(self.mu.max())
         text = (
             f"mu_macro up to {largest:.4g}, and mu_macro above {_PERCENT:g} is rare: is it in per "
             "cent? Then name the column mu_macro [%], or divide by 100"
         )
         cases = int(np.count_nonzero(doubtful))
-        return [{"row": "units", "field": "mu_macro", "cases": cases, "text": text}]
+        return [{"row": UNITS, "field": "mu_macro", "cases": cases, "text": text}, *found]
 
     def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The inputs of :meth:`model` at other places: those given, the others as at all points."""
@@ -205,7 +224,7 @@ class Measured:
                 raise InputError(name, "a column", "left out: it is fitted")
             if name in inputs:
                 raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
-        given = {**given, **inputs}
+        given = {name: _number(name, value) for name, value in {**given, **inputs}.items()}
         if not given:
             return dict(self.columns)
         same = dict(self.columns)
@@ -248,6 +267,17 @@ class Measured:
         answer = self.surrogate.evaluate(**inputs, gradient=slopes)
         mu = np.asarray(answer.mu_macro)
         return mu, np.asarray(answer.gradient[name]) if slopes else np.zeros_like(mu)
+
+
+def _number(name: str, value: Any) -> Any:
+    """A number or an array in SI, as for :meth:`mumacro.Surrogate.evaluate`, without a deviation or
+    an interval."""
+    one = read(name, value)
+    if one.low is not None:
+        raise InputError(name, value, "one number, not an interval")
+    if one.std is not None:
+        raise InputError(name, value, NO_DEVIATION)
+    return one.si
 
 
 def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:

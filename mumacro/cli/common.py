@@ -24,7 +24,8 @@ from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import NO_DEVIATION, read
-from mumacro.inputs.text_tables import SEPARATORS
+from mumacro.inputs.signs import THOUSANDS
+from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import belongs_to_value
 from mumacro.surrogate import Surrogate
 from mumacro.validity import Row, digits, k_effect
@@ -133,13 +134,29 @@ def add_table(parser: OneLineParser) -> None:
     add_form(parser)
 
 
-def add_format(parser: OneLineParser) -> None:
-    """The options for the form of CSV."""
-    parser.add_argument(
-        "--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,"
-    )
-    parser.add_argument(
-        "--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: ."
+def add_format(parser: argparse.ArgumentParser) -> None:
+    """The options for the form of a table as text; :func:`dialect_in` reads them."""
+    for name, choices, text in (
+        ("sep", SEPARATORS, "between the cells"),
+        ("decimal", (".", ","), "in numbers"),
+        ("thousands", THOUSANDS, "between thousands"),
+    ):
+        words = f"{text}: {' '.join(choices)}; default: as the table has"
+        parser.add_argument(f"--{name}", choices=choices, metavar="SIGN", help=words)
+    parser.add_argument("--encoding", metavar="NAME", help="such as utf-16; default: found out")
+    parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out N lines")
+
+
+def dialect_in(chosen: argparse.Namespace) -> Dialect:
+    """How a table as text is written, as far as the options say."""
+    if chosen.skip < 0:
+        raise UsageError(f"--skip {chosen.skip}: a number of lines, 0 or more")
+    return Dialect(
+        None if chosen.sep is None else SEPARATORS[chosen.sep],
+        chosen.decimal,
+        None if chosen.thousands is None else THOUSANDS[chosen.thousands],
+        chosen.encoding,
+        chosen.skip,
     )
 
 

@@ -1,6 +1,5 @@
 """``mumacro fit``: k and mu0 from measured points in a file."""
 
-import csv
 import math
 import sys
 import warnings
@@ -8,29 +7,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mumacro.analysis.fit import fit
 from mumacro.analysis.fitted import Fit
-from mumacro.analysis.measured_points import STD, UNKNOWNS, unknowns_beside
+from mumacro.analysis.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, open_table
 from mumacro.errors import InputError
-from mumacro.inputs.fields import LIKE, SI, unit_of
+from mumacro.inputs.decoding import TextError
+from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import AMPLITUDE
-from mumacro.inputs.text_tables import (
-    SEPARATORS,
-    absent,
-    find_heads,
-    read_cell,
-    read_head,
-    read_text,
-)
 from mumacro.validity import digits
 
 EXAMPLE = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\
-columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:
+columns by name, in SI or with a unit as in v0 [mm/s], which may stand below the name; others are
+  ignored, and so are lines before the names:
   v0 and mu_macro, of each point; what varies of Fz, y0 (or {AMPLITUDE}), omega or f;
   {STD}: of mu_macro, if known
   mu0, if it is known at each point, such as from the force without oscillation: then k
@@ -41,13 +32,11 @@ examples:
   {EXAMPLE}
   mumacro fit measured.csv Fz=10N y0=2um f=20kHz mu0=0.3 --unknown k --contact ball
 """
-_READ = (*SI, AMPLITUDE, "mu_macro", STD)  # columns
-_SHOWN = 5  # faults of a file
 
 
 def run(words: Sequence[str]) -> str:
     """``mumacro fit``."""
-    first = "points", {"help": "a file of CSV; - is standard input"}
+    first = "points", {"help": "a table as text, or .xlsx; - is standard input"}
     description = "k and mu0 of a contact from measured friction."
     parser = common.question("fit", description, _COLUMNS, "the other inputs", "*", first)
     parser.add_argument(
@@ -65,15 +54,12 @@ def run(words: Sequence[str]) -> str:
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
     kind = common.kind_in(chosen)
+    source = sys.stdin.buffer.read() if chosen.points == "-" else Path(chosen.points)
     try:
-        text = (
-            sys.stdin.read()
-            if chosen.points == "-"
-            else read_text(Path(chosen.points).read_bytes(), chosen.points)
-        )
-    except ValueError as error:
-        raise ImpossibleError(str(error)) from None
-    points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
+        table = read_points(source, common.dialect_in(chosen))
+    except TextError as error:
+        raise ImpossibleError(f"{chosen.points}: {error}") from None
+    points: dict[str, Any] = {**table.columns}
     unknown = unknown or unknowns_beside(points)
     there = [*unknown, *(name for name in points if name in kind.columns)]
     case = common.read_case(
@@ -88,9 +74,13 @@ def run(words: Sequence[str]) -> str:
             warnings.simplefilter("ignore")  # they are in the result
             result = fit(points, unknown, **kind.names, surrogate=surrogate, **case)
     except InputError as error:
-        raise ImpossibleError(f"{chosen.points}: {error}") from None
+        at_line = f"line {table.lines[error.index]}: " if error.index is not None else ""
+        fault = InputError(error.field, error.value, error.bound) if at_line else error
+        raise ImpossibleError(f"{chosen.points}: {at_line}{fault}") from None
     except ModuleNotFoundError as error:  # says what to install
         raise ImpossibleError(str(error)) from None
+    if table.read_as:
+        print(f"mumacro fit: read as: {table.read_as}", file=sys.stderr)
     if chosen.out is not None:
         heads = [
             name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]"
@@ -137,40 +127,3 @@ def _text(result: Fit, shown: int | None) -> str:
     doubts = [f"warning: {text}" for text in result.warnings]
     doubts += [f"{remark['row']}: {remark['text']}" for remark in result.remarks]
     return "\n".join([in_columns(rows), *doubts])
-
-
-def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> dict[str, Any]:
-    """The columns of measured points, by name in SI, (n,); those of other names are left out.
-
-    ImpossibleError tells what is wrong with the header or with cells, after ``where``.
-
-    >>> read_points("v0 [mm/s],mu_macro\\n10,0.2\\n", "points.csv")
-    {'v0': array([0.01]), 'mu_macro': array([0.2])}
-    """
-    lines = text.removeprefix("\ufeff").splitlines()
-    try:
-        header = read_head("".join(lines[:1]), lines[1:50], sep, decimal, ("mu_macro", STD))
-    except ValueError as error:
-        raise ImpossibleError(f"{where}: line 1: {error}") from None
-    rows = [row for row in csv.reader(lines[1:], delimiter=sep) if any(map(str.strip, row))]
-    places, faults = find_heads(
-        header, {name: name if name in SI else LIKE.get(name, "mu0") for name in _READ}
-    )
-    faults += [absent(name, header) for name in ("v0", "mu_macro") if name not in places]
-    columns = {name: np.empty(len(rows)) for name in places}
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(header):
-            faults.append(f"row {number} has {len(row)} cells, the header has {len(header)}")
-            continue
-        for name, (i, scale) in places.items():
-            try:
-                value = read_cell(name, row[i], decimal)
-                columns[name][number - 1] = scale.si(value)
-                if math.isnan(value):
-                    faults.append(f"row {number}: {name} is missing")
-            except ValueError as error:
-                faults.append(f"row {number}: {name} {error}, got {row[i][:80]!r}")
-    if faults:
-        more = f"; and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
-        raise ImpossibleError(f"{where}: {'; '.join(faults[:_SHOWN])}{more}")
-    return columns

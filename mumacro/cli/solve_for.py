@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.solve_for import solve_for
-from mumacro.cli import common
+from mumacro.analysis.solve_motion import UNKNOWNS
+from mumacro.cli import common, solve_motion
 from mumacro.cli.common import (
     CURVE,
     ImpossibleError,
@@ -38,16 +39,29 @@ def run(words: Sequence[str]) -> str:
     """``mumacro solve-for``."""
     description = "Every value of one input at which mu_macro is the target."
     epilog = (
-        f"{common.ABOUT_INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {EXAMPLE}"
+        f"{common.ABOUT_INPUTS}\nexample, the amplitude [m] that halves the friction:\n"
+        f"  {EXAMPLE}\nthe speed at which a conveyor carries its load:\n"
+        f"  {solve_motion.EXAMPLE} --target 0"
     )
-    first = "unknown", {"choices": (*NAMES, AMPLITUDE), "help": "the unknown input"}
+    unknowns = dict.fromkeys((*NAMES, AMPLITUDE, *UNKNOWNS))
+    first = (
+        "unknown",
+        {
+            "choices": [*unknowns],
+            "metavar": "unknown",
+            "help": "the unknown input; of a motion also x.amplitude, x.phase, ...",
+        },
+    )
     parser = common.question("solve-for", description, epilog, "the other five inputs", first=first)
     parser.add_argument("--target", type=_target, required=True, help="wanted mu_macro [-]")
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     common.add_exponent(parser)
+    solve_motion.add_parts(parser)
     chosen = parser.parse_intermixed_args(words)
+    if solve_motion.is_motion(chosen):
+        return solve_motion.run(chosen, chosen.between)
     unknown, (inner, scale), unit = (
         chosen.unknown,
         field_of(chosen.unknown),

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import check, real, stiffness
+from mumacro.inputs.cases import check, real
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
@@ -87,7 +87,7 @@ class Element:
             raise InputError(
                 "springs", springs, f"a whole number from 1 to {most} for contact={contact!r}"
             )
-        columns = {"mu0": real("mu0", mu0), "Fz": real("Fz", Fz), "k": stiffness(k)}
+        columns = {"mu0": real("mu0", mu0), "Fz": real("Fz", Fz), "k": real("k", k)}
         check(columns)
         if np.isinf(columns["k"]).any():
             raise InputError(

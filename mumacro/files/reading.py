@@ -1,85 +1,112 @@
-"""The three formats: which files and columns there are, and blocks of records.
+"""The formats of files: which files there are, their columns, and their rows in blocks.
 
-Cells of CSV and values of NDJSON are text.  Inputs become numbers; other columns stay text.
+Cells of tables as text and values of NDJSON are text.  Inputs become numbers; other columns stay
+text.
 """
 
-import csv
 import glob
-import gzip
 import json
 import math
-import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.dataset
 
-from mumacro.files.record_batch import FilesError
-from mumacro.inputs.text_tables import NO_UTF8, read_head
+from mumacro.files.errors import FilesError
+from mumacro.files.text_source import Block, TextTable, excerpt
+from mumacro.inputs.decoding import TextError, file_pieces
+from mumacro.inputs.text_tables import Dialect, Wanted
 
-FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
-ENDINGS = f"{', '.join(FORMATS)} (text also .gz)"
+#: endings of files that are written, and their format
+WRITTEN = {
+    ".csv": "text",
+    ".tsv": "text",
+    ".txt": "text",
+    ".parquet": "parquet",
+    ".ndjson": "ndjson",
+    ".jsonl": "ndjson",
+}
+#: of files that are read
+FORMATS = WRITTEN | dict.fromkeys((".lvm", ".dat", ".asc", ".prn", ".xlsx"), "text")
+ENDINGS = f"{', '.join(WRITTEN)} (text also .gz)"
+# of tables; texts that have another ending may be notes beside them
+_TABLES = {".csv", ".tsv", ".parquet", ".ndjson", ".jsonl"}
+# what begins the names of files that others leave in a folder: metadata, hidden files, Excel's lock
+_STRAY = ("_", ".", "~$")
 ROWS = 65_536  # of a block, at most: a third of a second of work
 LONGEST = 64 * 2**20  # bytes of a line
 
 
-class Block(NamedTuple):
-    """Some records in order; ``share`` is how much of the file is read after them.
-
-    A record that could not be read is a row of nulls; ``unreadable`` has its index, its text and
-    the fault. ``texts`` are the unchanged records, where they are text: cells of CSV, lines of
-    NDJSON.
-    """
-
-    batch: pa.RecordBatch
-    share: float
-    texts: Sequence[Any] = ()
-    unreadable: Sequence[tuple[int, str, str]] = ()
-
-
-def format_of(path: Path) -> tuple[str, bool]:
+def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:
     """The format by a name's ending, empty for another ending, and whether it is compressed."""
     name = path.name.lower()
-    file_format, compressed = (
-        FORMATS.get(Path(name.removesuffix(".gz")).suffix, ""),
-        name.endswith(".gz"),
-    )
+    compressed = name.endswith(".gz")
+    file_format = formats.get(ending_of(path), "")
     return "" if compressed and file_format == "parquet" else file_format, compressed
 
 
-def find_files(cases: Sequence[str | Path]) -> tuple[list[Path], str]:
-    """The files that paths, folders and patterns name, in order, and their format; FilesError where
-    one names no file, or the formats differ."""
+def ending_of(path: Path) -> str:
+    """The ending of a name, before that of a compressed file.
+
+    >>> ending_of(Path("cases.CSV.gz"))
+    '.csv'
+    """
+    return Path(path.name.lower().removesuffix(".gz")).suffix
+
+
+def find_files(
+    cases: Sequence[str | Path], say: Callable[[str], None] = lambda _text: None
+) -> tuple[list[Path], str]:
+    """The files that paths, folders and patterns name, in order, and their format.
+
+    A file that is named itself is a table as text where its ending tells nothing.  What others
+    leave in a folder is skipped, and said.  FilesError where one names no file, or formats differ.
+    """
     files: list[Path] = []
+    formats: dict[str, None] = {}
     for entry in cases:
         path = Path(entry)
+        if path.is_file():
+            files.append(path)
+            formats[format_of(path, FORMATS)[0] or "text"] = None
+            continue
         pattern = f"{glob.escape(str(path))}/**/*" if path.is_dir() else str(path)
-        matches = (
-            [path] if path.is_file() else sorted(map(Path, glob.glob(pattern, recursive=True)))
-        )
-        # in a folder, what begins with _ is metadata
-        candidates = [
-            p
-            for p in matches
-            if p == path or not (p.name.startswith("_") or p.name.endswith(".rejects.csv"))
-        ]
-        files += (usable := [p for p in candidates if p.is_file() and format_of(p)[0]])
-        if not usable:
+        matches = sorted(map(Path, glob.glob(pattern, recursive=True)))
+        found, strays = _tables_among([match for match in matches if match.is_file()])
+        if not found:
             raise FilesError(f"{entry}: no such file, or none that ends in {ENDINGS}")
-    formats = sorted({format_of(path)[0] for path in files})
+        if strays:
+            names = ", ".join(stray.name for stray in strays[:5])
+            say(f"{entry}: skipped {names}{f' and {len(strays) - 5} more' * (len(strays) > 5)}")
+        files += found
+        formats |= dict.fromkeys(format_of(one, FORMATS)[0] for one in found)
     if len(formats) > 1:
-        raise FilesError(f"the files are of several formats: {', '.join(formats)}")
-    return files, formats[0]
+        raise FilesError(f"the files are of several formats: {', '.join(sorted(formats))}")
+    return files, next(iter(formats))
+
+
+def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """The files of a folder that are tables of cases, and the others."""
+    usable = [
+        path
+        for path in paths
+        if format_of(path, FORMATS)[0]
+        and not path.name.startswith(_STRAY)
+        and not path.name.endswith(".rejects.csv")
+    ]
+    tables = [path for path in usable if ending_of(path) in _TABLES] or usable
+    return tables, [path for path in paths if path not in set(tables)]
 
 
 class ParquetSource:
     """Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in Hive."""
 
     head: Sequence[str] = ()
+    has_mark, sep, decimal = False, "", "."
 
     def __init__(self, files: Sequence[Path], folder: str | None) -> None:
         names = [str(path) for path in files]
@@ -90,8 +117,8 @@ class ParquetSource:
         self.schema = pa.unify_schemas([dataset.schema, *schemas], promote_options="permissive")
         self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
 
-    def blocks(self, file: int, skip: int, names: Sequence[str]) -> Iterator[Block]:
-        """The blocks of a file behind the first ``skip`` rows, of the columns ``names``."""
+    def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
+        """The blocks of a file, of the columns ``names``."""
         part, row = self.parts[file], 0
         scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
         options = {
@@ -102,147 +129,133 @@ class ParquetSource:
         }
         try:
             for batch in part.to_batches(self.schema, columns=names, **options):
+                numbers = range(row + 1, row + 1 + len(batch))
                 row += len(batch)
-                if row > skip:
-                    yield Block(batch, row / part.metadata.num_rows)
+                yield Block(batch, row / max(part.metadata.num_rows, 1), numbers)
         except (pa.ArrowException, OSError) as error:
             raise FilesError(f"{part.path}: damaged after row {row} ({error})") from None
 
 
-class _Lines:
-    """The lines of a text file, also a compressed one; ``share`` is how much of it is read."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.share = path, 0.0
-
-    def __iter__(self) -> Iterator[bytes]:
-        try:
-            with self.path.open("rb") as raw:
-                stream: Any = gzip.GzipFile(fileobj=raw) if format_of(self.path)[1] else raw
-                size = max(self.path.stat().st_size, 1)
-                while line := stream.readline(LONGEST):
-                    if len(line) == LONGEST:
-                        raise FilesError(f"{self.path}: a line has more than {LONGEST >> 20} MiB")
-                    self.share = raw.tell() / size
-                    yield line
-        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            raise FilesError(f"{self.path}: the compressed file is damaged ({error})") from None
-
-
 class TextSource:
-    """CSV, RFC 4180 with a header, or without ``sep`` NDJSON, one object a line; both in UTF-8.
+    """Tables as text, whose heads name the same columns.
 
-    The columns of NDJSON are those of the first block of every file, and others are refused unless
-    ``verbatim``: then records come out as they came in.  ``head`` has the names as they came in.
-    FilesError where there is no header, or headers differ, or the separator or decimal sign is
-    another one; then the options to give are named.
+    ``verbatim``, rows come out as they came in: as lines where ``sep``, the separator of the
+    output, is that of every file, else as cells.  FilesError where heads differ.
     """
 
-    def __init__(self, files: Sequence[Path], sep: str, decimal: str, verbatim: bool) -> None:
-        self.files, self.sep, self.verbatim = files, sep, verbatim
-        if sep:
-            heads = [_head(path, sep, decimal) for path in files]
-            names = [[cell.strip("\ufeff \t") for cell in head] for head in heads]
-            if differ := [
-                path for path, header in zip(files, names, strict=True) if header != names[0]
-            ]:
-                raise FilesError(f"{differ[0]}: its header differs from that of {files[0]}")
-        else:
-            starts = (
-                record for path in files for record in islice(self._records(_Lines(path)), ROWS)
-            )
-            heads = names = [
-                [*dict.fromkeys(name for record in starts for name in _object(record)[0])]
-            ]
-            if not names[0]:
-                raise FilesError(f"{files[0]}: holds no JSON object, one a line")
-        self.head, self.schema = heads[0], pa.schema([(name, pa.string()) for name in names[0]])
+    def __init__(
+        self, files: Sequence[Path], dialect: Dialect, wanted: Wanted, verbatim: bool
+    ) -> None:
+        self.tables = [TextTable(path, wanted, dialect) for path in files]
+        first = self.tables[0]
+        for table in self.tables:
+            if table.layout.heads != first.layout.heads:
+                raise FilesError(f"{table.path}: its header differs from that of {first.path}")
+            if verbatim and table.decimal != first.decimal:
+                raise FilesError(
+                    f"{table.path}: its decimal sign differs from that of {first.path}; give the "
+                    "files one by one, or write Parquet or NDJSON"
+                )
+        self.texts = "lines" * verbatim
+        self.sep, self.decimal = first.sep, first.decimal
+        self.head = first.layout.heads
+        self.schema = pa.schema([(head, pa.string()) for head in self.head])
 
-    def blocks(self, file: int, skip: int, names: Sequence[str]) -> Iterator[Block]:
-        """The blocks of a file behind the first ``skip`` records, of the columns ``names``."""
-        lines = _Lines(self.files[file])
-        records = islice(self._records(lines), skip, None)
-        while texts := [*islice(records, ROWS)]:
-            where, skip = f"{lines.path}: rows {skip + 1} to {skip + len(texts)}", skip + len(texts)
-            columns, faults = self._columns(texts, names, where)
-            try:
-                batch = pa.RecordBatch.from_arrays(
-                    [pa.array(columns[x], pa.string()) for x in names], [*names]
-                )
-            except UnicodeEncodeError:
-                row = (
-                    skip - len(texts) + 1 + next(i for i, x in enumerate(texts) if not _is_utf8(x))
-                )
-                raise FilesError(f"{lines.path}: row {row} {NO_UTF8}") from None
+    @property
+    def has_mark(self) -> bool:
+        """Whether the first file has a mark of byte order, or needs one as UTF-8, so that Excel
+        reads its signs."""
+        return self.tables[0].layout.encoding != "utf-8"
+
+    @property
+    def where(self) -> str:
+        """The place of the head, for messages."""
+        return f"{self.tables[0].path}: line {self.tables[0].layout.head}: "
+
+    def describe(self, say: Callable[[str], None]) -> None:
+        """Say how the files are read, where they are no plain CSV: once where all are alike."""
+        by_form: dict[str, list[str]] = {}
+        for table in self.tables:
+            if table.read_as:
+                by_form.setdefault(table.read_as, []).append(table.path.name)
+        for form, names in by_form.items():
+            where = "" if len(names) == len(self.tables) else f"{', '.join(names[:3])} "
+            say(f"{where}read as: {form}")
+
+    def write_with(self, sep: str) -> None:
+        """Give rows as they are needed for an output with the separator ``sep``."""
+        if self.texts and any(table.sep != sep for table in self.tables):
+            self.texts = "cells"
+
+    def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
+        """The blocks of a file, of the columns ``names``."""
+        return self.tables[file].blocks(names, self.texts)
+
+
+class NdjsonSource:
+    """NDJSON in UTF-8, one object a line.
+
+    The columns are those of the first block of every file, and others are refused unless
+    ``verbatim``: then lines come out as they came in.
+    """
+
+    head: Sequence[str] = ()
+    has_mark, sep, decimal = False, "", "."
+
+    def __init__(self, files: Sequence[Path], verbatim: bool) -> None:
+        self.files, self.verbatim = files, verbatim
+        starts = (line for path in files for _, line in islice(_lines(path), ROWS))
+        names = dict.fromkeys(name for line in starts for name in _object(line)[0])
+        if not names:
+            raise FilesError(f"{files[0]}: holds no JSON object, one a line")
+        self.schema = pa.schema([(name, pa.string()) for name in names])
+
+    def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
+        """The blocks of a file, of the columns ``names``."""
+        path, at = self.files[file], 0
+
+        def seen(place: int) -> None:
+            nonlocal at
+            at = place
+
+        size, lines = max(path.stat().st_size, 1), _lines(path, seen)
+        while some := [*islice(lines, ROWS)]:
+            numbers, texts = zip(*some, strict=True)
+            objects, faults = zip(*map(_object, texts), strict=True)
+            new = {name for record in objects for name in record} - {*self.schema.names}
+            if new and not self.verbatim:
+                first = next(i for i, x in zip(numbers, objects, strict=True) if new & x.keys())
+                where = f"{path}: line {first}"
+                remedy = "name it in the first, or write NDJSON"
+                raise FilesError(f"{where}: {min(new)!r} is in no earlier line; {remedy}")
+            columns = [
+                pa.array([_text(x.get(name)) for x in objects], pa.string()) for name in names
+            ]
             unreadable = [
-                (i, self._excerpt(texts[i]), fault) for i, fault in enumerate(faults) if fault
+                (i, excerpt(texts[i].decode("utf-8", "replace")), fault)
+                for i, fault in enumerate(faults)
+                if fault
             ]
-            yield Block(batch, lines.share, texts, unreadable)
-
-    def _records(self, lines: _Lines) -> Iterator[Any]:
-        """Lists of cells, or lines."""
-        if not self.sep:
-            yield from filter(None, map(bytes.strip, lines))
-            return
-        # bytes come out as they came in
-        texts = (line.decode("utf-8", "surrogateescape") for line in lines)
-        count = 0
-        try:
-            for row in islice(csv.reader(texts, delimiter=self.sep, strict=True), 1, None):
-                if len(row) > 1 or (row and row[0].strip()):
-                    count += 1
-                    yield row
-        except csv.Error as error:
-            fault = f"a quote is not closed, or not at the end of its cell ({error})"
-            raise FilesError(f"{lines.path}: row {count + 1}: {fault}") from None
-
-    def _columns(
-        self, records: Any, names: Sequence[str], where: str
-    ) -> tuple[dict[str, Any], Sequence[str | None]]:
-        """Values by column, and the fault of each record, if any."""
-        if self.sep:
-            width = len(self.head)
-            faults = [
-                None if len(x) == width else f"has {len(x)} cells, the header has {width}"
-                for x in records
-            ]
-            rows = (row if len(row) == width else [None] * width for row in records)
-            return dict(zip(self.schema.names, zip(*rows, strict=True), strict=True)), faults
-        objects, faults = zip(*map(_object, records), strict=True)
-        if not self.verbatim and (
-            new := {name for record in objects for name in record} - {*names}
-        ):
-            raise FilesError(
-                f"{where}: {min(new)!r} is in no earlier row; name it in the first, or write NDJSON"
-            )
-        return {name: [_text(record.get(name)) for record in objects] for name in names}, faults
-
-    def _excerpt(self, record: Any) -> str:
-        text: str = self.sep.join(record) if self.sep else record.decode("utf-8", "replace")
-        return text if len(text) <= 500 else text[:500] + "…"
+            batch = pa.RecordBatch.from_arrays(columns, [*names])
+            yield Block(batch, at / size, numbers, texts, unreadable)
 
 
-def _head(path: Path, sep: str, decimal: str) -> list[str]:
-    """The cells of the first line, after a look at the records behind it; a mark of byte order
-    stays."""
-    first, *rows = [*islice(_Lines(path), 51)] or [b""]
+def _lines(
+    path: Path, seen: Callable[[int], None] = lambda _at: None
+) -> Iterator[tuple[int, bytes]]:
+    """The lines of a file that are not empty, and their numbers."""
+    begun, number = b"", 0
     try:
-        cells = read_head(
-            first.decode("utf-8-sig"),
-            [row.decode("utf-8", "replace") for row in rows],
-            sep,
-            decimal,
-        )
-    except UnicodeDecodeError:
-        raise FilesError(f"{path}: line 1 {NO_UTF8}") from None
-    except ValueError as error:
-        raise FilesError(f"{path}: line 1: {error}") from None
-    return ["\ufeff" * (first[:3] == b"\xef\xbb\xbf") + cells[0], *cells[1:]]
-
-
-def _is_utf8(record: Sequence[str]) -> bool:
-    """Whether no cell has a byte that is kept as a half of a surrogate pair."""
-    return not any("\udc80" <= sign <= "\udcff" for cell in record for sign in cell)
+        for piece in chain(file_pieces(path, seen), [b"\n"]):
+            *lines, begun = (begun + piece).split(b"\n")
+            for line in lines:
+                number += 1
+                if text := line.strip():
+                    yield number, text
+            if len(begun) > LONGEST:
+                raise TextError(f"line {number + 1} has more than {LONGEST >> 20} MiB")
+    except TextError as error:
+        raise FilesError(f"{path}: {error}") from None
 
 
 def _object(text: bytes) -> tuple[dict[str, Any], str | None]:

@@ -4,29 +4,28 @@ Columns that are named like a missing input are refused.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from mumacro.answer import BAND
-from mumacro.errors import InputError, MumacroError
+from mumacro.errors import InputError
+from mumacro.files.errors import FilesError
+from mumacro.files.text_columns import numbers_of
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import GAP, LIKE, SI, refusal
+from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
-from mumacro.inputs.text_tables import (
-    TOO_LARGE,
-    absent,
-    absent_together,
-    find_heads,
-    meant_by,
-    read_cell,
-)
+from mumacro.inputs.numbers import TOO_LARGE
+from mumacro.inputs.signs import Signs
+from mumacro.inputs.text_tables import Wanted
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
+from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
@@ -36,11 +35,6 @@ ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 REJECTS = pa.schema(
     [("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())]
 )
-
-
-class FilesError(MumacroError):
-    """A file of cases cannot be read, understood or written; one line that names it, the reason and
-    the remedy."""
 
 
 def added_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
@@ -131,9 +125,8 @@ def find_columns(
         names, {name: LIKE.get(name, name) for name in (*kind.columns, *ENDS)}
     )
     other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in heads)
-    faults += [
-        f"the column {name!r} is there twice" for name in other_names if names.count(name) > 1
-    ]
+    counts = Counter(names)
+    faults += [f"the column {name!r} is there twice" for name in other_names if counts[name] > 1]
     stiffness_columns = [column for column in names if meant_by(column, loosely=False) == "k"]
     if rigid and stiffness_columns:
         faults.append(
@@ -160,6 +153,16 @@ def find_columns(
     }, added
 
 
+def wanted_columns(rigid: bool = False) -> Wanted:
+    """The columns that a table of cases may have, and those that it needs."""
+    names = [*SI, *LIKE]
+    like = {name: LIKE.get(name, name) for name in names}
+    like |= {f"std_{name}": unit for name, unit in like.items()}
+    stiffness = [] if rigid else [("k", ENDS[0])]
+    groups = [("mu0",), ("Fz",), *stiffness, ("y0", AMPLITUDE), ("omega", "f"), ("v0",)]
+    return Wanted(like, groups)
+
+
 def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
     """The faults of columns that are missing."""
     if "y0" in inputs and AMPLITUDE in (split_unit(column)[0] for column in names):
@@ -168,7 +171,7 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
     if inputs:
         one = len(inputs) == 1
         yield absent(inputs[0], names) if one else absent_together(inputs, names)
-    if "k" in inputs and not any(meant_by(column) == "k" for column in names):
+    if "k" in inputs and not any(meant_by(column, loosely=False) == "k" for column in names):
         yield "rename the one that holds k, or give --rigid if all contacts are rigid"
 
 
@@ -178,20 +181,21 @@ def answer_columns(
     headings: Mapping[str, tuple[str, Scale]],
     names: Sequence[str],
     kind: Kind,
-    decimal: str = ".",
+    signs: Signs | None = None,
 ) -> tuple[list[pa.Array], list[tuple[int, str, str | None, str]], dict[str, Array]]:
     """The columns ``names`` that :func:`answer` adds, rows of the rejects, and the inputs in the
-    file's units by heading."""
+    file's units by heading; ``signs`` are those of numbers as text."""
     columns_in: dict[str, Array] = {}
     values: dict[str, Array] = (
         {} if {"k", *ENDS} & headings.keys() else {"k": np.full(len(batch), math.inf)}
     )
     faults: dict[str, dict[int, str]] = {}
     for name, (heading, scale) in headings.items():
-        columns_in[heading], faults[name] = numbers(batch.column(heading), name, decimal)
-        values[name] = _in_si(columns_in[heading], scale, faults[name])
+        columns_in[heading], values[name], faults[name] = numbers(
+            batch.column(heading), name, signs or Signs(".", None), scale
+        )
     cases = Cases.of(values, kind)
-    result = surrogate.answer(cases, gradient="d_mu_macro_d_mu0" in names)
+    result = surrogate.answer(cases, (GRADIENT,) if "d_mu_macro_d_mu0" in names else ())
     rejected = result.source_code < 0
     mask = rejected if rejected.any() else None
     source_code = np.where(rejected, 0, result.source_code).astype(np.int8)
@@ -225,55 +229,38 @@ def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Ar
     )
 
 
-def _in_si(column: Array, scale: Scale, faults: dict[int, str]) -> Array:
-    """Values in SI; a power of ten below one divides, so that 2 um is the double 2e-6."""
-    if scale == Scale():
-        return column
-    with np.errstate(over="ignore"):
-        values: Array = column * scale.times / scale.over
-    beyond = np.isinf(values) & np.isfinite(column)  # a large stiffness is not a rigid contact
-    values[beyond] = math.nan
-    faults |= dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)
-    return values
-
-
-def numbers(array: pa.Array, name: str, decimal: str = ".") -> tuple[Array, dict[int, str]]:
-    """A column of the input ``name`` as doubles (n,), NaN where a cell has no number, and
-    what is wrong with cells of text.
+def numbers(
+    array: pa.Array, name: str, signs: Signs, scale: Scale
+) -> tuple[Array, Array, dict[int, str]]:
+    """A column of the input ``name`` as doubles (n,) in its own unit and in SI, NaN where a cell
+    has no number, and what is wrong with it.
 
     FilesError where the column is of another type than numbers or text.
     """
     if pa.types.is_dictionary(array.type):
         array = array.dictionary_decode()
-    arrow_type, column = array.type, array
-    is_text = (
+    arrow_type = array.type
+    if (
         pa.types.is_string(arrow_type)
         or pa.types.is_large_string(arrow_type)
         or pa.types.is_string_view(arrow_type)
-    )
+    ):
+        return numbers_of(pc.cast(array, pa.string()), name, signs, scale)
     is_number = (
         pa.types.is_integer(arrow_type)
         or pa.types.is_floating(arrow_type)
         or pa.types.is_decimal(arrow_type)
     )
-    if not (is_text or is_number or pa.types.is_null(arrow_type)):
+    if not (is_number or pa.types.is_null(arrow_type)):
         raise FilesError(f"the column {name} holds {arrow_type}, not numbers")
-    with suppress(pa.ArrowInvalid):
-        if is_text and decimal != ".":  # with a decimal comma 1.5 may mean 1500: it is no number
-            column = pc.replace_substring(pc.replace_substring(array, ".", "?"), decimal, ".")
-        values = pc.fill_null(pc.cast(column, pa.float64(), safe=False), math.nan).to_numpy(
-            zero_copy_only=False
-        )
-        if not is_text or np.isfinite(values).all():
-            return values, {}
-    # cell by cell, as not all of them are numbers
-    values, faults = np.full(len(array), math.nan), {}
-    for i, cell in enumerate(array.to_pylist()):
-        try:
-            values[i] = read_cell(name, cell or "", decimal)
-        except ValueError as error:
-            faults[i] = str(error)
-    return values, faults
+    column = pc.fill_null(pc.cast(array, pa.float64(), safe=False), math.nan)
+    values: Array = column.to_numpy(zero_copy_only=False)
+    # a power of ten below one divides, so that 2 um is the double 2e-6
+    with np.errstate(over="ignore"):
+        si: Array = values if scale == Scale() else values * scale.times / scale.over
+    beyond = np.isinf(si) & np.isfinite(values)  # a large stiffness is not a rigid contact
+    si = np.where(beyond, math.nan, si) if beyond.any() else si
+    return values, si, dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)
 
 
 def _field_and_reason(error: InputError) -> tuple[str, str]:

@@ -11,15 +11,18 @@ import numpy as np
 import pyarrow as pa
 
 from mumacro.files import reading
+from mumacro.files.errors import FilesError
 from mumacro.files.record_batch import (
     REJECTS,
-    FilesError,
     added_fields,
     answer_columns,
     find_columns,
+    wanted_columns,
 )
-from mumacro.files.writing import Output, csv_lines
+from mumacro.files.text_source import Block
+from mumacro.files.writing import Output, csv_lines, written_as
 from mumacro.inputs.kind import Kind, kind_of
+from mumacro.inputs.text_tables import Dialect
 from mumacro.surrogate import Surrogate
 from mumacro.table.atomic import growing, to_disk
 
@@ -43,12 +46,12 @@ def evaluate_files(
     *,
     rigid: bool = False,
     include: Sequence[str] = (),
-    sep: str = ",",
-    decimal: str = ".",
+    dialect: Dialect = Dialect(),  # noqa: B008
     contact: str = "spring",
     direction: str = "across",
     force: bool = False,
     progress: Callable[[float, int, int], None] = lambda _share, _rows, _rejected: None,
+    say: Callable[[str], None] = lambda _text: None,
 ) -> Summary:
     """Evaluate every case of some files.
 
@@ -64,12 +67,14 @@ def evaluate_files(
     surrogate : Surrogate
     rigid, include, contact, direction
         As in :func:`mumacro.files.answer`.
-    sep, decimal : str
-        Between the cells of CSV, and within its numbers, read and written.
+    dialect : mumacro.inputs.text_tables.Dialect
+        How tables as text are written, as far as it is known; the rest is found in the files.  A
+        separator and a decimal sign hold for an output as text, too.
     force : bool
         Replace an output that exists.
-    progress : callable
-        Called with the finished share, rows read and rejected.
+    progress, say : callable
+        Called with the finished share, rows read and rejected; with one line about how a table
+        as text is read, and which files of a folder are left out.
 
     Raises
     ------
@@ -87,9 +92,8 @@ def evaluate_files(
     1
     """
     try:
-        run = _Run(
-            cases, Path(out), surrogate, rigid, include, sep, decimal, kind_of(contact, direction)
-        )
+        kind = kind_of(contact, direction)
+        run = _Run(cases, Path(out), surrogate, rigid, include, dialect, kind, say)
         return run.go(force, progress)
     except (
         pa.ArrowException
@@ -98,11 +102,10 @@ def evaluate_files(
 
 
 class _State(NamedTuple):
-    """How far the run is after a piece: ``at`` records of a file, all rows and the rejected ones;
-    the piece's rejects as CSV."""
+    """How far the run is after a piece: the file, all rows and the rejected ones; the piece's
+    rejects as CSV."""
 
     file: int = 0
-    at: int = 0
     rows: int = 0
     rejected: int = 0
     rejects: str = ""
@@ -116,15 +119,11 @@ class _Run:
         surrogate: Surrogate,
         rigid: bool,
         include: Sequence[str],
-        sep: str,
-        decimal: str,
+        dialect: Dialect,
         kind: Kind,
+        say: Callable[[str], None],
     ) -> None:
-        if sep == decimal:
-            raise FilesError(
-                f"--sep and --decimal are both {sep!r}; give another --sep, such as ';'"
-            )
-        self.files, input_format = reading.find_files(cases)
+        self.files, input_format = reading.find_files(cases, say)
         output_format, compressed = reading.format_of(out)
         if not output_format or out.is_dir():
             raise FilesError(f"{out}: must be the name of a file that ends in {reading.ENDINGS}")
@@ -136,26 +135,28 @@ class _Run:
                 )
         self.begun = [_state_of(path) for path in self.files]
         self.verbatim = input_format == output_format != "parquet"
-        self.source: reading.ParquetSource | reading.TextSource
+        self.source: reading.ParquetSource | reading.TextSource | reading.NdjsonSource
+        where = f"{self.files[0]}: "
         if input_format == "parquet":
             folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
             self.source = reading.ParquetSource(self.files, folder)
+        elif input_format == "ndjson":
+            self.source = reading.NdjsonSource(self.files, self.verbatim)
         else:
             self.source = reading.TextSource(
-                self.files, sep if input_format == "csv" else "", decimal, self.verbatim
+                self.files, dialect, wanted_columns(rigid), self.verbatim
             )
-        headings, names = find_columns(
-            self.source.schema.names, rigid, include, kind, f"{self.files[0]}: "
-        )
-        self.evaluation = (
-            surrogate,
-            headings,
-            names,
-            kind,
-            decimal if input_format == "csv" else ".",
+            where = self.source.where
+        headings, names = find_columns(self.source.schema.names, rigid, include, kind, where)
+        self.evaluation = (surrogate, headings, names, kind)
+        sep, decimal = written_as(
+            reading.ending_of(out), self.source.sep, self.source.decimal, dialect
         )
         input_headings = [heading for heading, _ in headings.values()]
         self.output = Output(output_format, compressed, sep, decimal, headings.get("k", (None,))[0])
+        if isinstance(self.source, reading.TextSource):
+            self.source.write_with(sep)
+            self.source.describe(say)
         input_fields = [
             field.with_type(pa.float64())
             if field.name in input_headings and input_format != "parquet"
@@ -198,20 +199,22 @@ class _Run:
 
     def _opened_rejects(self, files: ExitStack) -> BinaryIO:
         stream = files.enter_context(growing(self.rejects))
-        head = csv_lines([["file"] * (len(self.files) > 1) + REJECTS.names])
-        stream.write(head.encode())
+        where = REJECTS.names[0] if isinstance(self.source, reading.ParquetSource) else "line"
+        head = [*["file"] * (len(self.files) > 1), where, *REJECTS.names[1:]]
+        stream.write(csv_lines([head]).encode())
         return stream
 
     def _new_pieces(self) -> Iterator[tuple[_State, Any, float]]:
         """The pieces of the output, with the state after each and the share of the input that is
         read; the head comes first."""
         state = _State()
-        if self.output.format == "csv":
+        if self.output.format == "text":
             headings = [*(self.source.head if self.verbatim else ()), *self.schema.names]
-            yield state, self.output.pack(csv_lines([headings], self.output.sep)), 0.0
+            mark = "\ufeff" * (self.verbatim and self.source.has_mark)
+            yield state, self.output.pack(mark + csv_lines([headings], self.output.sep)), 0.0
         for file in range(len(self.files)):
-            state = state._replace(file=file, at=0)
-            for block in self.source.blocks(file, 0, self.columns_read):
+            state = state._replace(file=file)
+            for block in self.source.blocks(file, self.columns_read):
                 state, text = self._piece(state, block)
                 yield state, text, (file + block.share) / len(self.files)
         self._refuse_changed()
@@ -223,9 +226,9 @@ class _Run:
                     f"{path}: changed while it was read; give the command again"
                 ) from None
 
-    def _piece(self, state: _State, block: reading.Block) -> tuple[_State, Any]:
+    def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
-        added, rejects, columns_in = answer_columns(block.batch, *self.evaluation)
+        added, rejects, columns_in = answer_columns(block.batch, *self.evaluation, block.signs)
         faults = {row: reason for row, *reason in rejects}
         faults |= {i: [None, text, reason] for i, text, reason in block.unreadable}
         columns = [
@@ -243,10 +246,10 @@ class _Run:
             accepted[[*faults]] = False
             batch, texts = batch.filter(pa.array(accepted)), [*compress(texts, accepted)]
         file = [self.files[state.file]] * (len(self.files) > 1)
-        reject_lines = csv_lines([*file, state.at + i + 1, *reason] for i, reason in faults.items())
+        reject_lines = csv_lines([*file, block.lines[i], *reason] for i, reason in faults.items())
         n, rejected = len(block.batch), state.rejected + len(faults)
         text = self.output.piece(batch, texts if self.verbatim else None)
-        return _State(state.file, state.at + n, state.rows + n, rejected, reject_lines), text
+        return _State(state.file, state.rows + n, rejected, reject_lines), text
 
 
 def _state_of(path: Path) -> tuple[int, ...]:

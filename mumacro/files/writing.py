@@ -12,6 +12,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet
 
+from mumacro.inputs.text_tables import BLANKS, Dialect
+
 
 def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
     """Lines of CSV."""
@@ -20,12 +22,23 @@ def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
     return text.getvalue()
 
 
+def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[str, str]:
+    """Separator and decimal sign of an output as text: those that are given, else those of the
+    input, ``sep`` and ``decimal``, where the ending fits."""
+    sep, decimal = dialect.sep or sep, dialect.decimal or decimal
+    if ending == ".tsv" or sep == BLANKS or (ending == ".txt" and not sep):
+        sep = "\t"
+    elif ending == ".csv" and not dialect.sep and sep in ("", "\t"):
+        sep = ";" if decimal == "," else ","
+    return sep or ",", decimal
+
+
 class Output(NamedTuple):
-    """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``compressed`` (.gz) piece by
+    """How rows are written: ``text``, ``ndjson`` or ``parquet``; text ``compressed`` (.gz) piece by
     piece.
 
-    ``sep`` and ``decimal`` are those of CSV; in the column ``stiffness`` infinity is written as
-    ``rigid``.
+    ``sep`` and ``decimal`` are those of a table as text; in the column ``stiffness`` infinity is
+    written as ``rigid``.
     """
 
     format: str
@@ -50,13 +63,8 @@ class Output(NamedTuple):
             for name, column in zip(batch.schema.names, batch.columns, strict=True)
         ]
         rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
-        if self.format == "csv":
-            rows = (
-                rows
-                if texts is None
-                else ([*first, *row] for first, row in zip(texts, rows, strict=True))
-            )
-            return self.pack(csv_lines(rows, self.sep))
+        if self.format == "text":
+            return self.pack(self._lines(rows, texts))
         line = (
             ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names)
             + "}\n"
@@ -69,6 +77,23 @@ class Output(NamedTuple):
         )
         return self.pack(
             "".join(begun + line % row for begun, row in zip(first, rows, strict=True))
+        )
+
+    def _lines(self, rows: Iterable[Sequence[Any]], texts: Sequence[Any] | None) -> str:
+        """Rows of cells as lines, behind ``texts``, which are lines or lists of cells."""
+        if texts is None:
+            return csv_lines(rows, self.sep)
+        if not texts or not isinstance(texts[0], str) or self.sep == self.decimal:
+            of_cells = (
+                [*(next(csv.reader([x], delimiter=self.sep)) if isinstance(x, str) else x), *row]
+                for x, row in zip(texts, rows, strict=True)
+            )
+            return csv_lines(of_cells, self.sep)
+        # numbers and words need no quotes
+        sep = self.sep
+        return "".join(
+            f"{text}{sep}{sep.join([cell or '' for cell in row])}\n"
+            for text, row in zip(texts, rows, strict=True)
         )
 
     def _cells(self, name: str, column: pa.Array) -> list[str | None]:

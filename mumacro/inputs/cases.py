@@ -1,15 +1,14 @@
-"""Cases in their one form: six columns of numbers by name, made once from any form of inputs.
+"""Cases in their one form: columns of numbers by name, made once from any form of inputs.
 
-Keywords, a mapping, a data frame, Arrow columns, a row of a file or of JSON become names and values
-(:func:`by_name`), and these become :class:`Cases`, which alone the kernel evaluates.  Labels
-of pandas, xarray and Dask are taken off and put back by :mod:`mumacro.frames`, between the two
-steps.
+Keywords, a mapping, a data frame, Arrow columns, rows of a file or of JSON become names and values
+(:func:`named`), and these become :class:`Cases`, which alone are evaluated
+(:mod:`mumacro.outputs`).  Labels of pandas, xarray and Dask are taken off and put back by
+:mod:`mumacro.frames`, between the two steps.
 """
 
 import enum
 import math
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,17 +16,29 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.fields import (
     BOUNDS,
+    FIELDS,
     POSITIVE,
     RAD_PER_CYCLE,
     STIFFNESS,
     UNITS,
-    is_rigid,
+    field_of,
     refusal,
 )
 from mumacro.inputs.k_range import BOUND, ENDS
-from mumacro.inputs.kind import AMPLITUDE, DIRECTIONS, LIFTS_OFF, SPRING, Kind
-from mumacro.inputs.names import unknown_name
-from mumacro.kernel.arrays import Array, common_shape, flat
+from mumacro.inputs.kind import (
+    AMPLITUDE,
+    CONTACTS,
+    DIRECTIONS,
+    KINDS,
+    LIFTS_OFF,
+    SPRING,
+    Kind,
+    code_of,
+    kind_of,
+)
+from mumacro.inputs.names import suggestion, unknown_name
+from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, read
+from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
 
 
 class Absent(enum.Enum):
@@ -41,33 +52,48 @@ class Absent(enum.Enum):
 
 
 ABSENT: Final = Absent.ABSENT
-#: types of one real number
-NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(code).type for code in "efdbhilqBHILQ"))
-)
-NUMBERS_AND_ARRAYS = NUMBERS | {np.ndarray}
-_UNLABELLED = NUMBERS_AND_ARRAYS | {list, tuple, type(None), dict, str}
+_UNLABELLED = NUMBERS | {np.ndarray, list, tuple, type(None), dict, str}
 _FLOAT = np.dtype(np.float64)
 _AMPLITUDES = ("y0", AMPLITUDE)
+#: the fields where the direction is a column
+ALL_FIELDS = (*FIELDS[:4], AMPLITUDE, *FIELDS[4:])
+KIND = ("contact", "direction")
+_NORMAL = np.array([kind.normal for kind in KINDS])
+#: columns of deviations -> the input
+DEVIATIONS = {f"std_{name}": name for name in (*ALL_FIELDS, "f")}
+#: what a data frame or a file may hold
+COLUMNS = (*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS)
+#: what a mapping may hold, too: options of one call
+OPTIONS = ("k_range", "std", "include", "gradient", "groups", "illegal")
+EXACT = "finite and >= 0, 0 where the input is exact"  # the bound of a deviation
 
 
 class Cases(NamedTuple):
-    """Cases of one kind, as the kernel takes them."""
+    """Cases as they are evaluated, of one contact and direction, or of one for each case."""
 
-    kind: Kind
-    #: by the names of ``kind.fields`` and in their order: one number for all cases, or an array
-    #: (n,); k is infinite where rigid, and the geometric middle of an interval
+    #: of all cases; None where each has its own, see ``codes``
+    kind: Kind | None
+    #: the names of the inputs; both amplitudes where the direction is a column
+    fields: tuple[str, ...]
+    #: by these names and in their order one number for all cases, or an array (n,); k is infinite
+    #: where rigid, and the geometric middle of an interval
     columns: dict[str, float | Array]
     #: of the inputs, broadcast: () for one case alone
     shape: tuple[int, ...]
     #: lowest and highest k of an interval, each (n,)
     ends: tuple[Array, Array] | None = None
-    #: the values of f [Hz], where the inputs had f: messages then name f in place of omega
-    frequency: Any = None
+    #: standard deviations of inputs, in their units, by name as in ``columns``; without an entry 0
+    std: dict[str, float | Array] = {}  # noqa: RUF012 - never changed
+    #: place in ``kind.KINDS`` of each case, -1 for a contact or a direction that does not exist
+    codes: Codes | None = None
+    #: what messages name as it came in: f, contact and direction, an amplitude of another direction
+    given: dict[str, Any] = {}  # noqa: RUF012 - never changed
 
     @classmethod
-    def of(cls, inputs: Mapping[str, Any], kind: Kind = SPRING, strict: bool = False) -> "Cases":
-        """Cases from inputs by name, see :func:`by_name`.
+    def of(
+        cls, values: Mapping[str, Any], kind: Kind | None = None, strict: bool = False
+    ) -> "Cases":
+        """Cases from names and values, see :func:`named`; ``kind`` where the values do not tell.
 
         InputError where an input is missing, is no real number, or shapes do not broadcast.  A
         value out of bounds is one where ``strict``, and for a case alone.
@@ -76,78 +102,191 @@ class Cases(NamedTuple):
         >>> cases = Cases.of(inputs)
         >>> cases.shape, cases.columns["k"]
         ((2,), inf)
+        >>> Cases.of({**inputs, "contact": ["ball", "spring"]}).codes.tolist()
+        [1, 0]
         """
-        low = high = ends = None
-        if "k_low" in inputs:
-            low, high, geometric_middle = middle(inputs, strict)
-            inputs = {**inputs, "k": geometric_middle}
-        columns = columns_of(inputs, kind)
-        arrays = [column for column in columns.values() if not isinstance(column, float)]
-        try:
-            shape = common_shape(arrays)
-        except ValueError as error:
-            shapes = {name: np.shape(column) for name, column in columns.items()}
-            raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
+        texts = {} if kind is not None else _texts(values)
+        if kind is None and not any(isinstance(text, np.ndarray) for text in texts.values()):
+            kind, texts = kind_of(**texts), {}
+        fields = _fields(texts) if kind is None else kind.fields
+        strange = {} if kind is None else _strange_amplitude(values, kind)
+        columns, given, std, ends = _numbers(values, fields)
+        std |= _deviations(values, fields, std)
+        given |= strange | texts
+        shape = _shape_of(columns, std, given)
+        for part in (columns, std, given):
+            for name, x in part.items():
+                if isinstance(x, np.ndarray):
+                    part[name] = flat(x, shape) if x.size != 1 else x.item()
+        if ends is not None:
+            ends = _flat_ends(ends, shape, strict)
+        codes = codes_of(given, (math.prod(shape),)) if texts else None
+        cases = cls(kind, fields, columns, shape, ends, std, codes, given)
+        if std or strange or texts:
+            return cases._where_they_agree(values, strict or not shape)
         if strict or not shape:
-            check(columns, inputs.get("f"), shape)
-        for name, column in columns.items():
-            if not isinstance(column, float):
-                columns[name] = flat(column, shape) if column.size != 1 else column.item()
-        if low is not None and high is not None:
-            ends = flat(low, shape or (1,)), flat(high, shape or (1,))
-        return cls(kind, columns, shape, ends, inputs.get("f"))
+            check(columns, given.get("f"), (cases.size,) if shape else ())
+        return cases
 
     @property
     def size(self) -> int:
         """How many cases."""
         return math.prod(self.shape)
 
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """The contacts and directions among the cases."""
+        if self.codes is None:
+            return () if self.kind is None else (self.kind,)
+        return tuple(KINDS[code] for code in np.unique(self.codes).tolist() if code >= 0)
+
+    @property
+    def one_kind(self) -> Kind:
+        """The contact and direction of all cases; TypeError where each has its own."""
+        if self.kind is None:
+            raise TypeError("the cases are of several kinds: see by_kind")
+        return self.kind
+
+    def part(self, which: slice | Places) -> "Cases":
+        """Some of many cases, (m,)."""
+
+        def cut(columns: Mapping[str, Any]) -> dict[str, Any]:
+            return {
+                name: x[which] if isinstance(x, np.ndarray) else x for name, x in columns.items()
+            }
+
+        size = len(range(*which.indices(self.size))) if isinstance(which, slice) else which.size
+        return self._replace(
+            columns=cut(self.columns),
+            shape=(size,),
+            ends=self.ends and (self.ends[0][which], self.ends[1][which]),
+            std=cut(self.std),
+            codes=None if self.codes is None else self.codes[which],
+            given=cut(self.given),
+        )
+
+    def by_kind(self) -> Iterator[tuple[slice | Places, "Cases"]]:
+        """The cases of each contact and direction, and where they stand."""
+        if self.codes is None:
+            yield slice(None), self
+            return
+        for kind in self.kinds:
+            where, fields = np.flatnonzero(self.codes == KINDS.index(kind)), kind.fields
+            part = self.part(where)
+            yield (
+                where,
+                part._replace(
+                    kind=kind,
+                    fields=fields,
+                    columns={name: part.columns[name] for name in fields},
+                    std={name: part.std[name] for name in fields if name in part.std},
+                    codes=None,
+                ),
+            )
+
     def reason(self, index: int) -> InputError:
         """Why the case at ``index`` has no answer."""
-        case = {
-            name: column if isinstance(column, float) else float(column[index])
-            for name, column in self.columns.items()
-        }
-        if self.ends is not None and math.isnan(case["k"]):
-            return InputError("k_range", tuple(float(end[index]) for end in self.ends), BOUND)
-        f = None if self.frequency is None else real("f", self.frequency)
+
+        def at(column: Any) -> Any:
+            return column[index] if isinstance(column, np.ndarray) else column
+
+        columns, std, given = (
+            {name: at(x) for name, x in part.items()}
+            for part in (self.columns, self.std, self.given)
+        )
+        ends = self.ends and tuple(float(end[index]) for end in self.ends)
         try:
-            check(
-                case, f if f is None else float(np.broadcast_to(f, self.shape or (1,)).flat[index])
-            )
+            kind = self.kind or kind_of(given["contact"], given["direction"])
+            for name in _AMPLITUDES:
+                if np.broadcast_to(self._strange(name), max(self.size, 1))[index]:
+                    raise _no_such_amplitude(name, float({**columns, **given}[name]), kind)
+            if ends and math.isnan(columns["k"]):
+                raise InputError("k_range", ends, BOUND)
+            for name, deviation in std.items():
+                if name in kind.fields and not 0.0 <= deviation < math.inf:
+                    raise InputError(f"std_{name}", float(deviation), EXACT)
+            check({name: float(columns[name]) for name in kind.fields}, given.get("f"))
         except InputError as error:
             return error
-        raise AssertionError(f"{case} has an answer")
+        raise AssertionError(f"the case {columns} has an answer")
+
+    # --- relations between inputs -----------------------------------------------------------------
+
+    def _has(self, name: str) -> Any:
+        """Whether a case has an amplitude of this name, () or (n,)."""
+        if self.codes is None:
+            return np.bool_(name in self.fields)
+        return (_NORMAL[self.codes] == (name == AMPLITUDE)) & (self.codes >= 0)
+
+    def _strange(self, name: str) -> Any:
+        """Whether a case is given an amplitude that it does not have, () or (n,).  One number is
+        for those cases that have it."""
+        column, has = self.given.get(name, self.columns.get(name, math.nan)), self._has(name)
+        one_for_all = self.codes is not None and not isinstance(column, np.ndarray)
+        return ~has & ~np.isnan(column) & (not (one_for_all and has.any()))
+
+    def _where_they_agree(self, values: Mapping[str, Any], refuse: bool) -> "Cases":
+        """The same, with NaN in v0 where contact, direction, amplitudes and deviations do not go
+        together; where ``refuse``, InputError for the first case that is not legal."""
+        bad = np.zeros(self.size if self.shape else 1, np.bool_)
+        for name in _AMPLITUDES:
+            if name not in self.columns and self.codes is not None and self._has(name).any():
+                raise _missing(
+                    values, tuple(x for x in self.fields if x not in _AMPLITUDES or x == name)
+                )
+            bad |= self._strange(name)
+        for name, deviation in self.std.items():
+            legal = (np.asarray(deviation) >= 0.0) & (np.asarray(deviation) < math.inf)
+            bad |= ~legal if name not in _AMPLITUDES else ~legal & self._has(name)
+        if self.codes is not None:
+            bad |= self.codes < 0
+        if refuse:
+            self._refuse_first(np.flatnonzero(bad).tolist()[:1])
+        if not bad.any():
+            return self
+        return self._replace(
+            columns={**self.columns, "v0": np.where(bad, math.nan, self.columns["v0"])}
+        )
+
+    def _refuse_first(self, bad: list[int]) -> None:
+        """Refuse the first case that is ``bad``, or has a number out of bounds."""
+        for places, part in self.by_kind():
+            try:
+                check(part.columns, part.given.get("f"), (part.size,) if part.shape else ())
+            except InputError as error:
+                index = error.index or 0
+                bad.append(index if isinstance(places, slice) else int(places[index]))
+        if bad:
+            reason = self.reason(min(bad))
+            where = min(bad) if self.shape else None
+            raise InputError(reason.field, reason.value, reason.bound, where)
 
 
 # --- from inputs of any form to names and values --------------------------------------------------
 
 
-def by_name(cases: Any, inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, Any]:
-    """The inputs of ``cases`` and those given by keyword, each once, by the names of ``kind``.
+def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
+    """The inputs and options of ``cases`` and those given by keyword, each once, by name.
 
-    An interval of k is ``k_low`` and ``k_high``; columns of Arrow are arrays.  InputError for an
-    input given twice, an amplitude of another direction, k beside an interval of it.
+    Of a mapping every name must be one of :data:`COLUMNS` or :data:`OPTIONS`; of a data frame, an
+    Arrow table or a Dataset other columns are ignored, and refused only where one resembles an
+    input that is missing.  Columns of Arrow are arrays; the option std becomes std_k and so on,
+    k_range k_low and k_high.  InputError for a name given twice.
 
-    >>> by_name({"mu0": 0.3, "note": "dry"}, {"k_range": (1e6, 2e6)})
-    {'mu0': 0.3, 'k_low': 1000000.0, 'k_high': 2000000.0}
+    >>> named({"mu0": 0.3, "contact": "ball"}, {"k_range": (1e6, 2e6), "std": {"mu0": 0.1}})
+    {'mu0': 0.3, 'contact': 'ball', 'std_mu0': 0.1, 'k_low': 1000000.0, 'k_high': 2000000.0}
     """
-    values = dict(inputs)
+    values = dict(keywords)
     if cases is not None:
-        columns = select("cases", cases, (*kind.columns, *ENDS))
-        if duplicates := columns.keys() & inputs.keys():
+        columns, rest = _select(cases)
+        if duplicates := columns.keys() & keywords.keys():
             name = min(duplicates)
-            raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
-        values = {**columns, **inputs}
-    own_amplitude = _AMPLITUDES[kind.normal]
-    wrong_amplitude = _AMPLITUDES[not kind.normal]
-    if wrong_amplitude in values:
-        bound = (
-            f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is "
-            f"{own_amplitude}"
-        )
-        raise InputError(wrong_amplitude, values[wrong_amplitude], bound)
-    if not values.keys().isdisjoint(("k_range", *ENDS)):
+            raise InputError(name, keywords[name], "given once: in the cases or as a keyword")
+        values = {**columns, **keywords}
+        _refuse_similar(rest, values)
+    if "std" in values:
+        values |= _spread(values.pop("std"), values)
+    if "k_range" in values:
         values = as_ends(values)
     for name, value in values.items():
         if type(value) not in _UNLABELLED and not library_of(value) and _of_arrow(value):
@@ -155,9 +294,67 @@ def by_name(cases: Any, inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[
     return values
 
 
+def _spread(option: Any, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The deviations of the option ``std`` as columns; none of them says that all inputs are
+    exact."""
+    if not isinstance(option, Mapping):
+        raise InputError("std", option, "a mapping of inputs to their deviations")
+    for name in option:
+        if f"std_{name}" not in DEVIATIONS:
+            raise InputError("std", name, f"of {', '.join(DEVIATIONS.values())}")
+        if f"std_{name}" in values:
+            raise InputError(f"std_{name}", option[name], "given once")
+    return {f"std_{name}": value for name, value in option.items()} or {"std_mu0": 0.0}
+
+
+def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
+    """What ``cases`` hold by known names, and the names of the rest."""
+    if isinstance(cases, Mapping) and not library_of(cases):  # a Dataset is a mapping, too
+        for name in cases.keys() - {*COLUMNS, *OPTIONS}:
+            raise unknown(str(name), cases[name])
+        return dict(cases), []
+    columns, present = _columns_in("cases", cases, COLUMNS)
+    return columns, [name for name in present if name not in columns]
+
+
+def unknown(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
+    """The error for a name that is none of ``allowed``."""
+    shown = [name for name in allowed if name not in DEVIATIONS]
+    meant = suggestion(name)
+    advice = f"; did you mean {meant}?" if meant in shown else ""
+    return InputError(name, value, f"one of {', '.join(shown)}{advice}")
+
+
+def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
+    """Refuse a column that resembles an input while that input is missing."""
+    present = {*values}
+    if present & {*ENDS, "k_range"}:
+        present.add("k")
+    for pair in (("omega", "f"), _AMPLITUDES):
+        if present & {*pair}:
+            present |= {*pair}
+    if present >= {*ALL_FIELDS}:
+        return
+    for column in rest:
+        meant = suggestion(str(column))
+        if meant is not None and meant not in present:
+            raise InputError(
+                str(column), "a column", f"named {meant} if it is that: {meant} is missing"
+            )
+
+
 def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset
-    has."""
+    """Those of ``names`` that a mapping, a data frame or one row of it, an Arrow table or stream,
+    or a Dataset has."""
+    return _columns_in(argument, cases, names)[0]
+
+
+def _columns_in(
+    argument: str, cases: Any, names: Iterable[str]
+) -> tuple[dict[str, Any], Iterable[str]]:
+    """The columns of these names, and the names of all columns."""
+    if library_of(cases) == "pandas" and not hasattr(cases, "columns"):  # one row of a frame
+        cases = cases.to_dict()
     # a stream of batches has no columns by name
     if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):
         # its columns come from one reading: a second one may have another order
@@ -167,12 +364,12 @@ def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
     try:
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars
         # have lists of names
-        present = (
+        present: Any = (
             cases
             if hasattr(cases, "keys")
             else getattr(cases, "column_names", None) or cases.columns
         )
-        return {name: cases[name] for name in names if name in present}
+        return {name: cases[name] for name in names if name in present}, present
     except (AttributeError, TypeError, KeyError) as error:
         type_name = f"{type(cases).__module__}.{type(cases).__qualname__}".removeprefix("builtins.")
         raise InputError(
@@ -196,10 +393,10 @@ def library_of(value: Any) -> str:
     return name if name in ("pandas", "xarray", "dask") else ""
 
 
-def has_labels(cases: Any, inputs: Mapping[str, Any]) -> bool:
+def has_labels(values: Iterable[Any]) -> bool:
     """Whether the answer is labelled, since an input is."""
-    values = (cases, *inputs.values())
-    return not _UNLABELLED.issuperset(map(type, values)) and any(map(library_of, values))
+    types = {*map(type, values)}
+    return not types <= _UNLABELLED and any(map(library_of, values))
 
 
 def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
@@ -218,6 +415,8 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
                 "both ends of it"
             )
             raise InputError(name, case[name], bound)
+    for name in case.keys() & {"std", *DEVIATIONS}:
+        raise InputError(name, case[name], NO_DEVIATION)
     for name in case.keys() - {*kind.columns, *_AMPLITUDES, "k_range", *ENDS}:
         bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
         raise InputError(name, case[name], bound)
@@ -226,7 +425,7 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
     }
     for name in inputs.keys() & ({"omega", "f"} if unknown == "omega" else {unknown}):
         raise InputError(name, inputs[name], f"left out, because {unknown} is the unknown or swept")
-    columns = columns_of(by_name(None, {**inputs, unknown: 1.0}, kind), kind)
+    columns = columns_of({**inputs, unknown: 1.0}, kind)
     for name, column in columns.items():
         if np.size(column) != 1:
             raise InputError(name, inputs.get(name, inputs.get("f")), "one number")
@@ -257,26 +456,34 @@ def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def middle(inputs: Mapping[str, Any], strict: bool = False) -> tuple[Array, Array, Array]:
-    """Both ends of an interval, and its geometric middle.
-
-    The middle of an illegal interval is NaN; InputError where ``strict``, and for one interval
-    alone.
-    """
-    low, high = (real(name, inputs[name]) for name in ENDS)
+def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:
+    """Lowest and highest k, each one number or an array, where an interval is given; InputError for
+    one interval that is none."""
+    if values.keys().isdisjoint(("k_range", *ENDS)):
+        return None
+    values = as_ends(values)
+    low, high = (read(name, values[name]).si for name in ENDS)
     try:
-        shape = common_shape((low, high))
+        legal = is_interval(low, high)
     except ValueError as error:
-        raise InputError(
-            "k_range", (low.shape, high.shape), "of shapes that broadcast together"
-        ) from error
-    legal = (low > 0.0) & (low <= high) & (high < math.inf)
-    if not legal.all() and (strict or not legal.ndim):
-        i = int(np.flatnonzero(~legal)[0])
-        ends = tuple(float(np.broadcast_to(end, shape).flat[i]) for end in (low, high))
-        raise InputError("k_range", ends, BOUND, i if shape else None)
-    lower, upper = (np.where(legal, end, np.nan) for end in (low, high))
-    return low, high, np.asarray(np.clip(np.sqrt(lower) * np.sqrt(upper), lower, upper))
+        shapes = np.shape(low), np.shape(high)
+        raise InputError("k_range", shapes, "of shapes that broadcast together") from error
+    if not np.ndim(legal) and not legal:
+        raise InputError("k_range", (low, high), BOUND)
+    return low, high
+
+
+def is_interval(low: Any, high: Any) -> Any:
+    """Whether two stiffnesses are the ends of an interval."""
+    return np.greater(low, 0.0) & np.less_equal(low, high) & np.less(high, math.inf)
+
+
+def middle(low: Any, high: Any) -> float | Array:
+    """The geometric middle of intervals, NaN where one is none."""
+    legal = is_interval(low, high)
+    lower, upper = (np.where(legal, end, math.nan) for end in (low, high))
+    inside = np.clip(np.sqrt(lower) * np.sqrt(upper), lower, upper)
+    return inside if inside.ndim else float(inside)
 
 
 def without_interval(
@@ -286,47 +493,183 @@ def without_interval(
 
     InputError for an interval where k itself is swept.
     """
-    if all(case.get(name) is None for name in ("k_range", *ENDS)):
+    inputs = {name: value for name, value in case.items() if value is not None or name == "k"}
+    ends = ends_in(inputs)
+    if ends is None and isinstance(inputs.get("k"), str):
+        typed = read("k", inputs["k"])
+        ends = None if typed.low is None else (typed.low, typed.high)
+    if ends is None:
         return case, {}
-    values = as_ends(case)
     if along == "k":
-        raise InputError(
-            "k_range", (values["k_low"], values["k_high"]), "left out where k is the swept input"
-        )
-    geometric_middle = middle(values, strict=True)[2]
-    ends = {name: values.pop(name) for name in ENDS}
-    return {**values, "k": geometric_middle}, ends
+        raise InputError("k_range", ends, "left out where k is the swept input")
+    rest = {name: x for name, x in inputs.items() if name not in ("k_range", *ENDS)}
+    return {**rest, "k": middle(*ends)}, dict(zip(ENDS, ends, strict=True))
 
 
 # --- from values to numbers -----------------------------------------------------------------------
 
 
-def columns_of(inputs: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, float | Array]:
-    """The six inputs by the names of ``kind.fields``, each one number or an array of float64.
+def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, float | Array]:
+    """The six inputs by the names of ``kind.fields``, each one number or an array of float64,
+    exact.
 
-    ``inputs`` has them by name, ``f`` [Hz] in place of ``omega`` if not None.  InputError where one
-    is missing, is given twice, or is no real number.
+    InputError where one is missing, is given twice, is no real number, has a deviation, or is the
+    amplitude of another direction.
     """
-    columns: dict[str, float | Array] = {}
-    for name in kind.fields:
-        source = name if name != "omega" else _frequency_in(inputs, kind)
-        try:
-            value = inputs[source]
-        except KeyError:
-            raise _missing(inputs, kind) from None
-        if type(value) is not float and not (
-            type(value) is np.ndarray and value.dtype is _FLOAT and value.ndim
-        ):
-            value = _column(source, value)
-        columns[name] = value if source != "f" else _angular(value)
+    _strange_amplitude(values, kind, refuse=True)
+    for name in values.keys() & {"std", *DEVIATIONS}:
+        raise InputError(name, values[name], NO_DEVIATION)
+    columns, _, std, ends = _numbers(values, kind.fields)
+    for name in std:
+        raise InputError(name, values.get(name, values.get("f")), NO_DEVIATION)
+    if ends is not None:
+        raise InputError("k", values.get("k"), "one value, no interval")
     return columns
 
 
-def _missing(inputs: Mapping[str, Any], kind: Kind) -> InputError:
-    """What to give, where ``inputs`` lack one or more of the six."""
-    frequency = {name for name in ("omega", "f") if inputs.get(name) is not None}
-    present = {*inputs} - {"omega"} | ({"omega"} if frequency else set())
-    absent = [name for name in kind.fields if name not in present]
+_Numbers = dict[str, float | Array]
+
+
+def _numbers(
+    values: Mapping[str, Any], fields: tuple[str, ...]
+) -> tuple[_Numbers, dict[str, Any], _Numbers, tuple[Any, Any] | None]:
+    """The inputs of these names as numbers or arrays; f, where it was given; deviations and ends
+    that stand in the values themselves."""
+    columns: _Numbers = {}
+    std: _Numbers = {}
+    given: dict[str, Any] = {}
+    ends = ends_in(values)
+    for name in fields:
+        source = name if name != "omega" else _frequency_in(values, fields)
+        if name == "k" and ends is not None:
+            columns[name] = middle(*ends)
+            continue
+        if source not in values:
+            if name in _AMPLITUDES and fields is ALL_FIELDS:
+                continue
+            raise _missing(values, fields)
+        value = values[source]
+        if type(value) is not float and not (
+            type(value) is np.ndarray and value.dtype is _FLOAT and value.ndim
+        ):
+            quantity = read(source, value)
+            value = quantity.si
+            if quantity.std is not None:
+                std[name] = quantity.std * field_of(source)[1]
+            if quantity.low is not None:
+                ends = quantity.low, quantity.high
+        if source == "f":
+            given["f"] = value
+            value = _angular(value)
+        columns[name] = value
+    return columns, given, std, ends
+
+
+def _deviations(
+    values: Mapping[str, Any], fields: tuple[str, ...], within: Mapping[str, Any]
+) -> _Numbers:
+    """The deviations that are given beside the values, by field; ``within`` are those that stand in
+    the values themselves."""
+    std: _Numbers = {}
+    for column, name in DEVIATIONS.items():
+        if column not in values:
+            continue
+        value, (field, per) = values[column], field_of(name)
+        if field not in fields:
+            bound = f"left out: this direction has no {name}"
+            raise InputError(column, value, bound)
+        if field in std or field in within:
+            bound = f"left out beside that of {field}: give the deviation once"
+            raise InputError(column, value, bound)
+        deviation = read(name, value)
+        if deviation.std is not None or deviation.low is not None:
+            raise InputError(column, value, "one number: the deviation itself")
+        std[field] = per * deviation.si
+    return std
+
+
+def _strange_amplitude(
+    values: Mapping[str, Any], kind: Kind | None, refuse: bool = False
+) -> dict[str, Any]:
+    """The amplitude of another direction, where there is a column of it: a case is refused where
+    it has a value.  InputError for one value of all cases."""
+    if kind is None:
+        return {}
+    name = _AMPLITUDES[not kind.normal]
+    if name not in values:
+        return {}
+    value = values[name]
+    column = math.nan if value is None else read(name, value).si
+    if refuse or not isinstance(column, np.ndarray):
+        if not np.isnan(column).all() or value is None:
+            raise _no_such_amplitude(name, value, kind)
+        return {}
+    return {name: column}
+
+
+def _no_such_amplitude(name: str, value: Any, kind: Kind) -> InputError:
+    bound = (
+        f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is "
+        f"{_AMPLITUDES[kind.normal]}"
+    )
+    return InputError(name, value, bound)
+
+
+def _texts(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Contact and direction: one text each, or arrays of them."""
+    texts = {}
+    for name, usual in (("contact", CONTACTS[0]), ("direction", DIRECTIONS[0])):
+        text = values.get(name, usual)
+        if not isinstance(text, str):
+            column = np.asarray(text, dtype=object)
+            text = column if column.ndim else column.item()
+        texts[name] = text
+    return texts
+
+
+def _fields(texts: Mapping[str, Any]) -> tuple[str, ...]:
+    """The inputs of cases whose contact or direction is a column."""
+    direction = texts["direction"]
+    return kind_of(direction=direction).fields if isinstance(direction, str) else ALL_FIELDS
+
+
+def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> tuple[Array, Array]:
+    """Both ends of the interval of every case, (n,); InputError for the first that is none, where
+    ``strict``."""
+    low, high = (flat(np.asarray(end), shape or (1,)) for end in ends)
+    if strict:
+        for index in np.flatnonzero(~is_interval(low, high) & ~np.isinf(low)).tolist():
+            where = index if shape else None
+            raise InputError("k_range", (float(low[index]), float(high[index])), BOUND, where)
+    return low, high
+
+
+def _shape_of(*parts: Mapping[str, Any]) -> tuple[int, ...]:
+    """The shape to which all columns broadcast; InputError where they do not."""
+    columns = {name: x for part in parts for name, x in part.items() if isinstance(x, np.ndarray)}
+    try:
+        return common_shape(columns.values())
+    except ValueError as error:
+        shapes = {name: x.shape for name, x in columns.items()}
+        raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
+
+
+def codes_of(words: Mapping[str, Any], shape: tuple[int, ...]) -> Codes:
+    """The kind of each case by its place in KINDS, -1 where there is no such kind; contact and
+    direction are texts or arrays of them."""
+    contacts, directions = (
+        np.broadcast_to(np.asarray(words.get(name, usual), object), shape).ravel().tolist()
+        for name, usual in (("contact", "spring"), ("direction", "across"))
+    )
+    codes = [code_of(*pair) for pair in zip(contacts, directions, strict=True)]
+    return np.array(codes, np.int8).reshape(shape)
+
+
+def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:
+    """What to give, where ``values`` lack one or more of the inputs."""
+    frequency = {name for name in ("omega", "f") if values.get(name) is not None}
+    present = {*values} - {"omega"} | ({"omega"} if frequency else set())
+    absent = [name for name in fields if name not in present]
     in_words = {name: f"{name} [{UNITS.get(name, 'N')}]" for name in absent}
     in_words["omega"] = "omega [rad/s] or f [Hz]"
     bounds = {name: f"given [{UNITS.get(name, 'N')}]" for name in absent} | {
@@ -344,85 +687,27 @@ def _angular(frequency: float | Array) -> float | Array:
     return frequency * RAD_PER_CYCLE
 
 
-def _frequency_in(inputs: Mapping[str, Any], kind: Kind) -> str:
-    """Which of omega and f the inputs have."""
-    if inputs.get("f") is None:
-        if inputs.get("omega") is None:
-            raise _missing(inputs, kind)
+def _frequency_in(values: Mapping[str, Any], fields: tuple[str, ...]) -> str:
+    """Which of omega and f the values have."""
+    if values.get("f") is None:
+        if values.get("omega") is None:
+            raise _missing(values, fields)
         return "omega"
-    if inputs.get("omega") is None:
+    if values.get("omega") is None:
         return "f"
     bound = "left out beside f [Hz], which stands in its place: give one, not both"
-    raise InputError("omega", inputs["omega"], bound)
-
-
-def _column(name: str, value: Any) -> float | Array:
-    """A value of the input ``name`` as one number or an array of float64; InputError with the
-    remedy where it has no real numbers."""
-    if name == AMPLITUDE and value is None:
-        raise InputError(name, None, "given [N] for direction normal")
-    if type(value) in NUMBERS:
-        with suppress(OverflowError):  # a whole number beyond double range is refused below
-            return float(value)
-    try:
-        array = real(name, value)
-    except InputError as error:
-        if name == AMPLITUDE:
-            raise InputError(name, value, LIFTS_OFF) from error.__cause__
-        if name != "k":
-            raise
-        array = stiffness(value)
-    return array if array.ndim else float(array)
-
-
-def stiffness(value: Any) -> Array:
-    """A stiffness, or an array of them, with the word ``rigid`` allowed; InputError with the remedy
-    for a gap."""
-    try:
-        return real("k", _rigid_as_infinity(value))
-    except InputError as error:
-        raise InputError("k", value, STIFFNESS) from error
-
-
-def _rigid_as_infinity(value: Any) -> Any:
-    """A stiffness, or an array of them, with infinity for the word ``rigid``."""
-    if isinstance(value, str):
-        return math.inf if is_rigid(value) else value
-    if not isinstance(value, (list, tuple)) and getattr(
-        getattr(value, "dtype", None), "kind", ""
-    ) not in ("O", "U"):
-        return value
-    try:
-        texts = np.asarray(value, dtype=object)
-        values = [math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]
-        return np.array(values).reshape(texts.shape)
-    except ValueError:  # lists of several lengths
-        return value
+    raise InputError("omega", values["omega"], bound)
 
 
 def real(name: str, value: Any) -> Array:
-    """``value`` as float64; complex numbers, times, text and None are refused, also where numpy
-    would convert them.
-
-    Masked entries are NaN.
-    """
-    try:
-        if isinstance(value, np.ma.MaskedArray):
-            value = (
-                np.ma.filled(value.astype(np.float64), math.nan)
-                if value.dtype.kind in "fiub"
-                else value.data
-            )
-        array = np.asarray(value)
-        if array.dtype.kind in "fiub":
-            return array.astype(np.float64, copy=False)
-        if array.dtype.kind == "O" and not any(
-            isinstance(x, (str, bytes)) or x is None for x in array.ravel()
-        ):
-            return array.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise InputError(name, value, "a real number or an array of them")
+    """A value as an array of float64, exact: InputError where it has a deviation or is an
+    interval."""
+    quantity = read(name, value)
+    if quantity.std is not None:
+        raise InputError(name, value, NO_DEVIATION)
+    if quantity.low is not None:
+        raise InputError(name, value, "one value: only evaluate and its forms take intervals")
+    return np.asarray(quantity.si)
 
 
 def check(
@@ -431,6 +716,11 @@ def check(
     """Refuse the first value out of :data:`BOUNDS`; ``frequency`` has the values of ``f`` where
     it replaced omega, ``shape`` is that of all cases, for the index of the case."""
     for name, values in columns.items():
+        if type(values) is float and (
+            (values > 0.0 or (values == 0.0 and name not in POSITIVE))
+            and (values < math.inf or name == "k")
+        ):
+            continue
         legal = np.greater(values, 0.0) if name in POSITIVE else np.greater_equal(values, 0.0)
         illegal = ~(legal if name == "k" else legal & np.isfinite(values))
         if illegal.any():

@@ -74,10 +74,12 @@ class Kind(NamedTuple):
 SPRING, BALL = Kind(0, 0), Kind(1, 0)  # across
 _KINDS: dict[tuple[str, str], Kind] = {
     (contact, direction): Kind(i, j)
-    for i, contact in enumerate(CONTACTS)
     for j, direction in enumerate(DIRECTIONS)
+    for i, contact in enumerate(CONTACTS)
 }
 del _KINDS["ball", "normal"]
+#: all that there are
+KINDS = (*_KINDS.values(),)
 
 
 def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
@@ -102,3 +104,15 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
         "radius, not modelled"
     )
     raise InputError("direction", direction, bound)
+
+
+def code_of(contact: object, direction: object) -> int:
+    """The place of a contact and a direction in :data:`KINDS`, -1 where there is none.
+
+    >>> code_of("ball", "across"), code_of("ball", "normal")
+    (1, -1)
+    """
+    try:
+        return KINDS.index(_KINDS[contact, direction])  # type: ignore[index]
+    except (KeyError, TypeError):
+        return -1

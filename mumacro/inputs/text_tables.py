@@ -1,212 +1,636 @@
-"""Tables with a head: separator and decimal sign of CSV, which column is which input, its unit,
-cells as numbers."""
+"""Tables as people and rigs write them: lines before the head, comments, separators, a row of
+units, numbers with any decimal sign, gaps.
+
+:func:`find_layout` looks at the first lines and finds how a table is written: the head is the first
+line that names what is needed.  :func:`rows` gives its records with the numbers of their lines, as
+an editor counts them, and :func:`read_cell` the number in a cell.  :func:`read_table` is all of it
+for a table in memory; files of any length are read in pieces (:mod:`mumacro.files.reading`).
+"""
 
 import csv
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain, islice
+from pathlib import Path
+from typing import NamedTuple
 
-from mumacro.inputs.fields import LIKE, is_rigid, unit_of
-from mumacro.inputs.names import suggestion
-from mumacro.inputs.old_texts import PLAIN, number_hint
-from mumacro.inputs.units import UNITS_OF, Scale, scale_of, split_unit
+import numpy as np
 
-#: separators of the cells of CSV, by name
-SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
-TOO_LARGE = "is beyond double range"
-NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
-# decimal sign -> a number that has it
-_SIGNED = {sign: re.compile(rf"[+-]?\d*[{sign}]\d+([eE][+-]?\d+)?") for sign in ".,"}
+from mumacro.errors import InputError
+from mumacro.inputs.decoding import NAMES, Piece, Text, TextError, file_pieces
+from mumacro.inputs.fields import is_rigid
+from mumacro.inputs.headings import (
+    absent,
+    absent_together,
+    find_heads,
+    heading,
+    meant_by,
+    unit_in_si,
+)
+from mumacro.inputs.numbers import TOO_LARGE, read_number
+from mumacro.inputs.reading import Value, read, reason_of
+from mumacro.inputs.signs import Cell, Signs
+from mumacro.inputs.units import Scale, scale_of, split_unit
+from mumacro.inputs.workbooks import BEGIN, SEP, sheet_of, sheet_pieces
+from mumacro.kernel.arrays import Array
+
+BLANKS = " "  #: the separator where any number of blanks stands between the cells
+#: separators of the cells, by the name that an option has
+SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}
+_WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
+_WORDS_OF_SIGNS = {".": "point", ",": "comma"}
+COMMENT = ("#", "%", "//", "!")  #: what begins a comment
+_LOOKED_AT = 2_000  # lines, in which the head must stand
+_MOST_COLUMNS = 200_000
+_GAP, SI_UNIT = Value(math.nan), Scale()
+#: cells without a value, in small letters
+GAPS = frozenset(
+    (
+        *("", "-", "--", "---", "—", "–", "−", ".", "..", "...", "?", "*"),
+        *("nan", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "1.#ind", "-1.#ind"),
+        *("na", "n/a", "n.a.", "n.d.", "k.a.", "k. a.", "n. v.", "<na>", "#n/a", "#na", "#nv"),
+        *("null", "(null)", "none", "nil", "missing", "undefined"),
+        *("#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#num!", "#zahl!", "#name?"),
+    )
+)
+# cells between blanks: quoted, or with blanks within brackets; brackets belong to what is before
+_CELL = re.compile(r'"([^"]*)"|((?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+)')
+_SEP_LINE = re.compile(r'\ufeff?"?sep=(.)"?', re.IGNORECASE | re.DOTALL)
+_APART = "give the rows from there on as a file of their own"
+_END_OF_HEADER = "***End_of_Header***"
 
 
-def _advice(
-    header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]
-) -> str | None:
-    """The options to give where a file has another separator or decimal sign; else None."""
-    separator, sign = _detect(header, rows, sep, decimal, more)
-    if (separator, sign) == (sep, decimal):
+class Dialect(NamedTuple):
+    """How a person says that a table is written; what is None is found out."""
+
+    sep: str | None = None  #: a character, or :data:`BLANKS`
+    decimal: str | None = None
+    thousands: str | None = None  #: empty where there is none
+    encoding: str | None = None
+    skip: int = 0  #: lines to leave out at the beginning
+    dashes: str = "--"  #: before the name of an option, in messages
+
+    def signs(self, layout: "Layout") -> Signs:
+        """What is known of the signs of numbers in a table."""
+        return Signs(self.decimal or layout.decimal, self.thousands, layout.sep, self.dashes)
+
+
+class Wanted(NamedTuple):
+    """The columns of a table that mean something."""
+
+    like: Mapping[str, str]  #: by name, the input whose units it has
+    needed: Sequence[Sequence[str]]  #: of each, one name must be there
+
+
+class Layout(NamedTuple):
+    """How a table is written."""
+
+    sep: str
+    decimal: str | None  #: as the table says itself
+    head: int  #: the line of the head
+    units: int | None  #: the line of the units, where they have one
+    heads: list[str]  #: names of the columns, with their units in brackets
+    first: int  #: the line behind them
+    names_first: bool  #: whether the first column is none of those that mean something
+    labview: bool  #: whether LabVIEW wrote it
+    encoding: str
+    skipped: list[int]  #: lines before the head that are not empty
+
+    @property
+    def without_comments(self) -> bool:
+        """Whether rows end before the last column, as LabVIEW writes them."""
+        return self.labview and self.heads[-1:] == ["Comment"]
+
+    def described(self, signs: Signs) -> str:
+        """How the table is read, in a few words; empty for plain CSV.
+
+        >>> wanted = Wanted({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
+        >>> start = Piece(1, ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"])
+        >>> layout = find_layout(start, wanted, Dialect())
+        >>> (signs := Dialect().signs(layout)).see([Cell(4, "v0", "1,5")])
+        >>> layout.described(signs)
+        'semicolon, decimal comma, head in line 2, units in line 3'
+        """
+        words = (
+            []
+            if self.encoding in ("", "utf-8", "utf-8-sig")
+            else [NAMES.get(self.encoding, self.encoding)]
+        )
+        words += [_WORDS.get(self.sep, repr(self.sep))] if self.sep != "," else []
+        words += ["decimal comma"] if signs.decimal == "," else []
+        words += [f"{_WORDS_OF_SIGNS[signs.grouped]} between thousands"] if signs.grouped else []
+        words += [f"head in line {self.head}"] if self.head > 1 else []
+        words += [f"units in line {self.units}"] if self.units else []
+        return ", ".join(words)
+
+
+class Record(NamedTuple):
+    """A row of a table."""
+
+    line: int  #: where it begins, as an editor counts
+    cells: list[str]
+    fault: str | None = None  #: why it is no row of this table
+    text: str = ""  #: as it stands there
+    is_whole: bool = True  #: whether the text has the cells and no others
+
+
+# --- how a table is written -----------------------------------------------------------------------
+
+
+class _Declared(NamedTuple):
+    """What the lines before the head say of the table."""
+
+    sep: str | None = None
+    decimal: str | None = None
+    labview: bool = False
+    units: int | None = None  # index of a line of LabVIEW with the units of the columns
+
+
+class _Head(NamedTuple):
+    at: int  # index of its line
+    end: int  # index of the line behind it
+    sep: str
+    cells: list[str]
+
+
+def find_layout(start: Piece, wanted: Wanted, dialect: Dialect, encoding: str = "") -> Layout:
+    """How a table is written, from its first lines.
+
+    Where no line names all that is needed, the head is the line that most probably is meant for it.
+    TextError where there is no line at all, or the row of units has a unit that is none.
+    """
+    lines, number = start.lines, start.first
+    declared = _declared(lines)
+    sep = dialect.sep or declared.sep
+    seps = (sep,) if sep else tuple(SEPARATORS.values())
+    found = [*islice(_heads_in(lines, dialect.skip, seps, wanted), 20)]
+    head = next((one for one in found if _fits(one, lines, declared.labview)), None)
+    head = head or (found[0] if found else _likely_head(lines, dialect.skip, seps))
+    cells = head.cells
+    while cells and not cells[-1]:
+        cells = cells[:-1]
+    heads = [heading(cell, wanted.like) for cell in cells]
+    first, units = head.end, None
+    if declared.units is not None:
+        label_line = _split(lines[declared.units], head.sep)
+        heads = _with_units(heads, ["", *label_line[1:]], wanted, number + declared.units) or heads
+        units = number + declared.units
+    commented = lines[head.at].lstrip("\ufeff ").startswith(COMMENT)
+    at = next(
+        (
+            i
+            for i in range(head.end, len(lines))
+            if lines[i].strip(f" \t{head.sep}")
+            and (commented or not lines[i].lstrip().startswith(COMMENT))
+        ),
+        None,
+    )
+    if at is not None:
+        is_comment = lines[at].lstrip().startswith(COMMENT)
+        unit_cells = _split(_uncommented(lines[at]) if is_comment else lines[at], head.sep)
+        with_units = _with_units(heads, unit_cells, wanted, number + at, is_comment)
+        if with_units:
+            heads, first, units = with_units, at + 1, number + at
+    return Layout(
+        head.sep,
+        declared.decimal,
+        number + head.at,
+        units,
+        heads,
+        number + first,
+        bool(heads) and split_unit(heads[0])[0] not in wanted.like,
+        declared.labview,
+        encoding,
+        [number + i for i in range(head.at) if lines[i].strip()],
+    )
+
+
+def _declared(lines: Sequence[str]) -> _Declared:
+    first = next((line for line in lines if line.strip()), "")
+    if match := _SEP_LINE.fullmatch(first.rstrip("\n")):
+        return _Declared(sep=match[1])
+    if not first.lstrip("\ufeff").startswith("LabVIEW Measurement"):
+        return _Declared()
+    sep = decimal = units = None
+    ends = 0
+    for i, line in enumerate(lines[:_LOOKED_AT]):
+        tag, *values = re.split(r"[\t,]", line.strip(), maxsplit=1)
+        value = values[0].strip() if values else ""
+        ends += tag == _END_OF_HEADER
+        if tag == "Separator":
+            sep = "," if value.lower() == "comma" else "\t"
+        elif tag == "Decimal_Separator":
+            decimal = value if value in (".", ",") else None
+        elif tag == "Y_Unit_Label" and ends < 2:
+            units = i
+    return _Declared(sep or "\t", decimal, True, units)
+
+
+def _heads_in(
+    lines: Sequence[str], skip: int, seps: Sequence[str], wanted: Wanted
+) -> Iterator[_Head]:
+    """The lines that name all that is needed."""
+    for i in range(skip, min(len(lines), _LOOKED_AT)):
+        names_all = all(any(name in lines[i] for name in names) for names in wanted.needed)
+        # of an odd number of quotes a cell goes on in the next line
+        if not names_all and lines[i].count('"') % 2 == 0:
+            continue
+        text, end = _whole(lines, i)
+        for sep in seps:
+            cells = _split(_uncommented(text), sep)
+            there = {split_unit(heading(cell, wanted.like))[0] for cell in cells}
+            if all(there.intersection(names) for names in wanted.needed):
+                yield _Head(i, end, sep, cells)
+
+
+def _whole(lines: Sequence[str], i: int) -> tuple[str, int]:
+    """A line with those behind it in which its quoted cells end, and the index behind them."""
+    text = lines[i]
+    for end in range(i + 1, min(i + 20, len(lines))):
+        if text.count('"') % 2 == 0:
+            return text, end
+        text += f"\n{lines[end]}"
+    return (text, min(i + 20, len(lines))) if text.count('"') % 2 == 0 else (lines[i], i + 1)
+
+
+def _uncommented(line: str) -> str:
+    """A line without the sign that makes it a comment: the head of a table may be in one."""
+    text = line.lstrip("\ufeff ")
+    return text.lstrip("#%/!").lstrip() if text.startswith(COMMENT) else text
+
+
+def _split(line: str, sep: str) -> list[str]:
+    """The cells of a head or of a row of units, without the blanks around them."""
+    if sep != BLANKS and line.count(sep) > _MOST_COLUMNS:
+        return []
+    if sep == BLANKS:
+        cells: list[str] = []
+        for match in _CELL.finditer(line):
+            if cells and match[0][0] in "[(":
+                cells[-1] += f" {match[0]}"
+            else:
+                cells.append(match[0].strip('"'))
+        return cells
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(sep)]
+    try:
+        cells = next(csv.reader([line], delimiter=sep, skipinitialspace=True), [])
+    except csv.Error:
+        return [line.strip()]
+    return [cell.strip() for cell in cells]
+
+
+def _fits(head: _Head, lines: Sequence[str], labview: bool) -> bool:
+    """Whether the row behind a head has as many cells."""
+    width = len(head.cells)
+    for line in islice(lines, head.end, None):
+        if line.strip() and not line.lstrip().startswith(COMMENT):
+            cells = _split(line, head.sep)
+            return len(cells) in (width, width - labview) or not any(cells[width:] or ["x"])
+    return True
+
+
+def _likely_head(lines: Sequence[str], skip: int, seps: Sequence[str]) -> _Head:
+    """The line that is probably meant for a head: one whose names are like those of inputs, or the
+    one above the first numbers."""
+    best, most = None, 0.0
+    for i in range(skip, min(len(lines), _LOOKED_AT)):
+        for sep in seps:
+            cells = _split(_uncommented(lines[i][:100_000]), sep)
+            if not any(cells):
+                continue
+            alike = sum(meant_by(cell, loosely=False) is not None for cell in cells[:200])
+            below = _split(lines[i + 1][:10_000], sep) if i + 1 < len(lines) else []
+            numbers = sum(_is_number(cell) for cell in below)
+            is_above = len(below) == len(cells) and numbers > len(cells) // 2
+            score = alike + 0.5 * is_above + 0.01 * (sep in lines[i])
+            if not any(map(_is_number, cells)) and score > most:
+                best, most = _Head(i, i + 1, sep, cells), score
+    if best is not None:
+        return best
+    at = next((i for i in range(skip, len(lines)) if lines[i].strip()), None)
+    if at is None:
+        raise TextError(f"line {skip + 1}: must name the columns, and is empty")
+    return _Head(at, at + 1, seps[0], _split(lines[at][:10_000], seps[0])[:_MOST_COLUMNS])
+
+
+def _is_number(cell: str) -> bool:
+    """Whether a cell begins as numbers do."""
+    return cell.lstrip("+-−.,")[:1].isdigit()
+
+
+def _with_units(
+    heads: Sequence[str],
+    cells: Sequence[str],
+    wanted: Wanted,
+    line: int,
+    may_be_prose: bool = False,
+) -> list[str] | None:
+    """The heads with the units in the row below them; None where that is no row of units.
+
+    A row without any number is one, unless it ``may_be_prose``: TextError where an input has none
+    of its units there.
+    """
+    names = [split_unit(head) for head in heads]
+    texts = [cell.strip(" []()") for cell in cells[: len(heads)]] + [""] * (len(heads) - len(cells))
+    known = [i for i, (name, _) in enumerate(names) if name in wanted.like and texts[i]]
+    scales = {i: scale_of(wanted.like[names[i][0]], texts[i]) for i in known}
+    units = [i for i in known if scales[i] is not None and texts[i] not in ("-", "1")]
+    numbers = [texts[i] for i in known if i not in units and _is_number(texts[i])]
+    if any(number != "1" for number in numbers) or any(map(str.strip, cells[len(heads) :])):
         return None
-    word = next(word for word, character in SEPARATORS.items() if character == separator)
-    finding = f"the columns are separated by {word!r} and the decimal sign is {sign!r}"
-    return f"{finding}: give --sep '{word}' --decimal '{sign}'"
-
-
-def _detect(
-    header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]
-) -> tuple[str, str]:
-    """The separator that gives most names of inputs or ``more``, and the decimal sign of most
-    numbers; at a tie those of the options."""
-
-    def inputs(separator: str) -> list[int]:
-        names = [split_unit(name)[0] for name in header.replace('"', "").split(separator)]
-        return [
-            i for i, name in enumerate(names) if name in more or suggestion(name, loosely=False)
-        ]
-
-    best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
-    input_columns = inputs(best)
-    cells = [
-        cell.strip()
-        for row in csv.reader(rows, delimiter=best)
-        for i, cell in enumerate(row)
-        if i in input_columns
+    is_empty = any(texts[i].lower() in GAPS or is_rigid(texts[i]) for i in known)
+    if not known or (not units and (numbers or is_empty)):
+        return None
+    if may_be_prose and len(units) < len(known):
+        return None
+    for i in known:
+        name, own = names[i]
+        if scales[i] is None:
+            raise TextError(
+                f"line {line}: {texts[i][:40]!r} is neither a number nor a unit of {name}"
+            )
+        if own is not None and scale_of(wanted.like[name], own) != scales[i]:
+            raise TextError(
+                f"line {line}: {name} is in {texts[i]}, its head says {own}; leave one of them out"
+            )
+    return [
+        f"{head} [{text}]"
+        if own is None and text not in ("", "-", "1") and len(text) <= 20
+        else head
+        for head, text, (_, own) in zip(heads, texts, names, strict=True)
     ]
 
-    def cells_with(sign: str) -> int:
-        return sum(_SIGNED[sign].fullmatch(cell) is not None for cell in cells)
 
-    return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
+def begin(text: Text, wanted: Wanted, dialect: Dialect) -> tuple[Layout, Iterator[tuple[int, str]]]:
+    """How a text is written, and the numbered lines behind the head."""
+    start = list[str]()
+    for piece in text:
+        start += piece.lines
+        if len(start) >= _LOOKED_AT:
+            break
+    layout = find_layout(Piece(1, start), wanted, dialect, text.encoding)
+    lines = chain(start, chain.from_iterable(piece.lines for piece in text))
+    return layout, iter(enumerate(islice(lines, layout.first - 1, None), layout.first))
 
 
-def read_text(data: bytes, where: str) -> str:
-    """A file of CSV as text, without the mark of byte order; ValueError with the remedy where it is
-    no UTF-8.
+# --- its rows -------------------------------------------------------------------------------------
 
-    >>> read_text(b"v0 [mm/s];\\xb5", "points.csv")
-    Traceback (most recent call last):
-    ValueError: points.csv: line 1 is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)
+
+def is_row(line: str, layout: Layout) -> bool:
+    """Whether a line is neither empty nor a comment.
+
+    A name such as #1 in the first column makes no comment of a row that is whole.
     """
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise ValueError(f"{where}: line {line} {NO_UTF8}") from None
+    sep = layout.sep
+    if not line.strip(f" \t{sep}"):
+        return False
+    if not line.lstrip().startswith(COMMENT):
+        return True
+    cells = len(line.split()) if sep == BLANKS else line.count(sep) + 1
+    return layout.names_first and cells == len(layout.heads) > 1
 
 
-def read_head(
-    line: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str] = ()
-) -> list[str]:
-    """The names in the first line of CSV; ValueError where it is no header, or the ``rows``
-    behind it need other options.
+def may_be_head(text: str, layout: Layout, wanted: Wanted) -> bool:
+    """Whether a text has all names that a head needs, or begins another segment of LabVIEW."""
+    if layout.labview and _END_OF_HEADER in text:
+        return True
+    return all(any(name in text for name in names) for names in wanted.needed)
 
-    ``more`` are names of columns that are no inputs.
 
-    >>> read_head("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
-    Traceback (most recent call last):
-    ValueError: the columns are separated by ';' and the decimal sign is ',': give --sep ';'
-    --decimal ','
+def records(
+    lines: Iterator[tuple[int, str]],
+    layout: Layout,
+    wanted: Wanted,
+    skip: Callable[[int], None] = lambda _line: None,
+) -> Iterator[Record]:
+    """The rows among numbered lines; a quoted cell may go on in the next lines.
+
+    Comments and repetitions of the head are left out, and ``skip`` is told their lines.  TextError
+    where a quote is not closed, and where another head begins.
     """
-    try:
-        cells = next(csv.reader([line], delimiter=sep, strict=True), [])
-    except csv.Error as error:
-        raise ValueError(f"is no header of CSV ({error})") from None
-    if not any(map(str.strip, cells)):
-        raise ValueError("must name the columns, and is empty")
-    if remedy := _advice(line, rows, sep, decimal, more):
-        raise ValueError(remedy)
-    return cells
-
-
-def find_heads(
-    heads: Sequence[str], like: Mapping[str, str]
-) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
-    """The place and unit of each column by name, and the faults of the heads.
-
-    ``like`` has the names of the columns, and for each the input whose units it has; other columns
-    are left out.
-
-    >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
-    ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
-    """
-    columns: dict[str, tuple[int, Scale]] = {}
-    faults = []
-    for i, head in enumerate(heads):
-        name, unit = split_unit(head)
-        if name not in like:
+    sep, width = layout.sep, len(layout.heads)
+    for line, text in lines:
+        if not is_row(text, layout):
+            if text.strip(f" \t{sep}"):
+                skip(line)
             continue
-        scale = Scale() if unit is None else scale_of(like[name], unit)
-        if scale is None:
-            hint = (
-                "; a frequency is f [Hz]" if name == "omega" and scale_of("f", unit or "") else ""
-            )
-            units = ", ".join(sorted(UNITS_OF[like[name]]))
-            faults.append(
-                f"the column {head!r} has a unit that {name} cannot have{hint}; known are {units}"
-            )
-        if name in columns:
-            faults.append(
-                f"{name} is there twice: {heads[columns[name][0]]!r} and {head!r}; rename one"
-            )
-        columns[name] = i, scale or Scale()
-    if {"f", "omega"} <= columns.keys():
-        faults.append("there are both f [Hz] and omega [rad/s]; leave one out")
-    return columns, faults
+        if may_be_head(text, layout, wanted) and _repeats_head(line, text, layout, wanted):
+            skip(line)
+            continue
+        if '"' in text:
+            cells, text = _quoted(line, text, lines, sep)
+        elif sep == BLANKS:
+            cells = text.split()
+        elif text.count(sep) > 2 * width + 1000:  # no use in taking it apart
+            yield Record(line, [], _irregular(text.count(sep) + 1, width), text)
+            continue
+        else:
+            cells = text.split(sep)
+        yield _regular(Record(line, cells, None, text), layout)
 
 
-def meant_by(head: str, *, loosely: bool = True) -> str | None:
-    """The input that a head probably stands for, as a whole or by its first word: k for
-    ``k_N_per_mm``."""
-    name = split_unit(head)[0]
-    first = re.split(r"[\W_]+", name.strip("_ "))[0]
-    return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
+def _repeats_head(line: int, text: str, layout: Layout, wanted: Wanted) -> bool:
+    """Whether a line is the head again; TextError where it is another one."""
+    heads = [heading(cell, wanted.like) for cell in _split(_uncommented(text), layout.sep)]
+    names = [split_unit(head)[0] for head in heads]
+    if text.startswith(_END_OF_HEADER):
+        raise TextError(f"line {line} begins another segment: {_APART}")
+    if not all(any(name in names for name in group) for group in wanted.needed):
+        return False
+    if names[: len(layout.heads)] == [split_unit(head)[0] for head in layout.heads]:
+        return True
+    raise TextError(f"line {line} is another head: {_APART}")
 
 
-def absent(name: str, heads: Sequence[str]) -> str:
-    """What to do about a column that is missing.
+def _quoted(
+    line: int, text: str, lines: Iterator[tuple[int, str]], sep: str
+) -> tuple[list[str], str]:
+    """The cells of a row with quotes, which may go on in the next lines, and all of its text."""
+    if sep == BLANKS:
+        return [match[0].strip('"') for match in _CELL.finditer(text)], text
+    texts = [text]
 
-    >>> absent("v0", ["speed", "mu_macro"])
-    "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
-    brackets)"
-    """
-    if alike := _similar(name, heads):
-        remedy = f"rename that column to {alike[1]} (or another unit in brackets)"
-        return f"there is no column {name}; {alike[0]!r} is similar: {remedy}"
-    meaning = ": the mean friction force over Fz" if name == "mu_macro" else ""
-    columns = ", ".join(map(repr, heads))
-    return f"there is no column {_heading(name)}{meaning}; there are {columns}"
+    def with_ends() -> Iterator[str]:
+        yield f"{text}\n"
+        for _, following in lines:
+            texts.append(following)
+            yield f"{following}\n"
 
-
-def absent_together(names: Sequence[str], heads: Sequence[str]) -> str:
-    """What to do about several columns that are missing; what they share is told once.
-
-    >>> absent_together(["Fz", "v0"], ["speed", "note"])
-    "there are no columns Fz [N], v0 [m/s]; there are 'speed', 'note'; similar: rename 'speed' to
-    v0 [m/s]"
-    """
-    headings = ", ".join(map(_heading, names))
-    renames = [f"{one[0]!r} to {one[1]}" for name in names if (one := _similar(name, heads))]
-    remedy = f"; similar: rename {', '.join(renames)}" if renames else ""
-    columns = ", ".join(map(repr, heads))
-    return f"there are no columns {headings}; there are {columns}{remedy}"
+    try:
+        reader = csv.reader(with_ends(), delimiter=sep, strict=True, skipinitialspace=True)
+        cells = next(reader)
+    except csv.Error as error:
+        fault = f"a quote is not closed, or not at the end of its cell ({error})"
+        raise TextError(f"line {line}: {fault}") from None
+    return cells, "\n".join(texts)
 
 
-def _heading(name: str) -> str:
-    """The heading that a column of an input has, in SI units."""
-    heading = f"{name} [{unit_of(name) if name in (*UNITS_OF, *LIKE) else '-'}]"
-    return f"{heading} or f [Hz]" if name == "omega" else heading
+def _regular(record: Record, layout: Layout) -> Record:
+    """A row with as many cells as the head, or with its fault; empty cells may follow."""
+    cells, width = record.cells, len(layout.heads)
+    if len(cells) == width:
+        return record
+    if len(cells) > width and not any(map(str.strip, cells[width:])):
+        return record._replace(cells=cells[:width], is_whole=False)
+    if len(cells) == width - 1 and layout.without_comments:
+        return record._replace(cells=[*cells, ""], is_whole=False)
+    return record._replace(fault=_irregular(len(cells), width))
 
 
-def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
-    """The head that probably stands for an input, and the heading that it should have."""
-    for head in heads:
-        field = meant_by(head)
-        if field and field in (name, {"omega": "f"}.get(name)):
-            return head, f"{field} [{unit_of(field)}]"
-    return None
+def _irregular(count: int, width: int) -> str:
+    return f"has {count:,} cell{'s' * (count != 1)}, the head has {width:,}"
 
 
-def read_cell(name: str, cell: str, decimal: str = ".") -> float:
-    """The number in a cell of the column ``name``: NaN where it is empty, infinity for the word
-    rigid in k.
+# --- its numbers ----------------------------------------------------------------------------------
 
-    With a decimal comma 1.5 is refused: it may stand for 1500.  ValueError says what is wrong.
 
-    >>> read_cell("v0", " 0,5 ", ","), read_cell("k", "Rigid"), read_cell("k", "")
-    (0.5, inf, nan)
+def read_cell(name: str, cell: str, signs: Signs, scale: Scale = SI_UNIT) -> Value:
+    """What a cell of the column ``name`` says, in SI: NaN for a gap.
+
+    A number is in the unit of the column, whose ``scale`` is given; a unit in the cell comes first.
+    ValueError says what is wrong.
+
+    >>> german = Signs(",", None)
+    >>> read_cell("v0", "1.000,5", german, Scale(over=1e3)).si, read_cell("k", "Rigid", german).si
+    (1.0005, inf)
+    >>> read_cell("v0", "5 um/s", german, Scale(over=1e3)).si, read_cell("k", "#NV", german).si
+    (5e-06, nan)
     """
     text = cell.strip()
-    if not text:
-        return math.nan
-    if name == "k" and is_rigid(text):
-        return math.inf
-    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
-    if not PLAIN.fullmatch(plain):
-        has_hint = decimal == "." or (name == "k" and ".." in text)
-        raise ValueError(
-            number_hint(name, text) if has_hint else f"must be a number such as 0{decimal}5"
+    if text.lower() in GAPS:
+        return _GAP
+    signs.check(text)
+    try:
+        number = read_number(text, signs.decimal)
+    except ValueError as error:
+        # a number that is none for this decimal sign, and not one with a unit or an interval
+        if ".." not in text and not text.strip("0123456789.,'’+-−eEdD \u00a0\u202f"):
+            raise ValueError(str(error)) from None
+    else:
+        value = scale.si(number)
+        if math.isinf(value) and math.isfinite(number):
+            raise ValueError(TOO_LARGE)
+        return Value(value)
+    try:
+        return read(name, signs.with_points(text))
+    except InputError as error:
+        raise ValueError(reason_of(error.bound)) from None
+
+
+class Table(NamedTuple):
+    """Columns of numbers that were read."""
+
+    columns: dict[str, Array]  #: by name, in SI, (n,)
+    units: dict[str, str]  #: of each column in the table; the SI unit where it has none
+    scales: dict[str, Scale]  #: of these units
+    lines: list[int]  #: of each row
+    skipped: list[int]  #: lines that are neither head nor units nor rows, and not empty
+    read_as: str  #: what was found out, see :meth:`Layout.described`
+
+    @property
+    def in_own_units(self) -> dict[str, Array]:
+        """The columns in their units."""
+        return {name: _in_unit(x, self.scales[name]) for name, x in self.columns.items()}
+
+
+def _in_unit(values: Array, scale: Scale) -> Array:
+    """Values in SI in another unit, with the digits that both have."""
+    own = values * scale.over / scale.times
+    return np.array([float(f"{value:.15g}") for value in own.tolist()])
+
+
+def source_of(
+    source: Path | bytes, dialect: Dialect, seen: Callable[[int], None] = lambda _at: None
+) -> tuple[Iterator[bytes], Dialect]:
+    """The pieces of a table's bytes, of a workbook those of its first sheet, and how it is written.
+
+    ``seen`` is told how far a file is read.
+    """
+    if isinstance(source, bytes):
+        begin, pieces = source[:4], iter([source])
+    else:
+        with source.open("rb") as stream:
+            begin = stream.read(4)
+        pieces = file_pieces(source, seen)
+    if begin != BEGIN:
+        return pieces, dialect
+    sheet = sheet_of(source) if isinstance(source, bytes) else _sheet_in(source)
+    return sheet, Dialect(SEP, ".", None, "utf-8", dialect.skip, dialect.dashes)
+
+
+def _sheet_in(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as stream:
+        yield from sheet_pieces(stream)
+
+
+def read_table(
+    source: Path | bytes, wanted: Wanted, dialect: Dialect, most: int = 1_000_000
+) -> Table:
+    """The columns of a table that mean something, in SI, from a file or its bytes.
+
+    TextError tells all that is wrong: its ``faults`` are one for each line.  A table may have
+    ``most`` rows.
+
+    >>> data = "Rig 7\\n\\nv0\\tmu_macro\\nmm/s\\t%\\n1,5\\t7\\n2,5\\t9\\n".encode()
+    >>> table = read_table(data, Wanted({"v0": "v0", "mu_macro": "mu0"}, [["v0"]]), Dialect())
+    >>> table.columns["mu_macro"].tolist(), table.skipped
+    ([0.07, 0.09], [1])
+    >>> table.read_as
+    'tab, decimal comma, head in line 3, units in line 4'
+    """
+    pieces, dialect = source_of(source, dialect)
+    text = Text(pieces, dialect.encoding)
+    layout, lines = begin(text, wanted, dialect)
+    columns, faults = find_heads(layout.heads, wanted.like)
+    missing = [group[0] for group in wanted.needed if not columns.keys() & set(group)]
+    if missing:
+        one = len(missing) == 1
+        faults.append(
+            absent(missing[0], layout.heads) if one else absent_together(missing, layout.heads)
         )
-    value = float(plain)
-    # too many digits must not pass for an infinite stiffness
-    if math.isinf(value) and any(map(str.isdigit, plain)):
-        raise ValueError(TOO_LARGE)
-    return value
+    if faults:
+        raise TextError.of([f"line {layout.head}: {fault}" for fault in faults])
+    skipped = [*layout.skipped]
+    rows = [*islice(records(lines, layout, wanted, skipped.append), most + 1)]
+    if len(rows) > most:
+        raise TextError(f"line {rows[-1].line}: there are more than {most:,} rows: average them")
+    if not rows:
+        raise TextError(f"line {layout.head}: no row follows the names of the columns")
+    signs = dialect.signs(layout)
+    whole = [row for row in rows if row.fault is None]
+    signs.see(
+        Cell(row.line, name, row.cells[i]) for row in whole for name, (i, _) in columns.items()
+    )
+    numbers = {name: np.empty(len(whole)) for name in columns}
+    wrong = [(row.line, f"line {row.line} {row.fault}") for row in rows if row.fault]
+    for name, (i, scale) in columns.items():
+        for j, row in enumerate(whole):
+            try:
+                numbers[name][j] = _one_number(name, row.cells[i], signs, scale)
+            except ValueError as error:
+                wrong.append((row.line, f"line {row.line}: {name} {error}"))
+    if wrong:
+        raise TextError.of([fault for _, fault in sorted(wrong, key=lambda one: one[0])])
+    units = {
+        name: split_unit(layout.heads[i])[1] or unit_in_si(name) for name, (i, _) in columns.items()
+    }
+    scales = {name: scale for name, (_, scale) in columns.items()}
+    lines_of_rows = [row.line for row in whole]
+    return Table(numbers, units, scales, lines_of_rows, skipped, layout.described(signs))
+
+
+def _one_number(name: str, cell: str, signs: Signs, scale: Scale) -> float:
+    """The number in a cell [SI]; ValueError where there is none, or more."""
+    shown = f", got {cell.strip()[:80]!r}"
+    try:
+        value = read_cell(name, cell, signs, scale)
+    except ValueError as error:
+        raise ValueError(f"{error}{shown}") from None
+    if value.std is not None or value.low is not None:
+        column = "; a deviation of mu_macro is a column std" if name == "mu_macro" else ""
+        raise ValueError(f"must be one number{column}{shown}")
+    if math.isnan(value.si):
+        raise ValueError("is missing")
+    return float(value.si)

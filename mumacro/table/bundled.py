@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from mumacro.errors import InputError, TableError
+
 _PACKAGE = Path(__file__).resolve().parent.parent
 
 
@@ -19,3 +21,26 @@ def bundled_tables() -> list[Path]:
         if paths:
             return paths
     return []
+
+
+def bundled_table(tolerance: float | None) -> Path:
+    """The tightest bundled table, or the smallest that meets ``tolerance``."""
+    tables = {float(path.stem.removeprefix("mumacro-")): path for path in bundled_tables()}
+    if not tables:
+        raise TableError("mumacro-*.nc", "no table is bundled with this installation; name a file")
+    if tolerance is None:
+        return tables[min(tables)]
+    if (
+        isinstance(tolerance, bool)
+        or not isinstance(tolerance, (int, float))
+        or not tolerance > 0.0
+    ):
+        raise InputError("tolerance", tolerance, "a path, a tolerance > 0, or None")
+    sufficient = [candidate for candidate in tables if candidate <= tolerance]
+    if not sufficient:
+        raise InputError(
+            "tolerance",
+            tolerance,
+            f">= {min(tables):g}, the tightest bundled table, or the path of another",
+        )
+    return tables[max(sufficient)]

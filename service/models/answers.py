@@ -9,6 +9,7 @@ from typing import Any, Generic, Literal, TypeAlias, TypeVar
 from pydantic import BaseModel, Field
 
 from mumacro.inputs.kind import ContactName, DirectionName
+from mumacro.outputs import MEMBERS
 
 from .inputs import Name
 
@@ -22,7 +23,12 @@ Numbers: TypeAlias = list[float | None]
 
 def quantity(text: str, unit: str, default: Any = ...) -> Any:
     """A member with its meaning and unit."""
-    return Field(default, description=f"{text} [{unit}]", json_schema_extra={"unit": unit})
+    return Field(default, description=f"{text} [{unit}]", json_schema_extra={"x-unit": unit})
+
+
+def member(path: str, default: Any = ...) -> Any:
+    """A value of an output, with the unit and the meaning that the library's list gives it."""
+    return quantity(MEMBERS[path].meaning, MEMBERS[path].unit, default)
 
 
 class Part(BaseModel, Generic[N]):
@@ -38,31 +44,29 @@ class Groups(Part[N]):
     """Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double
     range)."""
 
-    v_tilde: N = quantity("v0/(l0 omega)", "-")
-    y_tilde: N = quantity("y0/l0; for direction normal Fz_amplitude/Fz", "-")
-    l0: N = quantity("Length scale mu0 Fz/k; 0 for rigid contact", "m")
+    v_tilde: N = member("groups.v_tilde")
+    y_tilde: N = member("groups.y_tilde")
+    l0: N = member("groups.l0")
 
 
 class Limits(Part[N]):
     """Marks on the friction law of this case; null: beyond double range."""
 
-    mu_static: N = quantity(
-        "Static limit, v0 -> 0, eq. (38): mu0 sqrt(1 - y~^2), or 0 for y~ >= 1", "-"
-    )
-    v0_crit: N = quantity("Velocity at the border of continuous sliding", "m/s")
-    mu_crit: N = quantity("mu_macro at that border", "-")
+    mu_static: N = member("limits.mu_static")
+    v0_crit: N = member("limits.v0_crit")
+    mu_crit: N = member("limits.mu_crit")
 
 
 class Gradient(Part[N]):
     """d mu_macro / d input; null: not finite, or no such input (k of rigid contact)."""
 
-    mu0: N = quantity("d mu_macro / d mu0", "-")
-    Fz: N = quantity("d mu_macro / d Fz", "1/N")
-    k: N = quantity("d mu_macro / d k", "m/N")
-    y0: N | None = quantity("d mu_macro / d y0", "1/m", None)
-    Fz_amplitude: N | None = quantity("d mu_macro / d Fz_amplitude", "1/N", None)
-    omega: N = quantity("d mu_macro / d omega", "s/rad")
-    v0: N = quantity("d mu_macro / d v0", "s/m")
+    mu0: N = member("gradient.mu0")
+    Fz: N = member("gradient.Fz")
+    k: N = member("gradient.k")
+    y0: N | None = member("gradient.y0", None)
+    Fz_amplitude: N | None = member("gradient.Fz_amplitude", None)
+    omega: N = member("gradient.omega")
+    v0: N = member("gradient.v0")
 
 
 class GradientBound(Gradient[N], Generic[N]):
@@ -72,47 +76,43 @@ class GradientBound(Gradient[N], Generic[N]):
 class StdShare(Part[N]):
     """Share of each input in the variance, 0 to 1."""
 
-    mu0: N = quantity("Share of mu0", "-")
-    Fz: N = quantity("Share of Fz", "-")
-    k: N = quantity("Share of k", "-")
-    y0: N | None = quantity("Share of y0", "-", None)
-    Fz_amplitude: N | None = quantity("Share of Fz_amplitude", "-", None)
-    omega: N = quantity("Share of omega", "-")
-    v0: N = quantity("Share of v0", "-")
+    mu0: N = member("std_share.mu0")
+    Fz: N = member("std_share.Fz")
+    k: N = member("std_share.k")
+    y0: N | None = member("std_share.y0", None)
+    Fz_amplitude: N | None = member("std_share.Fz_amplitude", None)
+    omega: N = member("std_share.omega")
+    v0: N = member("std_share.v0")
 
 
 class Power(Part[N]):
     """Mean powers; null: not finite in double precision."""
 
-    oscillation: N = quantity(
-        "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; null: rigid", "W"
-    )
-    saved: N = quantity("Power that the drive saves: (mu0 - mu_macro) Fz v0", "W")
+    oscillation: N = member("power.oscillation")
+    saved: N = member("power.saved")
 
 
 class PowerBound(Part[N]):
     """Bounds of the absolute errors of the powers; null also: not known."""
 
-    oscillation: N = quantity("Bound of the absolute error of oscillation", "W")
-    saved: N = quantity("Bound of the absolute error of saved", "W")
+    oscillation: N = member("power_bound.oscillation")
+    saved: N = member("power_bound.saved")
 
 
 class Settling(Part[N]):
     """Until a disturbed contact is within 1 % of its steady cycle; null: infinite, it never
     slips."""
 
-    periods: N = quantity(
-        "For a small disturbance: ln(100)/slip_path; in stick-slip at most as many", "-"
-    )
-    periods_any: N = quantity("For a disturbance of any size: twice as many", "-")
-    time: N = quantity("periods as a time; also without oscillation", "s")
-    slip_path: N = quantity("Path of the foot in a period over l0; null also: rigid contact", "-")
+    periods: N = member("settling.periods")
+    periods_any: N = member("settling.periods_any")
+    time: N = member("settling.time")
+    slip_path: N = member("settling.slip_path")
 
 
 class SettlingBound(Part[N]):
     """Bound of the absolute error of periods; null also: not known."""
 
-    periods: N = quantity("Bound of the absolute error of periods", "-")
+    periods: N = member("settling_bound.periods")
 
 
 class Included(Part[N]):
@@ -122,19 +122,11 @@ class Included(Part[N]):
     limits: Limits[N] | None = None
     gradient: Gradient[N] | None = None
     gradient_bound: GradientBound[N] | None = None
-    std: N | None = quantity(
-        "Standard deviation of mu_macro to first order, from the gradient", "-", None
-    )
-    std_bound: N | None = quantity(
-        "The part of std that comes from the gradient's bound", "-", None
-    )
+    std: N | None = member("std", None)
+    std_bound: N | None = member("std_bound", None)
     std_share: StdShare[N] | None = None
-    stick_fraction: N | None = quantity(
-        "Share of the period during which the contact sticks", "-", None
-    )
-    stick_fraction_bound: N | None = quantity(
-        "Bound of its absolute error, larger at the border; null: not known", "-", None
-    )
+    stick_fraction: N | None = member("stick_fraction", None)
+    stick_fraction_bound: N | None = member("stick_fraction_bound", None)
     power: Power[N] | None = None
     power_bound: PowerBound[N] | None = None
     settling: Settling[N] | None = None
@@ -144,15 +136,15 @@ class Included(Part[N]):
 class OneOrMany(Included[N], Generic[N, R, S]):
     """The default answer and what ``include`` adds."""
 
-    mu_macro: N = quantity("Macroscopic coefficient of friction", "-")
-    mu_ratio: N = quantity("mu_macro/mu0, from 0 to 1", "-")
+    mu_macro: N = member("mu_macro")
+    mu_ratio: N = member("mu_ratio")
     regime: R = Field(description="How the contact moves")
-    error_bound: N = quantity("Bound of the absolute error of mu_macro", "-")
+    error_bound: N = member("error_bound")
     source: S = Field(
         description="Block of the table, or closed-form tail, that the value came from"
     )
-    mu_macro_low: N | None = quantity("Smallest mu_macro over the interval of k", "-", None)
-    mu_macro_high: N | None = quantity("Largest mu_macro over the interval of k", "-", None)
+    mu_macro_low: N | None = member("mu_macro_low", None)
+    mu_macro_high: N | None = member("mu_macro_high", None)
 
 
 class TableLabel(BaseModel):
@@ -178,12 +170,15 @@ class ModelRow(BaseModel):
 
 
 class Remark(BaseModel):
-    """One doubt about the inputs, such as a wrong unit."""
+    """One doubt about the inputs or outputs, for one case or many."""
 
-    row: str = Field(description="The row of the assumptions that it belongs to")
-    field: str = Field(description="The input that is doubted")
+    row: str = Field(description="The kind of doubt, such as units")
+    field: str = Field(description="The input or output that is meant")
     cases: int = Field(description="How many cases it is about")
     text: str = Field(description="A sentence on the first of them")
+
+
+_REMARKS = "What is doubtful; left out where nothing is"
 
 
 class Result(OneOrMany[Number, Regime, str]):
@@ -197,12 +192,13 @@ class Columns(OneOrMany[Numbers, list[Regime | None], list[str | None]]):
 class CaseAnswer(Result, Answered):
     """Answer to one case."""
 
-    mu_macro: float = quantity("Macroscopic coefficient of friction", "-")
-    mu_ratio: float = quantity("mu_macro/mu0, from 0 to 1", "-")
+    mu_macro: float = member("mu_macro")
+    mu_ratio: float = member("mu_ratio")
     model: list[ModelRow] | None = Field(
         None, description="Only if requested: what the model leaves out here"
     )
     digits: int | None = Field(None, description="With model: digits of mu_macro that k supports")
+    remarks: list[Remark] | None = Field(None, description=_REMARKS)
 
 
 # --- batches --------------------------------------------------------------------------------------
@@ -223,6 +219,7 @@ class BatchAnswered(Answered):
         description="One entry per bad case, in order; the first 1000 of them"
     )
     n_errors: int = Field(description="Number of bad cases, listed or not")
+    remarks: list[Remark] | None = Field(None, description=_REMARKS)
 
 
 class ColumnsAnswer(Columns, BatchAnswered):
@@ -399,6 +396,28 @@ class FitAnswer(Answered):
     curve: FittedCurve | None = Field(
         description="null where other inputs than v0 vary, or v0 is 0 everywhere"
     )
+    read_as: str | None = Field(None, description="Of a table: how it was read")
+    skipped_lines: list[int] | None = Field(
+        None, description="Of a table: lines that are neither names nor units nor points"
+    )
+
+
+class PointsAnswer(BaseModel):
+    """What was read of a table of points, without a fit."""
+
+    columns: dict[str, list[float]] = Field(
+        description="By name, in the units of the table", examples=[{"v0": [1.0, 5.0]}]
+    )
+    units: dict[str, str] = Field(description="Of the columns", examples=[{"v0": "mm/s"}])
+    lines: list[int] = Field(description="The line of each point, from 1")
+    skipped_lines: list[int] = Field(
+        description="Lines that are neither names nor units nor points, and not empty"
+    )
+    read_as: str = Field(
+        description="How the table was read; empty for plain CSV",
+        examples=["tab, decimal comma, head in line 3, units in line 4"],
+    )
+    api_version: str
 
 
 # --- tables, health, problems ---------------------------------------------------------------------

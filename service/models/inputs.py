@@ -21,8 +21,10 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from mumacro.inputs.cases import DEVIATIONS, EXACT
 from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, is_rigid, refusal
 from mumacro.inputs.k_range import BOUND
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from mumacro.inputs.old_texts import number_hint
 from mumacro.kernel.arrays import Array
 
@@ -151,7 +153,7 @@ class OneCase(Strict):
         return {name: values[name] for name in INPUTS if values.get(name) is not None}
 
 
-class Case(OneCase):
+class CaseInputs(OneCase):
     """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})
@@ -194,6 +196,7 @@ class Column(NamedTuple):
 
 
 _LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in BOUNDS}
+_LEAST |= dict.fromkeys(DEVIATIONS, 0.0)
 _MOST = dict.fromkeys(_LEAST, sys.float_info.max) | {"f": MOST_HZ}
 _NUMBERS = frozenset((float, int))
 
@@ -207,7 +210,7 @@ def number(name: str, value: object) -> tuple[float, str | None]:
             real = math.inf
         if _LEAST[name] <= real <= _MOST[name]:
             return real, None
-        return math.nan, refusal(name, real)
+        return math.nan, refusal(name, real) if name in BOUNDS else f"must be {EXACT}"
     if name == "k" and isinstance(value, str) and is_rigid(value):
         return math.inf, None
     if value is None and name != "k":
@@ -232,14 +235,11 @@ def column(name: str, values: Sequence[Any]) -> Column:
     return Column(array, reasons)
 
 
-def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
+def cells(name: str, value: Any) -> float | Column | None:
     """A number for all cases, or a list or an array with one for each."""
-    name = info.field_name or ""
-    if isinstance(value, Column):
-        return value
     if isinstance(value, list):
         return column(name, value)
-    if isinstance(value, np.ndarray):  # of a form in which infinity is a rigid contact
+    if isinstance(value, np.ndarray):  # finite numbers
         return Column(value, {})
     if value is None and name != "k":
         return None
@@ -247,6 +247,28 @@ def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
     if reason is not None:
         raise PydanticCustomError("input", "{reason}", {"reason": reason})
     return real
+
+
+def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
+    return cells(info.field_name or "", value)
+
+
+def _of_deviations(value: Any, info: ValidationInfo) -> float | Column | None:
+    return cells(f"std_{info.field_name}", value)
+
+
+def _words(value: Any, info: ValidationInfo) -> Any:
+    """One word for all cases, or a list with one for each, which the library reads."""
+    if isinstance(value, list):
+        return np.array([*value, None], object)[:-1]  # an array of lists is none of words
+    if isinstance(value, np.ndarray):
+        return value
+    names = CONTACTS if info.field_name == "contact" else DIRECTIONS
+    if not isinstance(value, str) or value not in names:
+        raise PydanticCustomError(
+            "input", "{reason}", {"reason": f"must be one of {', '.join(names)}"}
+        )
+    return value
 
 
 def _or_listed(*one: dict[str, Any]) -> WithJsonSchema:
@@ -261,6 +283,17 @@ HertzColumn = Annotated[
     Any, _CELLS, _or_listed({"type": "number", "minimum": 0, "maximum": MOST_HZ})
 ]
 StiffnessColumn = Annotated[Any, _CELLS, _or_listed(*OR_RIGID)]
+
+
+DeviationColumn = Annotated[
+    Any, PlainValidator(_of_deviations), _or_listed({"type": "number", "minimum": 0})
+]
+ContactColumn = Annotated[
+    Any, PlainValidator(_words), _or_listed({"type": "string", "enum": [*CONTACTS]})
+]
+DirectionColumn = Annotated[
+    Any, PlainValidator(_words), _or_listed({"type": "string", "enum": [*DIRECTIONS]})
+]
 
 
 class InputColumns(Strict):

@@ -1,19 +1,22 @@
 """What is asked beside the inputs: which contact and table, what else is computed."""
 
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, WithJsonSchema, WrapValidator, model_validator
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import RAD_PER_CYCLE
-from mumacro.inputs.kind import AMPLITUDE, ContactName, DirectionName, Kind, kind_of
+from mumacro.inputs.kind import ContactName, DirectionName, Kind, kind_of
+from mumacro.outputs import OUTPUTS
 
 from .inputs import (
     ALTERNATIVES,
     EXAMPLE,
     OR_RIGID,
-    Case,
+    CaseInputs,
+    ContactColumn,
+    DeviationColumn,
+    DirectionColumn,
     Hertz,
     InputColumns,
     NotNegative,
@@ -26,9 +29,10 @@ from .inputs import (
 )
 
 MODEL = "model"  # for one case only
-Include = Literal[
-    "groups", "limits", "gradient", "std", "stick_fraction", "power", "settling", "model"
-]
+if TYPE_CHECKING:
+    Include = str
+else:
+    Include = Literal[(*OUTPUTS, MODEL)]
 _INCLUDE = (
     "More to compute: groups (v~, y~, l0), limits (of the friction law), gradient, std (standard "
     "deviation), stick_fraction, power, settling, and for one case model (what it leaves out here)"
@@ -37,6 +41,7 @@ _CONTACT = "One spring of stiffness k, or a ball on a flat (Hertz) whose stiffne
 _DIRECTION = (
     "Of the oscillation, to that of sliding: across it, along it, or normal: the force oscillates"
 )
+_EACH = "; a list has one for each case"
 _TOLERANCE = "Error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
 
 
@@ -51,6 +56,16 @@ class Choice(Strict):
     def kind(self) -> Kind:
         """Contact and direction; InputError where they do not go together."""
         return kind_of(self.contact, self.direction)
+
+    @property
+    def words(self) -> dict[str, Any]:
+        """Contact and direction as the library takes them, where they are not the usual ones."""
+        words: dict[str, Any] = {}
+        if self.contact != "spring":
+            words["contact"] = self.contact
+        if self.direction != "across":
+            words["direction"] = self.direction
+        return words
 
 
 class InputStd(Strict):
@@ -73,45 +88,81 @@ class InputStd(Strict):
         return self
 
     @property
-    def by_field(self) -> dict[str, float]:
-        """The same with omega for f."""
-        values = self.model_dump()
-        values["omega"] += RAD_PER_CYCLE * values.pop("f")
-        return values
+    def columns(self) -> dict[str, Any]:
+        """Those that are given, as the library names them: ``std_k`` and so on; none of them says
+        that the inputs are exact."""
+        given = {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
+        return given or {"std_mu0": 0.0}
 
 
-def _check_options(options: Any) -> Any:
-    """Refuse deviations that have no effect, ``std`` in ``include`` without them, and a contact and
-    a direction that do not go together."""
-    std, kind = options.std, options.kind
-    if (std is None) == ("std" in (options.include or ())):
-        bound = "given if include has std"
-        if std is not None:
-            bound = "left out: no effect unless include has std"
-        raise InputError("std", None, bound)
-    if std is None:
-        return options
-    other = "y0" if kind.normal else AMPLITUDE
-    if getattr(std, other):
-        bound = f"without {other}, which direction {kind.names['direction']} does not have"
-        raise InputError("std", other, bound)
-    return options
+class StdColumns(Strict):
+    """Standard deviations of the inputs of many cases: numbers, or lists with one for each case."""
+
+    mu0: DeviationColumn = either("[-]")
+    Fz: DeviationColumn = either("[N]")
+    k: DeviationColumn = either("[N/m]")
+    y0: DeviationColumn = either("[m]")
+    omega: DeviationColumn = either("[rad/s]; or f")
+    f: DeviationColumn = either("[Hz], in place of omega")
+    v0: DeviationColumn = either("[m/s]")
+    Fz_amplitude: DeviationColumn = either("[N], for direction normal")
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """Those that are given, as the library names them: ``std_k`` and so on."""
+        return {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
 
 
-class Options(Choice):
+class Outputs(Strict):
+    """What is computed beside the default answer."""
+
+    include: Annotated[list[Include], Field(max_length=16)] | None = optional(
+        f"{_INCLUDE}; in a query joined by commas"
+    )
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The names that the library knows."""
+        return tuple(name for name in self.include or () if name != MODEL)
+
+    @property
+    def model(self) -> bool:
+        """Whether remarks on the model are wanted."""
+        return MODEL in (self.include or ())
+
+
+class Options(Outputs, Choice):
     """The options of a request in JSON."""
 
-    include: Annotated[list[Include], Field(max_length=16)] | None = optional(_INCLUDE)
-    std: InputStd | None = optional("Standard deviations of the inputs, for include=std")
+    std: InputStd | None = optional("Standard deviations of the inputs; they imply include=std")
 
-    _options_agree = model_validator(mode="after")(_check_options)
+    @property
+    def deviations(self) -> dict[str, Any]:
+        """Those that are given, as the library names them."""
+        return {} if self.std is None else self.std.columns
 
 
-class CaseRequest(Options, Case):
+class CaseRequest(Options, CaseInputs):
     """One case and the options of its answer."""
 
 
-class CaseColumns(Options, InputColumns):
+class Case(CaseInputs):
+    """One case of a batch in rows."""
+
+    contact: ContactName | None = optional(_CONTACT)
+    direction: DirectionName | None = optional(_DIRECTION)
+    std: InputStd | None = optional("Standard deviations of the inputs")
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """All that the library takes."""
+        words = {"contact": self.contact, "direction": self.direction}
+        deviations = {} if self.std is None else self.std.columns
+        given = {name: word for name, word in words.items() if word is not None}
+        return self.inputs | given | deviations
+
+
+class CaseColumns(Outputs, InputColumns):
     """Cases as columns and the options of their answers: lists of one length; a number holds for
     every case."""
 
@@ -121,6 +172,22 @@ class CaseColumns(Options, InputColumns):
             **ALTERNATIVES,
         }
     )
+
+    contact: ContactColumn = Field(
+        "spring", description=f"{_CONTACT}; a list has one for each case"
+    )
+    direction: DirectionColumn = Field(
+        "across", description=f"{_DIRECTION}; a list has one for each case"
+    )
+    tolerance: Positive | None = optional(_TOLERANCE)
+    std: StdColumns | None = optional("Standard deviations of the inputs; they imply include=std")
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """All that the library takes: numbers, texts, and what lists hold."""
+        deviations = {} if self.std is None else self.std.columns
+        words = {"contact": self.contact, "direction": self.direction}
+        return super().columns | words | deviations
 
 
 # --- queries --------------------------------------------------------------------------------------
@@ -139,52 +206,34 @@ class Deviations(Strict):
     std_Fz_amplitude: NotNegative | None = optional("Standard deviation [N]")
 
     @property
-    def std(self) -> InputStd | None:
-        """The deviations together; None where there are none."""
+    def deviations(self) -> dict[str, Any]:
+        """Those that are given."""
         names = self.model_fields_set & _DEVIATIONS
-        if not names:
-            return None
-        deviations = {name.removeprefix("std_"): getattr(self, name) for name in names}
-        if deviations.get("omega") and deviations.get("f"):
-            raise InputError("std_f", deviations["f"], "left out beside std_omega: not of both")
-        return InputStd(**deviations)
+        return {name: x for name in names if (x := getattr(self, name)) is not None}
 
 
 _DEVIATIONS = frozenset(Deviations.model_fields)
 
 
-class QueryOptions(Deviations, Choice):
+class QueryOptions(Deviations, Outputs, Choice):
     """The options of a request as a query."""
 
-    include: Annotated[list[Include], Field(max_length=16)] | None = optional(
-        f"{_INCLUDE}; joined by commas"
-    )
 
-    _options_agree = model_validator(mode="after")(_check_options)
-
-
-class BatchOptions(Deviations):
+class BatchOptions(Deviations, Outputs):
     """The options of a batch as a query; what is in the body is left out here."""
 
     contact: ContactName | None = optional(_CONTACT)
     direction: DirectionName | None = optional(_DIRECTION)
     tolerance: Positive | None = optional(_TOLERANCE)
-    include: Annotated[list[Include], Field(max_length=16)] | None = optional(
-        f"{_INCLUDE}; joined by commas"
-    )
-
-    _options_agree = model_validator(mode="after")(_check_options)
-
-    @cached_property
-    def kind(self) -> Kind:
-        """Contact and direction; InputError where they do not go together."""
-        return kind_of(self.contact or "spring", self.direction or "across")
 
     @property
     def members(self) -> dict[str, Any]:
         """What is given, as in a body."""
-        names = ("contact", "direction", "tolerance", "include", "std")
-        return {name: value for name in names if (value := getattr(self, name)) is not None}
+        names = ("contact", "direction", "tolerance", "include")
+        given = {name: value for name in names if (value := getattr(self, name)) is not None}
+        if deviations := self.deviations:
+            given["std"] = {name.removeprefix("std_"): x for name, x in deviations.items()}
+        return given
 
 
 def _interval_or(value: Any, stiffness: Any) -> Any:

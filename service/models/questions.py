@@ -2,6 +2,7 @@
 
 import math
 import sys
+from base64 import b64decode
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
@@ -24,6 +25,8 @@ from mumacro.inputs.fields import STIFFNESS, is_rigid
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.old_texts import number_hint
+from mumacro.inputs.signs import THOUSANDS
+from mumacro.inputs.text_tables import SEPARATORS, Dialect
 
 from .inputs import (
     EXAMPLE,
@@ -221,7 +224,8 @@ MeasuredPoints = Annotated[Any, _POINTS, WithJsonSchema(_LISTED)]
 
 
 class FitRequest(Choice):
-    """Measured points as columns: lists of one length; a plain number holds for every point."""
+    """Measured points as columns, lists of one length, where a plain number holds for every point;
+    or as a table, as it was pasted or as the bytes of its file."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -238,10 +242,14 @@ class FitRequest(Choice):
     )
 
     unknowns: Annotated[list[Literal["k", "mu0"]], Field(min_length=1, max_length=2)] = Field(
-        ["k", "mu0"], description="What is fitted"
+        ["k", "mu0"], description="What is fitted; with a table left out: k alone where it has mu0"
     )
-    v0: PositivePoints = Field(description="Sliding velocity of each point [m/s]")
-    mu_macro: MeasuredPoints = Field(description="Measured mu_macro of each point [-]")
+    v0: PositivePoints | None = optional(
+        "Sliding velocity of each point [m/s]; required without a table"
+    )
+    mu_macro: MeasuredPoints | None = optional(
+        "Measured mu_macro of each point [-]; required without a table"
+    )
     std: PositivePoints | None = optional("Standard deviation of mu_macro [-]")
     mu0: PositivePoints | None = optional("Friction coefficient, unless it is fitted [-]")
     Fz: PositivePoints | None = optional("Normal force [N]")
@@ -256,24 +264,79 @@ class FitRequest(Choice):
     Fz_amplitude: NotNegativePoints | None = optional(
         "Amplitude of the normal force [N], for direction normal in place of y0"
     )
+    points: str | None = optional(
+        "The points as a table: its head is the first line that names v0 and mu_macro, units stand "
+        "in brackets or in the line below",
+        examples=["v0 [mm/s]\tmu_macro\n1\t0.069\n5\t0.174\n20\t0.247\n100\t0.289\n"],
+    )
+    points_base64: str | None = optional("The bytes of the file of a table, in base64")
+    sep: Literal[tuple(SEPARATORS)] | None = optional(  # type: ignore[valid-type]
+        "Between the cells of the table; left out: found in it"
+    )
+    decimal: Literal[".", ","] | None = optional("In its numbers; left out: found in them")
+    thousands: Literal[tuple(THOUSANDS)] | None = optional(  # type: ignore[valid-type]
+        "Between the thousands of its numbers; left out: found in them"
+    )
+    encoding: Annotated[str, Field(max_length=40)] | None = optional(
+        "Of the bytes, such as utf-8, utf-16, windows-1252; left out: found in them"
+    )
+    skip: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
+        0, description="Lines to leave out at the beginning of the table"
+    )
+    read_only: bool = Field(False, description="Answer what was read of the table, without a fit")
 
     @model_validator(mode="after")
-    def _refuse_unknowns_and_other_amplitude(self) -> Self:
+    def _refuse_what_contradicts(self) -> Self:
         for name in self.unknowns:
             if getattr(self, name) is not None:
                 raise InputError(name, None, "left out: it is among the unknowns")
         other = "y0" if self.kind.normal else AMPLITUDE
         if getattr(self, other) is not None:
             raise InputError(other, None, f"left out for direction {self.direction}")
+        if self.points is not None and self.points_base64 is not None:
+            raise InputError("points_base64", None, "left out beside points")
+        if self.points is not None and self.encoding is not None:
+            raise InputError("encoding", None, "left out beside points, which are text already")
+        if self.points is None and self.points_base64 is None:
+            for column in ("v0", "mu_macro"):
+                if getattr(self, column) is None:
+                    raise InputError(column, None, "given: a list, or a table as points")
+            for option in ("sep", "decimal", "thousands", "encoding", "skip", "read_only"):
+                if option in self.model_fields_set:
+                    raise InputError(option, None, "left out: it belongs to a table, points")
         return self
 
     @property
-    def points(self) -> dict[str, Any]:
+    def columns(self) -> dict[str, Any]:
         """The columns that are given, by name; a null in k stays, unless k is fitted."""
         columns = {name: value for name in _COLUMNS if (value := getattr(self, name)) is not None}
         if "k" in self.model_fields_set and self.k is None and "k" not in self.unknowns:
             raise InputError("k", None, STIFFNESS)
         return columns
+
+    @property
+    def table(self) -> tuple[str, bytes] | None:
+        """The member that holds a table, and its bytes; None where there is none."""
+        if self.points is not None:
+            return "points", self.points.encode("utf-8", "surrogatepass")
+        if self.points_base64 is None:
+            return None
+        try:
+            return "points_base64", b64decode(self.points_base64, validate=True)
+        except ValueError:
+            raise InputError("points_base64", None, "base64 of the bytes of a file") from None
+
+    @property
+    def dialect(self) -> Dialect:
+        """How the table is written, as far as it is said."""
+        return Dialect(
+            None if self.sep is None else SEPARATORS[self.sep],
+            self.decimal,
+            None if self.thousands is None else THOUSANDS[self.thousands],
+            "utf-8" if self.points is not None else self.encoding,
+            self.skip,
+            dashes="",
+        )
 
 
 _COLUMNS = ("v0", "mu_macro", "std", "mu0", "Fz", "k", "y0", "omega", "f", "Fz_amplitude")

@@ -12,6 +12,8 @@ from typing import Annotated, Any
 from fastapi import Query, Request, Response
 from starlette.types import Receive, Scope, Send
 
+from mumacro.inputs.cases import KIND
+
 from ..batch import Batch
 from ..forms import MORE_CASES, read
 from ..limits import AT_ONCE, JSON, Work, only_json, read_body, within
@@ -71,7 +73,7 @@ class _Answer(Response):
         # computation.
         cost = len(text) / _BYTES_PER_UNIT
         batch = await self._run(lambda: self._batch(text), cost)
-        cost += batch.size * batch.plan.cost
+        cost += batch.cost
         pieces = _gathered(batch.write())
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [(b"content-type", JSON), (b"x-table", batch.table.id.encode("latin-1"))]
@@ -89,7 +91,8 @@ class _Answer(Response):
 
     def _batch(self, text: bytearray) -> Batch:
         state, options = self._state, self._options
-        body = read(text, self._most, options.kind)
+        words = {name: x for name, x in options.members.items() if name in KIND}
+        body = read(text, self._most, words)
         text.clear()
         return Batch.of(body, options, state.tables, self._most, count=state.metrics.cases)
 

@@ -6,15 +6,21 @@ from typing import Annotated, Any
 from fastapi import Query, Request, Response
 from starlette.responses import PlainTextResponse
 
+from mumacro import Surrogate
 from mumacro.errors import InputError
+from mumacro.inputs.k_range import ENDS
+from mumacro.outputs.evaluation import cost
+from mumacro.validity import digits, k_effect, model_rows
 
-from ..included import Plan, answer_case
 from ..models.answers import CaseAnswer
-from ..models.options import CaseQuery, CaseRequest, TextQuery
+from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
 from ..reading import DirectRoute, Json, dump
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
+#: members of a case of which nothing but the default is asked
+_PLAIN = frozenset(("mu0", "Fz", "k", "y0", "omega", "f", "v0", "tolerance", "value"))
+_INTERVAL = frozenset(("k_range", *ENDS))
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
 _CACHED: Any = {
     "model": CaseAnswer,
@@ -30,12 +36,31 @@ _CACHED: Any = {
 async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str, Any]:
     """The answer to a case."""
     state, inputs = request.app.state, case.inputs
-    table, plan = state.tables.pick(case.tolerance), Plan.of(case, inputs)
-    work = partial(answer_case, table.surrogate, inputs, plan)
-    large = plan.model or plan.cost > _LARGE
-    values, source = await state.work.question(work) if large else work()
+    table = state.tables.pick(case.tolerance)
+    if case.model_fields_set <= _PLAIN and _INTERVAL.isdisjoint(inputs):
+        answer = table.surrogate.evaluate(**inputs)
+        members, source = answer.to_dict(), answer.source_code
+    else:
+        work = partial(_answer_more, table.surrogate, case, inputs)
+        each = cost(case.outputs, (case.kind,), not _INTERVAL.isdisjoint(inputs))
+        large = case.model or each > _LARGE
+        members, source = await state.work.question(work) if large else work()
     state.metrics.case(table, source)
-    return {**values, **table.signature}
+    return {**members, **table.signature}
+
+
+def _answer_more(
+    surrogate: Surrogate, case: CaseRequest | CaseQuery, inputs: dict[str, Any]
+) -> tuple[dict[str, Any], int]:
+    """The members of the answer with all that is asked beside the default, and the code of its
+    source."""
+    words = case.kind.names
+    answer = surrogate.evaluate(**inputs, **words, **case.deviations, include=case.outputs)
+    members = answer.to_dict()
+    if case.model:  # rows of docs/validity.md, and the digits that k supports
+        members[MODEL] = model_rows(surrogate, inputs, **words)
+        members["digits"] = digits(k_effect(surrogate, inputs, **words))
+    return members, answer.source_code
 
 
 @router.get(

@@ -2,24 +2,30 @@
 points."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from fastapi import Response
 
 import mumacro
+from mumacro.analysis.measured_points import read_points, unknowns_beside
 from mumacro.contacts.geometries import contact_of
+from mumacro.errors import InputError
+from mumacro.inputs.decoding import TextError
+from mumacro.inputs.text_tables import Table
 
 from .. import API_VERSION
 from ..limits import Working
-from ..models.answers import FitAnswer, StiffnessAnswer
-from ..models.questions import FitRequest, StiffnessRequest
-from ..reading import Json, StrictRoute
+from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
+from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
+from ..problems import FieldFault, refuse
+from ..reading import Json, StrictRoute, TableRoute
 from ..tables import Loaded, LoadedTable
 from . import POST_PROBLEMS, router_of
 
-router = router_of("answers", StrictRoute)
+router, _tables = router_of("answers", StrictRoute), router_of("answers", TableRoute)
+_FAULTS = 100  # lines of a table that an answer names
 
 
 @router.post(
@@ -34,21 +40,68 @@ async def post_stiffness(contact: StiffnessRequest) -> Response:
     return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 
 
-@router.post(
+@_tables.post(
     "/fit",
-    responses={200: {"model": FitAnswer}, **POST_PROBLEMS},
+    responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS},
     summary="k and mu0 from measured points",
 )
 async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Response:
     """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word
     rigid."""
-    columns, table = measured.points, tables.pick(measured.tolerance)
-    return await work.question(lambda: Json(_fitted(table, measured, columns)))
+    columns, source, table = measured.columns, measured.table, tables.pick(measured.tolerance)
+
+    def answer() -> Response:
+        points = None if source is None else _points(*source, measured)
+        if points is not None and measured.read_only:
+            return Json(_as_read(points))
+        return Json(_fitted(table, measured, columns, points))
+
+    return await work.question(answer)
 
 
-def _fitted(table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any]) -> dict[str, Any]:
+def _points(member: str, data: bytes, measured: FitRequest) -> Table:
+    """The points of a table; a request has what is wrong with its lines at ``member``."""
+    try:
+        return read_points(data, measured.dialect, MAX_POINTS)
+    except TextError as error:
+        faults = error.faults or [str(error)]
+        refuse([FieldFault.of(member, fault) for fault in faults[:_FAULTS]])
+
+
+def _as_read(points: Table) -> dict[str, Any]:
+    return {
+        "columns": points.in_own_units,
+        "units": points.units,
+        "lines": points.lines,
+        "skipped_lines": points.skipped,
+        "read_as": points.read_as,
+        "api_version": API_VERSION,
+    }
+
+
+def _fitted(
+    table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any], points: Table | None
+) -> dict[str, Any]:
     words: Any = measured.kind.names
-    with warnings.catch_warnings():  # they are in the answer
-        warnings.simplefilter("ignore")
-        fit = mumacro.fit(columns, measured.unknowns, surrogate=table.surrogate, **words)
-    return {**fit.to_dict(), **table.signature}
+    unknowns: Sequence[str] = measured.unknowns
+    about: dict[str, Any] = {}
+    if points is not None:
+        if both := sorted(columns.keys() & points.columns.keys()):
+            raise InputError(both[0], None, "given once: it is a column of the points")
+        columns = {**points.columns, **columns}
+        if "unknowns" not in measured.model_fields_set:
+            unknowns = unknowns_beside(columns)
+        about = {"read_as": points.read_as, "skipped_lines": points.skipped}
+    try:
+        with warnings.catch_warnings():  # they are in the answer
+            warnings.simplefilter("ignore")
+            fit = mumacro.fit(columns, unknowns, surrogate=table.surrogate, **words)
+    except InputError as error:
+        if points is None or error.index is None:
+            raise
+        reason = f"line {points.lines[error.index]}: {error.field} must be {error.bound}"
+        refuse([FieldFault.of("points", reason, error.value)])
+    return {**fit.to_dict(), **about, **table.signature}
+
+
+router.routes.extend(_tables.routes)

@@ -4,7 +4,6 @@
 import csv
 import io
 import itertools
-from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,14 +13,17 @@ import mumacro
 from mumacro.analysis.law import Law
 from mumacro.analysis.solve_for import Solution
 from mumacro.analysis.stiffening import Stiffening
+from mumacro.answer import Answer, nested
 from mumacro.errors import InputError
+from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.fields import field_of, unit_of
 from mumacro.kernel.arrays import Array
+from mumacro.outputs import MEMBERS
+from mumacro.outputs.evaluation import chosen
 from mumacro.validity import load_rows
 
-from ..included import Plan, answer_columns, listed, nested
+from ..forms import listed
 from ..limits import Working
-from ..models import answers
 from ..models.answers import LawAnswer, SolveForAnswer
 from ..models.options import MODEL
 from ..models.questions import LawQuery, LawRequest, SolveForRequest
@@ -38,7 +40,7 @@ router = router_of("answers", StrictRoute)
 def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
     """The library's law and all columns beside the swept input."""
     case, (along, per) = question.inputs, field_of(question.along)
-    plan = _plan(question, case)
+    _refuse_model(question)
     law = mumacro.law(
         table.surrogate,
         along,
@@ -47,32 +49,36 @@ def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict
         points=question.points,
         scale=question.scale,
         stiffness_exponent=question.stiffness_exponent,
-        **plan.kind.names,
+        **question.kind.names,
         **case,
     )
-    inputs = _at(case, along, law.values, law.stiffening)
-    outputs, _ = answer_columns(table.surrogate, inputs, plan)
-    columns = listed(outputs) | {"mu_static": law.mu_static.tolist()}
+    answer = _answer_at(question, table, along, law.values, law.stiffening)
+    columns = {path: listed(path, answer[path]) for path in answer.paths}
+    columns["mu_static"] = law.mu_static.tolist()
     if law.stiffening is not None:
         columns["k"] = law.inputs["k"].tolist()
     return law, columns
 
 
-def _plan(question: Any, case: dict[str, Any]) -> Plan:
-    if MODEL in (question.include or ()):
+def _refuse_model(question: Any) -> None:
+    if question.model:
         raise InputError("include", MODEL, f"without {MODEL}, which is for one case: /v1/mu-macro")
-    return Plan.of(question, case)
 
 
-def _at(
-    case: dict[str, Any], unknown: str, values: Array, stiffening: Stiffening | None
-) -> dict[str, Any]:
-    """The inputs of the cases at values of one of them."""
-    inputs = {name: value for name, value in case.items() if value is not None}
+def _answer_at(
+    question: Any,
+    table: LoadedTable,
+    unknown: str,
+    values: Array,
+    stiffening: Stiffening | None,
+) -> Answer[Any]:
+    """The answers at values of one input, with what is included."""
+    inputs = {name: value for name, value in question.inputs.items() if value is not None}
     inputs[unknown] = values
     if stiffening is not None:
-        inputs |= stiffening.scaled(case, values)
-    return inputs
+        inputs |= stiffening.scaled(question.inputs, values)
+    cases = Cases.of(named(None, inputs | question.words | question.deviations))
+    return table.surrogate.answer(cases, chosen(question.outputs, cases))
 
 
 def _remarks_on(
@@ -142,15 +148,12 @@ async def get_law_csv(
 _TEXTS = ("regime", "source")
 
 
-@cache
+_BESIDE = {"mu_static": "-", "k": "N/m"}
+
+
 def unit_at(path: str) -> str:
-    """The unit of a column of a law, as the model of the answer has it."""
-    name, _, member = path.partition(".")
-    model: Any = LawAnswer
-    if member:
-        model = getattr(answers, "".join(word.capitalize() for word in name.split("_")))
-    extra: Any = model.model_fields[member or name].json_schema_extra
-    return str(extra["unit"])
+    """The unit of a column of a law."""
+    return _BESIDE[path] if path in _BESIDE else MEMBERS[path].unit
 
 
 # --- inverse --------------------------------------------------------------------------------------
@@ -171,7 +174,7 @@ async def post_solve_for(question: SolveForRequest, tables: Loaded, work: Workin
 
 def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     table, case = tables.pick(question.tolerance), question.inputs
-    plan = _plan(question, case)
+    _refuse_model(question)
     name, per = field_of(question.unknown)
     unit = 1.0
     if question.quantity == "mu_ratio":
@@ -186,10 +189,10 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
         [x * unit for x in question.target],
         within=within,
         stiffness_exponent=question.stiffness_exponent,
-        **plan.kind.names,
+        **question.kind.names,
         **case,
     )
-    included = _included(table, case, plan, name, solution)
+    included = _included(question, table, name, solution)
     answer: dict[str, Any] = {"unknown": question.unknown, "unit": unit_of(question.unknown)}
     answer["quantity"] = question.quantity
     answer |= _results(question, solution, included, unit, per)
@@ -234,18 +237,15 @@ def _results(
 
 
 def _included(
-    table: LoadedTable, case: dict[str, Any], plan: Plan, unknown: str, solution: Solution
+    question: SolveForRequest, table: LoadedTable, unknown: str, solution: Solution
 ) -> list[dict[str, Any]]:
     """The included quantities of every root, in order."""
     values = np.array([root.value for roots in solution.roots for root in roots])
-    if not plan.include or not values.size:
+    if not (question.outputs or question.deviations) or not values.size:
         return [{}] * values.size
-    inputs = _at(case, unknown, values, solution.stiffening)
-    outputs, _ = answer_columns(table.surrogate, inputs, plan)
-    default = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
-    more = {path: x.tolist() for path, x in outputs.items() if path not in default}
-    rows = zip(*more.values(), strict=True)
-    return [nested(dict(zip(more, row, strict=True))) for row in rows]
+    outputs = _answer_at(question, table, unknown, values, solution.stiffening).outputs
+    rows = zip(*(column.tolist() for column in outputs.values()), strict=True)
+    return [nested(dict(zip(outputs, row, strict=True))) for row in rows]
 
 
 def _reason(question: SolveForRequest, target: float, solution: Solution, unit: float) -> str:

@@ -39,7 +39,8 @@ def test_a_frame_has_one_row_a_case_with_what_was_requested(
     for name in ("mu_macro", "mu_ratio", "regime", "error_bound", "source"):
         np.testing.assert_array_equal(frame[name].to_numpy(), np.ravel(getattr(answer, name)))
     assert ("mu_macro_low" in frame) == ("k_range" in more)
-    assert ("d_mu_macro_d_k" in frame) == ("gradient" in more)
+    assert ("gradient.k" in frame) == ("gradient" in more)
+    assert list(frame) == answer.paths
 
 
 def test_a_frame_of_labelled_cases_keeps_the_index(surrogate: Surrogate) -> None:

@@ -15,9 +15,10 @@ from tests.support.cases import CASE, tables, without
 
 #: methods of (v~, y~)
 PLANE: dict[str, Callable[..., Any]] = {
-    **{name: getattr(Surrogate, name) for name in (*QUANTITY_NAMES, "ratio_with_bound")},
+    **{name: getattr(Surrogate, name) for name in QUANTITY_NAMES},
     **{
-        name: getattr(Surrogate, name) for name in ("power_with_bound", "stick_fraction_with_bound")
+        f"{name} with its bound": lambda s, v, y, name=name: s.quantity(name, v, y)
+        for name in QUANTITY_NAMES
     },
     **{
         f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True)
@@ -25,7 +26,7 @@ PLANE: dict[str, Callable[..., Any]] = {
     },
 }
 NO_NUMBERS: dict[str, Any] = {
-    "text": "0.1",
+    "text": "fast",
     "bytes": b"0.1",
     "complex": 1j,
     "None": None,
@@ -34,7 +35,7 @@ NO_NUMBERS: dict[str, Any] = {
     "a mapping": {"a": 1.0},
     "a type": float,
     "ragged": [[1.0], [1.0, 2.0]],
-    "texts": ["0.1", "0.2"],
+    "texts": ["fast", "0.2"],
     "bytes in a list": [b"1"],
     "complex array": np.array([1j, 2.0]),
     "too large": 10**400,
@@ -42,7 +43,7 @@ NO_NUMBERS: dict[str, Any] = {
     "times": np.array(["2020-01-01"], dtype="datetime64[s]"),
     "durations": np.array([1], dtype="timedelta64[s]"),
     "a time": np.datetime64("2020-01-01"),
-    "text array": np.array(["0.1"]),
+    "text array": np.array(["fast"]),
     "None in an array": [0.1, None],
     "records": np.zeros(3, dtype=[("a", "f8")]),
     "objects": np.array([object()]),
@@ -251,7 +252,7 @@ def test_six_inputs_of_any_bits_are_answered_alone_as_in_an_array(table: Surroga
     assert np.array_equal(np.isnan(answer.mu_macro), ~legal)
     assert np.all(answer.error_bound[legal] >= 0.0)
     for i, case in enumerate(six.T.tolist()):
-        assert table.evaluate_case(*case)[3] == answer.source_code[i]
+        assert table.tabulated.one(case).source == answer.source_code[i]
         try:
             one = table.evaluate(dict(zip(CASE, case, strict=True)), gradient=True)
         except InputError:

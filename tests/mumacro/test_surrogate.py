@@ -64,7 +64,7 @@ def test_fresh_solves_at_the_edges_lie_within_tolerance_and_bound(
     y = amplitudes(rng)
     v = speeds(rng, y, table.v_tilde_crit(y))
     truth = sweep.solve("full", v, y)["mu_ratio"]
-    mu, bound, _ = table.ratio_with_bound(v, y)
+    mu, bound, _ = table.quantity("mu_ratio", v, y)
     error = np.abs(mu - truth)
     assert error.max() <= table.tolerance
     assert (error / truth).max() <= ABS_TO_REL * table.tolerance + SOLVER_NOISE
@@ -75,7 +75,7 @@ def test_speeds_whose_square_overflows_still_follow_the_elliptic_integral(table:
     rng = np.random.default_rng(9)
     v = log_uniform(rng, 1e100, 1e300, 500)
     r = np.minimum(log_uniform(rng, 1e-6, 1e6, 500), 1e307 / v)
-    mu, bound, source = table.ratio_with_bound(v, r * v)
+    mu, bound, source = table.quantity("mu_ratio", v, r * v)
     assert mu == close(outer(r), rel=2e-15)
     assert np.all(bound <= 1e-14 * mu)
     assert set(source) == {SOURCES.index("tail_fast")}
@@ -117,8 +117,8 @@ def test_creep_at_large_amplitude_has_no_step_where_its_formula_changes(table: S
 def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: Surrogate) -> None:
     rng = np.random.default_rng(8)
     v, y = log_uniform(rng, 1e-100, 1e100, 50_000), log_uniform(rng, 1e-100, 1e100, 50_000)
-    power, of_power = table.power_with_bound(v, y)
-    _, of_stick = table.stick_fraction_with_bound(v, y)
+    power, of_power = table.quantity("power", v, y)[:2]
+    _, of_stick = table.quantity("stick_fraction", v, y)[:2]
     assert np.all(np.isfinite(of_power) & (of_power > 0.0))
     assert np.all(
         (of_stick >= 0.0)
@@ -126,7 +126,7 @@ def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: S
     )
     # the bound is small relative to the power, except for denormal numbers
     assert np.all((of_power <= 1e-3 * power)[power > 1e-280])
-    assert table.power_with_bound(float(v[0]), float(y[0])) == (power[0], of_power[0])
+    assert table.quantity("power", float(v[0]), float(y[0]))[:2] == (power[0], of_power[0])
     assert 0.0 < table.stick_fraction(0.0, 2.0) < 1.0 < 1.0 + table.power(0.0, 2.0)
 
 
@@ -137,7 +137,7 @@ def test_power_at_large_speed_is_that_of_the_shaker_against_friction(
     """p = y~^2/(2 v~) for y~ << v~, where a closed form would lose digits."""
     for y in (y for y in (1.5, 2.0, 1e2, 1e5) if y <= 1e-3 * v):
         expected = 0.5 * y * (y / v)
-        power, bound = table.power_with_bound(v, y)
+        power, bound = table.quantity("power", v, y)[:2]
         assert (
             abs(power - expected)
             <= bound + expected * (1.0 / v**2 if v < 1e100 else 0.0) + expected * (y / v) ** 2

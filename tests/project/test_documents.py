@@ -113,7 +113,7 @@ def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate: S
     page = (DOCS / "validity.md").read_text("utf-8")
     pattern = r"the ball has ([\d.]+), one spring with \$k\$ ([\d.]+), with .* ([\d.]+): the ball"
     ball, spring, softer = map(float, re.findall(pattern, page)[0])
-    assert surrogate.ratio_with_bound(0.05, 0.4, contact="ball")[0] == close(ball, abs=5e-5)
+    assert surrogate.quantity("mu_ratio", 0.05, 0.4, contact="ball")[0] == close(ball, abs=5e-5)
     assert surrogate.mu_ratio(0.05, 0.4) == close(spring, abs=5e-5)
     assert surrogate.mu_ratio(0.05 / 1.5, 0.4 / 1.5) == close(softer, abs=5e-5)
     heads, figures = re.findall(
@@ -153,7 +153,7 @@ def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(
     for table, bound in zip((surrogate, Surrogate.open(1e-4)), bounds, strict=True):
         shares = (1.0, 1.0 - 1e-15, 1.0 + 1e-15)
         largest = max(
-            table.stick_fraction_with_bound(share * table.v_tilde_crit(y), y)[1].max()
+            table.quantity("stick_fraction", share * table.v_tilde_crit(y), y)[:2][1].max()
             for share in shares
         )
         assert largest == close(float(bound), rel=0.05)

@@ -89,7 +89,7 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(
         return float(outer(y / v) + layer * (v / y))
 
     v = x * np.sqrt(y)
-    result, bound, _ = table.ratio_with_bound(v, y)
+    result, bound, _ = table.quantity("mu_ratio", v, y)
     assert abs(result - expected(v, y)) <= bound + 1e-14 * result
     along_v, along_y, error_v, error_y = table.slopes(v, y, bounds=True)[1:]
     near = {h: (expected(v * (1.0 + h), y), expected(v, y * (1.0 + h))) for h in (-1e-4, 1e-4)}

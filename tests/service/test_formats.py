@@ -64,12 +64,20 @@ def of_one(document: Row) -> Row:
         (error,) = document["errors"]
         assert document["detail"] == f"{error['field']}: {error['reason']}"
         return {**dict.fromkeys(COLUMNS), "error": document["detail"]}
-    assert tuple(document) == (*COLUMNS, "table", "api_version")
+    assert tuple(document) == (*COLUMNS, *_remarked(document), "table", "api_version")
     return {**{name: document[name] for name in COLUMNS}, "error": None}
 
 
+def _remarked(document: Row) -> tuple[str, ...]:
+    """The member of remarks, which is there where something is doubtful."""
+    return ("remarks",) if "remarks" in document else ()
+
+
+END = ("errors", "n_errors", "remarks", "table", "api_version")
+
+
 def with_errors(columns: Row, document: Row) -> list[Row]:
-    assert tuple(document)[-4:] == ("errors", "n_errors", "table", "api_version")
+    assert tuple(document)[-5:] == END
     assert document["n_errors"] == len(BAD)
     reasons = {
         error["index"]: f"{error['field']}: {error['reason']}" for error in document["errors"]
@@ -96,7 +104,7 @@ def by_rows(client: Any) -> list[Row]:
 
 def by_columns(client: Any) -> list[Row]:
     document = client.post(BATCH, json={name: [row[name] for row in ROWS] for name in NAMES}).json()
-    assert tuple(document)[:-4] == COLUMNS
+    assert tuple(document)[:-5] == COLUMNS
     return with_errors(document, document)
 
 
@@ -143,7 +151,7 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     good, std = list(GOOD), {"v0": 1e-3, "mu0": 0.01}
     options = {"include": INCLUDED, "std": std}
     single = [flat(client.post("/v1/mu-macro", json={**row, **options}).json()) for row in good]
-    names = [name for name in single[0] if not name.startswith(("table", "api"))]
+    names = [name for name in single[0] if not name.startswith(("table", "api", "remarks"))]
     assert names[: len(COLUMNS)] == list(COLUMNS)
     assert len(names) > 30
     single = [{name: row[name] for name in names} for row in single]

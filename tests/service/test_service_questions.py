@@ -4,6 +4,8 @@ import csv
 import io
 import json
 import math
+from base64 import b64encode
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ import pytest
 import mumacro
 from mumacro import Surrogate
 from mumacro.contacts.geometries import contact_of
-from service.included import INCLUDABLE
+from mumacro.outputs import OUTPUTS
 from service.routers.questions import unit_at
 from tests.support.cases import Case
 from tests.support.comparing import close
@@ -184,7 +186,7 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
 
 def test_every_quantity_has_its_unit_in_the_description(client: Any) -> None:
     for direction, amplitude in (("across", "y0"), ("normal", "Fz_amplitude")):
-        names = [name for name, one in INCLUDABLE.items() if direction not in one.lacks]
+        names = [name for name, one in OUTPUTS.items() if direction not in one.lacks]
         question = {**LAW, "y0": ..., amplitude: 1e-6, "direction": direction, "std": {"mu0": 0.01}}
         law = answered(client, "law", question, include=names)
         for name in names:
@@ -244,6 +246,86 @@ def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:
         "k"
     }
     assert answered(client, "fit", body, Fz=[10.0] * 19 + [11.0])["curve"] is None
+
+
+RIG = {"Fz": 10.0, "y0": 0.4e-6, "f": 20e3}
+FITTED = {  # tests/data/rigs, each with the case that its points lack
+    "amplifier.asc": RIG,
+    "excel_de.csv": RIG,
+    "labview.lvm": RIG,
+    "preamble.csv": {"y0": 0.4e-6, "f": 20e3},
+    "rheometer_utf16.csv": RIG,
+    "windows_1252.csv": RIG,
+}
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_the_file_of_a_rig_is_fitted(client: Any, repository: Path, name: str) -> None:
+    data = (repository / "tests" / "data" / "rigs" / name).read_bytes()
+    body = {**FITTED[name], "points_base64": b64encode(data).decode()}
+    answer = answered(client, "fit", body)
+    assert answer["values"]["k"] == close(8899923.56587856, rel=1e-6)
+    assert answer["points"]["v0"] == close(
+        [1e-3 * x for x in (1, 2, 5, 10, 20, 50, 100, 200)], rel=1e-12
+    )
+    assert answer["read_as"]
+
+
+def test_pasted_points_are_read_without_a_fit(client: Any) -> None:
+    pasted = "Rig 7\n\nv0\tmu_macro\tnote\nmm/s\t%\n1,5\t7\ta\n# no\n2,5\t9\tb\n".replace(
+        "%\n", "%\t\n"
+    )
+    answer = answered(client, "fit", {"points": pasted, "read_only": True})
+    assert answer["columns"] == {"v0": [1.5, 2.5], "mu_macro": [7.0, 9.0]}
+    assert answer["units"] == {"v0": "mm/s", "mu_macro": "%"}
+    assert (answer["lines"], answer["skipped_lines"]) == ([5, 7], [1, 6])
+    assert answer["read_as"] == "tab, decimal comma, head in line 3, units in line 4"
+    fitted = answered(
+        client, "fit", {**RIG, "points": "v0 [mm/s];mu0;mu_macro\n1;0,31;0,069\n5;0,31;0,174\n"}
+    )
+    assert [*fitted["values"]] == ["k"]  # mu0 is one of its columns
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer", "parts"),
+    [
+        ({"points": "v0 [um/s]\tmu_macro [%]\n1.000\t7\n"}, "#/points", ("line 2", "1 or 1000")),
+        ({"points": "v0,mu_macro\nx,1\n1,y\n"}, "#/points", ("line 2", "v0")),
+        ({"points": "v0,mu_macro\n1,0.2\n2,-3\n"}, "#/points", ("line 3", "mu_macro")),
+        ({"points": ""}, "#/points", ("line 1",)),
+        ({"points": "v0,mu_macro\n" + "1,0.2\n" * 1001}, "#/points", ("line 1002", "1,000")),
+        ({"points_base64": "no base64!"}, "#/points_base64", ("base64",)),
+        ({"points_base64": b64encode(b"PK\x03\x04").decode()}, "#/points_base64", ("workbook",)),
+        ({"points_base64": b64encode(b"\0" * 99).decode()}, "#/points_base64", ("zero byte",)),
+        ({"points": "a", "points_base64": "YQ=="}, "#/points_base64", ("points",)),
+        ({"points": "v0,mu_macro\n1,0.2\n", "v0": [1.0]}, "#/v0", ("given once",)),
+        ({"points": "v0,mu_macro\n1,0.2\n", "encoding": "utf-16"}, "#/encoding", ("points",)),
+        ({"points_base64": "YQ==", "encoding": "idna"}, "#/points_base64", ("encoding",)),
+        ({"v0": [1.0], "mu_macro": [0.2], "decimal": ","}, "#/decimal", ("points",)),
+        ({"v0": [1.0]}, "#/mu_macro", ("given",)),
+        ({"points": "v0,mu_macro\n1,0.2\n", "sep": "x"}, "#/sep", ()),
+        ({"points": "v0,mu_macro\n1,0.2\n", "skip": -1}, "#/skip", ()),
+    ],
+)
+def test_points_that_cannot_be_read_are_refused_by_line(
+    client: Any, body: Any, pointer: str, parts: tuple[str, ...]
+) -> None:
+    response = client.post("/v1/fit", json={**RIG, **body})
+    assert response.status_code == 422, response.text
+    fault = response.json()["errors"][0]
+    assert fault["pointer"] == pointer
+    assert all(part in fault["reason"] for part in parts), fault
+    assert "--" not in fault["reason"]  # no options of a command
+
+
+def test_a_table_may_be_larger_than_a_question_and_nothing_else(client: Any) -> None:
+    rows = "".join(f"{i}\t{'x' * 900}\t0.2\n" for i in range(1, 900))
+    table = {"points": f"v0 [mm/s]\tnote\tmu_macro\n{rows}", "read_only": True}
+    assert len(answered(client, "fit", table)["columns"]["v0"]) == 899
+    many = {**RIG, "points": "v0", **{f"x{i}": "y" * 600 for i in range(200)}}
+    assert client.post("/v1/fit", json=many).status_code == 413
+    assert client.post("/v1/stiffness", json=table).status_code == 413
+    assert client.post("/v1/fit", json={"points": "x" * 2**20}).status_code == 413
 
 
 def test_stiff_points_fit_a_rigid_contact_in_words(client: Any, surrogate: Surrogate) -> None:

@@ -31,7 +31,13 @@ FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 #: section
 PAGES = tuple(
     ROOT / path
-    for path in ("docs/accuracy.md", "docs/python.md", "docs/service.md", "tables/README.md")
+    for path in (
+        "docs/accuracy.md",
+        "docs/python.md",
+        "docs/service.md",
+        "docs/validation.md",
+        "tables/README.md",
+    )
 )
 
 

@@ -274,7 +274,7 @@ def test_every_level_gives_the_librarys_bits(
     v, y = points(table, 4000, 1)
     expected, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, dtype=np.int8)
     for code, quantity in enumerate(atlas.QUANTITY_NAMES):
-        data, rows = table._with(quantity), np.empty((5, v.size))
+        data, rows = table.tabulated.data(quantity), np.empty((5, v.size))
         kernel.values(data, code, v, y, expected, bound, source)
         kernel.slopes(data, code, v, y, rows)
         result = ask(driver.points, v.size, 9, code, v, y).T
@@ -287,7 +287,7 @@ def test_every_level_gives_the_librarys_bits(
         assert np.array_equal(result[7] == 0, source >= 0)
         assert np.array_equal(result[7] == 1, ~(v >= 0.0))
     assert set(source) >= {-1, *range(atlas.SOURCES.index("rigid"))}
-    assert same(ask(driver.borders, y.size, 1, y), kernel.border(table._data, y))
+    assert same(ask(driver.borders, y.size, 1, y), kernel.border(table.tabulated.data(), y))
 
 
 @pytest.mark.parametrize(
@@ -305,7 +305,7 @@ def test_other_options_move_the_last_digits_alone(
     v, y = drawn(table, 15_000, 3)
     with np.errstate(all="ignore"):
         away = np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-8
-    mu, bound, _ = table.ratio_with_bound(v, y)
+    mu, bound, _ = table.quantity("mu_ratio", v, y)
     rows = ask(build("gcc", *options).ratio_array, v.size, 1, v, y)
     assert np.all(np.abs(rows - mu) <= 2.0 * bound)
     assert (np.abs(rows - mu)[away] / np.spacing(mu[away])).max() <= apart
@@ -396,9 +396,9 @@ def test_cycles_are_the_librarys(best: Any, table: Surrogate) -> None:
             & np.isfinite(y)
             & np.isfinite(stiffness)
         )
-        power, bound = table.power_with_bound(v, y)
+        power, bound = table.quantity("power", v, y)[:2]
         unit = mu0 * load * (length * omega)
-        stick, stick_bound = table.stick_fraction_with_bound(v, y)
+        stick, stick_bound = table.quantity("stick_fraction", v, y)[:2]
         rows = np.array([length * table.v_tilde_crit(y) * omega, unit * power, unit * bound])
     assert moving.sum() > 1000
     assert same(result[:3, moving], rows[:, moving])

@@ -61,7 +61,7 @@ def test_the_table_continues_the_solver_down_to_denormal_speeds(y: float) -> Non
     s = opened(1e-12)
     slope = solve(1e-60, y).mu_ratio / 1e-60
     for v in (1e-60, 1e-147, 1e-220, 1e-304):
-        result, bound, _ = s.ratio_with_bound(v, y)
+        result, bound, _ = s.quantity("mu_ratio", v, y)
         assert result > 0.0
         assert result == close(slope * v, rel=1e-11, abs=5e-324)
         assert v > 1e-300 or bound < 1e-305
@@ -117,8 +117,8 @@ def test_the_table_continues_the_solver_down_to_any_amplitude(share: float, y: f
     s = opened(1e-12)
     at = Y_RANGE[0]
     solved = solve(share * 0.5 * at * at, at)
-    stick, stick_bound = s.stick_fraction_with_bound(share * 0.5 * y * y, y)
-    power, power_bound = s.power_with_bound(share * 0.5 * y * y, y)
+    stick, stick_bound = s.quantity("stick_fraction", share * 0.5 * y * y, y)[:2]
+    power, power_bound = s.quantity("power", share * 0.5 * y * y, y)[:2]
     assert abs(stick - solved.stick_fraction) <= stick_bound + 1e-14
     assert abs(power / y**4 - solved.power / at**4) <= power_bound / y**4 + 1e-13 * power / y**4
 

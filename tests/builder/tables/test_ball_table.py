@@ -150,7 +150,7 @@ def test_file_and_evaluation_agree_on_coordinates(index: int) -> None:
         for axis in (chart.a, chart.b)
     )
     v, y, _ = chart.point(a, b, table.border)
-    block, at_a, at_b = kernels[-1].places(table.cells("mu_ratio", BALL), v, y, 1)
+    block, at_a, at_b = kernels[-1].places(table.tabulated.data("mu_ratio", BALL), v, y, 1)
     here = block == index
     assert here.mean() > (0.2 if chart.name == "corner" else 0.95)
     for axis, x, at in ((chart.a, a, at_a), (chart.b, b, at_b)):

@@ -54,7 +54,7 @@ def test_cases_are_legal_and_repeatable_and_reach_every_block_and_the_fast_tail(
         assert np.all((v > 0.0) & np.isfinite(v) & (y > 0.0) & np.isfinite(y))
         assert np.array_equal((v, y), draw(name, 3000, sound, seed=0))
         assert not np.array_equal(v, draw(name, 3000, sound, seed=2)[0])
-        reached |= {SOURCES[code] for code in sound.ratio_with_bound(v, y)[2]}
+        reached |= {SOURCES[code] for code in sound.quantity("mu_ratio", v, y)[2]}
     assert reached >= {*BLOCK_NAMES, "tail_fast"}
     assert math.isclose(sum(share for share, _ in CASES.values()), 1.0)
     with pytest.raises(KeyError):

@@ -206,6 +206,29 @@ def test_predictions_that_would_be_misread_are_refused(
     assert caught.value.field == field
 
 
+def test_a_fit_reads_texts_and_units_like_every_answer(surrogate: Surrogate) -> None:
+    mu = friction(surrogate, v0=V0)
+    plain = fit({"v0": V0, "mu_macro": mu, "std": 1e-3}, **RIG)
+    texts = fit(
+        {"v0": [f"{1e3 * x!r} mm/s" for x in V0.tolist()], "mu_macro": mu, "std": "0.1 %"},
+        Fz="10N",
+        y0="2 um",
+        f="20kHz",
+    )
+    assert texts.values == {name: close(x, rel=1e-9) for name, x in plain.values.items()}
+    # a deviation of the friction is its std
+    typed = fit({"v0": V0, "mu_macro": [f"{x!r} ± 0.001" for x in mu.tolist()]}, **RIG)
+    assert typed.std == {name: close(x, rel=1e-6) for name, x in plain.std.items()}
+    there = plain.predict(v0=0.02, f=10e3)
+    again = plain.predict(v0="20 mm/s", f="10 kHz")
+    assert list(again) == close(list(there), rel=1e-12)
+
+
+def test_an_input_in_a_wrong_unit_is_remarked_on(surrogate: Surrogate) -> None:
+    [remark] = fit({"v0": V0, "mu_macro": friction(surrogate, v0=V0)}, **{**RIG, "Fz": 1e7}).remarks
+    assert (remark["row"], remark["field"]) == ("units", "Fz")
+
+
 def test_friction_that_looks_like_per_cent_is_remarked_on(surrogate: Surrogate) -> None:
     mu = friction(surrogate, v0=V0)
     assert fit({"v0": V0, "mu_macro": mu}, **RIG).remarks == ()
@@ -217,21 +240,6 @@ def test_friction_that_looks_like_per_cent_is_remarked_on(surrogate: Surrogate) 
 # --- the least chi2 -------------------------------------------------------------------------------
 
 
-def random_contact(chance: np.random.Generator) -> tuple[Case, Any]:
-    """A rig with its contact, and speeds from creep to sliding."""
-    mu0, force, k = (
-        chance.uniform(0.1, 0.8),
-        10.0 ** chance.uniform(-1, 2),
-        10 ** chance.uniform(4, 8),
-    )
-    y0 = 10.0 ** chance.uniform(-0.7, 1.0) * mu0 * force / k
-    f = 10.0 ** chance.uniform(1, 5)
-    low = chance.uniform(-4.0, -1.0)
-    high = chance.uniform(max(low + 0.7, -1.0), 0.5)
-    v0 = 2.0 * math.pi * f * y0 * np.geomspace(10.0**low, 10.0**high, int(chance.integers(3, 9)))
-    return {"mu0": mu0, "k": k, "Fz": force, "y0": y0, "f": f}, v0
-
-
 @pytest.mark.parametrize("direction", ["across", "along"])
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_exact_points_of_any_contact_give_it(
@@ -240,7 +248,7 @@ def test_exact_points_of_any_contact_give_it(
     chance = np.random.default_rng(7)
     words: Any = {"contact": contact, "direction": direction}
     for _ in range(25):
-        truth, v0 = random_contact(chance)
+        truth, v0 = fit_coverage.random_contact(chance)
         mu = np.asarray(surrogate.evaluate(**truth, v0=v0, **words).mu_macro)
         rig = {name: truth[name] for name in ("Fz", "y0", "f")}
         found = fit({"v0": v0, "mu_macro": mu}, **rig, **words)
@@ -273,7 +281,7 @@ def test_no_contact_fits_better_and_the_intervals_end_where_chi2_says(
     words: Any = {"contact": contact, "direction": direction}
     p = np.geomspace(1e-4, 1e5, 4001)[:, None]  # of y~
     for _ in range(4):
-        truth, v0 = random_contact(chance)
+        truth, v0 = fit_coverage.random_contact(chance)
         rig = {name: truth[name] for name in ("Fz", "y0", "f")}
         spread = 0.01 * truth["mu0"]
         clean = np.asarray(surrogate.evaluate(**truth, v0=v0, **words).mu_macro)
@@ -483,7 +491,10 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
             {**RIG, "unknowns": "k", "mu0": 0.28},
             "mu_macro at index 2 must be <= mu0",
         ),
-        ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "0.3"]}, RIG, "mu_macro must be a real number"),
+        ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "dry"]}, RIG, "mu_macro at index 1"),
+        (POINTS, {**RIG, "Fz": "10 ± 1 N"}, "without a deviation"),
+        (POINTS, {**RIG, "Fz": "9..11 N"}, "Fz must be"),
+        (POINTS, {**RIG, "Fz": "10 mm"}, "Fz must be"),
     ],
 )
 def test_bad_input_is_named_with_the_remedy(data: Any, inputs: Any, message: Any) -> None:

@@ -280,7 +280,7 @@ REFUSED: list[tuple[str, Any, Case, str]] = [
     ("across", ("k", ANY, (0.0, 1.0)), {}, "range must"),
     ("across", ("v0", ANY, (0.0, math.inf)), {}, "range must"),
     ("across", ("v0", ANY, 1.0), {}, "range must"),
-    ("across", ("v0", "fast"), {}, "target must be a real number"),
+    ("across", ("v0", "fast"), {}, "target must be a number"),
     ("across", ("v0", ANY), {"fz": 1.0}, "fz must be one of .*did you mean Fz"),
     ("across", ("omega", ANY), {"f": 1e3}, "f must"),
     ("across", ("v0", ANY), {"omega": None, "f": 1e308}, "f must"),

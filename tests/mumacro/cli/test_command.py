@@ -404,7 +404,8 @@ def test_fit_is_the_librarys(
         assert answer["interval"][name] == close(list(expected.interval[name]), rel=1e-6)
     assert (answer["contact"], answer["warnings"]) == ("ball", list(expected.warnings))
     assert answer.keys() == {*expected.to_dict(), "table"}
-    monkeypatch.setattr(sys, "stdin", io.StringIO(path.read_text()))
+    stdin = io.TextIOWrapper(io.BytesIO(path.read_bytes()))
+    monkeypatch.setattr(sys, "stdin", stdin)
     text = output_of(capsys, 0, "fit", "-", *words, "--unknown", *unknowns)
     assert [line.split()[0] for line in text.splitlines()[: len(unknowns)]] == list(unknowns)
     assert f"+- {expected.std[unknowns[0]]:.2g}" in text
@@ -440,7 +441,7 @@ def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, meas
             "a\n1\n",
             RIG,
             1,
-            ["no column v0 [m/s]; there are 'a'", "mu_macro [-]: the mean friction force over Fz"],
+            ["no columns v0 [m/s], mu_macro [-]", "the mean friction force over Fz", "'a'"],
         ),
         (
             "speed,mu_macro\n1,0.2\n",
@@ -455,17 +456,18 @@ def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, meas
             RIG,
             1,
             [
-                "row 1: mu_macro is missing",
-                "row 2: v0 must be a number, got 'x'",
-                "row 3 has 3 cells",
-                "row 4: v0 must",
+                "line 2: mu_macro is missing",
+                "line 3: v0 must be a number",
+                "line 4 has 3 cells",
+                "line 5: v0 must",
             ],
         ),
-        ("v0;mu_macro\n0,1;0,2\n0,2;0,21\n", RIG, 1, ["give --sep ';' --decimal ','"]),
+        ("v0;mu_macro\n1.000;2\n", RIG, 1, ["line 2: v0 '1.000'", "--decimal ."]),
+        ("x\n\nv0,mu_macro\n1,0.2\n2,-1\n", RIG, 1, ["line 5: mu_macro must be"]),
         ("v0,mu_macro\n1,0.2\n2,0.21\n", RIG[:1], 2, ["missing: omega [rad/s] or f [Hz]"]),
         ("v0,mu_macro\n1,0.2\n2,0.21\n", (*RIG, "v0=1"), 2, ["leave v0 out"]),
         ("v0,mu_macro\n1,0.2\n2,0.21\n", (*RIG, "--unknown", "y0"), 2, ["k, mu0 or both"]),
-        ("v0,mu_macro\n1,nan\n2,0.2\n", RIG, 1, ["row 1: mu_macro is missing"]),
+        ("v0,mu_macro\n1,nan\n2,0.2\n", RIG, 1, ["line 2: mu_macro is missing"]),
     ],
 )
 def test_bad_points_are_refused(
@@ -483,49 +485,45 @@ def test_a_misspelt_choice_gets_the_one_that_was_meant(capsys: Capture) -> None:
     assert "choose from" in ended(capsys, 2, CASE, "--contact", "xyz")
 
 
-def test_a_file_in_another_encoding_or_with_an_interval_in_k_gets_a_remedy(
-    capsys: Capture, tmp_path: Path
-) -> None:
-    pytest.importorskip("scipy")
+def test_an_interval_in_a_column_k_gets_a_remedy(capsys: Capture, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     path, out = tmp_path / "points.csv", str(tmp_path / "out.csv")
-    path.write_bytes("v0,mu_macro,y0 [µm]\n1,0.2,2\n2,0.21,2\n".encode("cp1252"))
-    assert "line 1 is not in UTF-8; save the file as UTF-8" in output_of(
-        capsys, 1, "fit", str(path), "Fz=10N", "f=20kHz"
-    )
-    path.write_bytes("mu0,Fz,k,y0 [µm],f,v0\n0.3,10,1e6,2,2e4,0.01\n".encode("cp1252"))
-    assert "line 1 is not in UTF-8; save the file as UTF-8" in output_of(
-        capsys, 1, "eval", str(path), "-o", out
-    )
     path.write_text("mu0,Fz,k,y0,f,v0\n0.3,10,0.8..1.2,2e-6,2e4,0.01\n")
     main(["eval", str(path), "-o", out])
     capsys.readouterr()
-    assert "columns k_low and k_high in a file" in Path(f"{out}.rejects.csv").read_text()
+    assert "columns k_low and k_high" in Path(f"{out}.rejects.csv").read_text()
 
 
-def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measured: Any) -> None:
-    pytest.importorskip("scipy")
-    path, _ = measured
-    (tmp_path / "german.csv").write_text(
-        "\ufeff" + path.read_text().replace(",", ";").replace(".", ","), "utf-8"
-    )
-    words = (*RIG, "--sep", ";", "--decimal", ",", "--json")
-    german = json.loads(output_of(capsys, 0, "fit", str(tmp_path / "german.csv"), *words))
-    assert (
-        german["values"]
-        == json.loads(output_of(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
-    )
-
-
-def test_a_german_file_of_two_columns_gets_advice_that_works(
-    capsys: Capture, tmp_path: Path
+@pytest.mark.parametrize("options", [(), ("--sep", ";", "--decimal", ",")])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "cp1252", "utf-16"])
+def test_points_of_a_german_file_are_read(
+    capsys: Capture, tmp_path: Path, measured: Any, options: Any, encoding: str
 ) -> None:
     pytest.importorskip("scipy")
-    path = tmp_path / "german.csv"
-    path.write_text("v0 [mm/s];mu_macro\n1;0,069\n5;0,174\n20;0,247\n100;0,289\n")
-    words = ("fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz")
-    assert "give --sep ';' --decimal ','" in output_of(capsys, 1, *words)
-    assert output_of(capsys, 0, *words, "--sep", ";", "--decimal", ",").startswith("k ")
+    path, _ = measured
+    text = path.read_text().replace(",", ";").replace(".", ",")
+    (tmp_path / "german.csv").write_text(text, encoding)
+    words = (*RIG, *options, "--json")
+    assert main(["fit", str(tmp_path / "german.csv"), *words]) == 0
+    german = capsys.readouterr()
+    assert "decimal comma" in german.err
+    plain = json.loads(output_of(capsys, 0, "fit", str(path), *RIG, "--json"))
+    assert json.loads(german.out)["values"] == plain["values"]
+
+
+def test_the_files_of_rigs_are_fitted(capsys: Capture, repository: Path) -> None:
+    pytest.importorskip("scipy")
+    rigs = repository / "tests" / "data" / "rigs"
+    for name, load in (
+        ("preamble.csv", ""),
+        ("windows_1252.csv", "Fz=10N"),
+        ("labview.lvm", "Fz=10N"),
+    ):
+        assert main(["fit", str(rigs / name), load, "y0=0.4um f=20kHz", "--json"]) == 0
+        captured = capsys.readouterr()
+        assert json.loads(captured.out)["values"]["k"] == close(8899923.56587856, rel=1e-6)
+        assert captured.err.startswith("mumacro fit: read as: ")
+        assert len(captured.err.splitlines()) == 1
 
 
 def test_a_fit_takes_mu0_of_each_point(capsys: Capture, tmp_path: Path) -> None:

@@ -54,8 +54,8 @@ def by_quad(
 @pytest.mark.parametrize(("v", "y"), [(0.05, 0.4), (0.3, 2.5), (1.2, 1.0)])
 def test_marched_springs(table: Surrogate, v: Any, y: Any) -> None:
     coarse, fine = (march_ball(v, y, 300, steps) for steps in (1500, 3000))
-    assert table.ratio_with_bound(v, y, **BALL)[0] == close(2.0 * fine - coarse, abs=2e-5)
-    assert table.ratio_with_bound(0.05, 0.4, **BALL)[0] == close(0.94910928, abs=5e-9)
+    assert table.quantity("mu_ratio", v, y, **BALL)[0] == close(2.0 * fine - coarse, abs=2e-5)
+    assert table.quantity("mu_ratio", 0.05, 0.4, **BALL)[0] == close(0.94910928, abs=5e-9)
 
 
 @pytest.mark.parametrize("name", QUANTITY_NAMES)
@@ -80,12 +80,12 @@ def test_static_limit(table: Surrogate) -> None:
                 lambda xi, e=e: math.sqrt(max((1 - xi * xi) ** 2 - e * e, 0.0)), 0, math.sqrt(1 - e)
             )[0]
         )
-        mu, bound, source = table.ratio_with_bound(0.0, y, **BALL)
+        mu, bound, source = table.quantity("mu_ratio", 0.0, y, **BALL)
         assert mu == close(closed, abs=bound)
         assert mu == close(integral, abs=1e-8)
-        assert table.ratio_with_bound(1e-16, y, **BALL)[0] == close(mu, abs=1e-11)
+        assert table.quantity("mu_ratio", 1e-16, y, **BALL)[0] == close(mu, abs=1e-11)
         assert SOURCES[source] == "static_limit"
-    assert table.ratio_with_bound(0.0, [1.5, 1.6, 1e9], **BALL)[0].tolist() == [0.0, 0.0, 0.0]
+    assert table.quantity("mu_ratio", 0.0, [1.5, 1.6, 1e9], **BALL)[0].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_border(table: Surrogate) -> None:
@@ -96,7 +96,7 @@ def test_border(table: Surrogate) -> None:
             np.max(1.5 * s * table.v_tilde_crit(y / (1.5 * s))), rel=1e-6
         )
         crit = table.v_tilde_crit(y, **BALL)
-        codes = [table.ratio_with_bound(crit * x, y, **BALL)[2] for x in (0.999, 1.001)]
+        codes = [table.quantity("mu_ratio", crit * x, y, **BALL)[2] for x in (0.999, 1.001)]
         assert [SOURCES[code] for code in codes] == ["ball_partial_slip", "ball_continuous"]
         assert (
             table.stick_fraction(crit * 1.001, y, **BALL)

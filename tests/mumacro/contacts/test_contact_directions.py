@@ -60,17 +60,17 @@ def test_any_amplitude_up_to_the_largest_number(table: Surrogate) -> None:
 def test_creeping_speeds_keep_their_digits(table: Surrogate) -> None:
     """With reverse slip mu~ is proportional to v~."""
     for a in (1.01, 1.5, 10.0, 1e4):
-        slope = table.ratio_with_bound(1e-6, a, **ALONG)[0] / 1e-6
+        slope = table.quantity("mu_ratio", 1e-6, a, **ALONG)[0] / 1e-6
         for v in (1e-8, 1e-12, 1e-100):
-            assert table.ratio_with_bound(v, a, **ALONG)[0] / v == close(
+            assert table.quantity("mu_ratio", v, a, **ALONG)[0] / v == close(
                 slope, rel=1e-6 * max(a / (a - 1.0), 1.0) ** 2
             )
 
 
 def test_static_and_continuous(table: Surrogate) -> None:
     for a in (0.0, 0.3, 1.0, 2.0):
-        assert table.ratio_with_bound(0.0, a, **ALONG)[0] == close(max(1.0 - a, 0.0), abs=1e-15)
-        mu, bound, source = table.ratio_with_bound(a * (1 + 1e-9), a, **ALONG)
+        assert table.quantity("mu_ratio", 0.0, a, **ALONG)[0] == close(max(1.0 - a, 0.0), abs=1e-15)
+        mu, bound, source = table.quantity("mu_ratio", a * (1 + 1e-9), a, **ALONG)
         assert (mu, bound) == (1.0, 0.0)
         assert SOURCES[source] == ("along_continuous" if a else "no_oscillation")
     assert table.v_tilde_crit([0.5, 2.0], **ALONG).tolist() == [0.5, 2.0]
@@ -96,7 +96,7 @@ def test_normal_is_the_master_curve_and_a_marched_spring(table: Surrogate) -> No
     """u <- min(u + v d tau, 1 + z cos tau)."""
     rng = np.random.default_rng(2)
     z, v = rng.uniform(0.0, 0.999, 300), 10.0 ** rng.uniform(-8, 0.5, 300)
-    mu, bound, source = table.ratio_with_bound(v, z, **NORMAL)
+    mu, bound, source = table.quantity("mu_ratio", v, z, **NORMAL)
     assert mu == close(1.0 - z * (1.0 - master_curve_limit(v / z)), abs=1e-14)
     assert bound.max() < 1e-13
     assert {SOURCES[code] for code in source} == {"normal_continuous", "normal_stick_slip"}
@@ -109,7 +109,7 @@ def test_normal_is_the_master_curve_and_a_marched_spring(table: Surrogate) -> No
     for _ in range(3):
         path = np.minimum.accumulate(np.concatenate([[u], limit - rising]))[1:] + rising
         u = path[-1]
-    assert table.ratio_with_bound(speed, share, **NORMAL)[0] == close(path.mean(), abs=2e-5)
+    assert table.quantity("mu_ratio", speed, share, **NORMAL)[0] == close(path.mean(), abs=2e-5)
 
 
 def test_where_reverse_slip_begins_the_slopes_jump_and_the_bound_says_so(table: Surrogate) -> None:
@@ -143,4 +143,4 @@ def test_a_ball_along_is_its_springs(tolerance: Any) -> None:
             whole = by_quad(s, name, v, a, "along", math.sqrt(max(1.0 - travel / 3.0, 0.0)))
             assert value == close(whole, abs=1e-11 + bound)
             assert SOURCES[source] == "along_reverse_slip"
-    assert s.ratio_with_bound(1.0, 0.99, contact="ball", **ALONG)[0] == 1.0
+    assert s.quantity("mu_ratio", 1.0, 0.99, contact="ball", **ALONG)[0] == 1.0

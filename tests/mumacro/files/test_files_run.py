@@ -21,6 +21,7 @@ import pyarrow.parquet as pq  # noqa: E402
 
 from mumacro.cli.main import main  # noqa: E402
 from mumacro.files import FilesError, evaluate_files, reading  # noqa: E402
+from mumacro.inputs import decoding  # noqa: E402
 from mumacro.table import atomic  # noqa: E402
 
 TABLE = opened(1e-12)
@@ -31,6 +32,7 @@ KINDS = ("csv", "csv.gz", "ndjson", "parquet")
 def small_blocks() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reading, "ROWS", 400)
+        patch.setattr(decoding, "PIECE", 20_000)
         yield
 
 
@@ -225,7 +227,7 @@ def test_a_fault_that_a_change_brings_in_is_told_as_a_change(
     assert "quote" not in str(failure.value)
     assert files_in(tmp_path) == [source.name]
     if kind.startswith("csv"):  # the fault alone is told as what it is
-        with pytest.raises(FilesError, match=r"row 20: a quote is not closed"):
+        with pytest.raises(FilesError, match=r"line 21: a quote is not closed"):
             evaluate_files([source], out, TABLE)
 
 

@@ -20,7 +20,7 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
     v, y = 10.0 ** rng.uniform(-8.0, 6.0, 60_000), 10.0 ** rng.uniform(-3.0, 8.0, 60_000)
     near = rng.random(v.size) < 0.5
     y[near] = rng.uniform(0.7, 3.5, np.count_nonzero(near))
-    block, a, b = kernels[-1].places(table._data, v, y)
+    block, a, b = kernels[-1].places(table.tabulated.data(), v, y)
     mine = block == index
     assert np.count_nonzero(mine) > 100
     chart = CHARTS[index]
@@ -42,8 +42,8 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
 def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surrogate) -> None:
     values = np.concatenate([10.0 ** np.arange(-320.0, 308.0, 4.0), [5e-324, 1.7e308]])
     v, y = (x.ravel() for x in np.meshgrid(values, values))
-    block, a, b = kernels[-1].places(table._data, v, y)
-    np.testing.assert_array_equal(block, table.ratio_with_bound(v, y)[2])
+    block, a, b = kernels[-1].places(table.tabulated.data(), v, y)
+    np.testing.assert_array_equal(block, table.quantity("mu_ratio", v, y)[2])
     assert np.all((block >= 0) & (block <= SOURCES.index("tail_fast")))
     for index, chart in enumerate(CHARTS):
         mine = block == index
@@ -67,7 +67,7 @@ def test_the_form_of_a_value_is_the_value_at_the_nodes(
         assert (quantity.name in part.nodes) == chart.holds(quantity)
         a, b = np.meshgrid(part.a, part.b, indexing="ij")
         v, y, eta = chart.point(a, b, table.border)
-        keep = (table.ratio_with_bound(v, y)[2] == index) & (v > 1e-200)
+        keep = (table.quantity("mu_ratio", v, y)[2] == index) & (v > 1e-200)
         base, factor = kernels[-1].forms(
             atlas.QUANTITY_NAMES.index(quantity.name), index, v[keep], y[keep], eta[keep]
         )

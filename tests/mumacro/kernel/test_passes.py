@@ -31,7 +31,7 @@ table = tables(1e-4, 1e-12)
 
 def one_by_one(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> list[Array]:
     """Value, bound, source, slopes and their bounds of points (n,), each an array of one."""
-    data, code = table._with(name), atlas.QUANTITY_NAMES.index(name)
+    data, code = table.tabulated.data(name), atlas.QUANTITY_NAMES.index(name)
     rows = []
     for i in range(v.size):
         one = slice(i, i + 1)
@@ -134,11 +134,11 @@ def test_the_logarithm_is_close_to_the_libraries_and_never_falls(
     """Where ln y~ is the coordinate: the logarithm of any y~, and of neighbouring doubles."""
     for start in (3.5, 4.0, 8.0, 16.0, 31.0, 1e3, 1e5):
         y = np.unique(start * (1.0 + np.arange(-2000, 2000) * 1e-15))
-        _, a, _ = kernel.places(table._data, 0.3 * table.v_tilde_crit(y), y)
+        _, a, _ = kernel.places(table.tabulated.data(), 0.3 * table.v_tilde_crit(y), y)
         assert np.all(np.abs(a - np.log(y)) <= 4.5e-16 * np.maximum(1.0, np.log(y)))
         assert np.all(np.diff(a) >= -2.3e-16 * np.log(start))
     y = np.geomspace(3.0 + 1e-9, 131_072.0, 20_000)
-    _, a, _ = kernel.places(table._data, 0.3 * table.v_tilde_crit(y), y)
+    _, a, _ = kernel.places(table.tabulated.data(), 0.3 * table.v_tilde_crit(y), y)
     assert np.all(np.abs(a - np.log(y)) <= 4.5e-16 * np.maximum(1.0, np.log(y)))
 
 
@@ -166,7 +166,7 @@ def test_every_level_with_fused_multiply_add_gives_the_same_bits(
 ) -> None:
     rng, n = np.random.default_rng(12), 20_000
     v, y = log_uniform(rng, 1e-9, 1e6, n), log_uniform(rng, 1e-6, 1e8, n)
-    code, data = atlas.QUANTITY_NAMES.index(name), table._with(name)
+    code, data = atlas.QUANTITY_NAMES.index(name), table.tabulated.data(name)
 
     def rows_of(kernel: Kernel) -> list[Any]:
         rows: list[Any] = [np.empty(n), np.empty(n), np.empty(n, np.int8), np.empty((5, n))]
@@ -205,7 +205,7 @@ def test_contacts_and_directions_have_the_same_bits(
     if kind[1] == 2:
         six[3] = six[1] * rng.uniform(0.0, 1.0, n)
     six[5][:20], six[3][20:40], six[2][40:60] = 0.0, 0.0, np.inf
-    data = table.cells("mu_ratio", Kind(*kind))
+    data = table.tabulated.data("mu_ratio", Kind(*kind))
 
     def numbers_of(kernel: Kernel, part: slice) -> list[Any]:
         columns = [np.ascontiguousarray(column[part]) for column in six]

@@ -205,7 +205,7 @@ def test_what_the_border_does_to_stick_is_well_bounded(
     sliding."""
     y = np.geomspace(low, high, 2000)
     v = np.minimum(sweep.solve("border", np.ones_like(y), y)["deficit"], table.v_tilde_crit(y))
-    share, bound = table.stick_fraction_with_bound(v, y)
+    share, bound = table.quantity("stick_fraction", v, y)[:2]
     error = np.abs(share - sweep.solve("full", v, y)["stick_fraction"])
     assert 0.5 < (error / bound).max() <= 1.0
 
@@ -254,7 +254,7 @@ def test_the_closed_form_for_large_speed_is_bounded_tightly(table: Surrogate) ->
     rounding."""
     y = np.geomspace(2.0, 1.2e4, 90)
     v = fast_from(table, y) * (1.0 + 1e-9)
-    mu, bound, source = table.ratio_with_bound(v, y)
+    mu, bound, source = table.quantity("mu_ratio", v, y)
     assert {SOURCES[code] for code in source} == {"tail_fast"}
     with mpmath.workdps(24):
         truth = [slow_manifold(*point) for point in zip(v.tolist(), y.tolist(), strict=True)]
@@ -387,7 +387,9 @@ def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(
     ours, fine, worst = opened(coarse), opened(1e-12), 0.0
     for kind in KINDS:
         v, y = draw(kind, 20_000, ours, seed=5)
-        (mu, bound, _), (truth, fine_bound, _) = (s.ratio_with_bound(v, y) for s in (ours, fine))
+        (mu, bound, _), (truth, fine_bound, _) = (
+            s.quantity("mu_ratio", v, y) for s in (ours, fine)
+        )
         share = np.maximum(np.abs(mu - truth) - fine_bound, 0.0) / np.maximum(bound, 1e-300)
         for i in np.argsort(share)[-20::4]:
             point: Case = {"v0": float(v[i]), "y0": float(y[i])}
@@ -422,7 +424,11 @@ def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(
 ) -> None:
     coarse = opened(1e-4)
     decay = settling(coarse, **UNIT, y0=y, v0=v)
-    less = 2.0 * math.pi * (v * coarse.ratio_with_bound(v, y)[1] + coarse.power_with_bound(v, y)[1])
+    less = (
+        2.0
+        * math.pi
+        * (v * coarse.quantity("mu_ratio", v, y)[1] + coarse.quantity("power", v, y)[:2][1])
+    )
     assert decay.error_bound == close(
         math.log(100.0) / (decay.slip_path - less) - decay.periods, rel=1e-9
     )

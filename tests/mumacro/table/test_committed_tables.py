@@ -90,7 +90,7 @@ def test_bounds_hold_on_the_border_in_the_corner_and_at_creeping_speeds(
                 of_stick.max()
                 <= 0.7 * math.sqrt(table.border.max_rel_error + 2e-15) + 30.0 * table.tolerance
             )
-    assert table.stick_fraction_with_bound(2.0 * crit, y)[1].max() == 0.0
+    assert table.quantity("stick_fraction", 2.0 * crit, y)[:2][1].max() == 0.0
     v = np.geomspace(1e-12, 1e-2, 30)[:, None]
     gaps = np.concatenate([-np.geomspace(1e-12, 0.2, 12), [0.0], np.geomspace(1e-12, 0.4, 12)])
     compare(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, 1.0 + gaps)))
@@ -99,14 +99,14 @@ def test_bounds_hold_on_the_border_in_the_corner_and_at_creeping_speeds(
     )
     # one digit of y~ changes mu~ by at most the root of two digits, also at the cusp
     assert (
-        table.ratio_with_bound(np.geomspace(1e-300, 1e-9, 400), 1.0)[1].max()
+        table.quantity("mu_ratio", np.geomspace(1e-300, 1e-9, 400), 1.0)[1].max()
         <= 1e-7 + table.tolerance
     )
 
 
 def test_the_reference_lies_within_tolerance_and_bounds(table: Surrogate, reference: Any) -> None:
     """The independent solver, in quadruple precision."""
-    mu, bound, source = table.ratio_with_bound(reference.v, reference.y)
+    mu, bound, source = table.quantity("mu_ratio", reference.v, reference.y)
     error = np.abs(mu - reference.mu_ratio)
     assert error.max() <= table.tolerance
     assert (error / reference.mu_ratio).max() <= ABS_TO_REL * table.tolerance
@@ -115,7 +115,7 @@ def test_the_reference_lies_within_tolerance_and_bounds(table: Surrogate, refere
     # the label can be wrong only within the error of the stored border
     distance = np.abs(reference.v / table.v_tilde_crit(reference.y) - 1.0)
     assert np.all(distance[wrong] <= table.border.max_rel_error)
-    stick, bound = table.stick_fraction_with_bound(reference.v, reference.y)
+    stick, bound = table.quantity("stick_fraction", reference.v, reference.y)[:2]
     assert np.all(np.abs(stick - reference.stick_fraction) <= bound + STICK_NOISE)
 
 

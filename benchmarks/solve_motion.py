@@ -1,0 +1,120 @@
+"""``solve_motion`` beside a scan of 2,000 points in random problems, its time, and its picture.
+
+python benchmarks/solve_motion.py [--only SECTION] [--share 0.01]
+
+Problems are springs with oscillations in x, y and the load, an unknown, and a target that a scan of
+the unknown crosses.
+"""
+
+from benchmarks.measuring import IMAGES, main, sections  # isort: split
+
+import math
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+import mumacro
+from mumacro.analysis.solve_motion import UNKNOWNS, Curve
+from mumacro.plotting import BLUE, RED, finish
+
+PROBLEMS, FINE = 1000, 2000
+POSSIBLE = [name for name in UNKNOWNS if name != "omega"]
+CONVEYOR: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e5, "f": 50.0, "x": 1e-4}
+PHASES = np.linspace(0.0, 360.0, 73)
+
+
+def problem(rng: np.random.Generator) -> tuple[str, dict[str, Any]]:
+    """An unknown and a motion without it, in units of mu0 Fz = k = omega = 1."""
+    unknown = str(rng.choice(POSSIBLE))
+    case: dict[str, Any] = {
+        "mu0": 0.3,
+        "Fz": 1.0 / 0.3,
+        "k": 1.0,
+        "f": 1.0 / (2.0 * math.pi),
+        "v0": float(10.0 ** rng.uniform(-2.5, 0.5)),
+    }
+    for part in ("x", "y"):
+        case[part] = (float(10.0 ** rng.uniform(-0.7, 0.9)), float(rng.uniform(0.0, 360.0)))
+    case["normal"] = (float(rng.uniform(0.1, 0.9)) * case["Fz"], float(rng.uniform(0.0, 360.0)))
+    name, _, member = unknown.partition(".")
+    if not member:
+        del case[name]
+        if name == "Fz":
+            case["normal"] = 0.0
+    return unknown, case
+
+
+def crossings(x: Any, gap: Any) -> list[tuple[float, float]]:
+    """Neighbours of a scan between which the gap changes its sign."""
+    legal = np.isfinite(gap)
+    x, gap = x[legal], gap[legal]
+    return [(x[i], x[i + 1]) for i in np.flatnonzero(gap[:-1] * gap[1:] < 0.0)]
+
+
+def search(share: float = 1.0) -> str:
+    """Crossings of a scan without a root, and roots that the motion does not confirm."""
+    rng = np.random.default_rng(20261127)
+    counts, several, spent, samples = Counter[str](), 0, 0.0, 0
+    missed, wrong = list[object](), list[object]()
+    problems = max(round(share * PROBLEMS), 1)
+    for _ in range(problems):
+        unknown, case = problem(rng)
+        x = mumacro.solve_motion(unknown, 1e9, **case).samples[0]  # how its range is spread
+        fine = np.interp(np.linspace(0.0, 1.0, FINE), np.linspace(0.0, 1.0, x.size), x)
+        mean, _ = Curve(unknown, "mu_macro", case).at(fine)
+        target = float(np.nanquantile(mean, rng.uniform(0.1, 0.9)))
+        start = time.perf_counter()
+        solution = mumacro.solve_motion(unknown, target, **case)
+        spent += time.perf_counter() - start
+        samples += solution.samples[0].size
+        roots, places = solution.roots[0], crossings(fine, mean - target)
+        several += len(places) > 1
+        counts[unknown] += 1
+        for a, b in places:
+            met = any(root.low <= b and root.high >= a for root in roots)
+            whole_turn = unknown.endswith("phase") and (a < 1e-3 or b > 360.0 - 1e-3)
+            if not (met or whole_turn):
+                missed.append((unknown, case, target, a, b))
+        wrong += [root for root in roots if abs(root.mean - target) > 2.0 * root.error_estimate]
+    kinds = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    lines = [
+        f"{problems} problems, {several} with several roots ({kinds}): {len(missed)} roots missed, "
+        f"{len(wrong)} off by more than twice their estimate.",
+        f"{1e3 * spent / problems:.0f} ms and {samples / problems:.0f} motions a problem.",
+        *(f"FAILED: {one}" for one in (*missed, *wrong)),
+    ]
+    return "\n".join(lines)
+
+
+def picture(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
+    """Writes the picture of docs/how-to/conveyor.md: transport speed over the phase of the load."""
+    from matplotlib.figure import Figure
+
+    speeds = np.full(PHASES.size, np.nan)
+    for i, phase in enumerate(PHASES):
+        roots = mumacro.solve_motion("v0", 0.0, **CONVEYOR, normal=(8.0, phase)).roots[0]
+        if roots:
+            speeds[i] = roots[-1].value
+    best = int(np.nanargmax(speeds))
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(PHASES, 1e3 * speeds, color=BLUE, lw=2.0, label="transport speed")
+    axes.plot(PHASES[best], 1e3 * speeds[best], "o", color=RED, mec="white", label="fastest")
+    axes.set(
+        xlabel="phase of the load [degrees]",
+        ylabel="speed at which the mean force is 0 [mm/s]",
+        xticks=np.arange(0, 361, 45),
+        xlim=(0.0, 360.0),
+    )
+    axes.set_ylim(bottom=0.0)
+    finish(axes, r"$\mu_0$ = 0.3, $F_z$ = 10 ± 8 N, $k$ = 0.1 N/µm, $x_0$ = 0.1 mm, $f$ = 50 Hz")
+    figure.savefig(IMAGES / "conveyor.png", dpi=110)
+    return f"fastest: {1e3 * speeds[best]:.2f} mm/s at {PHASES[best]:g} degrees"
+
+
+SECTIONS = sections(search, picture)
+
+if __name__ == "__main__":
+    main(__doc__, SECTIONS, share=1.0)

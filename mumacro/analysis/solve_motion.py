@@ -1,0 +1,544 @@
+"""The inverse problem over any periodic motion: which values of one input give a mean force.
+
+A mean force over one input of a motion may rise and fall several times, so the curve is sampled
+until every part of it is decided: an interval is halved as long as its middle differs from a cubic
+through its neighbours by so much that the target could be crossed in it.  Each change of sign is
+then narrowed by the method of Illinois; where the curve comes near the target without crossing it,
+the nearest place is looked for, since two roots may lie there.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mumacro import plotting
+from mumacro.analysis.motion import PARTS, motion
+from mumacro.errors import InputError
+from mumacro.inputs.cases import real
+from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
+from mumacro.inputs.names import unknown_name
+from mumacro.inputs.oscillation import read_oscillation
+from mumacro.inputs.reading import read, read_one
+from mumacro.kernel.arrays import Array, Bools
+
+#: inputs of a motion that may be unknown
+INPUTS = ("v0", "k", "Fz", "f", "omega", "mu0")
+MEMBERS = ("amplitude", "phase")
+UNKNOWNS = (*INPUTS, *(f"{part}.{member}" for part in PARTS for member in MEMBERS))
+#: what may be the target: mean forces, which have an estimate of their error
+OF = ("mu_macro", "mu_lateral")
+FIRST, LEVELS = 49, 7  # samples of the whole range, and how often an interval is halved
+# how many times the difference between a sample and the cubic through its neighbours the target
+# must be away for an interval to be left alone: found by search in 1,000 random problems
+# (benchmarks/solve_motion.py), where 1 missed a root
+_CLEAR = 4.0
+_NARROW = 1e-12  # of the range, where a bracket is one place
+_MOST_STEPS = 80
+_DECADES = 20.0  # a range whose ends are further apart than this factor is searched in logarithms
+
+
+class MotionRoot(NamedTuple):
+    """One value of the unknown."""
+
+    value: float  #: the unknown [SI], a phase in degrees
+    #: between them the mean force is within its error estimate of the target, to first order
+    low: float
+    high: float
+    mean: float  #: the mean force over the mean load there [-]
+    error_estimate: float  #: of it [-]
+
+
+class MotionReach(NamedTuple):
+    """Which mean forces the searched range has."""
+
+    low: float  #: the range of the unknown [SI], of a phase in degrees
+    high: float
+    least: float  #: smallest and largest mean force in it [-], of the samples
+    most: float
+
+
+@dataclass(frozen=True, repr=False)
+class MotionSolution:
+    """All roots of every target."""
+
+    unknown: str
+    of: str  #: "mu_macro" or "mu_lateral"
+    targets: tuple[float, ...]
+    roots: tuple[tuple[MotionRoot, ...], ...]  #: of each target, ascending
+    reach: MotionReach
+    #: for v0 without a root: the solution with x turned by 180 degrees, which moves the body the
+    #: other way; None where that has no root either
+    other_way: "MotionSolution | None"
+    samples: tuple[Array, Array] = field(compare=False)  #: of the unknown and the mean force
+    case: Mapping[str, Any] = field(compare=False)  #: the motion, without the unknown
+
+    @property
+    def value(self) -> float:
+        """The one root of the one target; InputError where there are none or several."""
+        every = [root for roots in self.roots for root in roots]
+        if len(every) != 1:
+            raise InputError("value", len(every), "used where there is one root: see .roots")
+        return every[0].value
+
+    @property
+    def unit(self) -> str:
+        """The unit of the unknown."""
+        return unit_of_unknown(self.unknown)
+
+    def reason(self, index: int = 0) -> str:
+        """Why a target has no root; empty where it has one."""
+        if self.roots[index]:
+            return ""
+        reach, target = self.reach, self.targets[index]
+        text = (
+            f"{self.of} = {target:.6g} is out of reach: {self.unknown} from {reach.low:.4g} to "
+            f"{reach.high:.4g} {self.unit} gives {reach.least:.4g} to {reach.most:.4g}"
+        )
+        if self.other_way is not None and self.other_way.roots[index]:
+            speed = self.other_way.roots[index][0].value
+            text += (
+                f"; with the phase of x turned by 180 degrees the body moves the other way, at "
+                f"{speed:.4g} m/s"
+            )
+        return text
+
+    def plot(self, axes: Any = None) -> Any:
+        """The mean force over the unknown with the targets and their roots; returns matplotlib's
+        axes."""
+        x, mean = self.samples
+        places = [root.value for roots in self.roots for root in roots]
+        return plotting.plot_roots(
+            _axis(self.unknown), x, mean, self.of, self.targets, places, _log(x[0], x[-1]), axes
+        )
+
+    def __repr__(self) -> str:
+        every = [root for roots in self.roots for root in roots]
+        shown = ", ".join(f"{root.value:.6g}" for root in every[:8])
+        more = ", ..." if len(every) > 8 else ""
+        found = f"{shown}{more} {self.unit}".rstrip() if every else f"no root: {self.reason()}"
+        return f"<MotionSolution {self.unknown}: {found}>"
+
+
+def unit_of_unknown(unknown: str) -> str:
+    """The unit of an unknown of a motion: SI, a phase in degrees.
+
+    >>> [unit_of_unknown(name) for name in ("v0", "x.amplitude", "normal.amplitude", "y.phase")]
+    ['m/s', 'm', 'N', 'deg']
+    """
+    part, _, member = unknown.partition(".")
+    if member == "phase":
+        return "deg"
+    return ("N" if part == "normal" else "m") if member else unit_of(part)
+
+
+def solve_motion(
+    unknown: str,
+    target: ArrayLike = 0.0,
+    of: str = "mu_macro",
+    within: tuple[Any, Any] | None = None,
+    **case: Any,
+) -> MotionSolution:
+    """Every value of one input of a motion at which a mean force is ``target``.
+
+    Parameters
+    ----------
+    unknown : str
+        v0, k, Fz, f, omega, mu0; or amplitude or phase of a part with one harmonic: "x.amplitude",
+        "x.phase", "y.amplitude", "y.phase", "normal.amplitude", "normal.phase".
+    target : array_like
+        Wanted value [-], shape (n,) or a scalar; 0 is the speed at which the motion carries itself.
+    of : str
+        "mu_macro", the mean force along the drag over the mean load, or "mu_lateral", across it.
+    within : (low, high), optional
+        Range to search, in SI (a phase in degrees), or texts with units.  Left out: all phases; a
+        speed up to ten times the fastest of the oscillation; another input over the decades in
+        which it matters.
+    **case
+        As in :func:`mumacro.motion`, one case, without the unknown.
+
+    Returns
+    -------
+    MotionSolution
+        All roots, ascending; where there is none, the range that is reachable, and for v0 the
+        solution that moves the other way.
+
+    Raises
+    ------
+    InputError
+        An unknown that a motion does not have, or that is given; an input that is missing or not
+        one number.
+
+    Examples
+    --------
+    The transport speed of a conveyor whose load follows its way by a quarter of a period:
+
+    >>> case = dict(mu0=0.3, Fz=10.0, k=1e5, f=50.0, x=1e-4, normal=(8.0, -90.0))
+    >>> solution = solve_motion("v0", target=0.0, **case)
+    >>> f"{solution.value * 1e3:.2f} mm/s"
+    '11.44 mm/s'
+    """
+    if unknown not in UNKNOWNS:
+        raise InputError("unknown", unknown, unknown_name(str(unknown), UNKNOWNS))
+    if of not in OF:
+        raise InputError("of", of, f"one of {', '.join(OF)}")
+    targets = np.atleast_1d(real("target", target)).astype(np.float64)
+    if targets.ndim != 1 or not np.isfinite(targets).all():
+        raise InputError("target", target, "finite numbers, one or a list")
+    curve = Curve(unknown, of, case)
+    low, high = _range(within, unknown, curve)
+    solution = _solved(curve, low, high, targets)
+    if unknown != "v0" or any(solution.roots) or not {"x", "normal"} <= case.keys():
+        return solution
+    turned = _solved(curve.turned(), low, high, targets)
+    return replace(solution, other_way=turned if any(turned.roots) else None)
+
+
+def _solved(curve: "Curve", low: float, high: float, targets: Array) -> MotionSolution:
+    """All roots in a range, without a look at the other way."""
+    scan = _Scan(curve, low, high, targets)
+    return MotionSolution(
+        unknown=curve.unknown,
+        of=curve.of,
+        targets=tuple(targets.tolist()),
+        roots=tuple(scan.roots(float(one)) for one in targets),
+        reach=MotionReach(low, high, float(scan.mean.min()), float(scan.mean.max())),
+        other_way=None,
+        samples=(scan.x, scan.mean),
+        case=curve.case,
+    )
+
+
+# --- the curve ------------------------------------------------------------------------------------
+
+
+class Curve:
+    """A mean force over the unknown of one motion."""
+
+    def __init__(self, unknown: str, of: str, case: Mapping[str, Any]) -> None:
+        self.unknown, self.of, self.case = unknown, of, dict(case)
+        part, _, member = unknown.partition(".")
+        if member:
+            given = read_oscillation(part, case.get(part, 0.0))
+            if len(given) > 1:
+                bound = f"of one harmonic where {unknown} is the unknown"
+                raise InputError(part, case[part], bound)
+            self._harmonic, self._amplitude, self._phase = given[0]
+            if member == "phase" and not np.any(self._amplitude):
+                raise InputError(
+                    part, case.get(part), f"an amplitude > 0, whose {unknown} is unknown"
+                )
+        elif case.get(unknown) is not None:
+            raise InputError(unknown, case[unknown], "left out: it is the unknown")
+        partner = {"f": "omega", "omega": "f"}.get(unknown)
+        if partner and case.get(partner) is not None:
+            raise InputError(partner, case[partner], f"left out: {unknown} is the unknown")
+        self._part, self._member = part, member
+        for name in INPUTS:
+            if case.get(name) is not None:
+                self.case[name] = self.number(name)
+
+    def turned(self) -> "Curve":
+        """The same motion with x turned by half a period: it moves the other way."""
+        terms = read_oscillation("x", self.case["x"])
+        turned = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
+        return Curve(self.unknown, self.of, {**self.case, "x": turned})
+
+    def at(self, values: Array) -> tuple[Array, Array]:
+        """The mean force and the estimate of its error, (n,) both; NaN where there is no motion."""
+        case = dict(self.case)
+        if self._member == "amplitude":
+            case[self._part] = [(self._harmonic, values, self._phase)]
+        elif self._member == "phase":
+            case[self._part] = [(self._harmonic, self._amplitude, values)]
+        else:
+            case[self.unknown] = values
+        answer = motion(**case)
+        shape = values.shape
+        mean, error = getattr(answer, self.of), answer.error_estimate
+        return np.broadcast_to(mean, shape).astype(float), np.broadcast_to(error, shape).astype(
+            float
+        )
+
+    def number(self, name: str) -> float:
+        """One given input of the case [SI]."""
+        value = self.case.get(name)
+        if value is None:
+            raise InputError(name, None, f"given [{unit_of(name)}]")
+        one = np.asarray(read(name, value).si)
+        if one.size != 1:
+            raise InputError(name, value, "one number: a search has one motion")
+        return float(one.ravel()[0])
+
+    @property
+    def omega(self) -> float:
+        """The angular frequency [rad/s]."""
+        if self.case.get("omega") is not None:
+            return self.number("omega")
+        return RAD_PER_CYCLE * self.number("f")
+
+    def swing(self) -> float:
+        """The largest way of the oscillations in x and y [m], harmonics as often as they turn."""
+        total = 0.0
+        for part in ("x", "y"):
+            if part != self._part or not self._member:
+                for order, amplitude, _ in read_oscillation(part, self.case.get(part, 0.0)):
+                    total += order * float(np.max(np.abs(amplitude)))
+        return total
+
+
+def _range(within: Any, unknown: str, curve: Curve) -> tuple[float, float]:
+    """The range to search, ascending."""
+    if within is None:
+        return _usual_range(unknown, curve)
+    part, _, member = unknown.partition(".")
+    quantity = "angle" if member == "phase" else ""
+    name = part if member else unknown
+    try:
+        low, high = (read_one(name, end, quantity) for end in within)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError("within", within, "two values, low and high") from error
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise InputError("within", (low, high), "two finite values, ascending")
+    if low < 0.0 and member != "phase":
+        raise InputError("within", (low, high), ">= 0")
+    return low, high
+
+
+def _usual_range(unknown: str, curve: Curve) -> tuple[float, float]:
+    """Where the unknown matters."""
+    member = unknown.partition(".")[2]
+    if member == "phase":
+        return 0.0, 360.0
+    if unknown == "normal.amplitude":
+        return 0.0, 0.999 * curve.number("Fz")
+    if unknown == "mu0":
+        return 1e-3, 10.0
+    if unknown == "v0":
+        swing = curve.swing()
+        if swing == 0.0:
+            raise InputError(
+                "x", curve.case.get("x"), "an oscillation in x or y, or within=(low, high)"
+            )
+        return 0.0, 10.0 * swing * curve.omega
+    if member:  # an amplitude, in units of mu0 Fz / k
+        length = curve.number("mu0") * curve.number("Fz") / curve.number("k")
+        return 1e-3 * length, 1e3 * length
+    swing = curve.swing()
+    if unknown in ("f", "omega"):
+        drag = curve.number("v0")
+        if drag == 0.0 or swing == 0.0:
+            raise InputError(
+                unknown, None, "searched within=(low, high), where v0 or x and y are 0"
+            )
+        middle = drag / swing  # where the oscillation is as fast as the drag
+        low, high = 1e-2 * middle, 1e4 * middle
+        return (low, high) if unknown == "omega" else (low / RAD_PER_CYCLE, high / RAD_PER_CYCLE)
+    if swing == 0.0:
+        raise InputError(unknown, None, "searched within=(low, high), where x and y are 0")
+    if unknown == "k":  # the way of the oscillation is 1e-3 to 1e3 times mu0 Fz / k
+        middle = curve.number("mu0") * curve.number("Fz") / swing
+    else:
+        middle = curve.number("k") * swing / curve.number("mu0")
+    return 1e-3 * middle, 1e3 * middle
+
+
+def _log(low: float, high: float) -> bool:
+    """Whether a range is searched, and drawn, in logarithms."""
+    return low > 0.0 and high / low > _DECADES
+
+
+# --- the search -----------------------------------------------------------------------------------
+
+
+class _Scan:
+    """Samples of a curve, dense enough that every part of it is decided for every target."""
+
+    def __init__(self, curve: Curve, low: float, high: float, targets: Array) -> None:
+        self.curve, self.low, self.high = curve, low, high
+        # a speed of 0 leaves a choice of the cycle: the search begins right beside it
+        start = 1e-6 * high if curve.unknown == "v0" and low == 0.0 else low
+        if curve.unknown == "v0" and low == 0.0:
+            places = np.concatenate(
+                [
+                    np.geomspace(start, 1e-2 * high, FIRST // 3),
+                    np.linspace(1e-2 * high, high, FIRST)[1:],
+                ]
+            )
+        elif _log(low, high):
+            places = np.geomspace(low, high, FIRST)
+        else:
+            places = np.linspace(low, high, FIRST)
+        mean, error = curve.at(places)
+        self._keep(places, mean, error)
+        if self.x.size < 4:
+            curve.at(np.asarray(0.5 * (low + high)))  # says why
+            raise InputError("within", (low, high), "a range in which the motion is possible")
+        open_ = np.ones(self.x.size - 1, dtype=np.bool_)
+        for _ in range(LEVELS):
+            open_ = self._halve(open_, targets)
+            if not open_.any():
+                break
+
+    def _keep(self, x: Array, mean: Array, error: Array) -> None:
+        legal = np.isfinite(mean)
+        self.x, self.mean, self.error = x[legal], mean[legal], error[legal]
+
+    def _halve(self, open_: Bools, targets: Array) -> Bools:
+        """Halve the intervals that are ``open_``, (n - 1,); which of the new ones stay open."""
+        i = np.flatnonzero(open_)
+        middles = _between(self.x[i], self.x[i + 1])
+        mean, error = self.curve.at(middles)
+        off = np.abs(mean - self._cubic(i, middles))
+        nearest = np.min(
+            [
+                np.min(np.abs(side[:, None] - targets), axis=1)
+                for side in (self.mean[i], mean, self.mean[i + 1])
+            ],
+            axis=0,
+        )
+        # an interval that crosses a target is open until the curve in it is smooth
+        undecided = ~(nearest > _CLEAR * off + error)
+        smooth = off <= 1e-3 * np.abs(self.mean[i + 1] - self.mean[i]) + error
+        crossing = np.any(
+            np.sign(self.mean[i][:, None] - targets)
+            != np.sign(self.mean[i + 1][:, None] - targets),
+            axis=1,
+        )
+        still = undecided & ~(crossing & smooth & _monotone(self.mean[i], mean, self.mean[i + 1]))
+        order = np.argsort(np.concatenate([self.x, middles]), kind="stable")
+        flags = np.zeros(self.x.size + middles.size, dtype=np.bool_)  # of the interval behind each
+        flags[i], flags[self.x.size :] = still, still
+        columns = [
+            np.concatenate(pair)[order]
+            for pair in ((self.x, middles), (self.mean, mean), (self.error, error))
+        ]
+        flags = flags[order]
+        legal = np.isfinite(columns[1])
+        self._keep(*columns)
+        return np.asarray(flags[legal][:-1])
+
+    def _cubic(self, i: Any, at: Array) -> Array:
+        """Cubics through four neighbouring samples each, at places within their middle interval."""
+        first = np.clip(i - 1, 0, self.x.size - 4)
+        x = np.stack([self.x[first + j] for j in range(4)])
+        y = np.stack([self.mean[first + j] for j in range(4)])
+        out = np.zeros(at.size)
+        for j in range(4):
+            factor = np.ones(at.size)
+            for m in range(4):
+                if m != j:
+                    factor *= (at - x[m]) / (x[j] - x[m])
+            out += y[j] * factor
+        return out
+
+    def roots(self, target: float) -> tuple[MotionRoot, ...]:
+        """All roots of one target, ascending."""
+        gap = self.mean - target
+        changes = np.flatnonzero(np.sign(gap[:-1]) * np.sign(gap[1:]) < 0.0)
+        found = [
+            self._narrowed(self.x[i], self.x[i + 1], gap[i], gap[i + 1], target) for i in changes
+        ]
+        found += [self._root(self.x[i]) for i in np.flatnonzero(gap == 0.0)]
+        for i in self._near(gap):
+            found += self._touched(i, gap, target)
+        unique: list[MotionRoot] = []
+        for root in sorted(root for root in found if root is not None):
+            if not unique or root.low > unique[-1].high:
+                unique.append(root)
+        if self._is_whole_turn and len(unique) > 1 and unique[-1].high - 360.0 >= unique[0].low:
+            unique.pop()  # 360 degrees are 0
+        return tuple(unique)
+
+    @property
+    def _is_whole_turn(self) -> bool:
+        return self.curve.unknown.endswith(".phase") and self.high - self.low == 360.0
+
+    def _near(self, gap: Array) -> list[int]:
+        """Inner samples nearer to the target than both neighbours, on the same side as these."""
+        size, side = np.abs(gap), np.sign(gap)
+        inner = np.arange(1, gap.size - 1)
+        lowest = (size[inner] <= size[inner - 1]) & (size[inner] <= size[inner + 1])
+        same = (side[inner] == side[inner - 1]) & (side[inner] == side[inner + 1])
+        return [int(i) for i in inner[lowest & same & (side[inner] != 0.0)]]
+
+    def _touched(self, i: int, gap: Array, target: float) -> list[MotionRoot | None]:
+        """Roots near a place where the curve comes near the target: two, one that touches, none."""
+        low, high, side = self.x[i - 1], self.x[i + 1], math.copysign(1.0, gap[i])
+        best, least = self.x[i], abs(gap[i])
+        for _ in range(12):
+            # the parabola through the ends and the best place says whether it can still be reached
+            inner = np.linspace(low, high, 10)[1:-1]
+            mean, error = self.curve.at(inner)
+            size = side * (mean - target)
+            j = int(np.nanargmin(size))
+            if size[j] < least:
+                best, least = inner[j], size[j]
+            if least <= 0.0:
+                ends = self.x[i - 1], best, self.x[i + 1]
+                gaps = gap[i - 1], side * least, gap[i + 1]
+                return [
+                    self._narrowed(ends[n], ends[n + 1], gaps[n], gaps[n + 1], target)
+                    for n in (0, 1)
+                ]
+            spread = np.nanmax(size) - np.nanmin(size)
+            if least > _CLEAR * spread + error[j]:
+                return []  # further away than what is left of its course
+            step = (high - low) / 9.0
+            low, high = max(best - step, self.x[i - 1]), min(best + step, self.x[i + 1])
+        return [self._root(float(best))] if least <= self._error_at(best) else []
+
+    def _error_at(self, x: float) -> float:
+        return float(self.curve.at(np.array([x]))[1][0])
+
+    def _narrowed(
+        self, a: float, b: float, fa: float, fb: float, target: float
+    ) -> MotionRoot | None:
+        """The root in a bracket, by the method of Illinois; None at a jump."""
+        width = b - a
+        side = 0
+        for step in range(_MOST_STEPS):
+            x = (fa * b - fb * a) / (fa - fb) if step % 4 != 3 else 0.5 * (a + b)
+            x = x if a < x < b else 0.5 * (a + b)
+            mean, error = self.curve.at(np.array([x]))
+            f = float(mean[0]) - target
+            if abs(f) <= 0.1 * error[0] or b - a <= _NARROW * max(abs(a), abs(b)):
+                break
+            if (f < 0.0) == (fa < 0.0):
+                a, fa, fb = x, f, fb * (0.5 if side == -1 else 1.0)
+                side = -1
+            else:
+                b, fb, fa = x, f, fa * (0.5 if side == 1 else 1.0)
+                side = 1
+        if abs(f) > 100.0 * error[0] and b - a <= _NARROW * width:
+            return None
+        return self._root(x)
+
+    def _root(self, x: float) -> MotionRoot:
+        """A root with the width in which the mean force is within its estimate of the target."""
+        step = 1e-4 * (abs(x) if x != 0.0 else self.high - self.low)
+        left, right = max(x - step, self.x[0]), min(x + step, self.x[-1])
+        mean, error = self.curve.at(np.array([left, x, right]))
+        slope = abs(float(mean[2] - mean[0])) / (right - left)
+        estimate = float(error[1])
+        width = estimate / slope if slope * step > estimate else step
+        return MotionRoot(float(x), float(x - width), float(x + width), float(mean[1]), estimate)
+
+
+def _between(a: Array, b: Array) -> Array:
+    """Middles of intervals, in logarithms where these are far from 0."""
+    with np.errstate(invalid="ignore"):
+        return np.where((a > 0.0) & (b > 1.5 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
+
+
+def _monotone(a: Array, middle: Array, b: Array) -> Bools:
+    return np.asarray((middle - a) * (b - middle) >= 0.0)
+
+
+def _axis(unknown: str) -> str:
+    return f"{unknown} [{unit_of_unknown(unknown)}]"

@@ -1,0 +1,223 @@
+"""A text file as lines: its encoding, its line ends, and what is no text at all.
+
+The encoding is the given one, else that of the byte order mark, else UTF-8, else Windows-1252: a
+file without a mark is Windows-1252 from the first byte on that is not UTF-8, as long as all before
+is ASCII, which is the same in both.  Lines end as an editor shows them: at a line feed, a carriage
+return, or both.
+"""
+
+import codecs
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mumacro.errors import MumacroError
+
+PIECE = 4 * 2**20  #: bytes that are read at once
+LONGEST = 16 * 2**20  #: characters of a line, at most
+_SHOWN = 5  # faults in one line
+_START = 1024  # bytes that tell the encoding
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+# files that are no tables as text, by their first bytes
+_OTHERS = (
+    (b"PK\x03\x04", "is a workbook (.xlsx) or another zip file"),
+    (b"\xd0\xcf\x11\xe0", "is a workbook of old Excel (.xls); save it as .xlsx or as CSV"),
+    (b"\x1f\x8b", "is compressed; name it .gz, or unpack it"),
+    (b"PAR1", "is Parquet; name it .parquet"),
+    (b"TDSm", "is a TDMS file of LabVIEW; export it as text"),
+    (b"\x89HDF", "is HDF5; export a table as text"),
+    (b"MATLAB 5", "is a MAT-file of MATLAB; write a table as text (writetable)"),
+    (b"%PDF", "is a PDF"),
+    (b"<", "is HTML or XML; save it as CSV"),
+)
+# what Python calls encodings and are none of texts, or slow ones
+_ENCODING = re.compile(
+    r"ascii|big5\w*|cp\w+|euc\w+|gb\w+|hp_roman8|iso8859\w+|johab|koi8\w+|latin\w+|mac\w+"
+    r"|ptcp154|shift\w+|tis_620|utf_(?:8|8_sig|16|16_le|16_be|32|32_le|32_be)"
+)
+#: encodings as people call them
+NAMES = {"utf-8": "UTF-8", "utf-8-sig": "UTF-8", "utf-16": "UTF-16", "utf-32": "UTF-32"}
+NAMES |= {"utf-16-le": "UTF-16", "utf-16-be": "UTF-16", "cp1252": "Windows-1252"}
+
+
+class TextError(MumacroError, ValueError):
+    """A table as text cannot be read: one line that says what, where, and the remedy."""
+
+    faults: Sequence[str] = ()  #: one for each line, where there are several
+
+    @classmethod
+    def of(cls, faults: Sequence[str]) -> "TextError":
+        """An error that tells the first faults."""
+        more = f"; and {len(faults) - _SHOWN:,} more" if len(faults) > _SHOWN else ""
+        error = cls("; ".join(faults[:_SHOWN]) + more)
+        error.faults = faults
+        return error
+
+
+class Piece(NamedTuple):
+    """Lines of a text, without their ends."""
+
+    first: int  #: the number of the first one, from 1
+    lines: list[str]
+
+
+def encoding_of(name: str) -> str:
+    """The encoding that a person names, as Python calls it; TextError where there is none of this
+    name.
+
+    >>> encoding_of("Windows-1252"), encoding_of("UTF8")
+    ('cp1252', 'utf-8')
+    """
+    python_name = name.strip().lower().replace("windows-", "cp")
+    try:
+        found = codecs.lookup(python_name).name
+    except (LookupError, ValueError):
+        found = ""
+    if not _ENCODING.fullmatch(found.replace("-", "_")):
+        such_as = "utf-8, utf-16, windows-1252, iso-8859-15, mac-roman, gb18030, shift-jis"
+        raise TextError(f"{name[:40]!r} is no encoding; give one such as {such_as}")
+    return found
+
+
+def file_pieces(path: Path, seen: Callable[[int], None] = lambda _at: None) -> Iterator[bytes]:
+    """The bytes of a file in pieces, also of a compressed one (.gz); ``seen`` is told how far the
+    file is read.  TextError where a compressed one is damaged."""
+    try:
+        with path.open("rb") as raw:
+            stream: Any = gzip.GzipFile(fileobj=raw) if path.name.lower().endswith(".gz") else raw
+            while data := stream.read(PIECE):
+                seen(raw.tell())
+                yield data
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise TextError(f"the compressed file is damaged ({error})") from None
+
+
+class Text:
+    """The lines of a text in pieces, from pieces of its bytes.
+
+    Memory holds a piece and a line.  TextError names the line of bytes that are no text of the
+    encoding, of a zero byte, and of a line that is too long.
+
+    >>> [piece.lines for piece in Text([b"a\\rb\\r", b"\\nc"])]
+    [['a', 'b'], ['c']]
+    """
+
+    def __init__(self, pieces: Iterable[bytes], encoding: str | None = None) -> None:
+        self._given = None if encoding is None else encoding_of(encoding)
+        self.encoding = ""  #: as Python calls it; known from the first piece on
+        self._bytes = _with_start(pieces)
+        self._lines = 0  # that are whole
+        self._begun: list[str] = []  # of the next line
+        self._ascii = True  # so far
+        self._decoder: codecs.IncrementalDecoder | None = None
+        self._line_ends = io.IncrementalNewlineDecoder(None, translate=True)
+        self._back: list[Piece] = []
+
+    def __iter__(self) -> Iterator[Piece]:
+        return self
+
+    def __next__(self) -> Piece:
+        if self._back:
+            return self._back.pop()
+        for data in filter(None, self._bytes):
+            text = self._decoded(data)
+            whole, end, rest = text.rpartition("\n")
+            if end:
+                lines = "".join([*self._begun, whole]).split("\n")
+                self._begun = []
+                self._lines += len(lines)
+            self._begun.append(rest)
+            if sum(map(len, self._begun)) > LONGEST:
+                where = f"line {self._lines + 1} has more than {LONGEST >> 20} MiB"
+                raise TextError(f"{where}: it is no table, or its line ends are lost")
+            if end:
+                return Piece(self._lines - len(lines) + 1, lines)
+        last = "".join(self._begun) + (self._decoded(b"", final=True) if self._decoder else "")
+        self._begun, self._decoder = [], None
+        if not last:
+            raise StopIteration
+        lines = last.removesuffix("\n").split("\n")
+        self._lines += len(lines)
+        return Piece(self._lines - len(lines) + 1, lines)
+
+    def put_back(self, piece: Piece) -> None:
+        """Give lines out again as the next piece."""
+        if piece.lines:
+            self._back.append(piece)
+
+    def _decoded(self, data: bytes, final: bool = False) -> str:
+        """The text of some bytes, whose lines end in line feeds."""
+        if self._decoder is None:
+            self._decoder = self._begin(data)
+        try:
+            text = self._decoder.decode(data, final)
+        except UnicodeDecodeError as error:
+            text = self._in_windows_1252(error, final)
+        self._ascii = self._ascii and text.isascii()
+        text = self._line_ends.decode(text, final)
+        if "\0" in text:
+            line = self._lines + 1 + text.count("\n", 0, text.index("\0"))
+            raise TextError(f"line {line} has a zero byte: it is no text, or damaged")
+        return text
+
+    def _begin(self, data: bytes) -> codecs.IncrementalDecoder:
+        """The decoder for the first bytes, which tell the encoding; what is no text is refused."""
+        for begin, what in _OTHERS:
+            if data.startswith(begin):
+                raise TextError(f"it {what}")
+        marked = next((name for mark, name in _MARKS if data.startswith(mark)), None)
+        self.encoding = self._given or marked or _of_zeros(data[:_START]) or "utf-8"
+        if marked and self.encoding in (
+            marked.removesuffix("-sig"),
+            f"{marked}-le",
+            f"{marked}-be",
+        ):
+            self.encoding = marked
+        return codecs.getincrementaldecoder(self.encoding)("strict")
+
+    def _in_windows_1252(self, error: UnicodeDecodeError, final: bool) -> str:
+        """The text of bytes that are not UTF-8, if they may be Windows-1252."""
+        data = error.object
+        unknown = self._given is None and self.encoding == "utf-8"
+        if unknown and self._ascii and data[: error.start].isascii():
+            self.encoding = "cp1252"
+            self._decoder = codecs.getincrementaldecoder("cp1252")("strict")
+            try:
+                return self._decoder.decode(data, final)
+            except UnicodeDecodeError as other:
+                error = other
+        before = data[: error.start]
+        ends = before.count(b"\n") + before.count(b"\r") - before.count(b"\r\n")
+        byte = f"byte 0x{data[error.start]:02x} in line {self._lines + 1 + ends}"
+        name = NAMES.get(self.encoding, self.encoding)
+        raise TextError(f"{byte} is not {name}: save the file as UTF-8, or give --encoding")
+
+
+def _with_start(pieces: Iterable[bytes]) -> Iterator[bytes]:
+    """The pieces, the first of them long enough to know the encoding by."""
+    start = b""
+    for piece in (rest := iter(pieces)):
+        start += piece
+        if len(start) >= _START:
+            break
+    yield start
+    yield from rest
+
+
+def _of_zeros(data: bytes) -> str | None:
+    """The encoding of two bytes a character, where every other byte is mostly zero."""
+    half = len(data) // 2
+    low, high = data[::2].count(0), data[1::2].count(0)
+    if half < 2 or max(low, high) < 0.7 * half or min(low, high) > 0.1 * half:
+        return None
+    return "utf-16-le" if high > low else "utf-16-be"

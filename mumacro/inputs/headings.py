@@ -1,0 +1,135 @@
+"""Heads of columns: which column is which input, in which unit, and what to do about one that is
+missing."""
+
+import re
+from collections.abc import Mapping, Sequence
+
+from mumacro.inputs.fields import INPUTS, QUANTITY_OF
+from mumacro.inputs.names import suggestion
+from mumacro.inputs.units import QUANTITIES, Scale, scale_of, split_unit
+
+# heads that a message lists, and that are compared with misspelt names
+_LISTED, _COMPARED = 20, 100
+# k in N/mm, k / (N/mm), k, N/mm: as standards for tables have it
+_WITH_UNIT = re.compile(r"(\w+)(?: ?/ ?| in |, ?)(\S.*)")
+
+
+def heading(cell: str, like: Mapping[str, str]) -> str:
+    """A head as it stands in a table, on one line, with its unit in brackets if it names one of
+    ``like``.
+
+    >>> heading("v0 / (mm/s)", {"v0": "v0"}), heading("run / day", {"v0": "v0"})
+    ('v0 [mm/s]', 'run / day')
+    """
+    text = " ".join(cell.split()) if "\n" in cell else cell.strip()
+    match = _WITH_UNIT.fullmatch(text)
+    if match and match[1] in like and text not in like:
+        unit = match[2].strip(" ()[]")
+        if scale_of(like[match[1]], unit) is not None:
+            return f"{match[1]} [{unit}]"
+    return text
+
+
+def find_heads(
+    heads: Sequence[str], like: Mapping[str, str]
+) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
+    """The place and unit of each column by name, and the faults of the heads.
+
+    ``like`` has the names of the columns, and for each the input whose units it has; other columns
+    are left out.
+
+    >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
+    ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
+    """
+    columns: dict[str, tuple[int, Scale]] = {}
+    faults = []
+    for i, head in enumerate(heads):
+        name, unit = split_unit(head)
+        if name not in like:
+            continue
+        scale = Scale() if unit is None else scale_of(like[name], unit)
+        if scale is None:
+            faults.append(f"the column {head!r} has a unit that {_no_unit(name, unit or '', like)}")
+        if name in columns:
+            faults.append(
+                f"{name} is there twice: {heads[columns[name][0]]!r} and {head!r}; rename one"
+            )
+        columns[name] = i, scale or Scale()
+    if {"f", "omega"} <= columns.keys():
+        faults.append("there are both f [Hz] and omega [rad/s]; leave one out")
+    return columns, faults
+
+
+def _no_unit(name: str, unit: str, like: Mapping[str, str]) -> str:
+    """Why a unit of a column is refused."""
+    hint = "; a frequency is f [Hz]" if name == "omega" and scale_of("f", unit) else ""
+    return f"{name} cannot have{hint}; give {QUANTITIES[QUANTITY_OF[like[name]]].such_as}"
+
+
+def meant_by(head: str, *, loosely: bool = True) -> str | None:
+    """The input that a head probably stands for, as a whole or by its first word: k for
+    ``k_N_per_mm``."""
+    name = split_unit(head)[0]
+    first = re.split(r"[\W_]+", name.strip("_ "))[0]
+    return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
+
+
+def absent(name: str, heads: Sequence[str]) -> str:
+    """What to do about a column that is missing.
+
+    >>> absent("v0", ["speed", "mu_macro"])
+    "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
+    brackets)"
+    """
+    if alike := _similar(name, heads):
+        remedy = f"rename that column to {alike[1]} (or another unit in brackets)"
+        return f"there is no column {name}; {alike[0]!r} is similar: {remedy}"
+    return f"there is no column {_heading(name)}; there are {_listed(heads)}"
+
+
+def absent_together(names: Sequence[str], heads: Sequence[str]) -> str:
+    """What to do about several columns that are missing; what they share is told once.
+
+    >>> absent_together(["Fz", "v0"], ["speed", "note"])
+    "there are no columns Fz [N], v0 [m/s]; there are 'speed', 'note'; similar: rename 'speed' to
+    v0 [m/s]"
+    """
+    headings = ", ".join(map(_heading, names))
+    renames = [f"{one[0]!r} to {one[1]}" for name in names if (one := _similar(name, heads))]
+    remedy = f"; similar: rename {', '.join(renames)}" if renames else ""
+    return f"there are no columns {headings}; there are {_listed(heads)}{remedy}"
+
+
+def _listed(heads: Sequence[str]) -> str:
+    """The heads for a message of bounded length."""
+    shown = ", ".join(
+        repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED]
+    )
+    more = len(heads) - _LISTED
+    return f"{shown} and {more:,} more" if more > 0 else shown
+
+
+def _heading(name: str) -> str:
+    """The heading that a column of an input has, in SI units."""
+    heading = f"{name} [{unit_in_si(name)}]"
+    more = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
+    return heading + more.get(name, "")
+
+
+def unit_in_si(name: str) -> str:
+    """The SI unit of a column.
+
+    >>> unit_in_si("k_low"), unit_in_si("mu_macro")
+    ('N/m', '-')
+    """
+    return INPUTS[name].unit if name in INPUTS else "-"
+
+
+def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
+    """The head that probably stands for an input, and the heading that it should have."""
+    for loosely, compared in ((False, heads), (True, heads[:_COMPARED])):
+        for head in compared:
+            field = meant_by(head, loosely=loosely)
+            if field and field in (name, {"omega": "f"}.get(name)):
+                return head, f"{field} [{split_unit(head)[1] or unit_in_si(field)}]"
+    return None

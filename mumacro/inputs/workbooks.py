@@ -1,0 +1,72 @@
+"""The first sheet of a workbook (.xlsx) as text, a line for each row; needs openpyxl.
+
+openpyxl reads row by row.  A reader that holds the whole rectangle of a sheet is no choice here: a
+file of 5 kB with one cell in the last corner asks it for 512 GB, and ends the process.
+"""
+
+import datetime
+import io
+import zipfile
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+from mumacro.errors import missing
+from mumacro.inputs.decoding import TextError
+from mumacro.inputs.signs import evidence
+
+BEGIN = b"PK\x03\x04"  #: the first bytes of a workbook
+SEP = "\t"  #: between the cells of a line
+_ROWS = 1_048_576  # of a sheet of Excel
+_UNPACKED = 512 * 2**20  # bytes
+_LINES = 4096  # of a piece
+
+
+def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:
+    """The first sheet as UTF-8 in pieces, with tabs between the cells and decimal points.
+
+    TextError where it is no workbook, or openpyxl is missing.
+    """
+    try:
+        import openpyxl  # type: ignore[import-untyped]
+    except ModuleNotFoundError as error:
+        remedy = f"{missing('files', error)}; or save it as CSV"
+        raise TextError(f"it is a workbook (.xlsx), and {remedy}") from None
+    try:
+        with zipfile.ZipFile(stream) as parts:
+            if sum(part.file_size for part in parts.infolist()) > _UNPACKED:
+                size = f"{_UNPACKED >> 20} MiB"
+                raise TextError(f"it is a workbook of more than {size}; save it as CSV")
+        sheet: Any = openpyxl.load_workbook(stream, read_only=True, data_only=True).worksheets[0]
+        sheet.reset_dimensions()
+        lines: list[str] = []
+        for row, _ in zip(sheet.iter_rows(), range(_ROWS), strict=False):
+            lines.append(SEP.join(map(_text, row)))
+            if len(lines) == _LINES:
+                yield "\n".join([*lines, ""]).encode()
+                lines = []
+        yield "\n".join([*lines, ""]).encode()
+    except TextError:
+        raise
+    except Exception as error:  # openpyxl raises what a damaged file makes it to
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise TextError(f"it is no workbook, or a damaged one ({reason})") from None
+
+
+def sheet_of(data: bytes) -> Iterator[bytes]:
+    """As :func:`sheet_pieces`, from the bytes of a file."""
+    return sheet_pieces(io.BytesIO(data))
+
+
+def _text(cell: Any) -> str:
+    """A cell as it would be typed."""
+    value = cell.value
+    if value is None:
+        return ""
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        # the sheet shows 7 % where it holds 0.07
+        return f"{100 * value:.15g}%" if "%" in (cell.number_format or "") else repr(value)
+    text = " ".join(str(value).split())
+    # a text that may be one of two numbers is none of them
+    return f"'{text}" if evidence(text) in ((".", False), (",", False)) else text

@@ -1,0 +1,32 @@
+"""What can be computed of cases: the list, and the one place that computes it.
+
+Each output is an entry in a file of its own: a name, a function, its values by path with unit and
+meaning, its cost, and for which kinds of cases it does not exist and why.  Python, command, files,
+HTTP and page take names, units and words from here, and write the values.  Equation numbers are
+those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations"
+(Friction, 2018).
+"""
+
+from mumacro.answer import BAND
+from mumacro.outputs.deviation import STD
+from mumacro.outputs.entry import Member, Output
+from mumacro.outputs.gradient import GRADIENT
+from mumacro.outputs.groups import GROUPS
+from mumacro.outputs.limits import LIMITS
+from mumacro.outputs.power import POWER
+from mumacro.outputs.settling import SETTLING
+from mumacro.outputs.stick_fraction import STICK_FRACTION
+
+#: by name, in the order in which an answer has them
+OUTPUTS: dict[str, Output] = {
+    output.name: output
+    for output in (GROUPS, LIMITS, GRADIENT, STD, STICK_FRACTION, POWER, SETTLING)
+}
+#: every number of an answer by its path
+MEMBERS: dict[str, Member] = {
+    "mu_macro": Member("-", "Macroscopic coefficient of friction"),
+    "mu_ratio": Member("-", "mu_macro/mu0, from 0 to 1"),
+    "error_bound": Member("-", "Bound of the absolute error of mu_macro"),
+    BAND[0]: Member("-", "Smallest mu_macro over the interval of k"),
+    BAND[1]: Member("-", "Largest mu_macro over the interval of k"),
+} | {path: member for output in OUTPUTS.values() for path, member in output.members.items()}

@@ -1,0 +1,36 @@
+"""What an output is: an entry of the list in :mod:`mumacro.outputs`."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from mumacro.inputs.kind import AMPLITUDE
+from mumacro.outputs.evaluated import Evaluated
+
+Values = dict[str, Any]  # by path: one number, or (n,)
+
+
+class Member(NamedTuple):
+    """One value of an output."""
+
+    unit: str  #: in SI
+    meaning: str
+
+
+class Output(NamedTuple):
+    """One output of cases: a new one is a file with such an entry, and a line in the list."""
+
+    name: str
+    #: all of its values, those of ``members``
+    compute: Callable[[Evaluated], Values]
+    #: by path: ``power.saved`` is ``saved`` within ``power``, as JSON nests them
+    members: Mapping[str, Member]
+    #: time of a case, in times of mu_macro alone for one spring across
+    cost: float
+    gradient: bool = False  #: whether it needs the slopes of mu_macro
+    #: direction, or k_range for an interval of k, that it does not exist for -> why
+    lacks: Mapping[str, str] = {}
+
+    def paths(self, fields: tuple[str, ...]) -> list[str]:
+        """Its values for cases with these inputs, in order."""
+        absent = {"y0", AMPLITUDE} - {*fields}
+        return [path for path in self.members if path.rpartition(".")[2] not in absent]

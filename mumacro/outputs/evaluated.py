@@ -1,0 +1,117 @@
+"""Cases with their answer, of which outputs are computed."""
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mumacro.inputs.cases import Cases
+from mumacro.inputs.kind import AMPLITUDE
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import Detail
+from mumacro.outputs.tabulated import Tabulated
+
+
+class Evaluated:
+    """Cases of one kind with their answer: plain numbers for one case, columns (n,) for many.
+
+    k is infinite where the contact is rigid.  What is not legal is NaN, with the source code -1.
+    The groups of columns are there for the details "groups" and "gradient", the slopes for
+    "gradient"; mu_macro_low and mu_macro_high for an interval of k.
+    """
+
+    v_tilde: Any
+    y_tilde: Any
+    length_scale: Any
+    mu_macro_low: Any
+    mu_macro_high: Any
+    #: d mu_macro / d input and their bounds, by field
+    gradient: dict[str, Any]
+    gradient_bound: dict[str, Any]
+
+    def __init__(self, tabulated: Tabulated, cases: Cases, detail: Detail = "values") -> None:
+        self.tabulated, self.cases, self.kind = tabulated, cases, cases.one_kind
+        self.columns, self.words = cases.columns, self.kind.names
+        one = not cases.shape
+        detail = "groups" if one and detail == "values" else detail
+        self._take: Callable[[Any], Any] = _item if one else np.ravel
+        if one and not self.kind.direction and cases.ends is None:
+            self._take = float
+            row = tabulated.one([*self.columns.values()], detail == "gradient", self.kind.contact)
+        else:
+            row = tabulated.rows(cases, detail)
+        take = self._take
+        self.mu_macro, self.mu_ratio = take(row.mu_macro), take(row.mu_ratio)
+        self.error_bound, self.source = take(row.error_bound), row.source
+        if take is not float:
+            self.source = take(row.source)
+        if detail != "values":
+            self.v_tilde, self.y_tilde = take(row.v_tilde), take(row.y_tilde)
+            self.length_scale = take(row.length_scale)
+        if detail == "gradient":
+            fields = self.kind.fields
+            self.gradient = dict(zip(fields, map(take, row.gradient), strict=True))
+            self.gradient_bound = dict(zip(fields, map(take, row.gradient_bound), strict=True))
+        if cases.ends is not None:
+            self._over_interval()
+
+    def _over_interval(self) -> None:
+        """The extremes of mu_macro, and the largest bound that was met there."""
+        extremes = self.tabulated.extremes(self.cases)
+        low, high, bound = map(self._take, extremes)
+        # of an interval of one point, rigid contact among them, there may be none
+        self.mu_macro_low = np.fmin(self.mu_macro, low)
+        self.mu_macro_high = np.fmax(self.mu_macro, high)
+        self.error_bound = np.fmax(self.error_bound, bound)
+
+    @cached_property
+    def moving(self) -> Any:
+        """Whether something oscillates."""
+        amplitude = self.columns[AMPLITUDE if self.kind.normal else "y0"]
+        return (amplitude != 0.0) & (self.columns["omega"] != 0.0)
+
+    @cached_property
+    def rigid(self) -> Any:
+        """Whether the contact is rigid."""
+        return self.columns["k"] == math.inf
+
+    @cached_property
+    def usable(self) -> Any:
+        """Whether it is elastic and oscillates, with groups within double range."""
+        return (self.y_tilde < math.inf) & self.moving
+
+    def quantity(self, name: str, v: Any, y: Any, kind: Any = None) -> tuple[Any, Any]:
+        """A tabulated quantity at groups in the shape of the cases, and its bound."""
+        kind = self.kind if kind is None else kind
+        if not self.cases.shape:
+            return self.tabulated.value(name, v, y, kind)[:2]
+        return self.tabulated.values(name, v, y, kind)[:2]
+
+    def crit(self, y: Any) -> Any:
+        """v~crit at amplitudes in the shape of the cases."""
+        crit = self.tabulated.crit(np.atleast_1d(y), self.kind)
+        return crit if self.cases.shape else _item(crit)
+
+    def at(self, **columns: Any) -> "Evaluated":
+        """The answers to the same cases with other values of some inputs, and one k."""
+        cases = self.cases._replace(columns={**self.columns, **columns}, ends=None)
+        return Evaluated(self.tabulated, cases)
+
+    def beside(self, columns: dict[str, Any], size: int) -> "Evaluated":
+        """The answers to other cases of this kind, in columns (size,)."""
+        cases = self.cases._replace(columns=columns, shape=(size,), ends=None)
+        return Evaluated(self.tabulated, cases)
+
+
+def _item(array: Array) -> float:
+    number: float = array.item()
+    return number
+
+
+def where(condition: Any, one: Any, other: Any) -> Any:
+    """``np.where``, which takes a microsecond for a single number."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, one, other)
+    return one if condition else other

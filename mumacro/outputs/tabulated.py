@@ -1,0 +1,147 @@
+"""The quantities of one table at points and at cases: all that asks the kernel for them.
+
+Large arrays are cut into slices, on several threads where that helps
+(:mod:`mumacro.kernel.threads`).  Nothing here checks a value: what is illegal gives NaN and the
+source code -1.
+"""
+
+import copy
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, Self
+
+import numpy as np
+
+from mumacro import closed_forms
+from mumacro.contacts.quadrature import put_driven
+from mumacro.errors import TableError
+from mumacro.inputs.cases import Cases
+from mumacro.inputs.kind import BALL, KINDS, SPRING, Kind
+from mumacro.kernel import threads as shared_out
+from mumacro.kernel.arrays import Array, Bools, Codes
+from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
+from mumacro.table import atlas
+from mumacro.table.blocks import BorderPiece, Table
+from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
+
+_KERNEL = kernels[-1]
+#: for one point, which does not fill the widest registers; the bits are the same
+SCALAR_KERNEL: Final = kernels[min(1, len(kernels) - 1)]
+CODES = {name: code for code, name in enumerate(atlas.QUANTITY_NAMES)}
+
+
+class Tabulated:
+    """A table, its cells as the kernel reads them, and how many threads a call may use."""
+
+    def __init__(self, table: Table, path: Path, threads: int | None) -> None:
+        self.table = table
+        self.threads = threads
+        self.border = Border(table.border)
+        _check_border(table.border, path)
+        self._spring = Data(*self.border.arrays, block_rows(table.blocks), outer_cells())
+        self._spring.put(atlas.MU, *quantity_cells(table.blocks, atlas.MU))
+        self._ball: Data | None = None
+        #: of one spring, with the cells of mu~
+        self.pointer = self._spring.pointer
+
+    def on_one_thread(self) -> Self:
+        """The same cells, whose calls start no thread."""
+        other = copy.copy(self)
+        other.threads = 1
+        return other
+
+    def data(self, name: str = "mu_ratio", kind: Kind = SPRING) -> Data:
+        """What the kernel reads of a quantity of a kind; its cells are cut on first use."""
+        if kind == BALL:
+            return self._of_ball(CODES[name])
+        data, code = self._spring, CODES[name]
+        if code not in data.quantities:
+            data.put(code, *quantity_cells(self.table.blocks, code))
+        if kind.contact:  # shaken along: a quadrature over springs
+            put_driven(data)
+        return data
+
+    def _of_ball(self, code: int) -> Data:
+        """Of a ball that is shaken across, which has cells of its own."""
+        data = self._ball
+        if data is None:
+            rows = block_rows(self.table.ball, atlas.BALL_CHARTS)
+            data = self._ball = Data(*self.border.arrays, rows, outer_cells())
+        if code not in data.quantities:
+            data.put(code, *quantity_cells(self.table.ball, code, atlas.BALL_CHARTS))
+        return data
+
+    # --- points (v~, y~) --------------------------------------------------------------------------
+
+    def ratios(self, v: Array, y: Array) -> Array:
+        """mu~ of one spring across at points (n,), without its bound."""
+        return shared_out.alone(atlas.MU, self._spring, v, y, self.threads)
+
+    def values(
+        self, name: str, v: Array, y: Array, kind: Kind = SPRING
+    ) -> tuple[Array, Array, Codes]:
+        """A quantity at points (n,), its bound, and the source codes."""
+        return shared_out.values(CODES[name], self.data(name, kind), v, y, self.threads, kind)
+
+    def value(self, name: str, v: float, y: float, kind: Kind = SPRING) -> tuple[float, float, int]:
+        """The same at one point."""
+        if kind.direction:
+            value, bound, source = self.values(name, np.array([v]), np.array([y]), kind)
+            return float(value[0]), float(bound[0]), int(source[0])
+        return SCALAR_KERNEL.value(self.data(name, kind), CODES[name], v, y, kind.contact)
+
+    def slopes(self, name: str, v: Array, y: Array) -> SlopeRows:
+        """A quantity of one spring across at points (n,), with its slopes and their bounds."""
+        return shared_out.slopes(CODES[name], self.data(name), v, y, self.threads)
+
+    def crit(self, y: Array, kind: Kind = SPRING) -> Array:
+        """v~crit at amplitudes (n,)."""
+        return _KERNEL.border(self._spring, y, kind)
+
+    def certain(self, v_tilde: Any, y_tilde: Any, kind: Kind | Codes = SPRING) -> Bools:
+        """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~
+        together, in the shape of both; ``kind`` may be one for each, by its place in KINDS."""
+        v, y = np.asarray(v_tilde), np.asarray(y_tilde)
+        if not isinstance(kind, Kind):
+            certain = np.zeros(v.shape, np.bool_)
+            for code in np.unique(kind[kind >= 0]).tolist():
+                here = kind == code
+                certain[here] = self.certain(v[here], y[here], KINDS[code])
+            return certain
+        crit = self.crit(np.ravel(y).astype(np.float64), kind).reshape(y.shape)
+        margin = self.border.max_rel_error + 4.0 * atlas.ROUNDING
+        with np.errstate(all="ignore"):
+            # groups beyond double range are not near the border, or it cannot be decided
+            extreme = (y == 0.0) | ~np.isfinite(y) | ~np.isfinite(v) | (v == 0.0)
+            return np.asarray(np.where(extreme, ~np.isnan(v), np.abs(v - crit) > margin * crit))
+
+    # --- cases ------------------------------------------------------------------------------------
+
+    def one(self, six: Sequence[Any], gradient: bool = False, contact: int = 0) -> Any:
+        """One case across in plain numbers: a ``mumacro_case``, see ``kernel/data.h``."""
+        pointer = self.data("mu_ratio", BALL).pointer if contact else self.pointer
+        return SCALAR_KERNEL.one(pointer, six, gradient, contact)
+
+    def rows(self, cases: Cases, detail: Detail = "values") -> CaseRows:
+        """Answers to cases of one kind, in their shape, (1,) for one case."""
+        kind, shape = cases.one_kind, cases.shape or (1,)
+        six = [*cases.columns.values()]
+        return shared_out.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
+
+    def extremes(self, cases: Cases) -> ExtremeRows:
+        """Extremes of mu_macro over intervals of k, (n,) each."""
+        if cases.ends is None:
+            raise TypeError("the cases have one k each")
+        low, high = cases.ends
+        six, kind = [*{**cases.columns, "k": low}.values()], cases.one_kind
+        return shared_out.intervals(self.data(kind=kind), six, high, self.threads, kind)
+
+
+def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
+    """Refuse a stored border whose nodes are not near the formula for every y~, since it selects
+    the block of a case."""
+    for index, ((name, axis, _), piece) in enumerate(zip(atlas.BORDER_PIECES, pieces, strict=True)):
+        y = axis.amplitude(piece.nodes)
+        crit = piece.values * _KERNEL.border_scales(index, y)[0]
+        if not np.all(np.abs(crit / closed_forms.border_blend(y) - 1.0) < 0.01):
+            raise TableError(path, f"the nodes of border/{name} are not v~crit(y~)")

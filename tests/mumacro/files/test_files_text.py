@@ -1,0 +1,282 @@
+"""``mumacro eval`` of tables as people and rigs write them: what is read, what is written, which
+files of a folder are left out."""
+
+import csv
+import io
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.support.cases import CASE, Capture, opened
+from tests.support.comparing import close
+
+pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
+
+from mumacro.cli.main import main  # noqa: E402
+from mumacro.files import FilesError, evaluate_files  # noqa: E402
+from mumacro.inputs import decoding  # noqa: E402
+from mumacro.inputs.text_tables import Dialect  # noqa: E402
+
+TABLE = opened(1e-12)
+MU = [0.24046650645751833, 0.13083979951924246]
+HEAD = "mu0,Fz,k,y0,f,v0"
+ROWS = "0.3,10,1e6,2e-6,20000,0.01\n0.3,10,1e6,3e-6,20000,0.01\n"
+
+
+def rows_of(path: Path, sep: str = ",") -> list[dict[str, str]]:
+    text = path.read_bytes().decode("utf-8-sig")
+    return list(csv.DictReader(io.StringIO(text, newline=""), delimiter=sep))
+
+
+def friction(path: Path, sep: str = ",") -> list[float]:
+    return [float(row["mu_macro"].replace(",", ".")) for row in rows_of(path, sep)]
+
+
+@pytest.fixture
+def rigs(repository: Path) -> Path:
+    return repository / "tests" / "data" / "rigs"
+
+
+@pytest.mark.parametrize(
+    ("name", "sep", "head"),
+    [
+        ("units_row.csv", ",", "id,mu0,Fz [N],k [N/um],y0 [um],f [kHz],v0 [mm/s],mu_macro"),
+        ("mixed_cr.csv", ",", "mu0,Fz,k,y0,f,v0,mu_macro"),
+        ("thousands_de.csv", ";", "mu0;Fz [N];k [N/mm];y0 [nm];f [Hz];v0 [um/s];mu_macro"),
+    ],
+)
+def test_files_of_rigs_are_evaluated_with_one_line_of_heads(
+    tmp_path: Path, rigs: Path, name: str, sep: str, head: str
+) -> None:
+    said = list[str]()
+    evaluate_files([rigs / name], tmp_path / "out.csv", TABLE, say=said.append)
+    assert friction(tmp_path / "out.csv", sep) == close(MU, rel=1e-12)
+    assert (tmp_path / "out.csv").read_text().startswith(head)
+    assert len(said) == (name != "mixed_cr.csv")
+    # what was written can be read again
+    again = (tmp_path / "out.csv").read_text().replace("mu_", "own_", 2).replace("mu_ratio", "r")
+    (tmp_path / "again.csv").write_text(
+        again.replace("regime", "a").replace("error_bound", "b").replace("source", "c")
+    )
+    evaluate_files([tmp_path / "again.csv"], tmp_path / "twice.csv", TABLE)
+    assert friction(tmp_path / "twice.csv", sep) == close(MU, rel=1e-12)
+
+
+def test_fixed_columns_of_a_program_in_fortran(tmp_path: Path, rigs: Path) -> None:
+    evaluate_files([rigs / "fortran.prn"], tmp_path / "out.csv", TABLE)
+    expected = TABLE.evaluate(**{**CASE, "y0": np.array([2e-6, 3e-6])}).mu_macro
+    assert friction(tmp_path / "out.csv") == expected.tolist()
+
+
+@pytest.mark.parametrize("ending", ["tsv", "txt", "csv", "tsv.gz"])
+@pytest.mark.parametrize("sep", [",", ";", "\t", " "])
+def test_text_of_every_ending_comes_in_and_goes_out(tmp_path: Path, ending: str, sep: str) -> None:
+    source = tmp_path / "cases.txt"
+    source.write_text(f"{HEAD}\n{ROWS}".replace(",", sep))
+    evaluate_files([source], tmp_path / f"out.{ending}", TABLE)
+    evaluate_files([tmp_path / f"out.{ending}"], tmp_path / "out.ndjson", TABLE) if False else None
+    assert (
+        evaluate_files([source], tmp_path / f"o.{ending}", TABLE, dialect=Dialect(sep=sep)).answered
+        == 2
+    )
+    if ending != "tsv.gz":
+        tab = ending == "tsv" or (ending == "txt" and sep in "\t ")
+        written = "\t" if tab else "," if sep in "\t " else sep
+        assert friction(tmp_path / f"out.{ending}", written) == close(MU, rel=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    notes=st.lists(
+        st.sampled_from(["", "a", "a b", '"', "a\nb", "#1", "1,5", "µ", "x;y", "'", "a\tb"]),
+        min_size=1,
+        max_size=12,
+    ),
+    piece=st.sampled_from([5, 40, 1000]),
+    sep=st.sampled_from([",", ";", "\t"]),
+    more=st.sampled_from(["", "# a comment\n", "\n", ";;;;;;\n", f"note,{HEAD}\n"]),
+)
+def test_plain_and_quoted_rows_give_the_same_however_the_file_is_cut(
+    tmp_path_factory: pytest.TempPathFactory, notes: list[str], piece: int, sep: str, more: str
+) -> None:
+    folder = tmp_path_factory.mktemp("cut")
+    rows = [
+        [note, "0.3", "10", "1e6", f"{i + 1}e-6", "20000", "0.01"] for i, note in enumerate(notes)
+    ]
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream, delimiter=sep, lineterminator="\n")
+    writer.writerow(["note", *HEAD.split(",")])
+    for row in rows:
+        writer.writerow(row)
+        stream.write(
+            more.replace(",", sep).replace(";", sep) if "note" not in more or sep == "," else ""
+        )
+    (folder / "cases.csv").write_text(stream.getvalue(), "utf-8")
+    whole = evaluate_files([folder / "cases.csv"], folder / "whole.csv", TABLE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(decoding, "PIECE", piece)
+        evaluate_files([folder / "cases.csv"], folder / "cut.csv", TABLE)
+        evaluate_files([folder / "cases.csv"], folder / "cut.parquet", TABLE)
+    assert whole.answered == len(notes)
+    assert (folder / "cut.csv").read_bytes() == (folder / "whole.csv").read_bytes()
+    written = sep if sep != "\t" else ","
+    assert [row["note"] for row in rows_of(folder / "cut.csv", written)] == notes
+
+
+def test_what_others_leave_in_a_folder_is_skipped_with_a_word(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    runs = tmp_path / "runs"
+    runs.mkdir()
+    for name in ("a.csv", "b.csv"):
+        (runs / name).write_text(f"{HEAD}\n{ROWS}")
+    (runs / "~$a.csv").write_bytes(b"\0" * 165)
+    (runs / "_SUCCESS.csv").write_text("")
+    (runs / "notes.txt").write_text("no cases")
+    (runs / "c.csv.rejects.csv").write_text("row")
+    assert main(["eval", str(runs), "-o", str(tmp_path / "out.csv")]) == 0
+    said = capsys.readouterr().err
+    assert all(name in said for name in ("~$a.csv", "notes.txt"))
+    assert len(friction(tmp_path / "out.csv")) == 4
+
+
+def test_files_that_differ_in_their_dialect_alone_are_one(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(f"{HEAD}\n{ROWS}")
+    (tmp_path / "b.csv").write_bytes(f"by hand\n{HEAD}\n{ROWS}".replace(",", ";").encode("utf-16"))
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    evaluate_files(files, tmp_path / "out.csv", TABLE)
+    assert friction(tmp_path / "out.csv") == close([*MU, *MU], rel=1e-12)
+    (tmp_path / "b.csv").write_text(f"{HEAD}\n{ROWS}".replace(",", ";").replace(".", ","))
+    with pytest.raises(FilesError, match="decimal sign"):
+        evaluate_files(files, tmp_path / "o.csv", TABLE)
+    evaluate_files(files, tmp_path / "o.parquet", TABLE)
+    (tmp_path / "b.csv").write_text(f"{HEAD} [mm/s]\n{ROWS}")
+    with pytest.raises(FilesError, match="header differs"):
+        evaluate_files(files, tmp_path / "o.csv", TABLE)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (
+            f"{HEAD}\n{ROWS}".replace(",", "\t")
+            .replace("0.3", "1")
+            .replace("1e6", "1.000")
+            .replace("2e-6", "2")
+            .replace("3e-6", "3")
+            .replace("0.01", "1"),
+            ("line 2: k '1.000'", "1 or 1000"),
+        ),
+        (f"a\n{HEAD}\n{ROWS}v0,f,y0,k,Fz,mu0\n{ROWS}", ("line 5 is another head",)),
+        (f"{HEAD}\nm,N,N/m,m,Hz,m/s\n{ROWS}", ("line 2", "mu0")),
+        (f"{HEAD}\n{ROWS}\0\0", ("line 4 has a zero byte",)),
+        (f"{HEAD}\n" + "1," * (9 * 2**20), ("line 2 has more than 16 MiB",)),
+        (f"{HEAD}\n{ROWS}" + "1" * (17 * 2**20), ("line 4 has more than 16 MiB",)),
+        ("{}", ("there are no columns",)),
+    ],
+    ids=["ambiguous", "another head", "no unit", "zero", "wide", "long", "json"],
+)
+@pytest.mark.parametrize("end", ["csv", "parquet"])
+def test_what_is_refused_leaves_nothing(
+    tmp_path: Path, capsys: Capture, text: str, parts: tuple[str, ...], end: str
+) -> None:
+    (tmp_path / "cases.csv").write_text(text)
+    assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / f"out.{end}")]) == 1
+    said = capsys.readouterr().err
+    assert all(part in said for part in parts), said[:500]
+    assert "Traceback" not in said
+    assert len(said) < 2000
+    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
+
+
+def test_a_head_of_a_hundred_thousand_columns(tmp_path: Path, capsys: Capture) -> None:
+    more = ",".join(f"c{i}" for i in range(100_000))
+    cells = ",".join("1" for _ in range(100_000))
+    source, out = tmp_path / "wide.csv", tmp_path / "out.csv"
+    source.write_text(f"{HEAD},{more}\n" + ROWS.replace("\n", f",{cells}\n"))
+    assert main(["eval", str(source), "-o", str(out)]) == 0
+    csv.field_size_limit()
+    line = out.read_text().splitlines()[1].split(",")
+    assert float(line[100_006]) == close(MU[0], rel=1e-12)
+    source.write_text(f"{HEAD.replace('v0', 'w0')},{more}\n" + ROWS.replace("\n", f",{cells}\n"))
+    capsys.readouterr()
+    assert main(["eval", str(source), "-o", str(out), "--force"]) == 1
+    assert len(capsys.readouterr().err) < 2000
+
+
+def test_the_decimal_sign_may_show_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(decoding, "PIECE", 100)
+    row = "1;10;1000000;1;20000;1\n"
+    late = row * 40 + row.replace(";1\n", ";0,5\n")
+    (tmp_path / "late.csv").write_text(f"{HEAD}\n".replace(",", ";") + late)
+    summary = evaluate_files([tmp_path / "late.csv"], tmp_path / "out.parquet", TABLE)
+    assert (summary.answered, summary.rejected) == (41, 0)
+
+
+# --- workbooks ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def workbook(tmp_path: Path) -> Any:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["Rig 7"])
+    sheet.append([])
+    sheet.append(["mu0 [%]", "Fz", "k", "y0", "f", "v0", "day"])
+    sheet.append(["", "N", "N/um", "um", "kHz", "mm/s", ""])
+    for y0 in (2, 3):
+        sheet.append([0.3, 10, 1, y0, 20, 10.0, "Monday"])
+        sheet.cell(sheet.max_row, 1).number_format = "0 %"
+    book.create_sheet("others").append(["x"])
+    book.save(tmp_path / "cases.xlsx")
+    return tmp_path / "cases.xlsx"
+
+
+def test_the_first_sheet_of_a_workbook_is_read(tmp_path: Path, workbook: Path) -> None:
+    said = list[str]()
+    evaluate_files([workbook], tmp_path / "out.csv", TABLE, say=said.append)
+    assert friction(tmp_path / "out.csv") == close(MU, rel=1e-12)
+    assert [row["day"] for row in rows_of(tmp_path / "out.csv")] == ["Monday"] * 2
+    assert "head in line 3, units in line 4" in said[0]
+
+
+def test_a_text_that_may_be_two_numbers_is_none_in_a_workbook(
+    tmp_path: Path, workbook: Path
+) -> None:
+    import openpyxl
+
+    book = openpyxl.load_workbook(workbook)
+    book.worksheets[0]["C5"] = "1.000"
+    book.save(workbook)
+    assert evaluate_files([workbook], tmp_path / "out.csv", TABLE).rejected == 1
+    assert (tmp_path / "out.csv.rejects.csv").read_text().splitlines()[1].startswith("5,k,")
+
+
+def test_a_corner_far_away_and_a_damaged_workbook(tmp_path: Path, workbook: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.load_workbook(workbook)
+    book.worksheets[0].cell(30_000, 16_384, "far")
+    book.save(workbook)
+    summary = evaluate_files([workbook], tmp_path / "out.parquet", TABLE)
+    assert summary.answered == 2
+    data = workbook.read_bytes()
+    for cut in (10, len(data) // 2, len(data) - 30):
+        workbook.write_bytes(data[:cut])
+        with pytest.raises(FilesError, match="workbook"):
+            evaluate_files([workbook], tmp_path / "cut.csv", TABLE)
+    assert not math.isnan(summary.answered)
+
+
+def test_a_workbook_without_openpyxl_gets_the_remedy(
+    tmp_path: Path, workbook: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "openpyxl", None)
+    with pytest.raises(FilesError, match=r"mumacro\[files\].*save it as CSV"):
+        evaluate_files([workbook], tmp_path / "out.csv", TABLE)

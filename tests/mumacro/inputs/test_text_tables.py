@@ -1,0 +1,402 @@
+"""Tables as people and rigs write them: files of rigs, every way to write a table, and what is
+refused with which lines."""
+
+import csv
+import io
+import itertools
+import re
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mumacro.analysis.measured_points import read_points
+from mumacro.inputs.decoding import Text, TextError, encoding_of
+from mumacro.inputs.signs import Signs, evidence
+from mumacro.inputs.text_tables import (
+    BLANKS,
+    GAPS,
+    Dialect,
+    Table,
+    Wanted,
+    read_cell,
+    read_table,
+)
+from mumacro.inputs.units import Scale
+from tests.support.comparing import close
+
+V0 = [1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2]
+MU = [0.069, 0.097, 0.174, 0.221, 0.247, 0.274, 0.289, 0.305]
+#: made after descriptions of what rigs and programs write, each with how it is read
+RIGS = {
+    "amplifier.asc": "Windows-1252, tab, decimal comma, head in line 9",
+    "excel_de.csv": "semicolon, decimal comma, point between thousands, head in line 2",
+    "finite_elements.txt": "blanks, head in line 6",
+    "labview.lvm": "tab, decimal comma, head in line 23, units in line 18",
+    "oscilloscope.csv": "units in line 2",
+    "preamble.csv": "head in line 8",
+    "rheometer.txt": "tab, head in line 10, units in line 11",
+    "rheometer_utf16.csv": "UTF-16, tab, decimal comma, head in line 6, units in line 8",
+    "savetxt.dat": "blanks, head in line 2",
+    "testing_machine.csv": "head in line 7, units in line 8",
+    "windows_1252.csv": "Windows-1252, semicolon, decimal comma",
+}
+POINTS = Wanted({"v0": "v0", "mu_macro": "mu0", "note": "mu0"}, [["v0"], ["mu_macro"]])
+
+
+@pytest.fixture
+def rigs(repository: Path) -> Path:
+    return repository / "tests" / "data" / "rigs"
+
+
+def refused(text: str | bytes, **options: Any) -> TextError:
+    """Why a table is refused."""
+    with pytest.raises(TextError) as refusal:
+        read(text, **options)
+    assert len(str(refusal.value).splitlines()) == 1
+    return refusal.value
+
+
+def read(text: str | bytes, **options: Any) -> Table:
+    data = text if isinstance(text, bytes) else text.encode()
+    return read_table(
+        data, Wanted(dict(list(POINTS.like.items())[:2]), POINTS.needed), Dialect(**options)
+    )
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_what_rigs_write_is_read_and_said(rigs: Path, name: str) -> None:
+    points = read_points(rigs / name)
+    assert points.columns["v0"].tolist() == close(V0, rel=1e-12)
+    assert points.columns["mu_macro"].tolist() == close(MU, rel=1e-12)
+    assert points.read_as == RIGS[name]
+    same = read_points((rigs / name).read_bytes())
+    assert same.columns["v0"].tolist() == points.columns["v0"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "parts"),
+    [
+        ("ambiguous.txt", 2, ("'1.000'", "may be 1 or 1000", "--decimal .", "--decimal ,")),
+        ("recorder.csv", 6, ("has 1 cell", "the head has 4")),
+        ("two_steps.csv", 8, ("another head",)),
+    ],
+)
+def test_what_can_be_read_in_two_ways_is_refused_with_its_line(
+    rigs: Path, name: str, line: int, parts: tuple[str, ...]
+) -> None:
+    with pytest.raises(TextError) as refusal:
+        read_points(rigs / name)
+    assert str(refusal.value).startswith(f"line {line}")
+    assert all(part in str(refusal.value) for part in parts)
+
+
+def test_the_advice_for_an_ambiguous_number_works(rigs: Path) -> None:
+    as_thousands = read_points(rigs / "ambiguous.txt", Dialect(decimal=",")).columns["v0"]
+    as_decimals = read_points(rigs / "ambiguous.txt", Dialect(decimal=".")).columns["v0"]
+    assert as_thousands.tolist() == close(V0, rel=1e-12)
+    assert as_decimals.tolist() == close([1e-3 * v for v in V0], rel=1e-12)
+    same = read_points(rigs / "ambiguous.txt", Dialect(thousands=".")).columns["v0"]
+    assert same.tolist() == as_thousands.tolist()
+
+
+# --- every way to write a table -------------------------------------------------------------------
+
+NUMBERS = st.floats(1e-9, 1e9).map(lambda x: float(f"{x:.6g}"))
+FORMS = st.sampled_from(["r", ".6g", ".3f", ".4e", "D", ",.4f", ",.0f"])
+
+
+def written(number: float, form: str, decimal: str) -> str:
+    """A number as text; groups of thousands have the other sign."""
+    text = (
+        repr(number)
+        if form == "r"
+        else f"{number:.8E}".replace("E", "D")
+        if form == "D"
+        else f"{number:{form}}"
+    )
+    return text if decimal == "." else text.translate(str.maketrans(".,", ",."))
+
+
+def value_of(text: str, decimal: str) -> float:
+    plain = text if decimal == "." else text.translate(str.maketrans(".,", ",."))
+    return float(plain.replace(",", "").replace("D", "E"))
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    rows=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=8),
+    sep=st.sampled_from([",", ";", "\t", "|", BLANKS]),
+    decimal=st.sampled_from(".,"),
+    forms=st.tuples(FORMS, FORMS),
+    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "cp1252", "utf-16"]),
+    before=st.lists(
+        st.sampled_from(
+            ["", "Rig: 7", "# v0 is the speed", "a,b;c\td", "date 2026-11-27", "1 2 3"]
+        ),
+        max_size=4,
+    ),
+    units=st.sampled_from(["none", "in the head", "below"]),
+    quoted=st.booleans(),
+    more=st.sampled_from(["", "comments", "empty", "trailing"]),
+)
+def test_a_table_is_read_as_it_was_written_or_refused(
+    rows: list[tuple[float, float]],
+    sep: str,
+    decimal: str,
+    forms: tuple[str, str],
+    line_end: str,
+    encoding: str,
+    before: list[str],
+    units: str,
+    quoted: bool,
+    more: str,
+) -> None:
+    cells = [
+        [written(x, form, decimal) for x, form in zip(row, forms, strict=True)] for row in rows
+    ]
+    head = ["v0 [µm/s]", "mu_macro"] if units == "in the head" else ["v0", "mu_macro"]
+    lines = [*before]
+    for row in [head, *([["µm/s", "-"]] if units == "below" else []), *cells]:
+        stream = io.StringIO(newline="")
+        separator = "\t" if sep == BLANKS else sep
+        style = csv.QUOTE_ALL if quoted and sep != BLANKS else csv.QUOTE_MINIMAL
+        csv.writer(stream, delimiter=separator, quoting=style, lineterminator="").writerow(row)
+        text = stream.getvalue().replace("\t", "  ") if sep == BLANKS else stream.getvalue()
+        lines.append(text + sep * (more == "trailing" and sep != BLANKS))
+        lines += {"comments": ["# a comment"], "empty": ["", sep * 3]}.get(more, [])
+    data = line_end.join([*lines, ""]).encode(encoding)
+    shown = [evidence(cell) for row in cells for cell in row]
+    if any(sign for sign, _ in shown) and not any(sure for _, sure in shown):
+        # alone what may be read in two ways is refused; and read, once the sign is given
+        signs = {sign for sign, _ in shown if sign}
+        if not (sep == "," and signs == {"."}):
+            assert "may be" in str(refused(data))
+        table = read(data, decimal=decimal)
+    else:
+        table = read(data)
+    scale = 1.0 if units == "none" else 1e-6
+    expected = np.array([[value_of(cell, decimal) for cell in row] for row in cells])
+    np.testing.assert_allclose(table.columns["v0"], scale * expected[:, 0], rtol=1e-14)
+    np.testing.assert_allclose(table.columns["mu_macro"], expected[:, 1], rtol=1e-14)
+    numbered = [i for i, line in enumerate(lines, 1) if cells[0][0] in line or len(rows) > 1]
+    assert len(table.lines) == len(rows)
+    assert {*table.lines} <= {*numbered}
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    text=st.text(alphabet="ab,\r\nµ €", max_size=60),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "utf-32"]),
+    cuts=st.lists(st.integers(0, 300), max_size=6),
+)
+def test_lines_do_not_depend_on_how_the_bytes_come(
+    text: str, encoding: str, cuts: list[int]
+) -> None:
+    data = text.encode(encoding)
+    places = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
+    pieces = [data[a:b] for a, b in itertools.pairwise(places)]
+    expected = re.split("\r\n|\r|\n", text)
+    expected = expected[:-1] if expected[-1] == "" else expected
+    numbered = [
+        (piece.first + i, line)
+        for piece in Text(pieces, None if encoding != "utf-8" else "utf-8")
+        for i, line in enumerate(piece.lines)
+    ]
+    assert numbered == list(enumerate(expected, 1))
+
+
+@given(
+    text=st.text(alphabet="0123456789.,", max_size=12).filter(
+        lambda x: not re.search(r"\.\.|,,", x)
+    )
+)
+def test_the_signs_of_a_number_tell_the_same_with_both_swapped(text: str) -> None:
+    swapped = str.maketrans(".,", ",.")
+    sign, sure = evidence(text)
+    assert evidence(text.translate(swapped)) == (sign.translate(swapped), sure)
+
+
+def test_bytes_after_ascii_are_windows_1252_and_mixed_ones_are_refused() -> None:
+    head = "v0,mu_macro,note\n1,0.2,"
+    assert read((head + "µ").encode("cp1252")).columns["v0"].tolist() == [1.0]
+    assert "line 3" in str(refused((head + "µ\n2,0.3,").encode() + b"\xb5"))
+    assert "0x81" in str(refused(head.encode() + b"\x81"))
+
+
+# --- options --------------------------------------------------------------------------------------
+
+
+def test_a_given_option_wins_over_what_is_found() -> None:
+    assert read("v0;mu_macro\n1.000;2\n", decimal=",").columns["v0"].tolist() == [1000.0]
+    assert read("v0;mu_macro\n1.000;2,5\n", thousands=".").columns["v0"].tolist() == [1000.0]
+    assert read("v0;mu_macro\n1'000;0.5\n", thousands="'").columns["v0"].tolist() == [1000.0]
+    assert "line 2" in str(refused("v0;mu_macro\n1.000;2,5\n", thousands=""))
+    assert "line 2" in str(refused("v0;mu_macro\n0.5;2\n", decimal=","))
+    assert read("v0|mu_macro|a;b\n1|2|3\n", sep="|").columns["v0"].tolist() == [1.0]
+    assert "v0" in str(refused("v0,mu_macro\n1,2\n", sep=";"))
+    again = "v0,mu_macro\n1,2\nmu_macro,v0\n3,4\n"
+    assert read(again, skip=2).columns["mu_macro"].tolist() == [3.0]
+    assert read("v0,mu_macro,µ\n1,2,3\n".encode("mac-roman"), encoding="mac-roman").lines == [2]
+    assert "both" in str(refused("v0,mu_macro\n1,2\n", decimal=",", thousands=","))
+
+
+@pytest.mark.parametrize(
+    "name", ["punycode", "idna", "rot13", "utf-7", "unicode_escape", "x" * 999]
+)
+def test_what_is_no_encoding_of_texts_is_refused(name: str) -> None:
+    with pytest.raises(TextError, match="is no encoding"):
+        encoding_of(name)
+
+
+# --- cells ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("cell", "si"),
+    [
+        ("1.5", 1.5e-3),
+        ("1.0D-3", 1e-6),
+        ("1.0d+03", 1.0),
+        ("−2", -2e-3),
+        ("+2", 2e-3),
+        ("1,234.5", 1.2345),
+        ("12 345", 12.345),
+        ("12\u202f345.5", 12.3455),
+        ("1'000", 1.0),
+        ("5 um/s", 5e-6),
+        (" 7 ", 7e-3),
+    ],
+)
+def test_numbers_in_cells(cell: str, si: float) -> None:
+    value = read_cell("v0", cell, Signs(".", None), Scale(over=1e3))
+    assert value.si == close(si, rel=1e-15)
+
+
+def test_per_cent_in_a_cell_comes_before_the_unit_of_the_column() -> None:
+    for scale in (Scale(), Scale(over=1e2)):
+        assert read_cell("mu_macro", "7 %", Signs(".", None), scale).si == close(0.07, rel=1e-15)
+
+
+@pytest.mark.parametrize("gap", sorted(GAPS))
+def test_every_spelling_of_a_gap_is_missing(gap: str) -> None:
+    for text in (gap, gap.upper(), f" {gap} "):
+        assert np.isnan(read_cell("v0", text, Signs(".", None)).si)
+    if gap.strip("-–—−"):  # a row of dashes is one of units
+        assert "line 3: v0 is missing" in str(refused(f'v0;mu_macro\n1;0,2\n"{gap}";0,3\n'))
+
+
+@pytest.mark.parametrize("cell", ["x", "1_0", "1.2.3", "0x10", "1e", "--1", "1e400", "1 2", "²"])
+def test_what_is_no_number_is_refused_with_its_line_and_name(cell: str) -> None:
+    fault = str(refused(f"v0\tmu_macro\n1\t0.2\n{cell}\t0.2\n"))
+    assert fault.startswith("line 3: v0 ")
+    assert repr(cell) in fault
+
+
+def test_a_deviation_or_an_interval_is_no_point() -> None:
+    assert "std" in str(refused("v0,mu_macro\n1,0.2 ± 0.1\n"))
+    assert "line 2: v0" in str(refused("v0,mu_macro\n1..2,0.2\n"))
+
+
+# --- units ----------------------------------------------------------------------------------------
+
+
+def test_a_row_of_units_is_checked() -> None:
+    assert read("v0,mu_macro\nmm/s,%\n1,7\n").columns["v0"].tolist() == [1e-3]
+    assert read("v0,mu_macro\n(mm/s),[-]\n1,7\n").units == {"v0": "mm/s", "mu_macro": "-"}
+    assert read("v0 [mm/s],mu_macro\nmm/s,\n1,7\n").columns["v0"].tolist() == [1e-3]
+    assert "line 2" in str(refused("v0 [m/s],mu_macro\nmm/s,\n1,7\n"))
+    assert "line 2" in str(refused("v0,mu_macro\nfurlong,pct\n1,7\n"))
+    assert read("v0 / (mm/s),mu_macro in %\n1,7\n").columns["mu_macro"].tolist() == [0.07]
+
+
+# --- bad input ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("data", "parts"),
+    [
+        (b"", ("line 1", "is empty")),
+        (b"\n \n\t\n", ("line 1", "is empty")),
+        (b"v0,mu_macro\n", ("line 1", "no row")),
+        (b"speed,mu_macro\n1,2\n", ("line 1", "'speed'", "v0 [m/s]")),
+        (b"a note\n\nspeed (mm/s);cof\n1,5;0,2\n2,5;0,3\n", ("line 3", "v0 [mm/s]")),
+        (b'v0,mu_macro\n1,"0.2\n', ("line 2", "quote")),
+        (b"v0,mu_macro\n1,0.2\n2", ("line 3 has 1 cell",)),
+        (b"v0,mu_macro\n1,0.2\n\0\0\0", ("line 3", "zero byte")),
+        (b"\0" * 5000, ("line 1", "zero byte")),
+        (b"PK\x03\x04 no workbook", ("workbook",)),
+        (b"\xd0\xcf\x11\xe0", (".xls",)),
+        (b"<html>", ("HTML",)),
+        (b"PAR1", ("Parquet",)),
+        (b"v0;mu_macro\n0,5;0.5\n", ("line 2", "'0,5'", "'0.5'", "decimal")),
+        (b"v0 [s],mu_macro\n1,2\n", ("line 1", "'v0 [s]'")),
+        (b"v0,v0,mu_macro\n1,1,2\n", ("line 1", "v0 is there twice")),
+    ],
+)
+def test_bad_tables_are_refused_in_one_line(data: bytes, parts: tuple[str, ...]) -> None:
+    message = str(refused(data))
+    assert all(part in message for part in parts), message
+
+
+def test_all_faults_are_told_by_line() -> None:
+    fault = refused("v0,mu_macro\n" + "x,1\n" * 20)
+    assert [one.partition(":")[0] for one in fault.faults] == [f"line {i}" for i in range(2, 22)]
+    assert "and 15 more" in str(fault)
+
+
+def test_a_sparse_file_of_two_gigabytes_is_refused_at_once(tmp_path: Path) -> None:
+    for begin in (b"", b"v0,mu_macro\n1,0.2\n"):
+        path = tmp_path / "sparse.csv"
+        with path.open("wb") as stream:
+            stream.write(begin)
+            stream.truncate(2 * 2**30)
+        with pytest.raises(TextError, match=f"line {3 if begin else 1} has a zero byte"):
+            read_points(path)
+        path.unlink()
+
+
+def long_line(n: int) -> bytes:
+    return b"v0,mu_macro\n" + b"1," * n
+
+
+#: tables of n signs, made to be slow
+SLOW: dict[str, Callable[[int], bytes]] = {
+    "one line": long_line,
+    "a head of columns": lambda n: (
+        b"v0,mu_macro," + b",".join(b"c%d" % i for i in range(n // 8)) + b"\n1,2\n"
+    ),
+    "heads that are nearly right": lambda n: b"v0 mu_macr0 x\n" * (n // 14),
+    "blanks in brackets": lambda n: b"v0 mu_macro k [" + b" " * n + b"x\n1 2\n",
+    "open brackets": lambda n: b"v0 mu_macro " + b"[(" * (n // 2) + b"\n1 2\n",
+    "quotes": lambda n: b"v0,mu_macro\n" + b'"",' * (n // 3) + b"\n",
+    "open quotes": lambda n: b'v0,mu_macro\n"' + b"1\n" * (n // 2),
+    "digits": lambda n: b"v0;mu_macro\n" + b"1" * (n // 2) + b".;" + b"1" * (n // 2) + b"\n",
+    "groups": lambda n: b"v0;mu_macro\n1" + b".111" * (n // 4) + b"x;2\n",
+    "comments": lambda n: b"v0,mu_macro\n1,2\n" + b"#\n" * (n // 2),
+    "units": lambda n: b"v0,mu_macro\n" + b"m" * n + b",%\n1,2\n",
+    "empty cells": lambda n: b"v0,mu_macro\n" + b"," * n + b"\n1,2\n",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLOW)
+def test_no_table_takes_longer_than_in_proportion_to_its_size(name: str) -> None:
+    def seconds(n: int) -> float:
+        data, times = SLOW[name](n), []
+        for _ in range(3):
+            start = time.process_time()
+            with suppress(TextError):
+                read(data)
+            times.append(time.process_time() - start)
+        return min(times)
+
+    # a quadratic one takes 64 times as long
+    assert seconds(800_000) < 20.0 * seconds(100_000) + 0.05
