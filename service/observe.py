@@ -232,9 +232,10 @@ class Observe:
         try:
             await self._app(scope, receive, send_marked)
         except ClientDisconnect as error:
-            status, failed = _GONE, isinstance(error.__cause__, Exception)
-            if failed:  # in the middle of its answer: the connection ends without the rest
-                status = meaning(error.__cause__, scope).kind.status
+            status, cause = _GONE, error.__cause__
+            if isinstance(cause, Exception):
+                # in the middle of its answer: the connection ends without the rest
+                status = meaning(cause, scope).kind.status
                 if "abort" not in state:
                     raise  # another server ends it
                 state["abort"]()

@@ -121,8 +121,8 @@ class Connection(HttpToolsProtocol):
         if self._busy and self.cycle.response_started:
             self.abort()
         elif not self.transport.is_closing():
-            answer = problem_of(error, self._refused(error.kind.status))
-            marks = self._observer.marks(self.scope)
+            refused = self._refused(error.kind.status)
+            answer, marks = problem_of(error, refused), self._observer.marks(refused)
             fields = b"".join(b"%b: %b\r\n" % field for field in (*answer.raw_headers, *marks))
             start = b"HTTP/1.1 %d %b" % (error.kind.status, error.kind.title.encode())
             self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, bytes(answer.body)))
@@ -132,15 +132,15 @@ class Connection(HttpToolsProtocol):
         """The scope of a request that is refused here, seen by the observer, now or when the
         application has ended."""
         if self._busy:
-            self._observer.name(self.scope)
-            self.scope["state"]["refused"] = status
-            return self.scope
+            busy: Any = self.scope
+            self._observer.name(busy)
+            busy["state"]["refused"] = status
+            return busy
         if not self._in_head:  # nothing of a request is there
             super().on_message_begin()
         method = self.parser.get_method().decode("ascii") if self.url else ""
         path = self.url.partition(b"?")[0][:_MOST_SHOWN].decode("latin-1")
         scope: Any = {**self.scope, "path": path, "method": method}
-        self.scope = scope
         self._observer.name(scope)
         self._observer.answered(scope, status, self.loop.time() - self._begun)
         return scope
