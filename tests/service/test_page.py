@@ -1,5 +1,9 @@
 """The pages: their headers, whether they fit the screen, accessibility, and the API key."""
 
+<<<<<<< HEAD
+=======
+import base64
+>>>>>>> d5fa2ce2051cf87869ecb5341170b10863744730
 import hashlib
 import json
 import os
@@ -77,7 +81,10 @@ def test_units_and_geometries_are_the_librarys(client: Any) -> None:
     names = client.get("/static/page/names.json").json()
     expected = {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}
     for name, one in names["inputs"].items():
-        assert one["units"] == {unit: list(scale) for unit, scale in expected[name].items()}
+        scales = {unit: list(scale) for unit, scale in expected[name].items()}
+        assert scales.items() <= one["units"].items()
+        typeset = {unit.replace("u", "µ"): scale for unit, scale in scales.items()}
+        assert one["units"] == {**scales, **typeset}
         assert set(one["offered"]) <= set(one["units"])
         assert one["meaning"]
     assert names["start"].keys() == names["inputs"].keys() == expected.keys() - {"omega"}
@@ -142,6 +149,8 @@ def test_built_documentation_is_served_if_named(
 ) -> None:
     (tmp_path / "how-to").mkdir()
     (tmp_path / "index.html").write_text("<h1>Guide</h1>")
+    (tmp_path / ".hidden").write_text("secret")
+    (tmp_path / "scripts.html").write_text("<script>one()</script><script src=two.js></script>")
     (tmp_path / "how-to" / "index.html").write_text("<h1>How to</h1>")
     settings = Settings(tables=(tables_dir,), guide=tmp_path, api_key="open-sesame")
     with TestClient(create_app(settings)) as guided:  # it needs no key
@@ -151,8 +160,14 @@ def test_built_documentation_is_served_if_named(
         assert guided.get("/guide/how-to/").text == "<h1>How to</h1>"
         assert guided.get("/guide").url.path == "/guide/"
         assert guided.get("/static/page/names.json").json()["guide"] is True
-        for path in ("/guide/none.html", "/guide/..%2Fsecret"):
+        for path in ("/guide/none.html", "/guide/..%2Fsecret", "/guide/.hidden"):
             problem(guided.get(path), 404)
+        policy = guided.get("/guide/scripts.html").headers["content-security-policy"]
+        digest = base64.b64encode(hashlib.sha256(b"one()").digest()).decode()
+        assert f"script-src 'self' 'sha256-{digest}';" in policy
+        assert "frame-ancestors 'none'" in policy
+        moved = guided.get("/guide/how-to", follow_redirects=False)
+        assert moved.headers["location"] == "how-to/"  # a proxy with TLS has another scheme
         problem(guided.post("/guide/", headers={"X-API-Key": "open-sesame"}), 405)
     for path in ("/guide", "/guide/", "/guide/tutorial.html"):  # says how to get it
         assert "python3 dev.py docs builds it" in problem(client.get(path), 404)["detail"]

@@ -51,6 +51,7 @@ export function lawQuestion(state, answer) {
 /** `moved({ name: value [SI] })` takes a value that was pointed at. */
 export function lawPanel(store, moved) {
   let answer, law, colours, target, latest;
+  let pointer = null; // where it is in the plot
   const plot = new Plot($("law"), paint);
   const along = () => law?.along ?? store.state.along;
   /** The unit of the axis: that of the input as it was typed. */
@@ -74,7 +75,7 @@ export function lawPanel(store, moved) {
     const at = (i) => `${show(law.mu_macro.at(i))} at ${text(law.values.at(i))}`;
     const marks = law.border.map(({ value }) => `; border of continuous sliding at ${text(value)}`).join("");
     $("law").setAttribute("aria-label", `Friction law from ${at(0)} to ${at(-1)}${marks}.`);
-    read(null);
+    read(pointer);
     plot.redraw();
   }
 
@@ -140,6 +141,7 @@ export function lawPanel(store, moved) {
 
   /** What stands below the law: at the pointer, else at the user's point. */
   function read(place) {
+    pointer = place;
     if (!law) return;
     if (!place || !plot.box || !plot.holds(place)) {
       const one = answer?.inputs[law.along]?.value;

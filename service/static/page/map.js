@@ -26,6 +26,7 @@ const AMPLITUDE = { y0: ["y0", "k", "mu0", "Fz"], Fz_amplitude: ["Fz_amplitude",
 /** `moved({ name: value [SI] })` takes values of the point; `loaded()` hears of a new map. */
 export function mapPanel(store, moved, loaded) {
   let map, answer, target;
+  let pointer = null; // where it is in the plot
   const plot = new Plot($("map"), paint);
   const amplitude = () => inputsOf(store.state)[3];
   const channel = new Channel(
@@ -123,6 +124,7 @@ export function mapPanel(store, moved, loaded) {
 
   /** What stands below the map: at the pointer, else at the user's point. */
   function read(place) {
+    pointer = place;
     if (!map) return;
     const at = place && plot.holds(place) ? place : null;
     if (!at) {
@@ -182,7 +184,7 @@ export function mapPanel(store, moved, loaded) {
             `${show(answer.groups.y_tilde ?? Infinity, 3)}, ${inWords(answer.regime)}.`
         : "Map of µ/µ₀ over dimensionless speed and amplitude",
     );
-    read(null);
+    read(pointer);
     plot.redraw();
     return map;
   };

@@ -39,6 +39,7 @@ function spread(answer, rows) {
 }
 
 export function numberPanel(store) {
+  $("number").replaceChildren(); // what stands there until the first answer
   $("assumes").addEventListener("click", () => $("assumptions").showModal());
   $("assumptions").addEventListener("click", ({ target, currentTarget }) => {
     if (target === currentTarget || target.closest("button")) currentTarget.close();

@@ -31,7 +31,7 @@ export function tabs(id) {
 /** The other numbers of a case: [name, explanation, value]. */
 function numbers(answer, all) {
   const { groups = {}, limits = {}, power, settling, stick_fraction: stick, inputs } = answer;
-  const digits = all ? 12 : 4;
+  const digits = all ? 10 : 4;
   const amplitude = inputs.y0?.value;
   const peak = amplitude === undefined ? null : amplitude * 2 * Math.PI * inputs.f.value;
   const rows = [
