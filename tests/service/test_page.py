@@ -1,9 +1,5 @@
 """The pages: their headers, whether they fit the screen, accessibility, and the API key."""
 
-<<<<<<< HEAD
-=======
-import base64
->>>>>>> d5fa2ce2051cf87869ecb5341170b10863744730
 import hashlib
 import json
 import os

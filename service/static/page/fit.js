@@ -89,8 +89,10 @@ export function fitPanel(store, moved, openCase) {
   };
 
   /** A value of k or µ₀ as text; k may be rigid, a bound infinite (null). */
-  const text = (name, value, digits = 4) =>
-    value === null || value === "rigid" ? (value ?? "∞") : inUnit(name, value, undefined, digits);
+  const text = (name, value, digits = 4, like = value) =>
+    value === null || value === "rigid"
+      ? (value ?? "∞")
+      : inUnit(name, value, unitFor(name, typeof like === "number" ? like : value), digits);
 
   function result() {
     if (!fit) return nothing;
@@ -98,8 +100,8 @@ export function fitPanel(store, moved, openCase) {
     const names = Object.keys(values).filter((name) => values[name] !== null);
     const equals = (name, one) => `${about.inputs[name].symbol} = ${text(name, one[name])}`;
     const best = names.map((name) => {
-      const spread = std[name] === null ? "not determined" : `± ${text(name, std[name], 2)}`;
-      return `${equals(name, values)} ${spread} (95 %: ${interval[name].map((end) => text(name, end)).join(" to ")})`;
+      const spread = std[name] === null ? "not determined" : `± ${text(name, std[name], 2, values[name])}`;
+      return `${equals(name, values)} ${spread} (95 %: ${interval[name].map((end) => text(name, end, 4, values[name])).join(" to ")})`;
     });
     const use = (one) => () => {
       const numbers = Object.entries(one).filter(([name, value]) => names.includes(name) && typeof value === "number");

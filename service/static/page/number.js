@@ -13,7 +13,7 @@ const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
 /** The number and its deviation as texts. */
 function numberOf(answer, all) {
   const { mu_macro: mu, std, error_bound: bound, mu_macro_low: low, mu_macro_high: high, digits = 4 } = answer;
-  if (all) return { value: friction(mu, digitsWithin(mu, bound)), std: std ? show(std, 6) : null };
+  if (all) return { value: friction(mu, digitsWithin(mu, bound) + 1), std: std ? show(std, 6) : null };
   if (std) {
     const [value, deviation] = withDeviation(mu, std);
     return { value, std: deviation };
@@ -26,7 +26,7 @@ function numberOf(answer, all) {
 function spread(answer, rows) {
   const { std_share: shares, mu_macro_low: low, mu_macro_high: high, inputs } = answer;
   if (low !== undefined && high > low) {
-    const digits = Math.max(2, digitsWithin(high, high - low) + 2);
+    const digits = Math.max(2, digitsWithin(high, high - low) + 3);
     return `${friction(low, digits)} to ${friction(high, digits)} for k = ${inputs.k.text}`;
   }
   if (shares) {

@@ -125,7 +125,12 @@ export class Plot {
   point(x, y) {
     const { box } = this;
     const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-    const at = [this.x(x), this.y(y)].map((value) => (Number.isNaN(value) ? -Infinity : value));
+    // 0 and infinity have no place on a logarithmic axis, but a side
+    const far = (scale, value, low, high) => {
+      if (scale.base && !(value > 0)) return low;
+      return value === Infinity ? high : scale(value);
+    };
+    const at = [far(this.x, x, -Infinity, Infinity), far(this.y, y, Infinity, -Infinity)];
     const place = [clamp(at[0], box.x, box.x + box.width), clamp(at[1], box.y, box.y + box.height)];
     const [right, down] = at.map((value, i) => Math.sign(Math.trunc(100 * clamp(value - place[i], -1e6, 1e6))));
     const outside = right !== 0 || down !== 0;

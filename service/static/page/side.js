@@ -83,17 +83,18 @@ function bars({ gradient, mu_macro: mu, inputs }) {
 /** `found(mark)` hears of the target that is asked for, null of none. */
 export function sidePanel(store, moved, found) {
   let answer, asked, solved;
+  let refusal = null;
   const channel = new Channel(
     (question) => post("v1/solve-for", question),
     (reply, question) => {
       asked = JSON.stringify(question);
       solved = { reply, question };
-      $("solve-status").textContent = "";
       show_();
       found(markOf());
     },
     (reason) => {
-      $("solve-status").textContent = reason ?? "";
+      refusal = reason;
+      compare();
     },
   );
 
@@ -133,13 +134,12 @@ export function sidePanel(store, moved, found) {
     compare();
   }
 
-  /** A result of other values is grey. */
+  /** A result of other values is grey; a refusal says why there is no other. */
   function compare() {
-    if (!solved || !answer) return;
-    const old = JSON.stringify(question()) !== asked;
+    const old = Boolean(solved && answer && JSON.stringify(question()) !== asked);
     $("solve-result").classList.toggle("old", old);
-    if (old) $("solve-status").textContent = "This was asked with other values.";
-    else if ($("solve-status").textContent.startsWith("This was")) $("solve-status").textContent = "";
+    $("solve-status").textContent = refusal ?? (old ? "This was asked with other values." : "");
+    $("solve-status").classList.toggle("bad", refusal !== null);
   }
 
   $("solve-form").addEventListener("submit", (event) => {
