@@ -17,6 +17,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import check, real
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import CONTACTS, SPRINGS_OF, Kind
+from mumacro.inputs.reading import read
 from mumacro.kernel.arrays import Array
 
 EXPONENT = "stiffness_exponent"
@@ -49,9 +50,13 @@ class Stiffening(NamedTuple):
 
     def scaled(self, case: Mapping[str, Any], load: ArrayLike) -> dict[str, Array]:
         """The stiffnesses of a case, k or the ends of its interval, at loads [N], (n,)."""
-        return {
-            name: self.stiffness(float(case[name]), load) for name in ("k", *ENDS) if name in case
-        }
+        if "k" not in case:
+            given = {name: read(name, case[name]).si for name in ENDS if name in case}
+        elif (one := read("k", case["k"])).low is not None and one.high is not None:
+            given = dict(zip(ENDS, (one.low, one.high), strict=True))
+        else:
+            given = {"k": one.si}
+        return {name: self.stiffness(float(k), load) for name, k in given.items()}
 
     def place(self, ratio: float) -> float:
         """The load [N] at which k/Fz is ``ratio`` times what it is at :attr:`load`; for m < 1."""

@@ -79,7 +79,8 @@ def _answer_at(
     inputs = {name: value for name, value in question.inputs.items() if value is not None}
     inputs[unknown] = values
     if stiffening is not None:
-        inputs |= stiffening.scaled(question.inputs, values)
+        stiffnesses = stiffening.scaled(question.inputs, values)
+        inputs = {name: value for name, value in inputs.items() if name != "k"} | stiffnesses
     cases = Cases.of(named(None, inputs | question.words | question.deviations))
     return table.surrogate.answer(cases, chosen(question.outputs, cases))
 

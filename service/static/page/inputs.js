@@ -3,7 +3,7 @@
 import { $ } from "./ask.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
-import { about, inPrint, inUnit, prose, typeset } from "./words.js";
+import { about, inPrint, inUnit, numberOf, prose, typeset } from "./words.js";
 
 const STEPS = 100; // of a slider, a decade
 
@@ -30,8 +30,8 @@ export function choice(store, name, words, reasons = {}) {
 
 /** What the service understood of a text, where that says more than the text. */
 function understood(name, { text, value, unit, std, low, high } = {}) {
-  if (value === undefined || value === null) return "";
-  if (low !== null && low !== undefined && high !== null)
+  if (typeof value !== "number") return "";
+  if (low !== undefined && high !== undefined)
     return `${inUnit(name, low, unit ?? undefined)} to ${inUnit(name, high, unit ?? undefined)}`;
   const said = inUnit(name, value, unit ?? undefined, 6);
   if (std) return `${said}, deviation ${inUnit(name, std, unit ?? undefined, 3)}`;
@@ -57,7 +57,8 @@ export function inputsPanel(store, moved) {
     const one = answer?.inputs[name];
     const rigid = name === "k" && store.state.contact === "rigid";
     const below = fault ?? doubt ?? (understood(name, one) || note);
-    const value = one?.value > 0 && Number.isFinite(one.value) ? Math.log10(one.value) : range[0];
+    const number = numberOf(one);
+    const value = number > 0 ? Math.log10(number) : range[0];
     return html`
       <div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
         <label for=${`field-${name}`} title=${about.inputs[name].meaning}>
@@ -98,7 +99,7 @@ export function inputsPanel(store, moved) {
   /** An arrow key moves an input by 5 %, with Shift by 0.5 %. */
   function step(event, name) {
     const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
-    const value = answer?.inputs[name]?.value;
+    const value = numberOf(answer?.inputs[name]);
     if (!way || !(value > 0)) return;
     event.preventDefault();
     moved({ [name]: value * (event.shiftKey ? 1.005 : 1.05) ** way }, 6);

@@ -1,10 +1,9 @@
 // The friction law: µ over one input, with the map's colours behind it.
 import { $, Channel } from "./ask.js";
-import { textAt } from "./map.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseOf, inputsOf } from "./state.js";
-import { about, inPrint, inUnit, inWords, show, toSI, toUnit, unitFor } from "./words.js";
+import { about, inPrint, inUnit, inWords, numberOf, show, toSI, toUnit, unitFor } from "./words.js";
 const { area, bisectCenter } = globalThis.d3;
 
 const POINTS = 241;
@@ -14,7 +13,7 @@ const EXTREMES = [1e-300, 1e300]; // of a range
 function usualRange(state, { inputs, limits }) {
   const { along, scale } = state;
   const border = along === "v0" ? limits?.v0_crit : null;
-  const marks = [inputs[along]?.value, border].filter((one) => one > 0 && Number.isFinite(one));
+  const marks = [numberOf(inputs[along]), border].filter((one) => one > 0 && Number.isFinite(one));
   const slider = about.inputs[along].range.map((exponent) => 10 ** exponent);
   let [low, high] = slider;
   if (marks.length) {
@@ -107,9 +106,10 @@ export function lawPanel(store, moved) {
     if (target?.along === law.along) {
       plot.path(shown.map((x) => [x, target.mu_macro]), "target");
     }
-    const here = answer.inputs[law.along]?.value;
+    const rigid = law.along === "k" && store.state.contact === "rigid";
+    const here = rigid ? Infinity : numberOf(answer.inputs[law.along]);
     if (here === undefined) return;
-    const x = here === null ? Infinity : toUnit(law.along, here, unit());
+    const x = toUnit(law.along, here, unit());
     if (answer.std) {
       const ends = [answer.mu_macro - answer.std, answer.mu_macro + answer.std];
       plot.path(ends.map((mu) => [x, mu]), "deviation", over);
@@ -144,8 +144,8 @@ export function lawPanel(store, moved) {
     pointer = place;
     if (!law) return;
     if (!place || !plot.box || !plot.holds(place)) {
-      const one = answer?.inputs[law.along]?.value;
-      const words = one === undefined || one === null ? "" : `Your case: ${text(one)}: µ = ${show(answer.mu_macro)}`;
+      const one = numberOf(answer?.inputs[law.along]);
+      const words = one === undefined ? "" : `Your case: ${text(one)}: µ = ${show(answer.mu_macro)}`;
       $("law-read").textContent = words;
       return;
     }
@@ -159,8 +159,8 @@ export function lawPanel(store, moved) {
     pull: ([x]) => law && moved({ [law.along]: toSI(law.along, plot.x.invert(x), unit()) }),
     grab: (moving) => store.drag(moving),
     step(right, up, factor) {
-      const value = answer?.inputs[along()]?.value;
-      if (!right || !Number.isFinite(value)) return false;
+      const value = numberOf(answer?.inputs[along()]);
+      if (!right || value === undefined) return false;
       moved({ [along()]: value * factor ** right }, 6);
       return true;
     },
@@ -181,7 +181,7 @@ export function lawPanel(store, moved) {
     return [Object.keys(columns), ...rows].map((cells) => `${cells.join(",")}\r\n`).join(""); // no cell holds a comma
   }
   const caption = () => inputsOf(store.state).filter((name) => name !== law.along)
-    .map((name) => `${about.inputs[name].symbol} = ${textAt(answer, name, answer.inputs[name]?.value ?? Infinity)}`).join(", ");
+    .map((name) => `${about.inputs[name].symbol} = ${answer.inputs[name]?.text}`).join(", ");
   $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${law.along}.csv`));
   $("law-image").addEventListener("click", () => law && plot.save(caption(), `friction-law-${law.along}.svg`));
 

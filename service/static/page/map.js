@@ -9,7 +9,7 @@ const { contours } = globalThis.d3;
 /** The text of an input at a value [SI], in the unit and with the relative deviation it had. */
 export function textAt(answer, name, value, digits = 4) {
   const { unit, std, value: before } = answer.inputs[name] ?? {};
-  const number = unit ? Math.abs(toUnit(name, value, unit)) : NaN;
+  const number = unit ? Math.abs(toUnit(name, value, unit)) : NaN; // how it would read
   const text = inUnit(name, value, number >= 1e-3 && number < 1e5 ? unit : unitFor(name, value), digits);
   return std ? `${text} ± ${show((100 * std) / before, 3)} %` : text;
 }

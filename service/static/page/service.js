@@ -3,6 +3,15 @@ import { withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
 
+/** All faults of a question that has several; names that share a reason stand together. */
+function together(errors) {
+  if (errors.length < 2) return null;
+  const names = Map.groupBy(errors, ({ reason }) => reason);
+  return [...names]
+    .map(([reason, all]) => `${all.map(({ field }) => field).join(", ")}: ${reason}`)
+    .join("; ");
+}
+
 async function ask(path, options) {
   let response, body;
   try {
@@ -16,7 +25,8 @@ async function ask(path, options) {
   if (response.ok) return { answer: body };
   const { status, headers } = response;
   if (status === 401) return { key: true };
-  const { errors = [], inputs = {}, detail = `status ${status}` } = body;
+  const { errors = [], inputs = {} } = body;
+  const detail = together(errors) ?? body.detail ?? `status ${status}`;
   if (status < 500 && ![408, 429].includes(status))
     return { refused: detail, faults: errors, inputs };
   return {

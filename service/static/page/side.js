@@ -4,7 +4,7 @@ import { $, Channel } from "./ask.js";
 import { html, render, svg } from "../lib/lit-html.js";
 import { post } from "./service.js";
 import { caseOf, inputsOf } from "./state.js";
-import { about, friction, inUnit, inWords, prefixed, show, typeset } from "./words.js";
+import { about, friction, inUnit, inWords, numberOf, prefixed, show, typeset } from "./words.js";
 
 /** Tabs: buttons that show one of several parts. */
 export function tabs(id) {
@@ -57,8 +57,8 @@ function bars({ gradient, mu_macro: mu, inputs }) {
   const names = Object.keys(gradient);
   const shares = names.map((name) => {
     const [input, per] = name === "omega" ? ["f", 2 * Math.PI] : [name, 1];
-    const value = inputs[input]?.value;
-    const share = gradient[name] === null || !Number.isFinite(value) ? null : (gradient[name] * per * value) / mu;
+    const value = numberOf(inputs[input]);
+    const share = gradient[name] === null || value === undefined ? null : (gradient[name] * per * value) / mu;
     return [input, share];
   });
   const most = Math.max(1, ...shares.map(([, share]) => Math.abs(share)));

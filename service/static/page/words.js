@@ -51,6 +51,9 @@ export const toSI = (name, number, unit) => {
 /** A unit with µ, for which the service writes u: N/µm. */
 export const inPrint = (unit) => unit.replace(/\bu(?=[A-Za-z])/, "µ");
 
+/** A value that was understood as a number [SI]; a rigid contact has none. */
+export const numberOf = (one) => (typeof one?.value === "number" ? one.value : undefined);
+
 /** A value of an input [SI] as text in a unit, as a person types it: "2 µm". */
 export function inUnit(name, value, unit = unitFor(name, value), digits = 4) {
   const number = Number(toUnit(name, value, unit).toPrecision(digits));
