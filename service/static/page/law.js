@@ -8,6 +8,7 @@ const { area, bisectCenter } = globalThis.d3;
 
 const POINTS = 241;
 const EXTREMES = [1e-300, 1e300]; // of a range
+const POSITIVE = ["mu0", "Fz", "k"]; // inputs that cannot be 0
 
 /** Where the law is drawn while no range is typed [SI]. */
 function usualRange(state, { inputs, limits }) {
@@ -24,6 +25,7 @@ function usualRange(state, { inputs, limits }) {
   // at Fz the contact lifts off
   if (along === "Fz" && state.direction === "normal") low = Math.max(low, 1.01 * inputs.Fz_amplitude.value);
   if (along === "Fz_amplitude") high = Math.min(high, 0.99 * inputs.Fz.value);
+  if (scale === "linear" && POSITIVE.includes(along)) low = Math.max(low, 1e-3 * high);
   return [Math.max(low, scale === "linear" ? 0 : EXTREMES[0]), Math.min(high, EXTREMES[1])];
 }
 
