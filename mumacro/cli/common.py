@@ -27,6 +27,8 @@ from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import belongs_to_value
+from mumacro.outputs import OUTPUTS
+from mumacro.outputs.evaluation import names_in
 from mumacro.surrogate import Surrogate
 from mumacro.validity import Row, digits, k_effect
 
@@ -121,6 +123,17 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
 
 
+def add_include(parser: argparse.ArgumentParser) -> None:
+    """The option for outputs beside mu_macro."""
+    text = f"also compute these, joined by commas: {', '.join(OUTPUTS)}"
+    parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
+
+
+def included(chosen: argparse.Namespace) -> tuple[str, ...]:
+    """The outputs that ``--include`` names; InputError for an unknown one."""
+    return tuple(name for text in chosen.include for name in names_in(text))
+
+
 def kind_in(chosen: argparse.Namespace) -> Kind:
     """The contact and direction that were chosen; InputError for a ball whose normal force
     oscillates."""
@@ -213,14 +226,15 @@ def read_case(
     one_k: str = "",
     whole: bool = True,
     optional: Sequence[str] = (),
+    std: dict[str, float] | None = None,
 ) -> dict[str, Any]:
     """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
     ``Surrogate.evaluate``.
 
     ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
     not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
-    other inputs must be there, but for those that are ``optional``.  UsageError tells everything
-    that is wrong, in one line.
+    other inputs must be there, but for those that are ``optional``.  Deviations go into ``std`` by
+    name; without it they are refused.  UsageError tells everything that is wrong, in one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])["k"]
     1000000.0
@@ -241,7 +255,11 @@ def read_case(
             faults.append(f"{name} is given twice")
         case[name] = math.nan
         try:
-            case[name] = _read(name, text, one_k)
+            case[name], deviation = _read(name, text, one_k)
+            if deviation is not None:
+                if std is None:
+                    raise InputError(name, text, NO_DEVIATION)
+                std[name] = deviation
         except InputError as error:
             faults.append(str(error))
     if strange:
@@ -254,18 +272,17 @@ def read_case(
     return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}
 
 
-def _read(name: str, text: str, one_k: str) -> float | tuple[float, float]:
-    """The value of an input, or the ends of k; InputError where it is none, or out of bounds."""
+def _read(name: str, text: str, one_k: str) -> tuple[float | tuple[float, float], float | None]:
+    """The value of an input, or the ends of k, and its deviation; InputError where it is none, or
+    out of bounds."""
     value = read(name, text)
     if value.low is not None:
         if one_k:
             raise InputError(name, text, f"one number: {one_k}")
-        return value.low, value.high
-    if value.std is not None:
-        raise InputError(name, text, NO_DEVIATION)
+        return (value.low, value.high), None
     field, in_model = ("omega", value.si * RAD_PER_CYCLE) if name == "f" else (name, value.si)
     check({field: in_model}, value.si if name == "f" else None)
-    return float(value.si)
+    return float(value.si), value.std
 
 
 def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mumacro.answer import BAND
+from mumacro.answer import BAND, DEFAULT
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
-from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import SPRING, Kind
+from mumacro.outputs import MEMBERS
 from mumacro.surrogate import Surrogate
 from mumacro.validity import model_rows
 from mumacro.version import __version__
@@ -28,22 +28,28 @@ def run(words: Sequence[str], description: str) -> str:
     """``mumacro 'mu0=0.3 ...'``; ``description`` is what the help says of the whole command."""
     parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
-    parser.add_argument("--gradient", action="store_true", help="also d mu_macro / d input")
+    common.add_include(parser)
+    parser.add_argument("--gradient", action="store_true", help="the same as --include gradient")
     parser.add_argument(
         "--model", action="store_true", help="in JSON, too: what the model leaves out in this case"
     )
     parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
     chosen = parser.parse_intermixed_args(words)
     kind = common.kind_in(chosen)
-    case = read_case(chosen.words, kind)
+    std: dict[str, float] = {}
+    case = read_case(chosen.words, kind, std=std)
     surrogate = open_table(chosen.table)
-    answer = surrogate.evaluate(**{**case, **kind.names, "gradient": chosen.gradient})
+    include = (*common.included(chosen), *(["gradient"] if chosen.gradient else []))
+    answer = surrogate.evaluate(
+        case, **kind.names, include=include, **({"std": std} if std else {})
+    )
     middle = common.middle_of(case)
     rows = model_rows(surrogate, middle, **kind.names) if chosen.model or not chosen.json else []
     if chosen.json:
-        names = ["mu_macro", "mu_ratio", "regime", "error_bound", "source", "v_tilde", "y_tilde"]
-        result = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
-        ends = {name: getattr(answer, name) for name in BAND if "k_range" in case}
+        members = answer.to_dict()
+        ends = {name: members.pop(name) for name in BAND if "k_range" in case}
+        result = {name: members.pop(name) for name in DEFAULT}
+        result |= {"v_tilde": answer.v_tilde, "y_tilde": answer.y_tilde, **members}
         result |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
         result |= {"model": rows} if chosen.model else {}
         result |= dict(kind.names.items() - SPRING.names.items())
@@ -53,6 +59,7 @@ def run(words: Sequence[str], description: str) -> str:
         for row in rows
         if (row["row"], "k_range" in case) != ROW_OF_K
     ]
+    lines += [("doubtful", remark["text"]) for remark in answer.remarks]
     text = in_columns(
         _rows_of(answer, surrogate, case, kind, common.format_for(chosen, surrogate, case, kind))
     )
@@ -86,7 +93,14 @@ def _rows_of(
             ),
             ("to", f"{answer.mu_macro_high:#{form}}", "[-]", "the most"),
         ]
-    for name, slope in (answer.gradient or {}).items():
-        unit = PER_UNIT[LIKE.get(name, name)]
-        rows.append((f"slope {name}", f"{slope:{form}}", f"[{unit}]", f"d mu_macro / d {name}"))
+    rows += [
+        (
+            path,
+            f"{value:{form}}",
+            f"[{MEMBERS[path].unit}]",
+            MEMBERS[path].meaning.partition("; null")[0],
+        )
+        for path, value in answer.outputs.items()
+        if not path.partition(".")[0].endswith("_bound")
+    ]
     return list(rows)
