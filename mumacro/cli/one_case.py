@@ -94,12 +94,7 @@ def _rows_of(
             ("to", f"{answer.mu_macro_high:#{form}}", "[-]", "the most"),
         ]
     rows += [
-        (
-            path,
-            f"{value:{form}}",
-            f"[{MEMBERS[path].unit}]",
-            MEMBERS[path].meaning.partition("; null")[0],
-        )
+        (path, f"{value:{form}}", f"[{MEMBERS[path].unit}]", MEMBERS[path].meaning)
         for path, value in answer.outputs.items()
         if not path.partition(".")[0].endswith("_bound")
     ]

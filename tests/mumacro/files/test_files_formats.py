@@ -498,7 +498,9 @@ def test_files_know_contact_and_ends_of_k(
         *(["mu_macro_low", "mu_macro_high"] if "k_low" in inputs else []),
         *ANSWERS[1:],
     ]
-    slopes = [f"gradient.{field}" for field in expected.gradient]
+    slopes = [
+        f"{name}.{field}" for name in ("gradient", "gradient_bound") for field in expected.gradient
+    ]
     assert list(written[0]) == [*inputs, *names, *slopes]
     for column in names:
         read_back = [
