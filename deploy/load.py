@@ -3,9 +3,9 @@
 
     python3 deploy/load.py URL [--workers 4] [--seconds 20]
 
-Every request must be answered: with 200 and all its cases, or with 503.  Prints one line of counts
-and the largest answer.  Exit code 1 if a request has no answer or another one.  Needs nothing but
-Python.
+Among them are bodies that are refused.  Every request must be answered: with 200 and all its
+cases, with the status of its fault, or with 503.  Prints one line of counts and the largest
+answer.  Exit code 1 if a request has no answer or another one.  Needs nothing but Python.
 """
 
 import argparse
@@ -24,6 +24,8 @@ CASES, SLOTS = 100_000, 4  # MUMACRO_MAX_BATCH, MUMACRO_MAX_BATCHES
 LARGEST = 16 * 2**20  # MUMACRO_MAX_BODY_BYTES
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 BATCH = "/v1/mu-macro/batch"
+#: of the bodies that are refused
+STATUS = {"too many rows": 413, "unknown names": 422, "nesting": 413, "a long text": 422}
 
 
 def texts() -> list[tuple[str, ...]]:
@@ -45,9 +47,17 @@ def bodies() -> dict[str, bytes]:
     )
     padding = (LARGEST - sum(map(len, whole)) - CASES - 2) // CASES  # spaces are read too
     padded = f",{' ' * padding}".join(whole)
+    empty, long = LARGEST // len("{},") - 1, LARGEST - 100
+    names = ",".join(f'"n{i}":0' for i in range(LARGEST // 13))
     forms = {
         "rows": f"[{padded}]",
         "columns": "{" + columns + "}",
+        "rows of nothing": f"[{'{},' * (CASES - 1)}{{}}]",
+        "too many rows": f"[{'{},' * empty}{{}}]",
+        "nulls": "{" + ",".join(f'"{n}":[{"null," * (CASES - 1)}null]' for n in NAMES) + "}",
+        "unknown names": "{" + names + "}",
+        "nesting": "[" * long,
+        "a long text": '{"k":"' + "x" * long + '"}',
     }
     return {name: text.encode() for name, text in forms.items()}
 
@@ -100,7 +110,7 @@ def main() -> int:
     with ThreadPoolExecutor(clients) as pool:
         for one in [pool.submit(client) for _ in range(clients)]:
             one.result()
-    right = {"503", *(f"{name} 200" for name in forms)}
+    right = {"503", *(f"{name} {STATUS.get(name, 200)}" for name in forms)}
     sizes = ", ".join(f"{name} {len(body) / 1e6:.1f} MB" for name, body in forms.items())
     totals = ", ".join(f"{name}: {n}" for name, n in sorted(counts.items()))
     print(

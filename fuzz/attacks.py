@@ -106,13 +106,31 @@ def holding(text: bytes, factor: float = 1.0) -> Attack:
     return lambda server, share: hold_connections(server, factor * share, text)
 
 
-def csv_of(start: bytes, line: bytes) -> Attack:
-    def attack(server: Server, share: float) -> None:
-        text = start + line * round((BODY - 100) / len(line) * share)  # as long as a body may be
-        posted(server, "text/csv", text, number=2 * BATCHES)
+def batches_of(*bodies: Callable[[float], bytes]) -> Attack:
+    """As many clients as there are slots send the same body, one body after the other."""
+    return lambda server, share: posted(
+        server, "application/json", *(body(share) for body in bodies)
+    )
 
-    return attack
 
+def repeated(start: bytes, unit: bytes, end: bytes, most: int = BODY) -> Callable[[float], bytes]:
+    """A body as long as one may be, of so many units at most."""
+    number = min(most, (BODY - 1000) // len(unit))
+    return lambda share: start + unit * (round(number * share) - 1) + end
+
+
+def unknown_names(share: float) -> bytes:
+    names = (f'"n{i}":0' for i in range(round(BODY / 13 * share)))
+    return f"{json.dumps(CASE)[:-1]},{','.join(names)}}}".encode()
+
+
+def nulls(share: float) -> bytes:
+    return json.dumps({name: [None] * round(CASES * share) for name in CASE}).encode()
+
+
+ROW = json.dumps(CASE).encode()
+TYPED = ROW.replace(b"1000000.0", b'"' + b"x" * 60 + b'"')
+STRANGE_ROW = ROW[:-1] + b"".join(b',"%c":0' % (97 + i) for i in range(12)) + b"}"
 
 ATTACKS: dict[str, Attack] = {
     "Heads without an end, of 64 KB of the smallest fields": holding(
@@ -125,8 +143,20 @@ ATTACKS: dict[str, Attack] = {
     "Bodies of 64 KB that lack their last byte": holding(
         head("/v1/mu-macro", 65_000) + b" " * 64_999
     ),
-    "A CSV whose first line is as long as a body may be": csv_of(b"", b"a,"),
-    "A CSV of blank lines": csv_of(b"mu0,Fz,k,y0,omega,v0\n", b"\n"),
+    "Rows without a member": batches_of(
+        repeated(b"[", b"{},", b"{}]", CASES), repeated(b"[", b"{},", b"{}]")
+    ),
+    "Columns of nulls": batches_of(nulls),
+    "Unknown names, of columns and of rows": batches_of(
+        unknown_names, repeated(b"[", STRANGE_ROW + b",", STRANGE_ROW + b"]", CASES)
+    ),
+    "The deepest nesting": batches_of(repeated(b"", b"[", b"["), repeated(b"", b'{"a":', b"")),
+    "The longest text, name and rows of texts": batches_of(
+        repeated(b'{"k":"', b"x", b'"}'),
+        repeated(b'{"k":"', b'\\"', b'"}'),
+        repeated(b'{"', b"x", b'":1}'),
+        repeated(b"[", TYPED + b",", TYPED + b"]", CASES),
+    ),
     "JSON of the smallest values and lists": brackets,
     "As many rows, and as long columns, as are allowed, with everything included": everything,
     "Columns of words and of nulls, which Python reads one by one": strange_words,

@@ -37,6 +37,7 @@ except ModuleNotFoundError as error:
     ) from None
 
 _COMMANDS = ("serve", "healthcheck")
+_OTHER_FILES = 64  # beside the connections: libraries, tables, the log
 _OPTIONS = ("host", "port", "tables", "workers", "log_level")
 
 
@@ -124,6 +125,26 @@ def _check(settings: Settings) -> int:
     return 0
 
 
+def _allow_files(connections: int) -> str | None:
+    """Allow this process a file for each connection; what to do where the system forbids that."""
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows has no such limit
+        return None
+    needed = connections + _OTHER_FILES
+    soft, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft in (resource.RLIM_INFINITY, -1) or soft >= needed:
+        return None
+    allowed = needed if most in (resource.RLIM_INFINITY, -1) else min(most, needed)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, most))
+    if allowed == needed:
+        return None
+    return (
+        f"{PREFIX}MAX_CONNECTIONS={connections} needs {needed} open files, and the system allows "
+        f"{allowed}: raise its limit (ulimit -n), or lower the setting"
+    )
+
+
 def _serve(settings: Settings) -> int:
     # Also from the command mumacro, which has not set it.
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
@@ -136,6 +157,8 @@ def _serve(settings: Settings) -> int:
         )
         return 1
 
+    if warning := _allow_files(settings.max_connections):
+        print(warning, file=sys.stderr)
     # Imported here: a health check must not load the server.
     import uvicorn
 
@@ -148,7 +171,7 @@ def _serve(settings: Settings) -> int:
     if sys.stdout.isatty() and settings.port:  # 0: any free port, which the log names
         threading.Thread(target=_announce, args=(settings,), daemon=True).start()
     try:
-        with shared_counters() if settings.workers > 1 else nullcontext():
+        with shared_counters(settings.workers) if settings.workers > 1 else nullcontext():
             # By name, so that only worker processes import it, and not their parent.  It reads the
             # headers of proxies.
             uvicorn.run(

@@ -18,15 +18,15 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import RedirectResponse
-from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
+from .guide_pages import GuidePages
 from .limits import Room, Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.options import Case, CaseColumns, CaseRequest
-from .observe import Observe
+from .observe import Observe, Observer
 from .problems import HANDLERS, Failures
 from .routers import batch, case, contact, health, motion, page, questions, table
 from .security import HEALTH_PATHS, SCHEMES, Heads, Keys
@@ -72,7 +72,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     # answered meanwhile.
     gc.collect()
     gc.freeze()
-    yield {"settings": app.state.settings}
+    yield {"settings": app.state.settings, "observer": app.state.observer}
     app.state.work.close()
 
 
@@ -121,7 +121,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     opened = {*HEALTH_PATHS, *page.OPEN}
     if settings.guide is not None:
         app.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)
-        app.mount("/guide", StaticFiles(directory=settings.guide, html=True))
+        app.mount("/guide", GuidePages(settings.guide))
         opened.add("/guide")
     methods: dict[str, set[str]] = {}
     for route in app.routes:
@@ -135,6 +135,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     }
     state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
     state.metrics = Metrics({*methods, *page.OPEN})
+    state.observer = Observer(state.metrics)
     keys = settings.keys()
     app.openapi = lambda: _described(app, closed=bool(keys))  # type: ignore[method-assign]
     # the last one is the outermost
@@ -144,7 +145,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Heads)
     app.add_middleware(Room)
     app.add_middleware(Failures)
-    app.add_middleware(Observe, metrics=state.metrics, trusted_proxies=settings.trusted_proxies)
+    app.add_middleware(
+        Observe, observer=state.observer, trusted_proxies=list(settings.trusted_proxies)
+    )
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,

@@ -146,7 +146,8 @@ def _joined(parts: list[Any]) -> Any:
 
 # --- columns --------------------------------------------------------------------------------------
 
-_TEXT = rb'"(?:[^"\\]|\\.)*+"'
+# A longer one is left to Python's json, which reads 16 MB of it in a tenth of the time.
+_TEXT = rb'"[^"\\]{0,4096}+(?:\\.[^"\\]{0,4096}+){0,256}+"'
 _SPACE = rb"[ \t\r\n]*+"
 _OPENS_OBJECT = re.compile(_SPACE + rb"\{")
 _MEMBER = re.compile(

@@ -1,11 +1,13 @@
 """Counters of requests and cases: those of prometheus_client; several workers share them through
 its multiprocess mode, in a private folder that is made at the start."""
 
+import logging
 import os
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from prometheus_client import (
     Histogram,
     disable_created_metrics,
     generate_latest,
+    values,
 )
 from prometheus_client.multiprocess import MultiProcessCollector
 
@@ -24,34 +27,65 @@ from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 from .tables import LoadedTable, Tables
 
 _SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
+# the files of prometheus_client for one worker, and what they hold with the labels below
+_FILES = ("counter", "histogram", "gauge_mostrecent")
+_FILE_BYTES = 2**19
 _METHODS = frozenset({"GET", "HEAD", "POST"})
+_log = logging.getLogger("mumacro.metrics")
 _BUCKETS_S = (
     1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0,
 )  # fmt: skip
 
 
 @contextmanager
-def shared_counters() -> Iterator[None]:
+def shared_counters(workers: int) -> Iterator[None]:
     """A private folder for the counters of all workers, in memory if possible; it is empty, and
     removed at the end.
 
-    Without a writable folder every worker reports its own counters.
+    Without room for a folder every worker reports its own counters.
     """
     memory = "/dev/shm"  # noqa: S108  (a folder of its own is made there)
-    place = memory if os.access(memory, os.W_OK) else None
     with ExitStack() as stack:
-        with suppress(OSError):
-            folder = tempfile.TemporaryDirectory(
-                prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True
-            )
-            os.environ[_SHARED] = stack.enter_context(folder)
+        for place in (memory, None):
+            with suppress(OSError):
+                folder = tempfile.TemporaryDirectory(
+                    prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True
+                )
+                name = stack.enter_context(folder)
+                probe = Path(name, "room")
+                probe.write_bytes(bytes(workers * len(_FILES) * _FILE_BYTES))
+                probe.unlink()
+                os.environ[_SHARED] = name
+                break
         yield
+
+
+def _reserve() -> None:
+    """Take the room of this worker's files before prometheus_client maps them into memory: a page
+    of a file for which there is no room ends the process (SIGBUS).
+
+    Without room this worker counts for itself.
+    """
+    if _SHARED not in os.environ:
+        return
+    files = [Path(os.environ[_SHARED], f"{kind}_{os.getpid()}.db") for kind in _FILES]
+    try:
+        for file in files:
+            if not file.exists():  # of a process before this one with its number: go on counting
+                file.write_bytes(bytes(_FILE_BYTES))
+    except OSError as error:
+        for file in files:
+            file.unlink(missing_ok=True)
+        del os.environ[_SHARED]
+        values.ValueClass = values.MutexValue
+        _log.warning("no room for shared counters, this worker has its own: %s", error)
 
 
 class Metrics:
     """Counters of requests and cases."""
 
     def __init__(self, paths: Iterable[str]) -> None:
+        _reserve()
         disable_created_metrics()  # type: ignore[no-untyped-call]
         self._paths = frozenset(paths)
         self.registry = own = CollectorRegistry()

@@ -11,7 +11,7 @@ import re
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import partial
@@ -23,13 +23,15 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from .metrics import Metrics
-from .problems import path_in
+from .problems import meaning, path_in
 from .security import HEALTH_PATHS, NOSNIFF
 
 _GONE = 499  # the usual status for a client that disconnected before the answer
 _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs
+_OF_PROXIES = (b"x-forwarded-for", b"x-forwarded-proto")
 _MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
 _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
+_MOST_OF_ODD = 1000  # characters of a value that cannot be written as it is
 _WRITE_EVERY_S = 0.05
 
 _ESCAPED = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
@@ -52,6 +54,26 @@ def for_people(line: Mapping[str, Any]) -> bytes:
     text = f"{line['time']:%H:%M:%S}  {level}{' '.join(map(str, words))}"
     lines = [one.translate(_ESCAPED) for one in (text, *raised)]
     return ("\n".join(lines) + "\n").encode("utf-8", "backslashreplace")
+
+
+_as_json = partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
+
+
+def _written(line: Mapping[str, Any], form: Callable[[Mapping[str, Any]], bytes]) -> bytes:
+    """A line of the log; of what cannot be written, how Python shows it."""
+    try:
+        return form(line)
+    except Exception:
+        return form(
+            {
+                **line,
+                **{
+                    name: ascii(x)[:_MOST_OF_ODD]
+                    for name, x in line.items()
+                    if name not in ("time", "level", "logger")
+                },
+            }
+        )
 
 
 class LogLines(logging.Handler):
@@ -95,10 +117,10 @@ class LogLines(logging.Handler):
         """Write by file descriptor: a Python file would hold its lock while the reader of a pipe
         stalls.
 
-        Line breaks within a line are escaped, so that a client cannot forge one.
+        Line breaks within a line are escaped, so that a client cannot forge one.  Whatever happens,
+        this thread goes on.
         """
-        as_json = partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
-        reported, form = 0, for_people if os.isatty(1) else as_json
+        reported, form = 0, for_people if os.isatty(1) else _as_json
         while True:
             time.sleep(_WRITE_EVERY_S)
             self._writes = True
@@ -108,8 +130,8 @@ class LogLines(logging.Handler):
                 _log.warning(
                     "%d lines of the log were dropped: standard output was not read in time", more
                 )
-            rest = memoryview(b"".join(map(form, lines)))
-            with suppress(OSError):  # the reader is gone
+            with suppress(Exception):  # such as OSError: the reader is gone
+                rest = memoryview(b"".join(_written(line, form) for line in lines))
                 while rest:
                     rest = rest[os.write(1, rest) :]
             self._writes = False
@@ -133,69 +155,90 @@ def log_config(level: str) -> dict[str, Any]:
     }
 
 
-class Observe:
-    """Middleware around every answer: its request id, its log line, its counters."""
+class Observer:
+    """What is kept of every answer: its id, its line in the log, its counters."""
 
-    def __init__(self, app: ASGIApp, metrics: Metrics, trusted_proxies: str) -> None:
-        self._app, self._metrics = app, metrics
-        # in scope
-        self._proxies: Any = ProxyHeadersMiddleware(lambda *_: asyncio.sleep(0), trusted_proxies)
+    def __init__(self, metrics: Metrics) -> None:
+        self._metrics = metrics
         self._stem = os.urandom(8).hex()
         self._numbers = itertools.count(int.from_bytes(os.urandom(6)))
+
+    def name(self, scope: Scope) -> None:
+        """Give a request its id: the one that it has brought, or a new one."""
+        if "request_id" not in scope:
+            offered = dict(scope["headers"]).get(b"x-request-id", b"")
+            scope["request_id"] = (
+                offered.decode()
+                if _ID.fullmatch(offered)
+                else f"{self._stem}{next(self._numbers):016x}"
+            )
+
+    @staticmethod
+    def marks(scope: Scope) -> tuple[tuple[bytes, bytes], ...]:
+        """The headers of every answer."""
+        return (b"x-request-id", scope["request_id"].encode()), NOSNIFF
+
+    def answered(self, scope: Scope, status: int, seconds: float) -> None:
+        """Count an answer, and log it."""
+        path, method = path_in(scope), scope["method"]
+        self._metrics.request(path, method, status, seconds)
+        quiet, lines = status == 200 and path in HEALTH_PATHS, LogLines.running
+        if lines is None or not _access.isEnabledFor(logging.DEBUG if quiet else logging.INFO):
+            return
+        client, holder = scope.get("client"), scope.get("key_holder")
+        lines.put(
+            {
+                "time": datetime.now(UTC),
+                "level": "debug" if quiet else "info",
+                "logger": "mumacro.access",
+                "message": "request",
+                "request_id": scope["request_id"],
+                "method": method,
+                "path": path,
+                "status": status,
+                "duration_ms": round(1e3 * seconds, 3),
+                "client": client[0][:_MOST_SHOWN] if client else None,
+                **({"key": holder} if holder else {}),
+            }
+        )
+
+
+class Observe:
+    """Middleware around every answer: what :class:`Observer` keeps of it."""
+
+    def __init__(self, app: ASGIApp, observer: Observer, trusted_proxies: list[str]) -> None:
+        self._app, self._observer = app, observer
+        # in scope
+        self._proxies: Any = ProxyHeadersMiddleware(lambda *_: asyncio.sleep(0), trusted_proxies)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        started, method = time.perf_counter(), scope["method"]
-        headers: dict[bytes, bytes] = dict(scope["headers"])
-        offered = headers.get(b"x-request-id", b"")
-        identity = (
-            offered.decode()
-            if _ID.fullmatch(offered)
-            else f"{self._stem}{next(self._numbers):016x}"
-        )
-        scope["request_id"] = identity
-        if b"x-forwarded-for" in headers or b"x-forwarded-proto" in headers:
+        started, status, state = time.perf_counter(), _GONE, scope.get("state", {})
+        self._observer.name(scope)
+        marks = self._observer.marks(scope)
+        if any(name in _OF_PROXIES for name, _ in scope["headers"]):
             await self._proxies(scope, receive, send)
-        path, status = path_in(scope), _GONE
 
         async def send_marked(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                message["headers"] = [
-                    *message["headers"],
-                    (b"x-request-id", identity.encode()),
-                    NOSNIFF,
-                ]
+                message["headers"] = [*message["headers"], *marks]
             await send(message)
 
         try:
             await self._app(scope, receive, send_marked)
         except ClientDisconnect as error:
-            status = _GONE
-            if error.__cause__ is not None:  # the answer has failed: the server ends the connection
-                raise
+            status, cause = _GONE, error.__cause__
+            if isinstance(cause, Exception):
+                # in the middle of its answer: the connection ends without the rest
+                status = meaning(cause, scope).kind.status
+                if "abort" not in state:
+                    raise  # another server ends it
+                state["abort"]()
         finally:
             seconds = time.perf_counter() - started
-            self._metrics.request(path, method, status, seconds)
-            quiet, lines = status == 200 and path in HEALTH_PATHS, LogLines.running
-            if lines is not None and _access.isEnabledFor(logging.DEBUG if quiet else logging.INFO):
-                client, holder = scope.get("client"), scope.get("key_holder")
-                lines.put(
-                    {
-                        "time": datetime.now(UTC),
-                        "level": "debug" if quiet else "info",
-                        "logger": "mumacro.access",
-                        "message": "request",
-                        "request_id": identity,
-                        "method": method,
-                        "path": path,
-                        "status": status,
-                        "duration_ms": round(1e3 * seconds, 3),
-                        "client": client[0][:_MOST_SHOWN] if client else None,
-                        **({"key": holder} if holder else {}),
-                    }
-                )
+            self._observer.answered(scope, state.get("refused", status), seconds)

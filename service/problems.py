@@ -122,10 +122,16 @@ def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
 def faults_of(
     errors: Iterable[Any], allowed: Iterable[str], parameter: bool | None = None
 ) -> list[FieldFault]:
-    """Pydantic's errors as faults, one per place; ``allowed`` are the names that may be given."""
+    """Pydantic's errors as faults, one per place; ``allowed`` are the names that may be given.
+
+    Those that are not shown have no reason: to find one takes longer than to find the fault.
+    """
     faults: dict[tuple[str | int, ...], FieldFault] = {}
     for error in errors:
         path, value = error["loc"], error["input"]
+        if len(faults) >= MAX_FIELD_FAULTS:
+            faults.setdefault(path, FieldFault(path, ""))
+            continue
         cause = error.get("ctx", {}).get("error")
         if isinstance(cause, InputError):  # a relation: it names the input to change
             path, value = (*path, cause.field), _NO_VALUE
@@ -453,7 +459,7 @@ class Failures:
                 fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
                 _log.exception("unexpected error", extra={"fields": fields})
             if begun:  # end the connection without the end of the answer
-                raise ClientDisconnect from error
+                raise ClientDisconnect from (error.__cause__ if _expected(error) else error)
             response = await handle(Request(scope, receive), error)
             await response(scope, receive, send)
 

@@ -9,8 +9,8 @@ solves nothing else: FastAPI's own reading of a case takes longer than its answe
 
 import json
 import string
+from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
-from contextlib import suppress
 from functools import partial
 from typing import Any
 from urllib.parse import parse_qsl
@@ -22,7 +22,7 @@ from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.datastructures import ImmutableMultiDict
 
-from .limits import JSON, SMALL_BODY, only_json, read_body
+from .limits import JSON, SMALL_BODY, Work, only_json, read_body
 from .problems import FieldFault, ProblemKind, RequestError, invalid, refuse
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -30,6 +30,7 @@ Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _FEW = 100  # members of a body that is not small
 _LISTS = frozenset(("include",))
+_MOST_MEMBERS = 200  # of an object in a small body
 
 
 # --- JSON -----------------------------------------------------------------------------------------
@@ -38,8 +39,8 @@ _LISTS = frozenset(("include",))
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     members = dict(pairs)
     if len(members) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = [name for name in members if names.count(name) > 1]
+        times = Counter(name for name, _ in pairs)
+        twice = [name for name in members if times[name] > 1]
         refuse([FieldFault.of(name, "is given more than once") for name in twice])
     return members
 
@@ -54,18 +55,40 @@ _DECODER = json.JSONDecoder(
 
 
 def decode(text: bytes, large: bool = False) -> Any:
-    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later."""
+    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later.
+
+    Unless the text is ``large``, an object of far too many members is refused.
+    """
     if not text:
         raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
-    if not large:
-        with suppress(ValueError):  # _DECODER gives the reason
-            return jiter.from_json(text, catch_duplicate_keys=True)
     try:
-        return _DECODER.decode(text.decode())
+        if large:
+            return _DECODER.decode(text.decode())
+        try:
+            value = jiter.from_json(text, catch_duplicate_keys=True)
+        except ValueError:  # _DECODER gives the reason
+            value = _DECODER.decode(text.decode())
+        if text.count(b":") > _MOST_MEMBERS:
+            _few_members(value)
+        return value
     except RecursionError:
         raise RequestError(ProblemKind.MALFORMED_BODY, "the body is nested too deeply") from None
     except ValueError as error:
         raise RequestError(ProblemKind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
+
+
+def _few_members(value: Any, path: tuple[str | int, ...] = ()) -> None:
+    """Refuse an object of far more members than there are fields: a reason for each would take
+    long."""
+    if isinstance(value, dict):
+        if len(value) > _MOST_MEMBERS:
+            reason = f"has {len(value)} members; send only fields, of which no object has so many"
+            refuse([FieldFault(path, reason, value)])
+        for name, member in value.items():
+            _few_members(member, (*path, name))
+    elif isinstance(value, list):
+        for i, one in enumerate(value):
+            _few_members(one, (*path, i))
 
 
 #: Write JSON as bytes; numbers that are not finite become null.
@@ -97,7 +120,8 @@ async def small_body(request: Request, most: int = SMALL_BODY) -> bytes:
     if headers.get(b"content-type") != JSON or b"content-encoding" in headers:
         only_json(headers)
     limit = min(most, request.app.state.settings.max_body_bytes)
-    body = bytes(await read_body(headers, request.receive, limit))
+    work: Work = request.app.state.work
+    body = bytes(await work.client(read_body(headers, request.receive, limit)))
     if len(body) > SMALL_BODY and body.count(b'":') + body.count(b'" :') > _FEW:
         detail = f"a body may have more than {SMALL_BODY} bytes where it is the text of a table"
         raise RequestError(ProblemKind.BODY_TOO_LARGE, detail)
@@ -265,7 +289,7 @@ def validated(model: Any, text: bytes) -> Any:
         members = decode(text)
         if not isinstance(members, dict):
             refuse([FieldFault((), "must be a JSON object", members)])
-        if error.errors()[0]["type"] != "json_invalid":
+        if error.error_count() > 1 or error.errors()[0]["type"] != "json_invalid":
             raise invalid(error, model, members) from None
         return of_members(model, members)  # such as half of a surrogate pair
     # one colon for each member: none is named twice, and there is no object within

@@ -47,7 +47,8 @@ class Keys:
         offered = headers.get(b"x-api-key")
         if offered is None:
             scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
-            offered = credentials.strip() if scheme.lower() == b"bearer" else b""
+            offered = credentials if scheme.lower() == b"bearer" else b""
+        offered = offered.strip()
         # compares all keys: the time does not depend on the key sent
         names = [
             name
@@ -62,8 +63,7 @@ class Keys:
 
 
 class Heads:
-    """Refuses a head that says two things, or asks for another protocol, as which its body would be
-    read."""
+    """Refuses a head that says two things."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -76,9 +76,8 @@ class Heads:
 
 
 def _check(scope: Scope, headers: Mapping[bytes, Any]) -> None:
-    version = scope["http_version"]
-    if version not in ("1.0", "1.1") or (version == "1.1" and b"host" not in headers):
-        raise RequestError(ProblemKind.MALFORMED_HTTP, "a request is of HTTP/1.1 and has one Host")
+    if scope["http_version"] == "1.1" and b"host" not in headers:
+        raise RequestError(ProblemKind.MALFORMED_HTTP, "a request of HTTP/1.1 has one Host")
     if headers.get(b"transfer-encoding", b"chunked").lower().strip(b" \t,") != b"chunked":
         raise RequestError(ProblemKind.MALFORMED_HTTP, "the only transfer coding is chunked")
     if len(headers) != len(scope["headers"]):
@@ -87,6 +86,3 @@ def _check(scope: Scope, headers: Mapping[bytes, Any]) -> None:
             if names.count(name) > 1:
                 detail = f"the header {name.decode()} is given more than once"
                 raise RequestError(ProblemKind.MALFORMED_HTTP, detail)
-    if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
-        detail = "this service does not upgrade connections: send no Upgrade"
-        raise RequestError(ProblemKind.MALFORMED_HTTP, detail)

@@ -7,21 +7,35 @@ tests try every limit on a socket.
 """
 
 import math
+from collections.abc import Iterator
 from itertools import chain
 from typing import Any, ClassVar
 
+import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from .observe import Observer
 from .problems import ProblemKind, RequestError, problem_of
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
+_MOST_SHOWN = 200  # bytes of a path that is refused here
 _PIECE = 2048  # bytes of a head that are read before its fields are counted
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
 _LOOK_EVERY_S = 0.25  # whether the time of a connection is over
 _TOO_LARGE = RequestError(
     ProblemKind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
 )
+
+
+def _without_upgrade(headers: list[tuple[bytes, bytes]]) -> Iterator[tuple[bytes, bytes]]:
+    """The fields of a head that do not ask for another protocol."""
+    for name, value in headers:
+        if name == b"connection":
+            options = (option.strip() for option in value.split(b","))
+            yield name, b", ".join(one for one in options if one.lower() != b"upgrade")
+        elif name != b"upgrade":
+            yield name, value
 
 
 class _Transport:
@@ -59,9 +73,10 @@ class Connection(HttpToolsProtocol):
     """One connection.  It is closed when the client is silent, slow to send or to read, or sends
     too large a head.
 
-    A second request that arrives before the first is answered is dropped, and the connection closes
-    after the answer. When all connections are open, the one that has waited longest for a request
-    is closed in favour of a new one.
+    A request to upgrade the connection to another protocol is answered as if it did not ask for
+    that (RFC 9110, 7.8).  A second request that arrives before the first is answered is dropped,
+    and the connection closes after the answer.  When all connections are open, the one that has
+    waited longest for a request is closed in favour of a new one.
     """
 
     #: connections without a request, the longest waiting first
@@ -74,7 +89,9 @@ class Connection(HttpToolsProtocol):
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
         self._settings = self.app_state["settings"]
-        self.headers = []
+        self._observer: Observer = self.app_state["observer"]
+        self.headers, self.url = [], b""
+        self._begun = self.loop.time()
 
     @property
     def _busy(self) -> bool:
@@ -100,14 +117,39 @@ class Connection(HttpToolsProtocol):
             self.loop.call_later(_LOOK_EVERY_S, self._look)
 
     def _refuse(self, error: RequestError) -> None:
+        """Answer in place of the application, unless that has begun, and close."""
         if self._busy and self.cycle.response_started:
-            self.transport.abort()
+            self.abort()
         elif not self.transport.is_closing():
-            answer = problem_of(error, {"path": "", "method": "GET", **(self.scope or {})})
-            fields = b"".join(b"%b: %b\r\n" % field for field in answer.raw_headers)
+            refused = self._refused(error.kind.status)
+            answer, marks = problem_of(error, refused), self._observer.marks(refused)
+            fields = b"".join(b"%b: %b\r\n" % field for field in (*answer.raw_headers, *marks))
             start = b"HTTP/1.1 %d %b" % (error.kind.status, error.kind.title.encode())
             self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, bytes(answer.body)))
             self.transport.close()
+
+    def _refused(self, status: int) -> Any:
+        """The scope of a request that is refused here, seen by the observer, now or when the
+        application has ended."""
+        if self._busy:
+            busy: Any = self.scope
+            self._observer.name(busy)
+            busy["state"]["refused"] = status
+            return busy
+        if not self._in_head:  # nothing of a request is there
+            super().on_message_begin()
+        method = self.parser.get_method().decode("ascii") if self.url else ""
+        path = self.url.partition(b"?")[0][:_MOST_SHOWN].decode("latin-1")
+        scope: Any = {**self.scope, "path": path, "method": method}
+        self._observer.name(scope)
+        self._observer.answered(scope, status, self.loop.time() - self._begun)
+        return scope
+
+    def abort(self) -> None:
+        """End the connection without the rest of an answer."""
+        if self.cycle is not None:
+            self.cycle.disconnected = True
+        self.transport.abort()
 
     def connection_made(self, transport: Any) -> None:
         """Make room, and wait for a request."""
@@ -142,7 +184,7 @@ class Connection(HttpToolsProtocol):
             stop = len(data) if self._busy and not self._in_head else start + _PIECE
             piece = data[start:stop]
             start, self._bytes = stop, self._bytes + len(piece)
-            super().data_received(piece)
+            self._feed(piece)
             # also behind a body
             if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):
                 self._refuse(_TOO_LARGE)
@@ -151,10 +193,36 @@ class Connection(HttpToolsProtocol):
         if self._in_head or not self._busy or (self.cycle.more_body and not in_batch):
             self._watch()
 
-    def send_400_response(self, msg: str) -> None:
-        """Refuse what the parser, or a limit here, has refused."""
-        if not self._second:
-            self._refuse(self._refusal or RequestError(ProblemKind.MALFORMED_HTTP, msg))
+    def _feed(self, data: bytes) -> None:
+        """Read bytes; refuse what the parser, or a limit here, refuses."""
+        try:
+            self.parser.feed_data(data)
+        except httptools.HttpParserError:
+            if not self._second:
+                fault = RequestError(ProblemKind.MALFORMED_HTTP, "this is no request of HTTP/1.1")
+                self._refuse(self._refusal or fault)
+        except httptools.HttpParserUpgrade as upgrade:
+            if self._upgrades:
+                self._read_without_upgrade(data[upgrade.args[0] :])
+
+    @property
+    def _upgrades(self) -> bool:
+        """Whether the parser takes what follows the head for another protocol."""
+        upgrades: bool = self.parser.should_upgrade()
+        return upgrades and self.parser.get_method() != b"CONNECT"
+
+    def _read_without_upgrade(self, rest: bytes) -> None:
+        """Read the head again, without what asks for an upgrade, and then the body: this parser
+        reads none behind an upgrade."""
+        start = b"%b %b HTTP/%b" % (
+            self.parser.get_method(),
+            self.url,
+            self.parser.get_http_version().encode(),
+        )
+        lines = [start, *(b"%b: %b" % field for field in _without_upgrade(self.headers))]
+        self.parser = httptools.HttpRequestParser(self)
+        self.parser.set_dangerous_leniencies(lenient_data_after_close=True)
+        self._feed(b"\r\n".join([*lines, b"", rest]))
 
     def pause_writing(self) -> None:
         """Give the client its time to read."""
@@ -171,7 +239,7 @@ class Connection(HttpToolsProtocol):
         if self._busy:
             self._second, self.cycle.keep_alive = True, False
             raise ValueError("a second request")
-        self._in_head, self._due = True, math.inf
+        self._in_head, self._due, self._begun = True, math.inf, self.loop.time()
         super().on_message_begin()
 
     def on_headers_complete(self) -> None:
@@ -182,15 +250,22 @@ class Connection(HttpToolsProtocol):
         if large or len(self.headers) > MAX_FIELDS:
             self._refusal = _TOO_LARGE
             raise _TOO_LARGE
+        if self._upgrades:
+            return
+        if self.parser.get_http_version() not in ("1.0", "1.1"):
+            raise ValueError("a version of HTTP that has no head like this")
         self._in_head, self._due = False, math.inf
         self.waiting.pop(self, None)
         if len(self.connections) > self._settings.max_connections:
             self.scope["state"]["full"] = True
+        self.scope["state"]["abort"] = self.abort
         super().on_headers_complete()
         self._end = self.loop.time() + self._settings.time_limit_s + _MARGIN_S
 
     def on_message_complete(self) -> None:
         """The client has sent its request."""
+        if self._in_head:  # what follows is read again
+            return
         self._due = math.inf
         super().on_message_complete()
 

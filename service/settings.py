@@ -7,8 +7,10 @@ shown.
 
 import os
 from functools import cached_property, partial
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BeforeValidator, DirectoryPath, Field, Secret, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
@@ -31,12 +33,40 @@ def _split(value: Any, separator: str = ",") -> Any:
 
 
 def _pairs(value: Any) -> Any:
-    """``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is."""
-    return (
-        dict(part.partition("=")[::2] for part in _split(value))
-        if isinstance(value, str)
-        else value
-    )
+    """``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is.
+
+    ValueError for a part without a name, and for a name that is given twice.
+    """
+    if not isinstance(value, str):
+        return value
+    pairs: dict[str, str] = {}
+    for part in value.split(","):
+        name, _, key = map(str.strip, part.partition("="))
+        if not name or name in pairs:
+            raise ValueError("a name is missing, or is given twice")
+        pairs[name] = key
+    return pairs
+
+
+def _without_dots(path: str) -> str:
+    if not {".", ".."}.isdisjoint(path.split("/")):
+        raise ValueError("a step that is . or ..")
+    return path
+
+
+def _an_origin(text: str) -> str:
+    """The origin of a page as a browser sends it: no path, no slash at the end."""
+    parts = urlsplit(text)
+    if text != "*" and not (parts.netloc and text == f"{parts.scheme}://{parts.netloc}".lower()):
+        raise ValueError("not an origin")
+    return text
+
+
+def _networks(texts: tuple[str, ...]) -> tuple[str, ...]:
+    if texts != ("*",):
+        for text in texts:
+            ip_network(text)
+    return texts
 
 
 # in site-packages PyTables may own it, without a table
@@ -59,6 +89,9 @@ def _one_name_each(keys: dict[str, Secret[str]]) -> dict[str, Secret[str]]:
 def _whole(default: int, least: int, most: int, more: str = "") -> Any:
     return Field(default, ge=least, le=most, description=f"an integer from {least}{more} to {most}")
 
+
+#: what to do about keys that cannot be used
+_NO_KEY = "unset the variable where no key is needed"
 
 # An empty variable must not count as "no key": a variable that is set shows that a key was
 # intended.
@@ -90,22 +123,33 @@ class Settings(BaseSettings):
     client_timeout_s: int = _whole(30, 1, 3600)
     time_limit_s: int = _whole(300, 1, 86400)
     api_key: Key | None = Field(
-        None, description="1 to 512 printable ASCII characters without spaces"
+        None, description=f"1 to 512 printable ASCII characters without spaces; {_NO_KEY}"
     )
     api_keys: Annotated[
         dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), AfterValidator(_one_name_each)
     ] = Field(
         default_factory=dict,
-        description="name=key pairs joined by commas; names of letters, digits and . _ -",
+        description="name=key pairs joined by commas, each name and each key once; names of "
+        f"letters, digits and . _ -; {_NO_KEY}",
     )
-    cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)] = Field(
-        (), description="origins such as https://tool.example joined by commas, or *"
+    cors_origins: Annotated[
+        tuple[Annotated[str, AfterValidator(_an_origin)], ...], NoDecode, BeforeValidator(_split)
+    ] = Field(
+        (),
+        description="origins such as https://tool.example joined by commas, in lower case and "
+        "without a path, or *",
     )
-    root_path: str = Field(
-        "", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing"
+    root_path: Annotated[str, AfterValidator(_without_dots)] = Field(
+        "",
+        pattern=r"^(/[A-Za-z0-9._~-]+)*$",
+        description="a path such as /friction without . and .. as steps, or nothing",
     )
-    trusted_proxies: str = Field(
-        "127.0.0.1", description="addresses or networks joined by commas, or *"
+    trusted_proxies: Annotated[
+        tuple[str, ...], NoDecode, BeforeValidator(_split), AfterValidator(_networks)
+    ] = Field(
+        ("127.0.0.1",),
+        description="addresses such as 10.0.0.1 or networks such as 10.0.0.0/8 joined by commas, "
+        "or *",
     )
     guide: DirectoryPath | None = Field(
         default_factory=_default_guide, description="a directory with the built documentation"

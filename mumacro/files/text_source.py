@@ -140,8 +140,8 @@ class TextTable:
             raise FilesError(f"{self.path}: {error}") from None
 
     def _plain(self, piece: Piece, names: Sequence[str], texts: str) -> Block | None:
-        """A block of lines without quotes, each with as many cells as the head; None where there
-        are others."""
+        """A block of lines that each have as many cells as the head; None where there are
+        others."""
         layout, sep, lines = self.layout, self.sep, piece.lines
         numbers: Sequence[int] = range(piece.first, piece.first + len(lines))
         doubtful = {"", " ", "\t", sep, *(mark[0] for mark in COMMENT)}
@@ -153,8 +153,10 @@ class TextTable:
         if layout.sep == BLANKS:
             lines = [sep.join(line.split()) for line in lines]
         text, width, count = "\n".join(lines), len(layout.heads), lines[0].count(sep) + 1
-        if '"' in text or may_be_head(text, layout, self.wanted):
+        if may_be_head(text, layout, self.wanted):
             return None
+        if '"' in text:
+            return None if layout.sep == BLANKS else self._of_cells(lines, numbers, names, texts)
         if not (count >= width or (layout.without_comments and count == width - 1)):
             return None
         places = {name: i for i, name in enumerate(layout.heads)}
@@ -170,6 +172,26 @@ class TextTable:
         rows = [line.split(sep) for line in lines] if texts == "cells" else lines
         batch = pa.RecordBatch.from_arrays([columns[i] for i in needed], schema=self._schema(names))
         return Block(batch, 0.0, numbers, rows if texts else ())
+
+    def _of_cells(
+        self, lines: Sequence[str], numbers: Sequence[int], names: Sequence[str], texts: str
+    ) -> Block | None:
+        """A block of lines with quotes, each with as many cells as the head; None where there are
+        others, or where a cell goes on in the next line."""
+        if any(line.count('"') % 2 for line in lines):
+            return None
+        try:
+            rows = [*csv.reader(lines, delimiter=self.sep, strict=True, skipinitialspace=True)]
+        except csv.Error:
+            return None
+        width = len(self.layout.heads)
+        if len(rows) != len(lines) or any(len(row) != width for row in rows):
+            return None
+        columns = [*zip(*rows, strict=True)]
+        places = {name: i for i, name in enumerate(self.layout.heads)}
+        arrays = [pa.array(columns[places[name]], pa.string()) for name in names]
+        batch = pa.RecordBatch.from_arrays(arrays, schema=self._schema(names))
+        return Block(batch, 0.0, numbers, (rows if texts == "cells" else lines) if texts else ())
 
     def _by_row(self, piece: Piece, text: Text, names: Sequence[str], texts: str) -> Block:
         """A block whose rows are read one by one; the last may go on in the next piece."""

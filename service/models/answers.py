@@ -23,7 +23,7 @@ Numbers: TypeAlias = list[float | None]
 
 def quantity(text: str, unit: str, default: Any = ...) -> Any:
     """A member with its meaning and unit."""
-    return Field(default, description=f"{text} [{unit}]", json_schema_extra={"unit": unit})
+    return Field(default, description=f"{text} [{unit}]", json_schema_extra={"x-unit": unit})
 
 
 def member(path: str, default: Any = ...) -> Any:

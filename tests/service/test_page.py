@@ -1,5 +1,7 @@
 """The pages: their headers, whether they fit the screen, accessibility, and the API key."""
 
+import base64
+import hashlib
 import json
 import math
 import os
@@ -120,6 +122,8 @@ def test_built_documentation_is_served_if_named(
 ) -> None:
     (tmp_path / "how-to").mkdir()
     (tmp_path / "index.html").write_text("<h1>Guide</h1>")
+    (tmp_path / ".hidden").write_text("secret")
+    (tmp_path / "scripts.html").write_text("<script>one()</script><script src=two.js></script>")
     (tmp_path / "how-to" / "index.html").write_text("<h1>How to</h1>")
     settings = Settings(tables=(tables_dir,), guide=tmp_path, api_key="open-sesame")
     with TestClient(create_app(settings)) as guided:  # it needs no key
@@ -129,8 +133,14 @@ def test_built_documentation_is_served_if_named(
         assert guided.get("/guide/how-to/").text == "<h1>How to</h1>"
         assert guided.get("/guide").url.path == "/guide/"
         assert guided.get("/static/page/names.json").json()["guide"] is True
-        for path in ("/guide/none.html", "/guide/..%2Fsecret"):
+        for path in ("/guide/none.html", "/guide/..%2Fsecret", "/guide/.hidden"):
             problem(guided.get(path), 404)
+        policy = guided.get("/guide/scripts.html").headers["content-security-policy"]
+        digest = base64.b64encode(hashlib.sha256(b"one()").digest()).decode()
+        assert f"script-src 'self' 'sha256-{digest}';" in policy
+        assert "frame-ancestors 'none'" in policy
+        moved = guided.get("/guide/how-to", follow_redirects=False)
+        assert moved.headers["location"] == "how-to/"  # a proxy with TLS has another scheme
         problem(guided.post("/guide/", headers={"X-API-Key": "open-sesame"}), 405)
     for path in ("/guide", "/guide/", "/guide/tutorial.html"):  # says how to get it
         assert "python3 dev.py docs builds it" in problem(client.get(path), 404)["detail"]

@@ -4,6 +4,7 @@ description."""
 import itertools
 import json
 import re
+import time
 from typing import Any
 from unittest.mock import Mock
 
@@ -215,17 +216,52 @@ def test_the_key_gives_access(closed: Any, case: Case, headers: Any) -> None:
     assert response.headers["vary"] == "X-API-Key, Authorization"
 
 
-def test_a_key_given_twice_and_an_upgrade_with_a_body_are_refused(
+def test_a_key_given_twice_is_refused_and_blanks_around_one_are_not(
     closed: Any, case: Case, problem: Any
 ) -> None:
     for name, value in (("X-API-Key", "s3cret-key"), ("Authorization", "Bearer s3cret-key")):
         problem(
             closed.get("/v1/mu-macro", params=case, headers=[(name, value), (name, "wrong")]), 400
         )
-    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", **KEY}
-    response = closed.post("/v1/mu-macro", json=case, headers=upgrade)
-    problem(response, 400)
-    assert response.headers["connection"] == "close"
+        spaced = {name: f"{value} \t"}
+        assert closed.get("/v1/mu-macro", params=case, headers=spaced).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("path", "members"),
+    [
+        ("/v1/mu-macro", {}),
+        ("/v1/mu-macro", {"std": None}),
+        ("/v1/law", {"start": 1e-3, "stop": 1.0}),
+        ("/v1/solve-for", {"unknown": "v0", "target": 0.1}),
+        ("/v1/motion", {"x": None}),
+        ("/v1/mu-macro/batch", {}),
+    ],
+)
+def test_time_to_refuse_grows_no_faster_than_the_body(
+    client: Any, case: Case, path: str, members: dict[str, Any]
+) -> None:
+    """Unknown names, one name again and again, long texts, and what is nested deeply."""
+    within = next((name for name, value in members.items() if value is None), None)
+
+    def bodies(size: int) -> list[str]:
+        start = json.dumps({**case, **members})[:-1].replace("null", "{")
+        end = "}}" if within else "}"
+        start = start if within else f"{start},"
+        names = [f'"{i:04x}":0' for i in range(size // 9)]
+        texts = [",".join(names), ",".join([*names, names[0]]), f'"a":"{"x" * size}"']
+        return [start + text + end for text in texts] + ['{"a":' + "[" * size]
+
+    def seconds(body: str) -> float:
+        times = []
+        for _ in range(5):
+            begun = time.process_time()
+            assert client.post(path, content=body).status_code in (400, 422)
+            times.append(time.process_time() - begun)
+        return min(times)
+
+    for short, long in zip(bodies(4_000 - 300), bodies(64_000 - 300), strict=True):
+        assert seconds(long) / seconds(short) < 64.0, short[:300]
 
 
 def test_a_large_body_is_refused_with_and_without_a_length(

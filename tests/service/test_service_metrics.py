@@ -1,7 +1,11 @@
 """Counters: their values, over all code paths and all workers."""
 
 import json
+import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -121,3 +125,31 @@ def test_several_workers_behind_a_key_count_together_and_stop(
             assert time.monotonic() < deadline
         assert server.stop() == 0
     assert all(json.loads(line) for line in server.lines)
+
+
+def test_without_room_for_shared_counters_a_worker_has_its_own(
+    surrogate: Surrogate, repository: Path, tmp_path: Path
+) -> None:
+    """Files that cannot be reserved; a page of one without room would end the process."""
+    program = (
+        "import sys; from pathlib import Path; from service.app import create_app;"
+        "from service.settings import Settings;"
+        "app = create_app(Settings(tables=(Path(sys.argv[1]),))); app.state.tables.load();"
+        "metrics = app.state.metrics; metrics.start(app.state.tables);"
+        "metrics.request('/livez', 'GET', 200, 0.1); sys.stdout.buffer.write(metrics.text())"
+    )
+    for folder in (tmp_path / "is not there", tmp_path):
+        done = subprocess.run(
+            [sys.executable, "-c", program, str(surrogate.path)],
+            cwd=repository,
+            env={**os.environ, "PROMETHEUS_MULTIPROC_DIR": str(folder)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert ("no room for shared counters" in done.stderr) == (folder != tmp_path)
+        counted = 'mumacro_requests_total{method="GET",route="/livez",status="200"} 1.0'
+        assert counted in done.stdout.splitlines()
+    files = [path.name for path in tmp_path.iterdir()]
+    assert len(files) == 3, files

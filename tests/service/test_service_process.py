@@ -21,8 +21,9 @@ from typing import Any
 import pytest
 
 from mumacro import Surrogate
-from service.observe import for_people
+from service.observe import LogLines, for_people
 from tests.support.cases import Case
+from tests.support.serving import CASE, connect, head, to_end
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 #: texts that a client behind a proxy can send in place of its address
@@ -345,3 +346,73 @@ def test_a_line_for_people_moves_no_cursor_and_forges_no_line() -> None:
     now = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
     line = {"time": now, "level": "warning", "logger": "x", "message": "a\x1b[2J\nb µ", "n": 1}
     assert for_people(line) == "03:04:05  warning: a\\x1b[2J\\x0ab µ n=1\n".encode()
+
+
+@pytest.mark.parametrize(
+    ("text", "status", "path"),
+    [
+        (b"nonsense\r\n\r\n", 400, ""),
+        (b"GET /v1/table HTTP/2.0\r\nHost: x\r\n\r\n", 400, "/v1/table"),
+        (b"GET /v1/table HTTP/1.1\r\nHost: x\r\n" + b"a: b\r\n" * 101, 431, "/v1/table"),
+        (b"GET /v1/table HTTP/1.1\r\nHost: x\r\nA: ", 408, "/v1/table"),
+        (b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\n{", 408, SINGLE),
+        (
+            b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nx",
+            400,
+            SINGLE,
+        ),
+    ],
+)
+def test_an_answer_to_what_is_no_whole_request_has_an_id_a_line_and_a_counter(
+    strict_server: Any, text: bytes, status: int, path: str
+) -> None:
+    with connect(strict_server) as raw:
+        raw.sendall(text)
+        received = to_end(raw)
+    head, _, body = received.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 %d " % status)
+    identity = json.loads(body)["request_id"]
+    assert f"\r\nx-request-id: {identity}".encode() in head
+    deadline = time.monotonic() + 20
+    while not (lines := [x for x in accesses(strict_server.lines) if x["request_id"] == identity]):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    assert [(line["status"], line["path"]) for line in lines] == [(status, path)]
+    counters = strict_server.ask("GET", "/metrics")[2].decode()
+    assert re.search(rf'mumacro_requests_total{{[^}}]*status="{status}"}}', counters)
+    assert "Traceback" not in strict_server.log.read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def strict_server(serving: Any, surrogate: Surrogate) -> Any:
+    with serving(surrogate.path, MUMACRO_CLIENT_TIMEOUT_S="1") as server:
+        yield server
+
+
+def test_a_client_that_does_not_read_its_answer_is_no_error_of_the_service(
+    strict_server: Any,
+) -> None:
+    body = json.dumps({**CASE, "v0": [1e-6 * i for i in range(1, 100_001)], "include": ["limits"]})
+    with connect(strict_server, receive_buffer=4096) as raw:
+        raw.sendall(head(BATCH, len(body)) + body.encode())
+        deadline = time.monotonic() + 60
+        while not [x for x in accesses(strict_server.lines) if x["path"] == BATCH]:
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+    lines = fields_of(strict_server.lines)
+    assert [line["status"] for line in lines if line.get("path") == BATCH] == [408]
+    assert not [line for line in lines if line["level"] == "error"]
+
+
+def test_the_log_goes_on_after_a_line_that_cannot_be_written(capfd: Any) -> None:
+    lines = LogLines()
+    for value in ("\ud800", {1: 2}, object()):
+        lines.put({"time": datetime.now(UTC), "level": "info", "logger": "x", "message": value})
+        lines.flush()
+    lines.put({"time": datetime.now(UTC), "level": "info", "logger": "x", "message": "the last"})
+    lines.flush()
+    LogLines.running = None
+    time.sleep(0.2)
+    written = capfd.readouterr().out.splitlines()
+    assert len(written) == 4
+    assert "the last" in written[-1]
