@@ -129,8 +129,8 @@ def main(words: Sequence[str]) -> int:
                 rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
                 print(f"{counts}: {done.out}{rejects}")
             for remark in done.remarks:
-                cases = f"{remark['cases']:,} rows, " if remark["cases"] > 1 else ""
-                console.print(f"doubtful: {cases}{remark['text']}")
+                rows = f"{remark['cases']:,} rows, " if remark["cases"] > 1 else ""
+                console.print(f"doubtful: {rows}{remark['text']}")
     except KeyboardInterrupt:
         print("mumacro eval: interrupted; nothing was written", file=sys.stderr)
         return 130

@@ -40,9 +40,8 @@ def run(words: Sequence[str], description: str) -> str:
     case = read_case(chosen.words, kind, std=std)
     surrogate = open_table(chosen.table)
     include = (*common.included(chosen), *(["gradient"] if chosen.gradient else []))
-    answer = surrogate.evaluate(
-        case, **kind.names, include=include, **({"std": std} if std else {})
-    )
+    options: dict[str, Any] = {**kind.names, "include": include, "std": std or None}
+    answer = surrogate.evaluate(case, **options)
     middle = common.middle_of(case)
     rows = model_rows(surrogate, middle, **kind.names) if chosen.model or not chosen.json else []
     if chosen.json:

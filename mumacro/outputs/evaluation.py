@@ -92,7 +92,8 @@ def answer(
     """
     gradient = any(output.gradient for output in outputs)
     detail: Detail = "gradient" if gradient else "groups" if outputs or groups else "values"
-    if cases.shape and not outputs and cases.codes is cases.ends is None:
+    plain = cases.codes is None and cases.ends is None
+    if cases.shape and plain and not outputs:
         rows = tabulated.rows(cases, detail)  # the kernel's arrays are the answer
         kept = (rows.v_tilde, rows.y_tilde, rows.length_scale) if groups else None
         numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
