@@ -32,6 +32,8 @@ SEARCHES = (
     ("ball, one harmonic", 1e-4, 10_000, 1e-6),
     ("ball", 1e-6, 2_000, 1e-8),
     ("ball, v0 = 0", 1e-6, 500, 1e-8),
+    ("spring, slow drag", 1e-6, 9_000, 1e-8),
+    ("ball, slow drag", 1e-6, 300, 1e-7),
 )
 AGAINST_TABLES = (
     ("spring", "across", 20_000),
@@ -72,6 +74,13 @@ def resting_motions(n: int, ball: bool = False, seed: int = 1) -> Iterator[dict[
     return itertools.islice((case for case in many if not case["v0"]), n)
 
 
+def slow_motions(n: int, ball: bool = False, seed: int = 1) -> Iterator[dict[str, Any]]:
+    """Those of ``random_motions`` with drags from 1e-9 to 1e-3 of mu0 Fz / k per radian."""
+    rng = np.random.default_rng(seed)
+    for case in random_motions(n, ball, seed):
+        yield {**case, "v0": 10.0 ** rng.uniform(-9.0, -3.0) * L0 * CASE["omega"]}
+
+
 def single_harmonics(n: int, seed: int = 1) -> Iterator[dict[str, Any]]:
     """Keywords of ``motion`` with one harmonic along or across, log-uniform, dragged."""
     rng = np.random.default_rng(seed)
@@ -85,19 +94,21 @@ class Deviations(NamedTuple):
     """Of random motions from finer cycles, each (n,)."""
 
     error: Array  #: of the mean force over Fz
-    estimate: Array
-    most: Array  #: what the tolerance allows the estimate
+    estimate: Array  #: of both
+    most: Array  #: what the tolerances allow the estimate
     stick: Array  #: of the stick fraction
     path: Array  #: of the slip path, over itself plus mu0 Fz / k
 
 
 def deviations(kind: str, tolerance: float, finer: float, n: int, seed: int = 1) -> Deviations:
-    """``kind`` is "spring", "ball", "ball, one harmonic" or "ball, v0 = 0"."""
+    """``kind`` is "spring" or "ball", alone or with ", one harmonic", ", v0 = 0", ", slow drag"."""
     contact, _, which = kind.partition(", ")
     if which == "one harmonic":
         cases = single_harmonics(n, seed)
     elif which == "v0 = 0":
         cases = resting_motions(n, contact == "ball", seed)
+    elif which == "slow drag":
+        cases = slow_motions(n, contact == "ball", seed)
     else:
         cases = random_motions(n, contact == "ball", seed)
     rows = []
@@ -106,8 +117,8 @@ def deviations(kind: str, tolerance: float, finer: float, n: int, seed: int = 1)
         rows.append(
             (
                 math.hypot(a.mu_macro - b.mu_macro, a.mu_lateral - b.mu_lateral),
-                a.error_estimate,
-                tolerance * CASE["mu0"],
+                a.error_estimate + b.error_estimate,
+                (tolerance + finer) * CASE["mu0"],
                 abs(a.stick_fraction - b.stick_fraction),
                 abs(a.slip_path - b.slip_path) / (L0 + b.slip_path),
             )

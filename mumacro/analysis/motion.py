@@ -26,7 +26,9 @@ from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
 
 TOLERANCES = 1e-9, 1e-2
-FURTHEST, SLOWEST = 1e9, 1e-12  # of ways per radian, in units of mu0 Fz / k
+# of ways per radian, in units of mu0 Fz / k; below the last, rounding decides which way the drag
+# pulls
+FURTHEST, SLOWEST = 1e9, 1e-9
 REMAINING = 0.01  # of a disturbance, after ``periods``
 PARTS = ("x", "y", "normal")
 _SPRINGS = 64  # of a ball that is drawn
@@ -329,7 +331,12 @@ def _legal(scenes: Scenes, one: bool, frequency: str) -> Bools:
     holds = np.isfinite(length) & (length > 0.0)
     require("mu0 Fz / k", holds, length, "a length > 0 within the range of numbers")
     require("speed", fastest <= FURTHEST, fastest, f"at most {FURTHEST:g} {unit}")
-    require("v0", (drag == 0.0) | (drag >= SLOWEST), c["v0"], f"0, or at least {SLOWEST:g} {unit}")
+    require(
+        "v0",
+        (drag == 0.0) | (drag >= SLOWEST * (1.0 - 1e-12)),
+        c["v0"],
+        f"0, or at least {SLOWEST:g} {unit}",
+    )
     return legal
 
 

@@ -57,8 +57,10 @@ class Element:
 
     Notes
     -----
-    Straight steps are exact.  The error of a curved motion falls with the square of its steps: 400
-    steps a period give mean forces to 3e-5 mu0 Fz, 800 to 1e-5.
+    Straight steps are exact.  The error of a curved motion falls with the square of its n steps a
+    period, and grows with the root of large amplitudes: mean forces are within max(6, 2 sqrt(y0
+    k/(mu0 Fz)))/n^2 of mu0 Fz at all of 4,000 random sines across (v~ from 0.03 to 30, amplitudes
+    to 3e4 mu0 Fz/k).  400 steps give 4e-5 up to an amplitude of 9 mu0 Fz/k, and 1.3e-4 at 100.
 
     Examples
     --------

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import Element, InputError, Motion, Surrogate, motion, settling
+from mumacro.analysis.motion import SLOWEST
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from tests.support.cases import Array, Capture
@@ -23,6 +24,7 @@ deviations = benchmark.deviations
 phase_sweep = benchmark.phase_sweep
 random_motions = benchmark.random_motions
 resting_motions = benchmark.resting_motions
+slow_motions = benchmark.slow_motions
 SCENE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
 COMMAND = "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=2cm/s"
 
@@ -200,7 +202,14 @@ def test_a_load_in_step_turns_friction_into_a_push() -> None:
 
 @pytest.mark.parametrize(
     ("contact", "tolerance", "n"),
-    [("spring", 1e-4, 300), ("spring", 1e-6, 300), ("ball", 1e-4, 20), ("ball, v0 = 0", 1e-4, 20)],
+    [
+        ("spring", 1e-4, 300),
+        ("spring", 1e-6, 300),
+        ("spring, slow drag", 1e-5, 300),
+        ("ball", 1e-4, 20),
+        ("ball, v0 = 0", 1e-4, 20),
+        ("ball, slow drag", 1e-4, 20),
+    ],
 )
 def test_the_estimate_covers_and_the_tolerance_holds(
     contact: str, tolerance: float, n: int
@@ -208,6 +217,71 @@ def test_the_estimate_covers_and_the_tolerance_holds(
     off = deviations(contact, tolerance, 1e-3 * tolerance, n, seed=21)
     assert (off.error <= off.estimate).all()
     assert (off.estimate <= off.most).all()
+
+
+@pytest.mark.parametrize("v", [1e-12, 1e-11, 1e-10, 1e-9])
+def test_a_ball_that_is_hardly_dragged_has_an_answer_or_a_refusal(v: float) -> None:
+    """It took minutes and gave up, at some motions already at 1e-6."""
+    one: dict[str, Any] = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "contact": "ball"}
+    if v < SLOWEST:
+        with pytest.raises(InputError) as refusal:
+            motion(**one, v0=v, x=(0.3, 40.0), y=0.9)
+        assert refusal.value.field == "v0"
+    else:
+        answer = motion(**one, v0=v, x=(0.3, 40.0), y=0.9)
+        assert answer.error_estimate <= 1e-6
+
+
+def test_a_slow_drag_whose_map_has_kinks_has_an_answer() -> None:
+    """The search went to and fro between two pieces of the map, at 1e-4 for 51 periods, below for
+    ever."""
+    case = [*slow_motions(16, ball=True, seed=77)][15]
+    for v in (1e-4, 1e-7, 1e-9):
+        case["v0"] = v * L0 * CASE["omega"]
+        assert motion(**case, contact="ball").error_estimate <= 1e-6 * CASE["mu0"]
+
+
+# --- the decay of a disturbance -------------------------------------------------------------------
+
+
+def left_of_a_disturbance(case: dict[str, Any], force: Array, steps: int) -> float:
+    """Of a small disturbance of the steady cycle, which begins with ``force`` [N], after a period;
+    it has first the direction in which a period leaves any."""
+    tau = 2.0 * math.pi * np.arange(steps + 1) / steps
+    x, y, load = (
+        sum(
+            (size * np.sin(n * tau + math.radians(p)) for n, size, p in case[name] or ()), 0.0 * tau
+        )
+        for name in ("x", "y", "normal")
+    )
+    x = x + case["v0"] / CASE["omega"] * tau
+    shift = np.array([1e-4, 0.7e-4])
+    for _ in range(2):
+        pair = Element(np.full(2, CASE["mu0"]), CASE["Fz"] + load[0], CASE["k"])
+        pair.state = np.stack([force, force + shift])[:, None]
+        for i in range(steps):
+            pair.step(x[i + 1] - x[i], y[i + 1] - y[i], CASE["Fz"] + load[i + 1])
+        size, after = np.hypot(*shift), pair.state[1, 0] - pair.state[0, 0]
+        left = float(np.hypot(*after) / size)
+        shift = after / left if left else shift
+    return left
+
+
+def test_periods_are_those_of_a_march_of_a_disturbed_cycle() -> None:
+    """The turn from the last direction of a period to the first of the next was left out."""
+    tried = 0
+    for case in random_motions(150, seed=12):
+        answer = motion(**case)
+        decay = math.log(100.0) / answer.periods
+        if not 0.01 < decay < -math.log(1e-6):
+            continue
+        cycle = answer.cycle(points=2)
+        left = left_of_a_disturbance(case, np.array([cycle.Fx[0], cycle.Fy[0]]), 3000)
+        assert -math.log(left) == close(decay, rel=0.05)
+        tried += 1
+    assert tried > 60
+    one: dict[str, Any] = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0}
+    assert motion(**one, v0=0.01, y=0.9).periods == close(3.018, abs=2e-3)
 
 
 def test_steps_that_are_halved_come_nearer() -> None:
@@ -335,6 +409,31 @@ def test_a_contact_that_only_sticks_keeps_what_its_start_gave_it() -> None:
     assert answer.periods == math.inf
     assert answer.slip_path == 0.0
     assert motion(**rest, x=1e-6).mu_macro == close(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+@pytest.mark.parametrize("size", [0.4, 1.2, 1.7])
+def test_springs_that_rest_keep_what_the_start_without_force_left_them(
+    contact: str, size: float
+) -> None:
+    """A spring with a limit L above y0 comes to stick.  From no force at y0 sin(phase) it goes to
+    and fro by y0, and slips on its first way until it fits: it keeps y0 sin(phase), but at most
+    L - y0, in the mean.  One with a lower limit slips in every period and keeps nothing."""
+    limits = np.array([1.0])
+    if contact == "ball":
+        edges = np.linspace(0.0, 1.0, 20_001)
+        limits = 1.5 * (1.0 - (0.5 * (edges[1:] + edges[:-1])) ** 2)
+    one: dict[str, Any] = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": 0.0}
+    for phase in (0.0, 30.0, 90.0, 200.0, 270.0):
+        start = size * math.sin(math.radians(phase))
+        kept = np.sign(start) * np.clip(np.minimum(abs(start), limits - size), 0.0, None)
+        answer = motion(**one, y=(size, phase), contact=contact)
+        assert answer.mu_lateral == close(-float(kept.mean()), abs=2e-6)
+        assert abs(answer.mu_macro) < 1e-9
+    closed = {("ball", 1.2): -0.0894427191}
+    if (contact, size) in closed:
+        answer = motion(**one, y=(size, 90.0), contact=contact)
+        assert answer.mu_lateral == close(closed[contact, size], abs=1e-6)
 
 
 ONE_SLIP = (  # with 1.23 times these lengths it slips once, in the first period

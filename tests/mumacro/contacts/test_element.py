@@ -55,6 +55,15 @@ def test_the_mean_is_the_tables_with_an_error_of_second_order(surrogate: Surroga
     assert np.abs(4.0 * errors[1] - errors[0])[smooth].max() < 3e-8
 
 
+def test_the_error_of_a_curved_motion_follows_the_rule_that_is_stated(surrogate: Surrogate) -> None:
+    """It said 3e-5 for 400 steps, which large amplitudes exceed: 1.7e-4 at y~ = 93."""
+    rng, n = np.random.default_rng(3), 400
+    v, y = 10.0 ** rng.uniform(-1.5, 1.5, 200), 10.0 ** rng.uniform(-1.5, 4.0, 200)
+    error = np.abs(means(v, y, n, 25) - surrogate.mu_ratio(v, y))
+    assert (error <= np.maximum(6.0, 2.0 * np.sqrt(y)) / n**2).all()
+    assert error.max() > 1e-4
+
+
 @pytest.mark.parametrize("contact", ["spring", "ball"])
 def test_a_straight_step_is_exact(contact: str) -> None:
     """One step, or the same in 512 parts, from any force."""
