@@ -125,7 +125,7 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
 
 def add_include(parser: argparse.ArgumentParser) -> None:
     """The option for outputs beside mu_macro."""
-    text = f"also compute these, joined by commas: {', '.join(OUTPUTS)}"
+    text = f"also {', '.join(OUTPUTS)}"
     parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
 
 

@@ -25,12 +25,10 @@ _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
-  for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N];
-  amplitudes are half of peak to peak; contact and direction may be columns; std_k and so on are
-  standard deviations, and add std; other columns are copied, text as text
+  for k also k_low and k_high; for y0, where the direction is normal, Fz_amplitude [N]; amplitudes
+  are half of peak to peak; also contact, direction, deviations std_k, ...; others are copied
 in text the head is the first line that has these names; a row of units may stand below it
-added: mu_macro, mu_ratio, regime, error_bound, source; with k_low, k_high mu_macro_low and _high;
-  what --include names, by path: power.saved
+added: mu_macro, mu_ratio, regime, error_bound, source; mu_macro_low, mu_macro_high; power.saved, ...
 rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 
 examples:
