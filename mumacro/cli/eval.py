@@ -28,13 +28,13 @@ columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [u
   for k also k_low and k_high; for y0, where the direction is normal, Fz_amplitude [N]; amplitudes
   are half of peak to peak; also contact, direction, deviations std_k, ...; others are copied
 in text the head is the first line that has these names; a row of units may stand below it
-added: mu_macro, mu_ratio, regime, error_bound, source; mu_macro_low, mu_macro_high; power.saved, ...
+added: mu_macro, mu_ratio, regime, error_bound, source; mu_macro_low, _high; power.saved, ...
 rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 
 examples:
   mumacro eval rig.txt -o out.csv --decimal ,
   mumacro eval - -o - < cases.csv > out.csv
-The output appears whole or not at all; an interrupted run leaves an older one as it is.
+The output appears whole or not at all.
 exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments, 130 interrupted
 """
 
