@@ -213,19 +213,22 @@ def read_case(
     one_k: str = "",
     whole: bool = True,
     optional: Sequence[str] = (),
+    deviations: bool = False,
 ) -> dict[str, Any]:
     """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
     ``Surrogate.evaluate``.
 
     ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
     not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
-    other inputs must be there, but for those that are ``optional``.  UsageError tells everything
+    other inputs must be there, but for those that are ``optional``.  With ``deviations`` those
+    that are typed, as in ``k=1±0.1N/um``, are in ``std``, by input.  UsageError tells everything
     that is wrong, in one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])["k"]
     1000000.0
     """
     case: dict[str, Any] = {}
+    std: dict[str, float] = {}
     faults: list[str] = []
     strange: list[str] = []
     for name, text in _pairs(words):
@@ -241,7 +244,9 @@ def read_case(
             faults.append(f"{name} is given twice")
         case[name] = math.nan
         try:
-            case[name] = _read(name, text, one_k)
+            case[name], deviation = _read(name, text, one_k, deviations)
+            if deviation is not None:
+                std[name] = deviation
         except InputError as error:
             faults.append(str(error))
     if strange:
@@ -251,21 +256,27 @@ def read_case(
     faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
         raise UsageError("; ".join(faults))
-    return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}
+    read_in_si: dict[str, Any] = {
+        "k_range" if isinstance(value, tuple) else name: value for name, value in case.items()
+    }
+    return read_in_si | ({"std": std} if std else {})
 
 
-def _read(name: str, text: str, one_k: str) -> float | tuple[float, float]:
-    """The value of an input, or the ends of k; InputError where it is none, or out of bounds."""
+def _read(
+    name: str, text: str, one_k: str, deviations: bool
+) -> tuple[float | tuple[float, float], float | None]:
+    """The value of an input, or the ends of k, and its deviation; InputError where it is none, or
+    out of bounds."""
     value = read(name, text)
     if value.low is not None:
         if one_k:
             raise InputError(name, text, f"one number: {one_k}")
-        return value.low, value.high
-    if value.std is not None:
+        return (value.low, value.high), None
+    if value.std is not None and not deviations:
         raise InputError(name, text, NO_DEVIATION)
     field, in_model = ("omega", value.si * RAD_PER_CYCLE) if name == "f" else (name, value.si)
     check({field: in_model}, value.si if name == "f" else None)
-    return float(value.si)
+    return float(value.si), value.std
 
 
 def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:

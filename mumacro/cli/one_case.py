@@ -6,6 +6,7 @@ from typing import Any
 from mumacro.answer import BAND
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
+from mumacro.inputs.doubts import UNITS
 from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import SPRING, Kind
 from mumacro.surrogate import Surrogate
@@ -35,9 +36,10 @@ def run(words: Sequence[str], description: str) -> str:
     parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
     chosen = parser.parse_intermixed_args(words)
     kind = common.kind_in(chosen)
-    case = read_case(chosen.words, kind)
-    surrogate = open_table(chosen.table)
-    answer = surrogate.evaluate(**{**case, **kind.names, "gradient": chosen.gradient})
+    case = read_case(chosen.words, kind, deviations=True)
+    surrogate, std = open_table(chosen.table), case.pop("std", None)
+    options = {**kind.names, "gradient": chosen.gradient, "std": std}
+    answer: Any = surrogate.evaluate(**{**case, **options})
     middle = common.middle_of(case)
     rows = model_rows(surrogate, middle, **kind.names) if chosen.model or not chosen.json else []
     if chosen.json:
@@ -45,14 +47,19 @@ def run(words: Sequence[str], description: str) -> str:
         result = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
         ends = {name: getattr(answer, name) for name in BAND if "k_range" in case}
         result |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
+        if std:
+            whole = answer.to_dict()
+            result |= {name: whole[name] for name in ("std", "std_bound", "std_share")}
+        result |= {"remarks": answer.remarks} if answer.remarks else {}
         result |= {"model": rows} if chosen.model else {}
         result |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**result, "table": common.about(surrogate)})
     lines = [
         ("assumes", f"{row['row']}: {common.in_words(row['text'], middle)}")
         for row in rows
-        if (row["row"], "k_range" in case) != ROW_OF_K
+        if (row["row"], "k_range" in case) != ROW_OF_K and row["row"] != UNITS  # a remark
     ]
+    lines += [("remark", f"{one['field']}: {one['text']}") for one in answer.remarks]
     text = in_columns(
         _rows_of(answer, surrogate, case, kind, common.format_for(chosen, surrogate, case, kind))
     )
@@ -86,6 +93,10 @@ def _rows_of(
             ),
             ("to", f"{answer.mu_macro_high:#{form}}", "[-]", "the most"),
         ]
+    if "std" in answer.paths:
+        shares = {name: answer[f"std_share.{name}"] for name in kind.fields}
+        parts = ", ".join(f"{name} {100.0 * x:.3g} %" for name, x in shares.items() if x > 0.0)
+        rows.insert(1, ("+-", f"{answer['std']:.2g}", "[-]", f"standard deviation; {parts}"))
     for name, slope in (answer.gradient or {}).items():
         unit = PER_UNIT[LIKE.get(name, name)]
         rows.append((f"slope {name}", f"{slope:{form}}", f"[{unit}]", f"d mu_macro / d {name}"))
