@@ -3,6 +3,7 @@
 orjson and jiter read JSON fast, but no other thread runs meanwhile.  Long lists are therefore read
 slice by slice, and written so.  What they refuse, or what is shaped in another way, is left to
 Python's ``json``: that is slow, lets other threads run, and gives the reason.
+"""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
