@@ -119,7 +119,7 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
         opening = b"[" if start else b""
         between = text[start : end.start()] + b"]" if end else text[start:]
         values = orjson.loads(opening + between)
-        if b"{" in between and _count(between, b":") != sum(map(len, values)):
+        if b"{" in between and _count(between, b":") != _members_in(values):
             raise ValueError("a name is given twice, or a text has a colon")
         if not values and (start or end):
             raise ValueError("nothing beside a comma")
@@ -128,6 +128,11 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
             raise too_large(max_batch)
         yield values
         start = end.end() if end else len(text)
+
+
+def _members_in(rows: list[Any]) -> int:
+    """How many members the objects of a list have."""
+    return sum(len(row) for row in rows if isinstance(row, dict))
 
 
 def _numbers(values: list[Any]) -> Any:
