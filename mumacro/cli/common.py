@@ -27,13 +27,14 @@ from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import belongs_to_value
+from mumacro.outputs import OUTPUTS
+from mumacro.outputs.evaluation import names_in
 from mumacro.surrogate import Surrogate
 from mumacro.validity import Row, digits, k_effect
 
 ABOUT_INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
-  mu0    Coulomb friction coefficient [-], > 0
-  Fz     normal force [N], > 0
+  mu0    Coulomb friction coefficient [-], > 0;   Fz  normal force [N], > 0
   k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
   y0     amplitude [m], half of peak to peak; with --direction normal Fz_amplitude [N], below Fz
   omega  angular frequency [rad/s], or f, frequency [Hz], >= 0
@@ -119,6 +120,17 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
     text = "of the oscillation; normal: of the normal force; default: across"
     parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
+
+
+def add_include(parser: argparse.ArgumentParser) -> None:
+    """The option for outputs beside mu_macro."""
+    text = ", ".join(OUTPUTS)
+    parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
+
+
+def included(chosen: argparse.Namespace) -> tuple[str, ...]:
+    """The outputs that ``--include`` names; InputError for an unknown one."""
+    return tuple(name for text in chosen.include for name in names_in(text))
 
 
 def kind_in(chosen: argparse.Namespace) -> Kind:

@@ -582,9 +582,8 @@ def _deviations(
     """The deviations that are given beside the values, by field; ``within`` are those that stand in
     the values themselves."""
     std: _Numbers = {}
-    for column, name in DEVIATIONS.items():
-        if column not in values:
-            continue
+    for column in [column for column in DEVIATIONS if column in values]:
+        name = DEVIATIONS[column]
         value, (field, per) = values[column], field_of(name)
         if field not in fields:
             bound = f"left out: this direction has no {name}"
@@ -628,9 +627,9 @@ def _no_such_amplitude(name: str, value: Any, kind: Kind) -> InputError:
 
 def _texts(values: Mapping[str, Any]) -> dict[str, Any]:
     """Contact and direction: one text each, or arrays of them."""
-    texts = {}
-    for name, usual in (("contact", CONTACTS[0]), ("direction", DIRECTIONS[0])):
-        text = values.get(name, usual)
+    texts = {"contact": CONTACTS[0], "direction": DIRECTIONS[0]}
+    for name in values.keys() & texts.keys():
+        text = values[name]
         if not isinstance(text, str):
             column = np.asarray(text, dtype=object)
             text = column if column.ndim else column.item()
