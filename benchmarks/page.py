@@ -27,7 +27,7 @@ def main() -> None:
         opened = driven.Opened(browser, server.url)
         try:
             for name, (address, width, height) in PICTURES.items():
-                page = opened(address, width=width, height=height, new=True)
+                page = opened(address, width=width, height=height)
                 time.sleep(0.5)
                 foot = page.run("return document.documentElement.scrollHeight;")
                 shown = foot if width > 760 else 2 * height

@@ -142,7 +142,7 @@ def back(page: Any, steps: int = -1) -> None:
 
 
 def test_back_and_forward_go_through_the_inputs(open_page: Any) -> None:
-    page = open_page(new=True)
+    page = open_page()
     page.type("#field-y0", "3 um")
     page.type("#field-mu0", "0.2")
     page.click("[name=contact][value=ball]")
@@ -206,14 +206,14 @@ def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> No
     page = open_page("#Fz=12.5 N&along=y0&v0=0.01m/s&from=1e-7 m&to=1e-5 m&digits=all")
     before = [page.text("#mu"), page.find("#law").get_attribute("aria-label")]
     page.type("#field-mu0", "0.3")
-    again = open_page("#" + page.address(), new=True)
+    again = open_page("#" + page.address())
     assert [again.text("#mu"), again.find("#law").get_attribute("aria-label")] == before
     expected = surrogate.evaluate(**{**START, "Fz": 12.5})
     assert float(before[0]) == close(expected.mu_macro, abs=2 * expected.error_bound)
     shown = [again.value(f"#{field}") for field in ("field-Fz", "along", "field-v0", "from")]
     assert shown == ["12.5 N", "y0", "0.01m/s", "1e-7 m"]
     assert not again.find("#notice").is_displayed()
-    bad = open_page("#mu0=-1&k=rigid&bad=1", new=True)
+    bad = open_page("#mu0=-1&k=rigid&bad=1")
     assert "bad=1" in bad.text("#notice-text")
     assert bad.find("#field-mu0").get_attribute("aria-invalid") == "true"
     bad.click("#notice-close")
@@ -254,7 +254,7 @@ def test_every_copy_of_a_case_gives_the_number_of_the_page(
     assert float(re.findall(r'"mu_macro": ([^,\s]+)', command)[0]) == close(number, rel=1e-8)
     curl = output(*shlex.split(copied("curl")))
     assert float(re.findall(r'"mu_macro":([^,\s]+)', curl)[0]) == close(number, rel=1e-8)
-    link = open_page("#" + copied("link").partition("#")[2], new=True)
+    link = open_page("#" + copied("link").partition("#")[2])
     assert link.number() == number
 
 

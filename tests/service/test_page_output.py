@@ -32,7 +32,7 @@ AXIS = "return document.querySelector('#law > .title').textContent;"  # of the l
 def test_it_loads_and_shows_the_known_value(
     open_page: Any, surrogate: Surrogate, live_server: Any
 ) -> None:
-    page = open_page(new=True)
+    page = open_page()
     answer = surrogate.evaluate(**START, gradient=True)
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
     assert page.text("#regime") == "stick slip"
@@ -136,7 +136,7 @@ OUTSIDE = (
 def test_a_point_outside_of_the_map_is_marked_on_its_frame(
     open_page: Any, address: Any, side: Any, words: Any
 ) -> None:
-    page = open_page(address, new=True)  # the pointer of another test may be on the map
+    page = open_page(address)  # the pointer of another test may be on the map
     assert words in page.text("#map-read")
     x, y = page.run(
         "const [plot, point] = ['#map', '#map .point'].map((one) =>"
@@ -472,7 +472,7 @@ def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None
 
 
 def test_it_prints_on_one_page(open_page: Any, tmp_path: Path) -> None:
-    page = open_page("#k=1 ± 0.1 N/um", new=True)
+    page = open_page("#k=1 ± 0.1 N/um")
     options = {"printBackground": True, "preferCSSPageSize": True}
     data = page.browser.execute_cdp_cmd("Page.printToPDF", options)["data"]
     pdf = base64.b64decode(data)

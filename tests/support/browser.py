@@ -73,11 +73,10 @@ def start(folder: Path) -> Any:
 
 
 class Opened:
-    """Opens a state of the page by its address; loads a new document only if needed."""
+    """Opens a state of the page by its address, each time in a new document."""
 
     def __init__(self, browser: Any, url: Any) -> None:
         self.browser, self.url = browser, url
-        self.shown: Any = None
 
     def __call__(
         self,
@@ -86,30 +85,20 @@ class Opened:
         height: int = 1000,
         url: Any = None,
         path: str = "",
-        new: bool = False,
         wait: bool = True,
     ) -> Any:
-        view = (width, height, url or self.url, path)
         page = Page(self.browser, url or self.url)
-        if new or view != self.shown or path:
-            self.browser.get("about:blank")
-            metrics = {
-                "width": width,
-                "height": height,
-                "deviceScaleFactor": 1,
-                "mobile": width < 500,
-            }
-            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-            page.scheme("light")
-            page.complaints()
-            self.browser.get(f"{url or self.url}/{path}{address}")
-            self.shown = view
-        else:
-            page.run(
-                "history.replaceState(null, '', location.pathname); scrollTo(0, 0);"
-                "const heard = new Promise((done) => addEventListener('hashchange', done, { once: "
-                f"true }}));location.hash = {json.dumps(address or '#mu0=0.3')}; await heard;"
-            )
+        self.browser.get("about:blank")
+        metrics = {
+            "width": width,
+            "height": height,
+            "deviceScaleFactor": 1,
+            "mobile": width < 500,
+        }
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        page.scheme("light")
+        page.complaints()
+        self.browser.get(f"{url or self.url}/{path}{address}")
         if wait and not path and url is None:
             page.settle()
         return page
@@ -123,10 +112,9 @@ class Opened:
             "Page.addScriptToEvaluateOnNewDocument", {"source": source}
         )
         try:
-            yield self(address, new=True, wait=wait)
+            yield self(address, wait=wait)
         finally:
             self.browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
-            self.shown = None
 
 
 class Page:
