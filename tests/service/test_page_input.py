@@ -162,7 +162,7 @@ def test_back_and_forward_go_through_the_inputs(open_page: Any) -> None:
 
 
 def test_a_drag_is_one_step_and_the_map_stays_where_it_is(open_page: Any) -> None:
-    page = open_page(new=True, width=1280, height=800)
+    page = open_page(width=1280, height=800)
     page.run(
         "window.steps = 0; const push = history.pushState.bind(history);"
         "history.pushState = (...all) => { window.steps += 1; push(...all); };"

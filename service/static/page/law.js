@@ -53,6 +53,7 @@ export function lawQuestion(state, answer) {
 export function lawPanel(store, moved) {
   let answer, law, colours, target, latest;
   let pointer = null; // where it is in the plot
+  let refused = null;
   const plot = new Plot($("law"), paint);
   const along = () => law?.along ?? store.state.along;
   /** The unit of the axis: that of the input as it was typed. */
@@ -67,8 +68,9 @@ export function lawPanel(store, moved) {
       show_();
     },
     (reason) => {
+      refused = reason;
       $("law-status").textContent = reason ?? "";
-      $("law").classList.toggle("old", reason !== null);
+      $("law").classList.toggle("old", refused !== null);
     },
   );
 
@@ -187,8 +189,9 @@ export function lawPanel(store, moved) {
   $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${law.along}.csv`));
   $("law-image").addEventListener("click", () => law && plot.save(caption(), `friction-law-${law.along}.svg`));
 
-  return (state, reply, scale, wanted) => {
+  return (state, reply, scale, wanted, old) => {
     [answer, colours, target] = [reply, scale, wanted];
+    $("law").classList.toggle("old", old || refused !== null);
     if (!answer) return;
     const question = lawQuestion(state, answer);
     const [start, stop] = [question.start, question.stop];

@@ -63,7 +63,7 @@ function show() {
   const colours = panels.map(answer, target?.mu_ratio);
   panels.inputs(answer, trouble?.faults ?? new Map());
   panels.number(answer, trouble, old);
-  panels.law(state, answer, colours, target);
+  panels.law(state, answer, colours, target, old);
   panels.side(answer);
   panels.copy();
   panels.stiffness();
