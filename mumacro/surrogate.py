@@ -501,7 +501,7 @@ class Surrogate:
             force is Fz + Fz_amplitude cos(omega t), for a spring only.
         include : sequence of str
             Outputs to compute beside mu_macro, by name: groups, limits, gradient, std,
-            stick_fraction, power, settling (:data:`mumacro.outputs.OUTPUTS`).  Each is in the
+            stick_fraction, power, settling (``mumacro.outputs.OUTPUTS``).  Each is in the
             answer by its path, such as ``answer["power.saved"]``, with its bound.
         std : mapping
             Standard deviations of inputs by name, in their units, of independent errors; numbers or
@@ -607,7 +607,7 @@ class Surrogate:
         self, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
     ) -> Answer[Any]:
         """:meth:`evaluate` of cases in their one form, with outputs of
-        :func:`mumacro.outputs.evaluation.chosen`; ``groups`` keeps v~, y~ and l0, too."""
+        ``mumacro.outputs.evaluation.chosen``; ``groups`` keeps v~, y~ and l0, too."""
         answer = evaluation.answer(self.tabulated, cases, outputs, groups)
         answer._surrogate = self
         return answer
