@@ -58,7 +58,8 @@ enum {
  * drag` in benchmarks/motion.py. */
 #define MU_MOTION_SLOW \
     1e-6 /* l0 per radian; below, a slip that larger steps miss moves the cycle */
-#define MU_MOTION_OF_SLOW 1e-6 /* the tolerance there at most */
+#define MU_MOTION_OF_SLOW 1e-6         /* the tolerance there at most */
+#define MU_MOTION_ROUNDING_OF_SLOW 0.1 /* of that tolerance: 3 of 6,000 springs need 0.05 */
 #define MU_MOTION_CUT 0.1
 #define MU_MOTION_LONGEST_CUT 0.7
 #define MU_MOTION_LEAST_SHARE 1e-9
@@ -655,7 +656,8 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
     const double followed = slow ? mu_min(tolerance, MU_MOTION_OF_SLOW) : tolerance;
     double of_step = mu_cube_root_near(mu_min(MU_STEP_OF_TOLERANCE * followed, MU_STEP_LARGEST));
     const double rounding =
-        mu_max(MU_MOTION_ROUNDING, mu_min(0.05 * tolerance, MU_MOTION_MOST_ROUNDING));
+        slow ? MU_MOTION_ROUNDING_OF_SLOW * followed
+             : mu_max(MU_MOTION_ROUNDING, mu_min(0.05 * tolerance, MU_MOTION_MOST_ROUNDING));
     const double goal = m->drag > 0.0 ? 0.1 * followed : 0.01 * mu_min(tolerance, 1e-5);
     int near = f[0] != 0.0 || f[1] != 0.0;
     mu_steady last, out;
