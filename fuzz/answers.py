@@ -1,12 +1,13 @@
 """Properties of the answers, checked over the full double range of every input.
 
-    python fuzz/answers.py [--only promises|driven] [--share 0.01] [--write]
+    python fuzz/answers.py [--only promises|driven|seams] [--share 0.01] [--write]
 
 Cases are drawn in three ways: any positive double for each input, by its bits; inputs of any size
 with groups v~ and y~ in the range of the table; and a share of inputs at the ends of the double
 range.
 """
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Iterator
@@ -19,15 +20,23 @@ from numpy.typing import NDArray
 from builder.solver.ball import Springs
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
-from builder.tables.contacts import SolvedContact, ball
+from builder.tables.contacts import FINE, SolvedContact, ball, spring
 from builder.tables.verify import BALL_CASES, Neighbours, bound_over_error
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
+from mumacro.inputs.kind import BALL, SPRING
 from mumacro.kernel.binding import CaseRows, kernels
-from mumacro.table.atlas import QUANTITY_NAMES
+from mumacro.table.atlas import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE
 from tests.support import extended
-from tests.support.driven import answered, hard, ordinary
+from tests.support.driven import answered, beside_lines, hard, ordinary
 from tests.support.measuring import main, markdown, quantity, sections
+from tests.support.seams import (
+    beside_every_seam,
+    by_its_values,
+    off_the_lines,
+    true_slopes,
+    with_slopes,
+)
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]
@@ -348,8 +357,10 @@ def driven(share: float) -> str:
         medians = [
             float(np.median(1.0 / row[row > 0])) if (row > 0).any() else math.nan for row in worst
         ]
+        more = [beside_lines(count // 10, 24, contact, normal)]
         if not normal:
-            hard_v, hard_y = hard(count // 20, 23)
+            more.append(hard(count // 20, 23))
+        for hard_v, hard_y in more:
             v, y, worst = (
                 np.append(v, hard_v),
                 np.append(y, hard_y),
@@ -382,6 +393,83 @@ def driven(share: float) -> str:
     )
 
 
+def seams(share: float) -> str:
+    """Both sides of every seam of cells, of the border's too, in every table: values and slopes
+    against the finest table and fresh solves, slopes against differences of the table's own
+    values."""
+    rows, fine = [], Surrogate.open(1e-12)
+    springs = Springs(fine)
+    with Sweep(os.cpu_count() or 1) as sweep:
+        for tolerance, kind in itertools.product((1e-4, 1e-7, 1e-10, 1e-12), (SPRING, BALL)):
+            table = Surrogate.open(tolerance)
+            of = ball(springs, FINE, os.cpu_count() or 1) if kind == BALL else spring(sweep)
+            sources = {
+                "own values": (by_its_values(table, of), N // 50),
+                "fresh solves": (of, N // 2500),
+            }
+            if tolerance > FINE:
+                sources["finest table"] = (by_its_values(fine, of), N // 10)
+            for source, (truth, n) in sources.items():
+                found: dict[str, list[tuple[Array, Array]]] = {}
+                for _, v, y in beside_every_seam(table, kind, max(40, int(n * share))):
+                    here = off_the_lines(table, v, y)
+                    for row, ratios in beside(table, truth, source, v[here], y[here]):
+                        found.setdefault(row, []).append(ratios)
+                for row, parts in found.items():
+                    beyond, over = (np.concatenate(x) for x in zip(*parts, strict=True))
+                    cells = f"{beyond.size:,}", f"{beyond.max():.2f}", f"{(beyond > 1.0).sum():,}"
+                    middle = quantity(float(np.nanmedian(over))) if (over == over).any() else ""
+                    rows.append(
+                        [
+                            kind.names.get("contact", "spring"),
+                            f"{tolerance:g}",
+                            source,
+                            row,
+                            *cells,
+                            middle,
+                        ]
+                    )
+    return markdown(
+        (
+            "across",
+            "table",
+            "against",
+            "row",
+            "points",
+            "largest error, bound = 1",
+            "outside",
+            "median bound / error",
+        ),
+        rows,
+        4,
+    )
+
+
+def beside(
+    table: Surrogate, truth: SolvedContact, source: str, v: Array, y: Array
+) -> Iterator[tuple[str, tuple[Array, Array]]]:
+    """Error over bound and bound over error of every row of :func:`seams`."""
+
+    def ratios(value: Array, bound: Array, true: Array, unsure: Array) -> tuple[Array, Array]:
+        error = np.abs(value - true)
+        with np.errstate(all="ignore"):
+            beyond = np.where(error > unsure, (error - unsure) / bound, 0.0)
+        return np.nan_to_num(beyond, posinf=1e99), bound_over_error(bound, unsure, error)
+
+    if source != "own values":
+        solved = truth.solve(v, y)
+        for name in QUANTITY_NAMES:
+            value, bound, code = truth.quantity(table, name, v, y)
+            sliding = REGIME_OF_SOURCE[code] == CONTINUOUS
+            yield name, ratios(value, bound, solved[name], truth.noise(name, v, y, solved, sliding))
+    for name, slopes, unsure in true_slopes(table, truth, truth.sloped, v, y):
+        rows = truth.slopes(table, name, v, y)
+        keep = with_slopes(table, QUANTITIES[QUANTITY_NAMES.index(name)], v, y)
+        pair = ratios(rows[1:3], rows[3:5], slopes, unsure)
+        beyond, over = (x[:, keep].ravel() for x in pair)
+        yield f"slopes of {name}", (beyond, over)
+
+
 PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
     "finite, in [0, mu0], with a finite bound": finite,
     "rises with v0, falls with y0 and omega": monotone,
@@ -406,4 +494,4 @@ def promises(share: float) -> str:
 
 
 if __name__ == "__main__":
-    main(__doc__, sections(promises, driven), share=1.0)
+    main(__doc__, sections(promises, driven, seams), share=1.0)

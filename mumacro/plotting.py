@@ -36,6 +36,7 @@ _SYMBOLS = {
     "k": "$k$",
     "y0": "$y_0$",
     "omega": r"$\omega$",
+    "f": "$f$",
     "v0": "$v_0$",
     AMPLITUDE: r"$\hat F_z$",
 }

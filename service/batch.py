@@ -71,9 +71,10 @@ class Batch:
             raise InputError("include", MODEL, f"without {MODEL}, which is for one case")
         values, reasons = model.columns | std, dict(body.reasons)
         # the first bad input of a case, in the order of the inputs, is told
-        for name, column in values.items():
+        for name, column in [*values.items()]:
             if isinstance(column, Column):
-                values[name] = column.values
+                del values[name]
+                values |= column.parts(name)
                 for i, reason in column.reasons.items():
                     reasons.setdefault(i, (name, reason))
         lengths = {name: len(x) for name, x in values.items() if isinstance(x, np.ndarray)}

@@ -67,6 +67,9 @@ def _is_utf8(parameters: str) -> bool:
     )
 
 
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
 async def read_body(
     headers: Mapping[bytes, bytes],
     receive: Receive,
@@ -91,7 +94,7 @@ async def read_body(
         if size > SMALL_BODY:
             large()
         if not more:
-            return body
+            return body.removeprefix(_BYTE_ORDER_MARK)  # RFC 8259, 8.1
         message = await receive()
         if message["type"] != "http.request":
             raise ClientDisconnect

@@ -32,9 +32,10 @@ from mumacro.inputs.fields import NAMES as INPUTS
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.old_texts import number_hint
+from mumacro.inputs.reading import no_number
 
 from . import API_VERSION
+from .understood import UNDERSTOOD, is_wanted, understood
 
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
@@ -166,7 +167,7 @@ def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
     if kind == "float_type" and type(value) is int and name in BOUNDS:  # beyond double range
         return refusal(name, math.inf)
     if kind == "float_type":
-        return number_hint(name.removeprefix("std_"), value)
+        return no_number(name, value)
     if kind in _OUT_OF_BOUNDS and name in BOUNDS and len(error["loc"]) == 1:
         return refusal(name, math.inf if abs(value) > _LARGE else float(value))
     if kind == "finite_number":
@@ -212,7 +213,14 @@ def invalid(
     if "mu0" in model.model_fields and model.model_fields["mu0"].is_required():
         paths = {fault.path for fault in faults}
         faults += [fault for fault in _absent_in(members) if fault.path not in paths]
-    return refused(faults)
+    return refused(faults, **_understood(members))
+
+
+def _understood(members: Any) -> dict[str, Any]:
+    """What was understood of the other inputs, where the request asks for it."""
+    if not isinstance(members, Mapping) or not is_wanted(members):
+        return {}
+    return {UNDERSTOOD: understood(members)}
 
 
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
@@ -290,7 +298,7 @@ def _of_fastapi(error: RequestValidationError, scope: Scope) -> RequestError:
     dependant = scope["route"].dependant
     declared = (dependant.body_params or dependant.query_params)[0].field_info.annotation
     errors = [{**fault, "loc": fault["loc"][1:]} for fault in error.errors()]
-    return refused(faults_of(errors, names_of(declared)))
+    return refused(faults_of(errors, names_of(declared)), **_understood(error.body))
 
 
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:
@@ -325,12 +333,12 @@ def _no_such_path(scope: Scope) -> str:
     return "no such path; /docs describes all of them"
 
 
-def _of_input(error: InputError, _: Scope) -> RequestError:
+def of_input(error: InputError, **members: Any) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
     name = error.field.removeprefix("std_")  # a deviation is a member of std
     steps = (name,) if name == error.field else ("std", name)
-    return refused([FieldFault(steps, reason_of(error), value)])
+    return refused([FieldFault(steps, reason_of(error), value)], **members)
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:
@@ -346,7 +354,7 @@ _MEANINGS: dict[type[Exception], Any] = {
     RequestError: lambda error, _: error,
     RequestValidationError: _of_fastapi,
     HTTPException: _of_http,
-    InputError: _of_input,
+    InputError: lambda error, _: of_input(error),
     TableError: _of_table,
     MemoryError: _of_memory,
 }

@@ -137,8 +137,7 @@ async def small_body(request: Request, most: int = SMALL_BODY) -> bytes:
 
 
 def members_of(query: bytes) -> dict[str, Any]:
-    """The parameters of a query as a body has them: numbers as numbers, and both ends of
-    ``k=low..high``."""
+    """The parameters of a query as a body has them: numbers as numbers, others as texts."""
     members: dict[str, Any] = {}
     twice: dict[str, None] = {}
     for name, value in _pairs(query):
@@ -146,8 +145,6 @@ def members_of(query: bytes) -> dict[str, Any]:
             members.setdefault(name, []).extend(part.strip() for part in value.split(","))
         elif name in members:
             twice[name] = None
-        elif name == "k" and ".." in value:
-            members[name] = tuple(_number(end) for end in value.split(".."))
         else:
             members[name] = _number(value)
     if twice:

@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mumacro import plotting
 from mumacro.analysis.borders import Crossing, border_crossings
@@ -14,10 +13,11 @@ from mumacro.analysis.input_curve import InputCurve
 from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
-from mumacro.inputs.cases import fixed_inputs, real, without_interval
-from mumacro.inputs.fields import FIELDS, POSITIVE
+from mumacro.inputs.cases import fixed_inputs, without_interval
+from mumacro.inputs.fields import NAMES, POSITIVE, QUANTITY_OF, field_of
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
+from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
@@ -28,7 +28,7 @@ SCALES = ("log", "linear")
 class Law:
     """A sweep of one input."""
 
-    along: str  #: the swept input
+    along: str  #: the swept input, as it was named: omega [rad/s] or f [Hz]
     values: Array  #: its values [SI], ascending, shape (n,)
     #: the results, arrays (n,); of an interval of k those at its geometric middle, and the band
     answer: Answer[Any]
@@ -44,9 +44,10 @@ class Law:
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """All six inputs [SI]: ``case``, and the swept one (n,); k (n,), too, where it grows with
-        Fz."""
-        six = {**self.case, self.along: self.values}
+        """All six inputs [SI]: ``case``, and the swept one (n,), omega where it is f; k (n,), too,
+        where it grows with Fz."""
+        name, per = field_of(self.along)
+        six = {**self.case, name: per * self.values}
         return six if self.stiffening is None else six | self.stiffening.scaled(six, self.values)
 
     @property
@@ -92,8 +93,8 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
     InputError for ends out of bounds or not ascending, a logarithmic range from 0, fewer than two
     points.
     """
-    if along not in (*FIELDS, AMPLITUDE):
-        raise InputError("along", along, f"one of {', '.join(FIELDS)}, {AMPLITUDE}")
+    if along not in (*NAMES, AMPLITUDE):
+        raise InputError("along", along, f"one of {', '.join(NAMES)}, {AMPLITUDE}")
     if scale not in SCALES:
         raise InputError("scale", scale, f"one of {', '.join(SCALES)}")
     if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
@@ -113,19 +114,16 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
     return np.clip(values, start, stop)
 
 
-def _end(name: str, value: float | None) -> float:
-    """One end of the range as a float."""
+def _end(along: str, name: str, value: Any) -> float:
+    """One end of the range of an input as a float."""
     if value is None:
         raise InputError(name, None, "given [SI]: the range goes from start to stop")
-    end = real(name, value)
-    if end.ndim:
-        raise InputError(name, end.shape, "one number")
-    return float(end)
+    return read_one(name, value, QUANTITY_OF[along])
 
 
-def _ascending(values: ArrayLike) -> Array:
+def _ascending(along: str, values: Any) -> Array:
     """Values of the swept input, (n,)."""
-    x = real("values", values)
+    x = np.asarray(read("values", values, QUANTITY_OF[along]).si)
     if x.ndim != 1 or not x.size or not np.all(np.diff(x) >= 0.0):
         raise InputError("values", values, "one-dimensional and ascending")
     return x
@@ -135,11 +133,11 @@ def law(
     surrogate: Surrogate,
     along: str = "v0",
     *,
-    start: float | None = None,
-    stop: float | None = None,
+    start: Any = None,
+    stop: Any = None,
     points: int = 201,
     scale: str = "log",
-    values: ArrayLike | None = None,
+    values: Any = None,
     refine: bool = False,
     contact: str = "spring",
     direction: str = "across",
@@ -152,10 +150,10 @@ def law(
     ----------
     surrogate : Surrogate
     along : str
-        The swept input: mu0, Fz, k, y0, omega or v0; for direction normal Fz_amplitude in place of
-        y0.
+        The swept input: mu0, Fz, k, y0, omega, f or v0; for direction normal Fz_amplitude in place
+        of y0.
     start, stop : float
-        Its first and its last value [SI], both included.
+        Its first and its last value [SI], or with a unit as in "1mm/s"; both included.
     points, scale : int, str
         How many values there are, evenly spaced on a scale "log" or "linear".
     values : array_like
@@ -189,29 +187,35 @@ def law(
     >>> sweep.answer.mu_macro.round(4).tolist(), round(sweep.border[0].value, 5)
     ([0.2238, 0.2405, 0.296], 0.06868)
     """
+    if along not in QUANTITY_OF:
+        raise InputError("along", along, f"one of {', '.join(NAMES)}, {AMPLITUDE}")
     if values is None:
-        x = sweep_values(along, _end("start", start), _end("stop", stop), points, scale)
+        ends_given = (_end(along, "start", start), _end(along, "stop", stop))
+        shown = sweep_values(along, *ends_given, points, scale)
     elif start is None and stop is None:
-        x = _ascending(values)
+        shown = _ascending(along, values)
     else:
         raise InputError("values", "an array", "left out beside start and stop")
-    kind = kind_of(contact, direction)
-    middle_case, ends = without_interval(case, along)
-    middle_case, stiffening = stiffening_of(middle_case, along, kind, stiffness_exponent)
+    name, per = field_of(along)
+    kind, x = kind_of(contact, direction), per * shown
+    middle_case, ends = without_interval(case, name)
+    middle_case, stiffening = stiffening_of(middle_case, name, kind, stiffness_exponent)
     fixed = fixed_inputs(middle_case, along, kind)
-    curve = InputCurve(surrogate, fixed, along, kind, stiffening)
+    curve = InputCurve(surrogate, fixed, name, kind, stiffening)
     ends_of_range = float(x[0]), float(x[-1])
     border = border_crossings(
-        surrogate, along, fixed, *ends_of_range, **kind.names, stiffening=stiffening
+        surrogate, name, fixed, *ends_of_range, **kind.names, stiffening=stiffening
     )
     if refine:
         x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
+        shown = x / per
     answer = curve.answer(x, groups=True, strict=True)
     if ends:
         interval = {**{name: value for name, value in fixed.items() if name != "k"}, **ends}
-        band_curve = InputCurve(surrogate, interval, along, kind, stiffening)
+        band_curve = InputCurve(surrogate, interval, name, kind, stiffening)
         answer = band_curve.answer(x, groups=True, strict=True)
-    at_rest = curve.answer(x, v0=0.0) if along != "v0" else curve.answer(0.0)
+    at_rest = curve.answer(x, v0=0.0) if name != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
     k_range = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
-    return Law(along, x, answer, mu_static, border, fixed, kind, curve.stiffening, k_range)
+    marks = tuple(replace(crossing, value=crossing.value / per) for crossing in border)
+    return Law(along, shown, answer, mu_static, marks, fixed, kind, curve.stiffening, k_range)

@@ -43,8 +43,9 @@ from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
-from mumacro.inputs.fields import POSITIVE
+from mumacro.inputs.fields import POSITIVE, QUANTITY_OF, field_of
 from mumacro.inputs.kind import AMPLITUDE, kind_of
+from mumacro.inputs.reading import read_one
 from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.surrogate import Surrogate
 
@@ -114,7 +115,7 @@ def solve_for(
     unknown: str,
     target: ArrayLike,
     *,
-    within: tuple[float, float] | None = None,
+    within: tuple[Any, Any] | None = None,
     contact: str = "spring",
     direction: str = "across",
     stiffness_exponent: float | None = None,
@@ -126,13 +127,13 @@ def solve_for(
     ----------
     surrogate : Surrogate
     unknown : str
-        One of mu0, Fz, k, y0, omega, v0; for direction normal Fz_amplitude in place of y0.
+        One of mu0, Fz, k, y0, omega, f, v0; for direction normal Fz_amplitude in place of y0.
     target : array_like
         mu_macro [-], >= 0, shape (n,) or a scalar.
     within : (float, float), optional
-        Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for
-        k, Fz and mu0 from where the contact is so soft that it does not matter to where it is as
-        good as rigid.
+        Search range [SI], or with units as in ("1um", "1mm").  Left out: everywhere for v0, y0,
+        omega, f and Fz_amplitude (below Fz); for k, Fz and mu0 from where the contact is so soft
+        that it does not matter to where it is as good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
     stiffness_exponent : float, optional
@@ -157,6 +158,26 @@ def solve_for(
     [['2.8656e-06 m'], []]
     """
     kind = kind_of(contact, direction)
+    given, (unknown, per) = unknown, field_of(unknown)
+    ends_given = None if within is None else _ends(given, within)
+    if per != 1.0:
+        fixed_inputs(without_interval(case)[0], given, kind)  # messages name what was asked for
+        solution = solve_for(
+            surrogate,
+            unknown,
+            target,
+            within=None if ends_given is None else (per * ends_given[0], per * ends_given[1]),
+            contact=contact,
+            direction=direction,
+            stiffness_exponent=stiffness_exponent,
+            **case,
+        )
+        solution = _in_unit(solution, given, per)
+        if ends_given is None:
+            return solution
+        low, high = ends_given
+        return replace(solution, reach=replace(solution.reach, low=low, high=high))
+    within = ends_given
     inputs, interval = without_interval(case, unknown)
     if interval:
         softest, middle, stiffest = (
@@ -212,6 +233,32 @@ def solve_for(
     return Solution(unknown, targets, tuple(roots), reach, constant, stiffening=curve.stiffening)
 
 
+def _in_unit(solution: Solution, unknown: str, per: float) -> Solution:
+    """A solution by another name of the unknown, whose unit has ``per`` of the field's."""
+    roots = tuple(
+        tuple(
+            root._replace(value=root.value / per, low=root.low / per, high=root.high / per)
+            for root in of_target
+        )
+        for of_target in solution.roots
+    )
+    reach = replace(solution.reach, low=solution.reach.low / per, high=solution.reach.high / per)
+    ends = solution.ends
+    if ends is not None:
+        ends = _in_unit(ends[0], unknown, per), _in_unit(ends[1], unknown, per)
+    return replace(solution, unknown=unknown, roots=roots, reach=reach, ends=ends)
+
+
+def _ends(unknown: str, within: Any) -> tuple[float, float]:
+    """Both ends of a range of the unknown, in its SI unit."""
+    try:
+        low, high = within
+    except (TypeError, ValueError) as error:
+        raise InputError("range", within, "two ascending, finite numbers") from error
+    quantity = QUANTITY_OF.get(unknown, "")
+    return read_one("range", low, quantity), read_one("range", high, quantity)
+
+
 def _legal(curve: InputCurve) -> tuple[float, float]:
     """Smallest and largest legal value of the unknown."""
     low, high = TINY if curve.unknown in POSITIVE else 0.0, HUGE
@@ -221,10 +268,7 @@ def _legal(curve: InputCurve) -> tuple[float, float]:
 
 
 def _checked_range(curve: InputCurve, within: tuple[float, float]) -> tuple[float, float]:
-    try:
-        low, high = (float(end) for end in within)
-    except (TypeError, ValueError) as error:
-        raise InputError("range", within, "two ascending, finite numbers") from error
+    low, high = within
     least, most = _legal(curve)
     if not least <= low < high <= most:
         bound = "two ascending, finite numbers " + ("> 0" if curve.unknown in POSITIVE else ">= 0")

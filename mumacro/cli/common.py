@@ -27,13 +27,14 @@ from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import belongs_to_value
+from mumacro.outputs import OUTPUTS
+from mumacro.outputs.evaluation import names_in
 from mumacro.surrogate import Surrogate
 from mumacro.validity import Row, digits, k_effect
 
 ABOUT_INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
-  mu0    Coulomb friction coefficient [-], > 0
-  Fz     normal force [N], > 0
+  mu0    Coulomb friction coefficient [-], > 0;   Fz  normal force [N], > 0
   k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
   y0     amplitude [m], half of peak to peak; with --direction normal Fz_amplitude [N], below Fz
   omega  angular frequency [rad/s], or f, frequency [Hz], >= 0
@@ -119,6 +120,17 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
     text = "of the oscillation; normal: of the normal force; default: across"
     parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
+
+
+def add_include(parser: argparse.ArgumentParser) -> None:
+    """The option for outputs beside mu_macro."""
+    text = ", ".join(OUTPUTS)
+    parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
+
+
+def included(chosen: argparse.Namespace) -> tuple[str, ...]:
+    """The outputs that ``--include`` names; InputError for an unknown one."""
+    return tuple(name for text in chosen.include for name in names_in(text))
 
 
 def kind_in(chosen: argparse.Namespace) -> Kind:
@@ -213,19 +225,22 @@ def read_case(
     one_k: str = "",
     whole: bool = True,
     optional: Sequence[str] = (),
+    deviations: bool = False,
 ) -> dict[str, Any]:
     """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
     ``Surrogate.evaluate``.
 
     ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
     not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
-    other inputs must be there, but for those that are ``optional``.  UsageError tells everything
+    other inputs must be there, but for those that are ``optional``.  With ``deviations`` those
+    that are typed, as in ``k=1±0.1N/um``, are in ``std``, by input.  UsageError tells everything
     that is wrong, in one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])["k"]
     1000000.0
     """
     case: dict[str, Any] = {}
+    std: dict[str, float] = {}
     faults: list[str] = []
     strange: list[str] = []
     for name, text in _pairs(words):
@@ -241,7 +256,9 @@ def read_case(
             faults.append(f"{name} is given twice")
         case[name] = math.nan
         try:
-            case[name] = _read(name, text, one_k)
+            case[name], deviation = _read(name, text, one_k, deviations)
+            if deviation is not None:
+                std[name] = deviation
         except InputError as error:
             faults.append(str(error))
     if strange:
@@ -251,21 +268,27 @@ def read_case(
     faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
         raise UsageError("; ".join(faults))
-    return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}
+    read_in_si: dict[str, Any] = {
+        "k_range" if isinstance(value, tuple) else name: value for name, value in case.items()
+    }
+    return read_in_si | ({"std": std} if std else {})
 
 
-def _read(name: str, text: str, one_k: str) -> float | tuple[float, float]:
-    """The value of an input, or the ends of k; InputError where it is none, or out of bounds."""
+def _read(
+    name: str, text: str, one_k: str, deviations: bool
+) -> tuple[float | tuple[float, float], float | None]:
+    """The value of an input, or the ends of k, and its deviation; InputError where it is none, or
+    out of bounds."""
     value = read(name, text)
     if value.low is not None:
         if one_k:
             raise InputError(name, text, f"one number: {one_k}")
-        return value.low, value.high
-    if value.std is not None:
+        return (value.low, value.high), None
+    if value.std is not None and not deviations:
         raise InputError(name, text, NO_DEVIATION)
     field, in_model = ("omega", value.si * RAD_PER_CYCLE) if name == "f" else (name, value.si)
     check({field: in_model}, value.si if name == "f" else None)
-    return float(value.si)
+    return float(value.si), value.std
 
 
 def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:

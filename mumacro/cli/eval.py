@@ -9,7 +9,15 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from mumacro.cli.common import OneLineParser, add_format, add_kind, dialect_in, open_table
+from mumacro.cli.common import (
+    OneLineParser,
+    add_format,
+    add_include,
+    add_kind,
+    dialect_in,
+    included,
+    open_table,
+)
 from mumacro.files.reading import find_files
 from mumacro.files.run import evaluate_files
 
@@ -17,16 +25,16 @@ _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
-  for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N];
-  amplitudes are half of peak to peak; other columns are copied, text as text
+  for k also k_low and k_high; for y0, where the direction is normal, Fz_amplitude [N]; amplitudes
+  are half of peak to peak; also contact, direction, deviations std_k, ...; others are copied
 in text the head is the first line that has these names; a row of units may stand below it
-added: mu_macro, mu_ratio, regime, error_bound, source; with k_low, k_high mu_macro_low and _high
+added: mu_macro, mu_ratio, regime, error_bound, source; mu_macro_low, _high; power.saved, ...
 rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 
 examples:
   mumacro eval rig.txt -o out.csv --decimal ,
   mumacro eval - -o - < cases.csv > out.csv
-The output appears whole or not at all; an interrupted run leaves an older one as it is.
+The output appears whole or not at all.
 exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments, 130 interrupted
 """
 
@@ -71,20 +79,11 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument(
         "--rigid", action="store_true", help="there is no column k: all contacts are rigid"
     )
-    parser.add_argument(
-        "--include",
-        choices=("gradient",),
-        action="append",
-        default=[],
-        help="add d mu_macro / d input",
-    )
+    add_include(parser)
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
     chosen = parser.parse_intermixed_args(words)
     surrogate = open_table(chosen.table)
-    options = {
-        name: getattr(chosen, name)
-        for name in ("rigid", "include", "contact", "direction", "force")
-    }
+    options = {name: getattr(chosen, name) for name in ("rigid", "contact", "direction", "force")}
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     bars = (
         BarColumn(),
@@ -111,6 +110,7 @@ def main(words: Sequence[str]) -> int:
                     out,
                     surrogate,
                     dialect=dialect_in(chosen),
+                    include=included(chosen),
                     progress=progress,
                     say=lambda text: console.print(f"mumacro eval: {text}"),
                     **options,
@@ -126,6 +126,9 @@ def main(words: Sequence[str]) -> int:
             else:
                 rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
                 print(f"{counts}: {done.out}{rejects}")
+            for remark in done.remarks:
+                rows = f"{remark['cases']:,} rows, " if remark["cases"] > 1 else ""
+                console.print(f"doubtful: {rows}{remark['text']}")
     except KeyboardInterrupt:
         print("mumacro eval: interrupted; nothing was written", file=sys.stderr)
         return 130

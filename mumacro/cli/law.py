@@ -7,7 +7,7 @@ from mumacro.analysis.approximations import approximations
 from mumacro.analysis.law import law as friction_law
 from mumacro.cli import common
 from mumacro.cli.common import CURVE, UsageError, as_json, in_columns, open_table, read_case
-from mumacro.inputs.fields import field_of, unit_of
+from mumacro.inputs.fields import unit_of
 from mumacro.inputs.reading import read_one
 from mumacro.validity import load_rows
 
@@ -36,16 +36,14 @@ def run(words: Sequence[str]) -> str:
     (along, *ends), kind = chosen.along, common.kind_in(chosen)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
-    (inner, scale), unit = field_of(along), unit_of(along)
+    unit = unit_of(along)
     case = read_case(chosen.words, kind, **common.without_or_load(along))
-    start, stop = (
-        scale * end for end in common.read_values(((along, end) for end in ends), read_one)
-    )
+    start, stop = common.read_values(((along, end) for end in ends), read_one)
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     surrogate = open_table(chosen.table)
     law = friction_law(
         surrogate,
-        inner,
+        along,
         start=start,
         stop=stop,
         points=(CURVE if drawn else 25) if chosen.points is None else chosen.points,
@@ -55,11 +53,10 @@ def run(words: Sequence[str]) -> str:
         **kind.names,
         **case,
     )
-    model = load_rows(inner, law.case, chosen.contact, law.stiffening)
+    model = load_rows(along, law.case, chosen.contact, law.stiffening)
     columns = law.columns | (approximations(surrogate, law) if chosen.approximations else {})
-    columns = {along: columns.pop(inner) / scale, **columns}
     by_unit = {along: unit, "k": unit_of("k")}
-    border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in law.border]
+    border = [{along: c.value, "mu_macro": c.mu_macro} for c in law.border]
     if chosen.json:
         return as_json(
             {
@@ -75,10 +72,10 @@ def run(words: Sequence[str]) -> str:
         f"{name} [{by_unit[name]}]" if name in by_unit else name: column
         for name, column in columns.items()
     }
-    middle = law.values[law.values.size // 2]
-    form = common.format_for(chosen, surrogate, {**case, inner: middle}, kind)
+    middle = float(law.values[law.values.size // 2])
+    form = common.format_for(chosen, surrogate, {**case, along: middle}, kind)
     of_k = ", for the geometric middle of k" if law.band else ""
-    marks = [f"{c.name} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in law.border]
+    marks = [f"{c.name} at {along} = {c.value:{form}} {unit}{of_k}" for c in law.border]
     marks += common.model_lines(model)
     if chosen.out is not None:
         return "\n".join(

@@ -16,7 +16,7 @@ from mumacro.cli.common import (
     open_table,
     read_case,
 )
-from mumacro.inputs.fields import NAMES, field_of, unit_of
+from mumacro.inputs.fields import NAMES, unit_of
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.reading import read_one
 from mumacro.validity import load_rows
@@ -62,11 +62,7 @@ def run(words: Sequence[str]) -> str:
     chosen = parser.parse_intermixed_args(words)
     if solve_motion.is_motion(chosen):
         return solve_motion.run(chosen, chosen.between)
-    unknown, (inner, scale), unit = (
-        chosen.unknown,
-        field_of(chosen.unknown),
-        unit_of(chosen.unknown),
-    )
+    unknown, unit = chosen.unknown, unit_of(chosen.unknown)
     kind = common.kind_in(chosen)
     if unknown not in kind.columns:
         raise UsageError(
@@ -77,24 +73,22 @@ def run(words: Sequence[str]) -> str:
     if chosen.ratio and unknown == "mu0":
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
-    ends = [
-        scale * end
-        for end in common.read_values(((unknown, text) for text in chosen.between or ()), read_one)
-    ]
+    between = [(unknown, text) for text in chosen.between or ()]
+    ends = common.read_values(between, read_one)
     surrogate = open_table(chosen.table)
     solution = solve_for(
         surrogate,
-        inner,
+        unknown,
         target,
         within=(ends[0], ends[1]) if ends else None,
         stiffness_exponent=chosen.stiffness_exponent,
         **kind.names,
         **case,
     )
-    model = load_rows(inner, common.middle_of(case), chosen.contact, solution.stiffening)
+    model = load_rows(unknown, common.middle_of(case), chosen.contact, solution.stiffening)
     reach, two = solution.reach, solution.ends
     if not solution.roots[0] and not (two and any(end.roots[0] for end in two)):
-        where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
+        where = f"{unknown} from {reach.low:.6g} to {reach.high:.6g} {unit}"
         if not ends:  # all that a double holds
             where = f"any {unknown}"
         if solution.constant:
@@ -111,9 +105,9 @@ def run(words: Sequence[str]) -> str:
     roots = [
         (
             *((k,) if two else ()),
-            r.value / scale,
-            r.low / scale,
-            r.high / scale,
+            r.value,
+            r.low,
+            r.high,
             r.mu_macro,
             r.regime,
         )
@@ -147,7 +141,7 @@ def run(words: Sequence[str]) -> str:
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
         curve = friction_law(
             surrogate,
-            inner,
+            unknown,
             start=low,
             stop=high,
             points=CURVE,
@@ -164,7 +158,7 @@ def run(words: Sequence[str]) -> str:
             lambda axes: curve.plot(axes, roots=at, target=target),
         )
     at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
-    form = common.format_for(chosen, surrogate, {**case, inner: at_one}, kind)
+    form = common.format_for(chosen, surrogate, {**case, unknown: at_one}, kind)
     text = in_columns(
         [heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)]
     )

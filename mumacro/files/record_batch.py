@@ -5,17 +5,19 @@ Columns that are named like a missing input are refused.
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from mumacro.answer import BAND
+from mumacro.answer import BAND, DEFAULT, TEXTS
 from mumacro.errors import InputError
 from mumacro.files.errors import FilesError
 from mumacro.files.text_columns import numbers_of
-from mumacro.inputs.cases import Cases
+from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases
+from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import GAP, LIKE, SI, refusal
 from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
 from mumacro.inputs.k_range import ENDS
@@ -25,12 +27,13 @@ from mumacro.inputs.signs import Signs
 from mumacro.inputs.text_tables import Wanted
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
-from mumacro.outputs.gradient import GRADIENT
+from mumacro.outputs import OUTPUTS
+from mumacro.outputs.evaluation import chosen, names_in
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-#: columns that are added
-ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+#: columns that are always added
+ANSWERS = DEFAULT
 #: of a row without a result: its index, the input (null: the row itself), the value, the reason
 REJECTS = pa.schema(
     [("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())]
@@ -63,15 +66,17 @@ def answer(
         ``v0`` [m/s], with another unit where the heading has it in brackets; numbers or text.  An
         infinite k, or the word ``rigid``, is a rigid contact.  A null, a NaN or an empty cell is
         missing, in k as elsewhere.  ``k_low`` and ``k_high`` may stand for k; ``Fz_amplitude`` [N]
-        stands for y0 in direction normal.  Other columns are copied unchanged.
+        stands for y0 in direction normal.  ``contact`` and ``direction`` have those of each case,
+        ``std_k`` and so on standard deviations.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
         Left out, the tightest table that comes with the library.
     rigid : bool
         All contacts are rigid and there is no column k.
     include : sequence of str
-        ``"gradient"`` adds d mu_macro / d input, ``d_mu_macro_d_mu0`` and so on.
+        Outputs beside mu_macro, as in :meth:`mumacro.Surrogate.evaluate`; their columns have the
+        paths as names: ``power.saved``.
     contact, direction : str
-        Of all cases, as in :meth:`mumacro.Surrogate.evaluate`.
+        Of all cases, as in :meth:`mumacro.Surrogate.evaluate`, where there is no column of them.
 
     Returns
     -------
@@ -94,14 +99,33 @@ def answer(
     >>> rejects.to_pylist()
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
     """
-    kind = kind_of(contact, direction)
-    headings, names = find_columns(batch.schema.names, rigid, include, kind)
-    added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), headings, names, kind)
-    schema = pa.schema([*batch.schema, *added_fields(names)], batch.schema.metadata)
-    answered = pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema)
+    columns = find_columns(batch.schema.names, rigid, include, kind_of(contact, direction))
+    result = answer_columns(batch, surrogate or Surrogate.open(), columns)
+    schema = pa.schema([*batch.schema, *added_fields(columns.added)], batch.schema.metadata)
+    answered = pa.RecordBatch.from_arrays([*batch.columns, *result.added], schema=schema)
     return answered, pa.RecordBatch.from_pylist(
-        [dict(zip(REJECTS.names, row, strict=True)) for row in rejects], REJECTS
+        [dict(zip(REJECTS.names, row, strict=True)) for row in result.rejects], REJECTS
     )
+
+
+class Columns(NamedTuple):
+    """Which columns of a table of cases mean what, and what is added to them."""
+
+    #: by input, or ``std_k`` and so on: the heading, and the scale of its unit
+    headings: dict[str, tuple[str, Scale]]
+    words: dict[str, str]  #: heading of the column of contacts, of directions
+    kind: Kind  #: of all cases, where there is no column of it
+    include: tuple[str, ...]
+    added: list[str]  #: names of the columns that are added
+
+
+class Answered(NamedTuple):
+    """What :func:`answer_columns` gives."""
+
+    added: list[pa.Array]
+    rejects: list[tuple[int, str, str | None, str]]  #: rows of ``REJECTS``
+    own: dict[str, Array]  #: the inputs in the units of the table, by heading
+    remarks: list[Remark]
 
 
 def find_columns(
@@ -110,23 +134,29 @@ def find_columns(
     include: Sequence[str] = (),
     kind: Kind = SPRING,
     where: str = "",
-) -> tuple[dict[str, tuple[str, Scale]], list[str]]:
-    """By input, in their order, the heading and the scale of its unit; and the names of the
-    columns that are added.
+) -> Columns:
+    """What the columns of these names mean, and the names of those that are added.
 
     FilesError names, after ``where``, all columns that stand twice in the heading, would be written
     twice, have an unknown unit, or are missing; for a missing one it lists the columns of the file,
     or names a similar one.
 
-    >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"])[0]["Fz"]
+    >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"]).headings["Fz"]
     ('Fz [kN]', Scale(times=1000.0, over=1.0))
     """
-    heads, faults = find_heads(
-        names, {name: LIKE.get(name, name) for name in (*kind.columns, *ENDS)}
-    )
-    other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in heads)
+    like = {name: LIKE.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
+    like |= {column: LIKE.get(name, name) for column, name in DEVIATIONS.items()}
+    heads, faults = find_heads(names, like)
+    words = {name: name for name in KIND if name in names}
+    for name, word in kind.names.items():
+        if name in words and word != SPRING.names[name]:
+            faults.append(f"--{name} {word} is given, but there is a column {name}; leave one out")
+    known = {*heads, *words}
+    other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in known)
     counts = Counter(names)
-    faults += [f"the column {name!r} is there twice" for name in other_names if counts[name] > 1]
+    faults += [
+        f"the column {name!r} is there twice" for name in (*other_names, *words) if counts[name] > 1
+    ]
     stiffness_columns = [column for column in names if meant_by(column, loosely=False) == "k"]
     if rigid and stiffness_columns:
         faults.append(
@@ -136,21 +166,27 @@ def find_columns(
     if "k" in heads and (end := [name for name in ENDS if name in heads]):
         faults.append(f"there are both k and {end[0]}; leave one out")
     ends = ENDS if heads.keys() & {*ENDS} else () if rigid else ("k",)
-    required = [name for field in kind.fields for name in (ends if field == "k" else (field,))]
+    fields = ALL_FIELDS if "direction" in words else kind.fields
+    required = [name for field in fields for name in (ends if field == "k" else (field,))]
+    if "direction" in words:  # each case has one of both amplitudes
+        spare = {"y0", AMPLITUDE} - heads.keys()
+        required = [name for name in required if name not in spare or spare == {"y0", AMPLITUDE}]
     faults += _absent(
         [name for name in required if name not in heads and (name != "omega" or "f" not in heads)],
         names,
     )
-    slopes = [f"d_mu_macro_d_{name}" for name in kind.fields] if "gradient" in include else []
-    added = [ANSWERS[0], *(BAND if ends == ENDS else ()), *ANSWERS[1:], *slopes]
+    deviations = any(column in heads for column in DEVIATIONS)
+    wanted = {*names_in(include)} | ({"std"} if deviations else set())
+    outputs = [output for name, output in OUTPUTS.items() if name in wanted]
+    paths = [path for output in outputs for path in output.paths(fields)]
+    added = [DEFAULT[0], *(BAND if ends == ENDS else ()), *DEFAULT[1:], *paths]
     faults += [
         f"the column {name!r} would be written twice; rename it" for name in added if name in names
     ]
     if faults:
         raise FilesError(where + "; ".join(faults))
-    return {
-        name: (names[heads[name][0]], heads[name][1]) for name in (*required, "f") if name in heads
-    }, added
+    headings = {name: (names[heads[name][0]], heads[name][1]) for name in like if name in heads}
+    return Columns(headings, words, kind, tuple(include), added)
 
 
 def wanted_columns(rigid: bool = False) -> Wanted:
@@ -176,26 +212,20 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
 
 
 def answer_columns(
-    batch: pa.RecordBatch,
-    surrogate: Surrogate,
-    headings: Mapping[str, tuple[str, Scale]],
-    names: Sequence[str],
-    kind: Kind,
-    signs: Signs | None = None,
-) -> tuple[list[pa.Array], list[tuple[int, str, str | None, str]], dict[str, Array]]:
-    """The columns ``names`` that :func:`answer` adds, rows of the rejects, and the inputs in the
-    file's units by heading; ``signs`` are those of numbers as text."""
-    columns_in: dict[str, Array] = {}
-    values: dict[str, Array] = (
-        {} if {"k", *ENDS} & headings.keys() else {"k": np.full(len(batch), math.inf)}
-    )
+    batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs | None = None
+) -> Answered:
+    """The answers to a batch; ``signs`` are those of numbers as text."""
+    own: dict[str, Array] = {}
+    values: dict[str, Any] = {} if {"k", *ENDS} & columns.headings.keys() else {"k": math.inf}
     faults: dict[str, dict[int, str]] = {}
-    for name, (heading, scale) in headings.items():
-        columns_in[heading], values[name], faults[name] = numbers(
+    for name, (heading, scale) in columns.headings.items():
+        own[heading], values[name], faults[name] = numbers(
             batch.column(heading), name, signs or Signs(".", None), scale
         )
-    cases = Cases.of(values, kind)
-    result = surrogate.answer(cases, (GRADIENT,) if "d_mu_macro_d_mu0" in names else ())
+    values |= columns.kind.names
+    values |= {name: _words(batch.column(heading)) for name, heading in columns.words.items()}
+    cases = Cases.of(values)
+    result = surrogate.answer(cases, chosen(columns.include, cases))
     rejected = result.source_code < 0
     mask = rejected if rejected.any() else None
     source_code = np.where(rejected, 0, result.source_code).astype(np.int8)
@@ -203,24 +233,26 @@ def answer_columns(
         "regime": _dictionary(REGIME_OF_SOURCE[source_code], REGIMES, mask),
         "source": _dictionary(source_code, SOURCES, mask),
     }
-    for name, slope in (result.gradient or {}).items():
-        # the slope along k is 0 for a rigid contact, which has no k
-        column = (
-            slope
-            if name != "k" or name not in values
-            else np.where(np.isinf(values["k"]), math.nan, slope)
-        )
-        arrays[f"d_mu_macro_d_{name}"] = pa.array(column, mask=np.isnan(column))
-    columns = [
-        arrays[name] if name in arrays else pa.array(getattr(result, name), mask=mask)
-        for name in names
-    ]
+    for path in columns.added:
+        if path not in TEXTS:
+            column = result[path]
+            # what there is not is null
+            absent = np.isnan(column) if path in result.outputs else mask
+            arrays[path] = pa.array(column, mask=absent)
     rejects = []
     for i in np.flatnonzero(rejected).tolist():
         name, reason = _field_and_reason(cases.reason(i))
-        cell = batch.column(headings[name][0])[i].as_py()
-        rejects.append((i, name, None if cell is None else str(cell), faults[name].get(i, reason)))
-    return columns, rejects, columns_in
+        heading = columns.words.get(name) or columns.headings[name][0]
+        cell = batch.column(heading)[i].as_py()
+        reason = faults.get(name, {}).get(i, reason)
+        rejects.append((i, name, None if cell is None else str(cell), reason))
+    return Answered([arrays[path] for path in columns.added], rejects, own, result.remarks)
+
+
+def _words(column: pa.Array) -> Any:
+    """A column of contacts or directions, without blanks around the words."""
+    words = [x.strip() if isinstance(x, str) else x for x in column.to_pylist()]
+    return np.array([*words, None], object)[:-1]
 
 
 def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
@@ -266,6 +298,8 @@ def numbers(
 def _field_and_reason(error: InputError) -> tuple[str, str]:
     """The input of a row that has no result, and why."""
     name, value = error.field, error.value
+    if name in KIND:
+        return name, f"must be {error.bound}"
     if isinstance(value, tuple):  # of an interval the end that is missing, or the lower one
         end = int(math.isnan(value[1]) and not math.isnan(value[0]))
         name, value = ENDS[end], value[end]

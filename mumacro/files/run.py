@@ -10,6 +10,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from mumacro.answer import add
 from mumacro.files import reading
 from mumacro.files.errors import FilesError
 from mumacro.files.record_batch import (
@@ -21,6 +22,7 @@ from mumacro.files.record_batch import (
 )
 from mumacro.files.text_source import Block
 from mumacro.files.writing import Output, csv_lines, written_as
+from mumacro.inputs.doubts import Remark
 from mumacro.inputs.kind import Kind, kind_of
 from mumacro.inputs.text_tables import Dialect
 from mumacro.surrogate import Surrogate
@@ -30,13 +32,14 @@ from mumacro.table.atomic import growing, to_disk
 @dataclass(frozen=True)
 class Summary:
     """What a run did: rows read, answered and rejected; the files (``rejects`` is None without
-    any)."""
+    any); what is doubtful."""
 
     rows: int
     answered: int
     rejected: int
     out: Path
     rejects: Path | None
+    remarks: list[Remark]
 
 
 def evaluate_files(
@@ -147,8 +150,9 @@ class _Run:
                 self.files, dialect, wanted_columns(rigid), self.verbatim
             )
             where = self.source.where
-        headings, names = find_columns(self.source.schema.names, rigid, include, kind, where)
-        self.evaluation = (surrogate, headings, names, kind)
+        self.surrogate, self.remarks = surrogate, list[Remark]()
+        self.columns = find_columns(self.source.schema.names, rigid, include, kind, where)
+        headings = self.columns.headings
         sep, decimal = written_as(
             reading.ending_of(out), self.source.sep, self.source.decimal, dialect
         )
@@ -163,8 +167,9 @@ class _Run:
             else field
             for field in self.source.schema
         ]
-        self.columns_read = input_headings if self.verbatim else self.source.schema.names
-        fields = [*([] if self.verbatim else input_fields), *added_fields(names)]
+        needed = [*input_headings, *self.columns.words.values()]
+        self.columns_read = needed if self.verbatim else self.source.schema.names
+        fields = [*([] if self.verbatim else input_fields), *added_fields(self.columns.added)]
         self.schema = pa.schema(fields, self.source.schema.metadata)
 
     def go(self, force: bool, progress: Callable[[float, int, int], None]) -> Summary:
@@ -195,6 +200,7 @@ class _Run:
             state.rejected,
             self.out,
             self.rejects if state.rejected else None,
+            self.remarks,
         )
 
     def _opened_rejects(self, files: ExitStack) -> BinaryIO:
@@ -228,11 +234,15 @@ class _Run:
 
     def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
-        added, rejects, columns_in = answer_columns(block.batch, *self.evaluation, block.signs)
+        added, rejects, own, remarks = answer_columns(
+            block.batch, self.surrogate, self.columns, block.signs
+        )
+        for remark in remarks:
+            add(self.remarks, remark)
         faults = {row: reason for row, *reason in rejects}
         faults |= {i: [None, text, reason] for i, text, reason in block.unreadable}
         columns = [
-            column if column.type == field.type else pa.array(columns_in[field.name])
+            column if column.type == field.type else pa.array(own[field.name])
             for field, column in zip(
                 self.schema, [] if self.verbatim else block.batch.columns, strict=False
             )

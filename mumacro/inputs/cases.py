@@ -37,7 +37,8 @@ from mumacro.inputs.kind import (
     kind_of,
 )
 from mumacro.inputs.names import suggestion, unknown_name
-from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, read
+from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, in_unit, read
+from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
 
 
@@ -369,7 +370,16 @@ def _columns_in(
             if hasattr(cases, "keys")
             else getattr(cases, "column_names", None) or cases.columns
         )
-        return {name: cases[name] for name in names if name in present}, present
+        names = {*names}
+        found = {name: cases[name] for name in names if name in present}
+        for head in present:
+            name, unit = split_unit(head) if isinstance(head, str) else (head, None)
+            if unit is None or name not in names or head in names:
+                continue
+            if name in found:
+                raise InputError(name, head, "given once")
+            found[name] = in_unit(name, cases[head], unit)
+        return found, present
     except (AttributeError, TypeError, KeyError) as error:
         type_name = f"{type(cases).__module__}.{type(cases).__qualname__}".removeprefix("builtins.")
         raise InputError(
@@ -406,8 +416,9 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
     ``f`` may stand for ``omega``; inputs that are None are left out.  InputError where one of the
     five is missing or is not one legal number, and where the unknown has a value.
     """
-    if unknown not in kind.fields:
-        raise InputError("unknown", unknown, f"one of {', '.join(kind.fields)}")
+    if unknown not in kind.columns:
+        raise InputError("unknown", unknown, f"one of {', '.join(kind.columns)}")
+    field = field_of(unknown)[0]
     for name in ("k_range", *ENDS):
         if case.get(name) is not None:
             bound = (
@@ -423,13 +434,13 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
     inputs = {
         name: value for name, value in case.items() if value is not None or name == "k" != unknown
     }
-    for name in inputs.keys() & ({"omega", "f"} if unknown == "omega" else {unknown}):
+    for name in inputs.keys() & ({"omega", "f"} if field == "omega" else {field}):
         raise InputError(name, inputs[name], f"left out, because {unknown} is the unknown or swept")
-    columns = columns_of({**inputs, unknown: 1.0}, kind)
+    columns = columns_of({**inputs, field: 1.0}, kind)
     for name, column in columns.items():
         if np.size(column) != 1:
             raise InputError(name, inputs.get(name, inputs.get("f")), "one number")
-    del columns[unknown]
+    del columns[field]
     check(columns, inputs.get("f"))
     return {name: float(np.ravel(column)[0]) for name, column in columns.items()}
 
@@ -571,9 +582,8 @@ def _deviations(
     """The deviations that are given beside the values, by field; ``within`` are those that stand in
     the values themselves."""
     std: _Numbers = {}
-    for column, name in DEVIATIONS.items():
-        if column not in values:
-            continue
+    for column in [column for column in DEVIATIONS if column in values]:
+        name = DEVIATIONS[column]
         value, (field, per) = values[column], field_of(name)
         if field not in fields:
             bound = f"left out: this direction has no {name}"
@@ -617,9 +627,9 @@ def _no_such_amplitude(name: str, value: Any, kind: Kind) -> InputError:
 
 def _texts(values: Mapping[str, Any]) -> dict[str, Any]:
     """Contact and direction: one text each, or arrays of them."""
-    texts = {}
-    for name, usual in (("contact", CONTACTS[0]), ("direction", DIRECTIONS[0])):
-        text = values.get(name, usual)
+    texts = {"contact": CONTACTS[0], "direction": DIRECTIONS[0]}
+    for name in values.keys() & texts.keys():
+        text = values[name]
         if not isinstance(text, str):
             column = np.asarray(text, dtype=object)
             text = column if column.ndim else column.item()

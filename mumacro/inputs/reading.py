@@ -138,6 +138,17 @@ def reason_of(bound: str) -> str:
     return bound if bound.startswith(("is ", "must ")) else f"must be {bound}"
 
 
+def no_number(name: str, value: object) -> str:
+    """Why a value that is neither a number nor a text is refused in JSON.
+
+    >>> no_number("k", None), no_number("y0", True)
+    ('is missing; write rigid or a number', 'must be a number')
+    """
+    if name == "k" and value is None:
+        return GAP
+    return "must be a number, not a text" if isinstance(value, str) else "must be a number"
+
+
 def carries_unit(value: Any) -> bool:
     """Whether a value, such as a quantity of pint or a labelled array with ``attrs["units"]``, says
     its unit."""
@@ -165,6 +176,26 @@ def without_unit(name: str, value: Any, quantity: str = "") -> Any:
         numbers = read(name, value, quantity).si
         return type(value)(numbers, index=value.index, name=value.name)
     return value
+
+
+def in_unit(name: str, column: Any, unit: str) -> Any:
+    """A column whose head has the unit, such as ``y0 [um]``, in SI and with its labels.
+
+    >>> in_unit("y0", [2.0, 3.0], "um").tolist()
+    [2e-06, 3e-06]
+    """
+    quantity = QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
+    scale = scale_in(quantity, unit)
+    if scale is None:
+        raise InputError(name, f"a column in {unit}", QUANTITIES[quantity].bound)
+    kind = getattr(getattr(column, "dtype", None), "kind", "O")
+    if _library(column) in ("pandas", "xarray", "dask") and kind in "fiub":
+        return scale.si(column)
+    numbers: Any = np.asarray(read(name, column, quantity).si)
+    numbers = scale.si(numbers)
+    if _library(column) == "pandas":
+        return type(column)(numbers, index=column.index, name=column.name)
+    return numbers
 
 
 _WITHOUT_UNIT = NUMBERS | {str, list, tuple, dict, type(None), np.ndarray}

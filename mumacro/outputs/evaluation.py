@@ -53,7 +53,9 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
 
     InputError for an unknown name, one that all of the cases lack, and std without a deviation.
     """
-    names = {*names_in(include)}
+    names = {*names_in(include)} if include else set()
+    if not names and not cases.std:
+        return ()
     if "std" in names and not cases.std:
         bound = "given if include has std: the deviation of at least one input"
         raise InputError("std", None, bound)
@@ -90,6 +92,12 @@ def answer(
     """
     gradient = any(output.gradient for output in outputs)
     detail: Detail = "gradient" if gradient else "groups" if outputs or groups else "values"
+    plain = cases.codes is None and cases.ends is None
+    if cases.shape and plain and not outputs:
+        rows = tabulated.rows(cases, detail)  # the kernel's arrays are the answer
+        kept = (rows.v_tilde, rows.y_tilde, rows.length_scale) if groups else None
+        numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
+        return Answer(*numbers, rows.source, kept, cases)
     remarks: list[Remark] = []
     columns: Values = {}
     if cases.codes is None:
@@ -177,7 +185,7 @@ def _answer(
             return columns[name]
         return columns[name].reshape(shape) if name in columns else np.full(shape, math.nan)
 
-    source = columns.get("source", np.full(cases.size, -1))
+    source = columns["source"] if columns else np.full(cases.size, -1)
     source = np.asarray(source, np.int8).reshape(shape) if shape else int(source)
     groups = None
     if detail != "values" or not shape:

@@ -29,7 +29,8 @@ POWER = Output(
     power,
     {
         "power.oscillation": Member(
-            "W", "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; null: rigid"
+            "W",
+            "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; none where it is rigid",
         ),
         "power.saved": Member("W", "Power that the drive saves: (mu0 - mu_macro) Fz v0"),
         "power_bound.oscillation": Member("W", "Bound of the absolute error of oscillation"),

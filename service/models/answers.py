@@ -161,6 +161,17 @@ class Answered(BaseModel):
     api_version: str
 
 
+class Understood(BaseModel):
+    """What was understood of one input."""
+
+    text: str | None = Field(description="As it came; null where it was a number")
+    value: float | Literal["rigid"] = Field(description="In SI; of an interval its middle")
+    unit: str = Field(description="That was typed, or the SI unit")
+    std: float | None = Field(None, description="One standard deviation [SI]")
+    low: float | None = Field(None, description="Ends of an interval [SI]")
+    high: float | None = None
+
+
 class ModelRow(BaseModel):
     """One thing that the model leaves out, see docs/validity.md."""
 
@@ -179,6 +190,7 @@ class Remark(BaseModel):
 
 
 _REMARKS = "What is doubtful; left out where nothing is"
+_UNDERSTOOD = "Only if requested: what was understood of each input"
 
 
 class Result(OneOrMany[Number, Regime, str]):
@@ -199,6 +211,7 @@ class CaseAnswer(Result, Answered):
     )
     digits: int | None = Field(None, description="With model: digits of mu_macro that k supports")
     remarks: list[Remark] | None = Field(None, description=_REMARKS)
+    inputs: dict[str, Understood] | None = Field(None, description=_UNDERSTOOD)
 
 
 # --- batches --------------------------------------------------------------------------------------
@@ -480,3 +493,4 @@ class Problem(BaseModel):
     request_id: str | None = None
     errors: list[FieldProblem] | None = None
     n_errors: int | None = None
+    inputs: dict[str, Understood] | None = Field(None, description=_UNDERSTOOD)

@@ -6,7 +6,7 @@ the amplitude of the direction) are the library's, which refuses them when it is
 
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -17,16 +17,29 @@ from pydantic import (
     PlainValidator,
     ValidationInfo,
     WithJsonSchema,
-    WrapValidator,
 )
-from pydantic_core import PydanticCustomError
 
+from mumacro.errors import InputError
 from mumacro.inputs.cases import DEVIATIONS, EXACT
-from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, is_rigid, refusal
+from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, refusal
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
-from mumacro.inputs.old_texts import number_hint
+from mumacro.inputs.reading import Value, no_number, read, reason_of
 from mumacro.kernel.arrays import Array
+
+from .values import (
+    Amplitude,
+    AngularFrequency,
+    Force,
+    ForceAmplitude,
+    Frequency,
+    Friction,
+    Positive,
+    Speed,
+    Stiffness,
+    fault,
+    interval_of,
+)
 
 #: what a case may hold, in the order in which it is described
 INPUTS = (
@@ -47,18 +60,7 @@ EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20
 MAX_REASONS = 1000  # bad cases of a batch that are listed
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, {"const": "rigid", "type": "string"}]
-
-
-def rigid_or(value: Any, number: Callable[[Any], float]) -> float:
-    """Infinity for the word rigid; any other value must be a number."""
-    return math.inf if isinstance(value, str) and is_rigid(value) else number(value)
-
-
-Stiffness = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
 
 
 def optional(description: str, **more: Any) -> Any:
@@ -135,22 +137,21 @@ Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 class OneCase(Strict):
     """The inputs of one case; omega or f, and k or an interval of it: exactly one of each."""
 
-    mu0: Positive = Field(description=_MU0, examples=[0.3])
-    Fz: Positive = Field(description=_FZ, examples=[10.0])
+    mu0: Friction = Field(description=_MU0, examples=[0.3])
+    Fz: Force = Field(description=_FZ, examples=[10.0])
     k: Stiffness = either(_K, examples=[1e6])
-    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
-    omega: NotNegative | None = optional(_OMEGA)
-    f: Hertz | None = optional(_F, examples=[20e3])
-    v0: NotNegative = Field(description=_V0, examples=[0.01])
-    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
-    k_low: Positive | None = optional(_LOW)
-    k_high: Positive | None = optional(_HIGH)
+    y0: Amplitude | None = optional(_Y0, examples=[2e-6])
+    omega: AngularFrequency | None = optional(_OMEGA)
+    f: Frequency | None = optional(_F, examples=[20e3])
+    v0: Speed = Field(description=_V0, examples=[0.01])
+    Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
+    k_low: Stiffness | None = optional(_LOW)
+    k_high: Stiffness | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite."""
-        values = self.__dict__
-        return {name: values[name] for name in INPUTS if values.get(name) is not None}
+        return _with_interval(_given(self))
 
 
 class CaseInputs(OneCase):
@@ -164,35 +165,59 @@ class CaseInputs(OneCase):
 class OtherInputs(Strict):
     """The inputs of a question about one of them, which is left out or null."""
 
-    mu0: Positive | None = optional(_MU0, examples=[0.3])
-    Fz: Positive | None = optional(_FZ, examples=[10.0])
+    mu0: Friction | None = optional(_MU0, examples=[0.3])
+    Fz: Force | None = optional(_FZ, examples=[10.0])
     k: Stiffness | None = optional(_K, examples=[1e6])
-    y0: NotNegative | None = optional(_Y0, examples=[2e-6])
-    omega: NotNegative | None = optional(_OMEGA)
-    f: Hertz | None = optional(_F, examples=[20e3])
-    v0: NotNegative | None = optional(_V0)
-    Fz_amplitude: NotNegative | None = optional(_AMPLITUDE)
-    k_low: Positive | None = optional(_LOW)
-    k_high: Positive | None = optional(_HIGH)
+    y0: Amplitude | None = optional(_Y0, examples=[2e-6])
+    omega: AngularFrequency | None = optional(_OMEGA)
+    f: Frequency | None = optional(_F, examples=[20e3])
+    v0: Speed | None = optional(_V0)
+    Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
+    k_low: Stiffness | None = optional(_LOW)
+    k_high: Stiffness | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite, and a null in k stays."""
-        values = self.__dict__
-        inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
-        if values["k"] is None and "k" in self.model_fields_set:
+        inputs = _with_interval(_given(self))
+        if self.k is None and "k" in self.model_fields_set:
             inputs["k"] = None
         return inputs
+
+
+def _given(model: BaseModel) -> dict[str, Any]:
+    """The inputs that are given, by name."""
+    values = model.__dict__
+    return {name: values[name] for name in INPUTS if values.get(name) is not None}
+
+
+def _with_interval(inputs: dict[str, Any]) -> dict[str, Any]:
+    """The inputs, with k_range for an interval in k."""
+    if (ends := interval_of(inputs.get("k"))) is not None:
+        del inputs["k"]
+        inputs["k_range"] = ends
+    return inputs
 
 
 # --- columns --------------------------------------------------------------------------------------
 
 
 class Column(NamedTuple):
-    """One input of many cases: NaN where there is no number, and why, by the index of the case."""
+    """One input of many cases: NaN where there is no number, and why, by the index of the case;
+    deviations and ends of intervals where entries have some."""
 
     values: Array
     reasons: Mapping[int, str]
+    std: Array | None = None
+    low: Array | None = None
+    high: Array | None = None
+
+    def parts(self, name: str) -> dict[str, Array]:
+        """The columns that the library takes."""
+        std = {} if self.std is None else {f"std_{name}": self.std}
+        if self.low is None or self.high is None:
+            return {name: self.values, **std}
+        return {"k_low": self.low, "k_high": self.high, **std}
 
 
 _LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in BOUNDS}
@@ -201,21 +226,30 @@ _MOST = dict.fromkeys(_LEAST, sys.float_info.max) | {"f": MOST_HZ}
 _NUMBERS = frozenset((float, int))
 
 
-def number(name: str, value: object) -> tuple[float, str | None]:
+def entry(name: str, value: object) -> tuple[Value, str | None]:
     """The value of an input and None, or NaN and the reason why it is none."""
-    if type(value) in _NUMBERS:
+    if isinstance(value, str):
         try:
-            real = float(value)  # type: ignore[arg-type]
+            one = read(name.removeprefix("std_"), value)
+        except InputError as error:
+            return _NO_VALUE, reason_of(error.bound)
+        if name == "k" and one.si == math.inf:
+            return one, None
+    elif type(value) in _NUMBERS:
+        try:
+            one = Value(float(value))  # type: ignore[arg-type]
         except OverflowError:
-            real = math.inf
-        if _LEAST[name] <= real <= _MOST[name]:
-            return real, None
-        return math.nan, refusal(name, real) if name in BOUNDS else f"must be {EXACT}"
-    if name == "k" and isinstance(value, str) and is_rigid(value):
-        return math.inf, None
-    if value is None and name != "k":
-        return math.nan, "is required"
-    return math.nan, number_hint(name, value)
+            one = Value(math.inf)
+    elif value is None and name != "k":
+        return _NO_VALUE, "is required"
+    else:
+        return _NO_VALUE, no_number(name, value)
+    if _LEAST[name] <= one.si <= _MOST[name]:
+        return one, None
+    return _NO_VALUE, refusal(name, one.si) if name in BOUNDS else f"must be {EXACT}"
+
+
+_NO_VALUE = Value(math.nan)
 
 
 def column(name: str, values: Sequence[Any]) -> Column:
@@ -227,33 +261,41 @@ def column(name: str, values: Sequence[Any]) -> Column:
             array = np.array([math.inf])
         if np.isfinite(array).all():
             return Column(array, {})
-    array, reasons = np.empty(len(values)), dict[int, str]()
+    read_values, reasons = [], dict[int, str]()
     for i, value in enumerate(values):
-        array[i], reason = number(name, value)
+        one, reason = entry(name, value)
+        read_values.append(one)
         if reason is not None and len(reasons) < MAX_REASONS:
             reasons[i] = reason
-    return Column(array, reasons)
+    si = np.array([one.si for one in read_values], np.float64)
+    std = low = high = None
+    if any(one.std is not None for one in read_values):
+        std = np.array([one.std or 0.0 for one in read_values])
+    if any(one.low is not None for one in read_values):  # a number is an interval of itself
+        low = np.array([one.si if one.low is None else one.low for one in read_values])
+        high = np.array([one.si if one.high is None else one.high for one in read_values])
+    return Column(si, reasons, std, low, high)
 
 
-def cells(name: str, value: Any) -> float | Column | None:
-    """A number for all cases, or a list or an array with one for each."""
+def cells(name: str, value: Any) -> float | str | Column | None:
+    """A number or a text for all cases, or a list or an array with one for each."""
     if isinstance(value, list):
         return column(name, value)
     if isinstance(value, np.ndarray):  # finite numbers
         return Column(value, {})
     if value is None and name != "k":
         return None
-    real, reason = number(name, value)
+    one, reason = entry(name, value)
     if reason is not None:
-        raise PydanticCustomError("input", "{reason}", {"reason": reason})
-    return real
+        raise fault(reason)
+    return value if isinstance(value, str) else float(one.si)
 
 
-def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
+def _of_cases(value: Any, info: ValidationInfo) -> float | str | Column | None:
     return cells(info.field_name or "", value)
 
 
-def _of_deviations(value: Any, info: ValidationInfo) -> float | Column | None:
+def _of_deviations(value: Any, info: ValidationInfo) -> float | str | Column | None:
     return cells(f"std_{info.field_name}", value)
 
 
@@ -265,13 +307,12 @@ def _words(value: Any, info: ValidationInfo) -> Any:
         return value
     names = CONTACTS if info.field_name == "contact" else DIRECTIONS
     if not isinstance(value, str) or value not in names:
-        raise PydanticCustomError(
-            "input", "{reason}", {"reason": f"must be one of {', '.join(names)}"}
-        )
+        raise fault(f"must be one of {', '.join(names)}")
     return value
 
 
 def _or_listed(*one: dict[str, Any]) -> WithJsonSchema:
+    one = (*one, {"type": "string"})
     several = {"type": "array", "items": {"anyOf": [*one, {"type": "null"}]}}
     return WithJsonSchema({"anyOf": [*one, several]})
 
@@ -282,7 +323,7 @@ NotNegativeColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "minimu
 HertzColumn = Annotated[
     Any, _CELLS, _or_listed({"type": "number", "minimum": 0, "maximum": MOST_HZ})
 ]
-StiffnessColumn = Annotated[Any, _CELLS, _or_listed(*OR_RIGID)]
+StiffnessColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "exclusiveMinimum": 0})]
 
 
 DeviationColumn = Annotated[

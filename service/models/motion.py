@@ -8,27 +8,33 @@ from pydantic import (
     ConfigDict,
     Field,
     TypeAdapter,
+    ValidationError,
+    ValidationInfo,
     WithJsonSchema,
     WrapValidator,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mumacro.analysis.motion import TOLERANCES
 from mumacro.errors import InputError
+from mumacro.inputs.fields import QUANTITY_OF
 from mumacro.inputs.kind import ContactName
-from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE
+from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
+from mumacro.inputs.reading import read_one, reason_of
 
 from .answers import Number, Numbers, quantity
-from .inputs import (
-    EXAMPLE,
-    ONE_FREQUENCY,
-    Hertz,
+from .inputs import EXAMPLE, ONE_FREQUENCY, Strict, optional
+from .values import (
+    AngularFrequency,
+    Force,
+    Frequency,
+    Friction,
     NotNegative,
-    Positive,
+    Speed,
     Stiffness,
-    Strict,
-    optional,
+    fault,
+    text_schema,
 )
 
 MAX_TERMS = 10  # of one part of the motion
@@ -67,21 +73,53 @@ _STRICT = ConfigDict(strict=True)
 _AMPLITUDE: Any = TypeAdapter(NotNegative, config=_STRICT)
 _PAIR: Any = TypeAdapter(_Pair, config=_STRICT)
 _LISTED: Any = TypeAdapter(_Listed)
+_HARMONIC: Any = TypeAdapter(Harmonic)
+_Text = Annotated[str, WithJsonSchema(text_schema("length", False))]
 
 
-def _of_its_form(value: Any, _: Any) -> Any:
+def _of_its_form(value: Any, _: Any, info: ValidationInfo) -> Any:
     """The oscillation as the library takes it; a union would report the faults of every form."""
+    name = info.field_name or ""
+    if isinstance(value, str):
+        try:
+            return read_oscillation(name, value)
+        except InputError as error:
+            raise fault(reason_of(error.bound)) from None
+    if isinstance(value, dict):
+        one = _HARMONIC.validate_python(_with_numbers(name, value, ()))
+        return [(one.harmonic, one.amplitude, one.phase)]
     if not isinstance(value, list):
         return _AMPLITUDE.validate_python(value)
     if value and not isinstance(value[0], dict):
         return _PAIR.validate_python(value)
-    return [(one.harmonic, one.amplitude, one.phase) for one in _LISTED.validate_python(value)]
+    parts = [
+        _with_numbers(name, part, (i,)) if isinstance(part, dict) else part
+        for i, part in enumerate(value[: MAX_TERMS + 1])
+    ]
+    return [(one.harmonic, one.amplitude, one.phase) for one in _LISTED.validate_python(parts)]
 
 
-_Oscillation = Annotated[NotNegative | _Pair | _Listed, WrapValidator(_of_its_form)]
+def _with_numbers(name: str, part: dict[str, Any], place: tuple[int, ...]) -> dict[str, Any]:
+    """A part with numbers for amplitude and phase that are texts, such as "2um" and "90 deg"."""
+    numbers = dict(part)
+    for member, kind in (("amplitude", QUANTITY_OF[name]), ("phase", "angle")):
+        if isinstance(part.get(member), str):
+            try:
+                numbers[member] = read_one(member, part[member], kind)
+            except InputError as error:
+                reason = InitErrorDetails(
+                    type=fault(reason_of(error.bound)), loc=(*place, member), input=part[member]
+                )
+                raise ValidationError.from_exception_data(name, [reason]) from None
+    return numbers
+
+
+_Oscillation = Annotated[
+    NotNegative | _Text | Harmonic | _Pair | _Listed, WrapValidator(_of_its_form)
+]
 _FORMS = (
-    "an amplitude, half of peak to peak; an amplitude and a phase in degrees; or a list of "
-    f"harmonics, at most {MAX_TERMS}. Left out: none"
+    'an amplitude, half of peak to peak; a text such as "2um@90deg"; an amplitude with its phase '
+    f"in degrees; or a list of harmonics, at most {MAX_TERMS}. Left out: none"
 )
 
 
@@ -93,27 +131,27 @@ class MotionRequest(Strict):
             "examples": [
                 {
                     **{name: x for name, x in EXAMPLE.items() if name != "y0"},
-                    "x": [1e-6, 90.0],
-                    "y": 2e-6,
+                    "x": {"amplitude": 1e-6, "phase": 90.0},
+                    "y": "2um",
                 }
             ],
             "allOf": [ONE_FREQUENCY],
         }
     )
 
-    mu0: Positive = Field(description="Coulomb friction coefficient of the contact [-]")
-    Fz: Positive = Field(description="Mean normal force [N]")
-    k: Annotated[Stiffness, _POSITIVE] = Field(
+    mu0: Friction = Field(description="Coulomb friction coefficient of the contact [-]")
+    Fz: Force = Field(description="Mean normal force [N]")
+    k: Stiffness = Field(
         description="Tangential stiffness of the contact [N/m]; a rigid contact is the limit of a "
         "large one"
     )
-    omega: Annotated[NotNegative, _POSITIVE] | None = optional(
+    omega: Annotated[AngularFrequency, _POSITIVE] | None = optional(
         "Angular frequency of the period [rad/s]; omega or f is required"
     )
-    f: Annotated[Hertz, _POSITIVE] | None = optional(
+    f: Annotated[Frequency, _POSITIVE] | None = optional(
         "Frequency of the period [Hz], in place of omega"
     )
-    v0: NotNegative = Field(description="Speed of the drag along x [m/s]")
+    v0: Speed = Field(description="Speed of the drag along x [m/s]")
     x: _Oscillation | None = optional(f"Oscillation along the drag [m]: {_FORMS}")
     y: _Oscillation | None = optional(f"Oscillation across it [m]: {_FORMS}")
     normal: _Oscillation | None = optional(

@@ -3,39 +3,38 @@
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, WithJsonSchema, WrapValidator, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from mumacro.errors import InputError
 from mumacro.inputs.kind import ContactName, DirectionName, Kind, kind_of
 from mumacro.outputs import OUTPUTS
 
+from ..understood import UNDERSTOOD
 from .inputs import (
     ALTERNATIVES,
     EXAMPLE,
-    OR_RIGID,
     CaseInputs,
     ContactColumn,
     DeviationColumn,
     DirectionColumn,
-    Hertz,
     InputColumns,
-    NotNegative,
     OneCase,
-    Positive,
     Strict,
     either,
     optional,
-    rigid_or,
 )
+from .values import Deviation, Positive
 
 MODEL = "model"  # for one case only
+_BESIDE = (MODEL, UNDERSTOOD)  # what the library does not compute
 if TYPE_CHECKING:
     Include = str
 else:
-    Include = Literal[(*OUTPUTS, MODEL)]
+    Include = Literal[(*OUTPUTS, *_BESIDE)]
 _INCLUDE = (
     "More to compute: groups (v~, y~, l0), limits (of the friction law), gradient, std (standard "
-    "deviation), stick_fraction, power, settling, and for one case model (what it leaves out here)"
+    "deviation), stick_fraction, power, settling, and for one case model (what it leaves out here) "
+    "and inputs (what was understood of them)"
 )
 _CONTACT = "One spring of stiffness k, or a ball on a flat (Hertz) whose stiffness before slip is k"
 _DIRECTION = (
@@ -71,14 +70,14 @@ class Choice(Strict):
 class InputStd(Strict):
     """Standard deviations of the inputs, in their units; independent errors are assumed."""
 
-    mu0: NotNegative = Field(0.0, description="[-]")
-    Fz: NotNegative = Field(0.0, description="[N]")
-    k: NotNegative = Field(0.0, description="[N/m]")
-    y0: NotNegative = Field(0.0, description="[m]")
-    omega: NotNegative = Field(0.0, description="[rad/s]; or f")
-    f: Hertz = Field(0.0, description="[Hz], in place of omega")
-    v0: NotNegative = Field(0.0, description="[m/s]")
-    Fz_amplitude: NotNegative = Field(0.0, description="[N], for direction normal")
+    mu0: Deviation = Field(0.0, description="[-]")
+    Fz: Deviation = Field(0.0, description="[N]")
+    k: Deviation = Field(0.0, description="[N/m]")
+    y0: Deviation = Field(0.0, description="[m]")
+    omega: Deviation = Field(0.0, description="[rad/s]; or f")
+    f: Deviation = Field(0.0, description="[Hz], in place of omega")
+    v0: Deviation = Field(0.0, description="[m/s]")
+    Fz_amplitude: Deviation = Field(0.0, description="[N], for direction normal")
 
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
@@ -123,7 +122,7 @@ class Outputs(Strict):
     @property
     def outputs(self) -> tuple[str, ...]:
         """The names that the library knows."""
-        return tuple(name for name in self.include or () if name != MODEL)
+        return tuple(name for name in self.include or () if name not in _BESIDE)
 
     @property
     def model(self) -> bool:
@@ -196,14 +195,14 @@ class CaseColumns(Outputs, InputColumns):
 class Deviations(Strict):
     """The members of ``std``, each as a parameter of its own."""
 
-    std_mu0: NotNegative | None = optional("Standard deviation [-]")
-    std_Fz: NotNegative | None = optional("Standard deviation [N]")
-    std_k: NotNegative | None = optional("Standard deviation [N/m]")
-    std_y0: NotNegative | None = optional("Standard deviation [m]")
-    std_omega: NotNegative | None = optional("Standard deviation [rad/s]")
-    std_f: Hertz | None = optional("Standard deviation [Hz]")
-    std_v0: NotNegative | None = optional("Standard deviation [m/s]")
-    std_Fz_amplitude: NotNegative | None = optional("Standard deviation [N]")
+    std_mu0: Deviation | None = optional("Standard deviation [-]")
+    std_Fz: Deviation | None = optional("Standard deviation [N]")
+    std_k: Deviation | None = optional("Standard deviation [N/m]")
+    std_y0: Deviation | None = optional("Standard deviation [m]")
+    std_omega: Deviation | None = optional("Standard deviation [rad/s]")
+    std_f: Deviation | None = optional("Standard deviation [Hz]")
+    std_v0: Deviation | None = optional("Standard deviation [m/s]")
+    std_Fz_amplitude: Deviation | None = optional("Standard deviation [N]")
 
     @property
     def deviations(self) -> dict[str, Any]:
@@ -236,46 +235,11 @@ class BatchOptions(Deviations, Outputs):
         return given
 
 
-def _interval_or(value: Any, stiffness: Any) -> Any:
-    """Two ends for low..high, which the request has taken apart; any other value is one k."""
-    if isinstance(value, tuple):
-        return tuple(stiffness(end) for end in value)
-    return stiffness(value)
-
-
-_NUMBER = r"[0-9]{1,9}(\.[0-9]{1,9})?([eE][+-]?[0-9]{1,2})?"
-_INTERVAL = {"type": "string", "pattern": rf"^{_NUMBER}\.\.{_NUMBER}$"}
-#: one k, the word rigid, or low..high
-QueryStiffness = Annotated[
-    Positive,
-    WrapValidator(rigid_or),
-    WrapValidator(_interval_or),
-    WithJsonSchema({"anyOf": [*OR_RIGID, _INTERVAL], "examples": [1e6]}),
-]
-
-
 class CaseQuery(QueryOptions, OneCase):
     """One case and the options of its answer."""
-
-    k: QueryStiffness = either(
-        'Tangential stiffness of the contact [N/m], "rigid", or low..high; required',
-        examples=[1e6],
-    )
-
-    @property
-    def inputs(self) -> dict[str, Any]:
-        """Those that are given, by name; two ends are an interval of k."""
-        return with_interval(super().inputs)
 
 
 class TextQuery(CaseQuery):
     """One case and the value that is wanted of its answer."""
 
     value: str = Field("mu_macro", description="Such as mu_macro, regime or power.saved")
-
-
-def with_interval(inputs: dict[str, Any]) -> dict[str, Any]:
-    """Two ends in k as k_range."""
-    if isinstance(inputs.get("k"), tuple):
-        inputs["k_range"] = inputs.pop("k")
-    return inputs

@@ -1,7 +1,6 @@
 """The bodies and queries of the questions: friction law, inverse problem, stiffness, fit."""
 
 import math
-import sys
 from base64 import b64decode
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -14,17 +13,16 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
-    WrapValidator,
     model_validator,
 )
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import InitErrorDetails
 
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import STIFFNESS, is_rigid
+from mumacro.inputs.fields import QUANTITY_OF, STIFFNESS
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
-from mumacro.inputs.old_texts import number_hint
+from mumacro.inputs.reading import no_number, read_one, reason_of
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.text_tables import SEPARATORS, Dialect
 
@@ -33,15 +31,13 @@ from .inputs import (
     NOT_BOTH,
     OR_RIGID,
     Name,
-    NotNegative,
     OtherInputs,
     Pair,
-    Positive,
     Strict,
     optional,
-    rigid_or,
 )
-from .options import Choice, Options, QueryOptions, QueryStiffness, with_interval
+from .options import Choice, Options, QueryOptions
+from .values import End, Length, Load, Modulus, NotNegative, fault
 
 MAX_VALUES = 10_001  # of a law
 MAX_TARGETS = 10_000
@@ -64,13 +60,19 @@ class Sweep(Strict):
     """The values of a law."""
 
     along: Name = Field("v0", description="The swept input, which is left out of the case")
-    start: NotNegative = Field(
-        description="First value [SI]; > 0 on a logarithmic scale", examples=[1e-4]
+    start: End = Field(
+        description="First value [SI], or with a unit; > 0 on a logarithmic scale", examples=[1e-4]
     )
-    stop: Positive = Field(description="Last value [SI], > start", examples=[10.0])
+    stop: End = Field(description="Last value [SI], or with a unit; > start", examples=[10.0])
     points: _Whole = Field(201, description="Number of values")
     scale: Literal["log", "linear"] = Field("log", description="Spacing of the values")
     stiffness_exponent: _Exponent | None = optional(_EXPONENT)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Both ends in the SI unit of the swept input."""
+        quantity = QUANTITY_OF[self.along]
+        return read_one("start", self.start, quantity), read_one("stop", self.stop, quantity)
 
 
 _five = {name: value for name, value in EXAMPLE.items() if name != "v0"}
@@ -92,17 +94,6 @@ class LawRequest(Options, Sweep, OtherInputs):
 
 class LawQuery(QueryOptions, Sweep, OtherInputs):
     """mu_macro over a range of one input."""
-
-    k: QueryStiffness | None = optional(
-        'Tangential stiffness of the contact [N/m], "rigid", or low..high; required, '
-        "unless it is swept",
-        examples=[1e6],
-    )
-
-    @property
-    def inputs(self) -> dict[str, Any]:
-        """Those that are given, by name; two ends are an interval of k."""
-        return with_interval(super().inputs)
 
 
 class SolveForRequest(Options, OtherInputs):
@@ -139,15 +130,14 @@ class SolveForRequest(Options, OtherInputs):
         "mu_macro",
         description="What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)",
     )
-    range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = optional(
-        "Where to search [SI], ascending; left out: wherever it changes mu_macro"
+    range: Annotated[list[End], Field(min_length=2, max_length=2)] | None = optional(
+        "Where to search [SI], or with units, ascending; left out: wherever it changes mu_macro"
     )
     stiffness_exponent: _Exponent | None = optional(_EXPONENT)
 
 
 # --- stiffness ------------------------------------------------------------------------------------
 
-_Modulus = Annotated[Positive, WrapValidator(rigid_or), WithJsonSchema({"anyOf": OR_RIGID})]
 _Poisson = Annotated[float, Field(gt=-1, le=0.5, allow_inf_nan=False)]
 if TYPE_CHECKING:
     _Geometry = str
@@ -166,15 +156,15 @@ class StiffnessRequest(Strict):
     )
 
     geometry: _Geometry = Field(description=_GEOMETRIES)
-    radius: Positive | None = optional("Radius of the ball, pin or cylinder [m]")
-    length: Positive | None = optional("Length of the cylinder [m]; of: cylinder")
-    Fz: Positive | None = optional("Normal force [N]")
+    radius: Length | None = optional("Radius of the ball, pin or cylinder [m]")
+    length: Length | None = optional("Length of the cylinder [m]; of: cylinder")
+    Fz: Load | None = optional("Normal force [N]")
     oscillation: Literal["across", "along"] | None = optional(
         "To the axis of the cylinder; of: cylinder"
     )
-    E: _Modulus = Field(description='Young\'s modulus of the first body [Pa], or "rigid"')
+    E: Modulus = Field(description='Young\'s modulus of the first body [Pa], or "rigid"')
     nu: _Poisson = Field(description="Poisson's ratio of the first body [-]")
-    E2: _Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
+    E2: Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
     nu2: _Poisson | None = optional("Of the second body [-]")
 
 
@@ -182,24 +172,34 @@ class StiffnessRequest(Strict):
 
 
 def _of_points(value: Any, info: ValidationInfo) -> Any:
-    """A number, or an array of numbers, as an array; the word rigid in k is infinite."""
+    """A number or a text, or an array of them, as an array in SI; the word rigid in k is
+    infinite."""
     name = info.field_name or ""
-    if name == "k" and isinstance(value, str) and is_rigid(value):
-        return math.inf
     entries = value if isinstance(value, list) else [value]
     if len(entries) > MAX_POINTS:
-        reason = f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them"
-        raise PydanticCustomError("input", "{reason}", {"reason": reason})
+        raise fault(f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them")
+    numbers = np.empty(len(entries))
     for i, entry in enumerate(entries):
-        if type(entry) not in (int, float) or not abs(entry) <= sys.float_info.max:
-            real = type(entry) in (int, float)
-            reason = "must be finite" if real else number_hint(name, entry)
-            fault = PydanticCustomError("input", "{reason}", {"reason": reason})
+        number, reason = _of_point(name, entry)
+        if reason is not None:
             place = (i,) if isinstance(value, list) else ()
             raise ValidationError.from_exception_data(
-                name, [InitErrorDetails(type=fault, loc=place, input=entry)]
+                name, [InitErrorDetails(type=fault(reason), loc=place, input=entry)]
             )
-    return np.array(value, np.float64)
+        numbers[i] = number
+    return numbers if isinstance(value, list) else numbers[0]
+
+
+def _of_point(name: str, value: Any) -> tuple[float, str | None]:
+    """One number in SI, or the reason why it is none."""
+    if type(value) not in (int, float, str):
+        return math.nan, no_number(name, value)
+    try:
+        number = read_one(name, value)
+    except InputError as error:
+        return math.nan, reason_of(error.bound)
+    rigid = name == "k" and type(value) is str
+    return number, None if math.isfinite(number) or rigid else "must be finite"
 
 
 _LISTED = {

@@ -14,7 +14,9 @@ from mumacro.validity import digits, k_effect, model_rows
 
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
+from ..problems import of_input
 from ..reading import DirectRoute, Json, dump
+from ..understood import UNDERSTOOD, understood
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
@@ -37,16 +39,22 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     """The answer to a case."""
     state, inputs = request.app.state, case.inputs
     table = state.tables.pick(case.tolerance)
-    if case.model_fields_set <= _PLAIN and _INTERVAL.isdisjoint(inputs):
-        answer = table.surrogate.evaluate(**inputs)
-        members, source = answer.to_dict(), answer.source_code
-    else:
-        work = partial(_answer_more, table.surrogate, case, inputs)
-        each = cost(case.outputs, (case.kind,), not _INTERVAL.isdisjoint(inputs))
-        large = case.model or each > _LARGE
-        members, source = await state.work.question(work) if large else work()
+    more: dict[str, Any] = {}
+    if case.include and UNDERSTOOD in case.include:
+        more = {UNDERSTOOD: understood(case.model_dump())}
+    try:
+        if case.model_fields_set <= _PLAIN and _INTERVAL.isdisjoint(inputs):
+            answer = table.surrogate.evaluate(**inputs)
+            members, source = answer.to_dict(), answer.source_code
+        else:
+            work = partial(_answer_more, table.surrogate, case, inputs)
+            each = cost(case.outputs, (case.kind,), not _INTERVAL.isdisjoint(inputs))
+            large = case.model or each > _LARGE
+            members, source = await state.work.question(work) if large else work()
+    except InputError as error:
+        raise of_input(error, **more) from None
     state.metrics.case(table, source)
-    return {**members, **table.signature}
+    return {**members, **more, **table.signature}
 
 
 def _answer_more(

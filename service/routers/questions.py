@@ -16,7 +16,7 @@ from mumacro.analysis.stiffening import Stiffening
 from mumacro.answer import Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named
-from mumacro.inputs.fields import field_of, unit_of
+from mumacro.inputs.fields import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
@@ -39,13 +39,13 @@ router = router_of("answers", StrictRoute)
 
 def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
     """The library's law and all columns beside the swept input."""
-    case, (along, per) = question.inputs, field_of(question.along)
+    case, along, (start, stop) = question.inputs, question.along, question.ends
     _refuse_model(question)
     law = mumacro.law(
         table.surrogate,
         along,
-        start=question.start * per,
-        stop=question.stop * per,
+        start=start,
+        stop=stop,
         points=question.points,
         scale=question.scale,
         stiffness_exponent=question.stiffness_exponent,
@@ -100,9 +100,9 @@ async def post_law(question: LawRequest, tables: Loaded, work: Working) -> Respo
     def answer() -> Response:
         table = tables.pick(question.tolerance)
         law, columns = _law(question, table)
-        along, per = question.along, field_of(question.along)[1]
-        swept = {"along": along, "unit": unit_of(along), "values": law.values / per}
-        border = [{"value": mark.value / per, "mu_macro": mark.mu_macro} for mark in law.border]
+        along = question.along
+        swept = {"along": along, "unit": unit_of(along), "values": law.values}
+        border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in law.border]
         remarks = _remarks_on(question, along, question.inputs, law.stiffening)
         return Json({**swept, **nested(columns), "border": border, **remarks, **table.signature})
 
@@ -126,8 +126,8 @@ async def get_law_csv(
 
     def answer() -> Response:
         law, columns = _law(question, tables.pick(question.tolerance))
-        along, per = question.along, field_of(question.along)[1]
-        heads = {f"{along} [{unit_of(along)}]": (law.values / per).tolist()}
+        along = question.along
+        heads = {f"{along} [{unit_of(along)}]": law.values.tolist()}
         for path in sorted(columns, key=lambda path: path in _TEXTS):  # texts last
             shown = ["" if value != value else value for value in columns[path]]
             heads[path if path in _TEXTS else f"{path} [{unit_at(path)}]"] = shown
@@ -175,14 +175,14 @@ async def post_solve_for(question: SolveForRequest, tables: Loaded, work: Workin
 def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     table, case = tables.pick(question.tolerance), question.inputs
     _refuse_model(question)
-    name, per = field_of(question.unknown)
+    name = question.unknown
     unit = 1.0
     if question.quantity == "mu_ratio":
         if question.unknown == "mu0" or question.mu0 is None:
             bound = "mu_macro where mu0 is the unknown or is left out"
             raise InputError("quantity", question.quantity, bound)
         unit = question.mu0
-    within = None if question.range is None else (question.range[0] * per, question.range[1] * per)
+    within = None if question.range is None else (question.range[0], question.range[1])
     solution = mumacro.solve_for(
         table.surrogate,
         name,
@@ -195,11 +195,11 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     included = _included(question, table, name, solution)
     answer: dict[str, Any] = {"unknown": question.unknown, "unit": unit_of(question.unknown)}
     answer["quantity"] = question.quantity
-    answer |= _results(question, solution, included, unit, per)
+    answer |= _results(question, solution, included, unit)
     if solution.ends:
         ks = case.get("k_range") or (case["k_low"], case["k_high"])
         answer["ends"] = [
-            {"k": k, **_results(question, end, None, unit, per)}
+            {"k": k, **_results(question, end, None, unit)}
             for k, end in zip(ks, solution.ends, strict=True)
         ]
     answer |= _remarks_on(question, name, case, solution.stiffening)
@@ -211,18 +211,13 @@ def _results(
     solution: Solution,
     included: list[dict[str, Any]] | None,
     unit: float,
-    per: float,
 ) -> dict[str, Any]:
     """The roots of every target, what was searched, and what is reachable there."""
     reach, more = solution.reach, itertools.repeat({}) if included is None else iter(included)
     results: list[dict[str, Any]] = []
     for target, roots in zip(question.target, solution.roots, strict=True):
-        in_unit = [
-            root._replace(value=root.value / per, low=root.low / per, high=root.high / per)
-            for root in roots
-        ]
         results.append(
-            {"target": target, "roots": [{**root._asdict(), **next(more)} for root in in_unit]}
+            {"target": target, "roots": [{**root._asdict(), **next(more)} for root in roots]}
         )
         if not roots:
             results[-1]["reason"] = _reason(question, target, solution, unit)
@@ -232,7 +227,7 @@ def _results(
         "min_included": reach.min_included,
         "max_included": reach.max_included,
     }
-    searched = [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per]
+    searched = [reach.low, None if reach.high > _NO_LIMIT else reach.high]
     return {"results": results, "range": searched, "reachable": reachable}
 
 

@@ -9,7 +9,8 @@ from mumacro.errors import TableError
 
 from .. import __version__
 from ..models.answers import TableAnswer
-from ..models.inputs import Positive, Strict
+from ..models.inputs import Strict
+from ..models.values import Positive
 from ..reading import Json, StrictRoute
 from ..tables import Loaded
 from . import GET_PROBLEMS, file_answer, problems, router_of

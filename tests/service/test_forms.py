@@ -9,7 +9,6 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mumacro.inputs.kind import SPRING
 from service import forms
 from service.problems import RequestError
 from tests.support.serving import CASE
@@ -40,7 +39,7 @@ def outcome(text: str, step: int) -> Any:
     """What is read of a body in slices of so many bytes; None where it is refused."""
     with patch.object(forms, "_READ", step):
         try:
-            body = forms.read(bytearray(text.encode()), 1000, SPRING)
+            body = forms.read(bytearray(text.encode()), 1000, {})
         except RequestError:
             return None
     return {name: plain(value) for name, value in body.members.items()}

@@ -51,6 +51,24 @@ def ordinary(n: int, seed: int, normal: bool = False) -> tuple[Array, Array]:
     return v[below][:n], y[below][:n]
 
 
+def beside_lines(n: int, seed: int, contact: str, normal: bool) -> tuple[Array, Array]:
+    """Beside the lines where a formula ends: v~ = y~, and along that from which a spring slips
+    backwards, of a ball its middle one."""
+    rng = np.random.default_rng(seed)
+    apart = 10.0 ** rng.uniform(-13.0, -1.0, n)
+    y = 10.0 ** rng.uniform(-4.0, 0.0 if normal else 4.0, n)
+    v = y * (1.0 - apart)
+    if not normal:
+        x = np.where(rng.random(n) < 0.5, 10.0 ** rng.uniform(-6.0, 0.0, n), rng.random(n))
+        back = np.sqrt((1.0 - x) * (1.0 + x)) - x * np.arccos(x)
+        line = (1.5 if contact == "ball" else 1.0) / np.maximum(back, 1e-9)
+        reversing = rng.random(n) < 0.7
+        y = np.where(reversing, line * (1.0 + rng.choice([-1.0, 1.0], n) * apart), y)
+        v = np.where(reversing, x * y, v)
+    below = (v < y) & (y < (1.0 if normal else 1e9))
+    return v[below], y[below]
+
+
 def hard(n: int, seed: int) -> tuple[Array, Array]:
     """The points at which such rules err most, where the reference has digits to spare."""
     v, y = hard_points(n, along=True, seed=seed)

@@ -6,11 +6,25 @@ anywhere; beside a seam along both; and beside a crossing of two seams at distan
 size, which is where a strip along one seam ends at another.
 """
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from builder.tables.contacts import SolvedContact
-from mumacro.table.atlas import BORDER_PIECES, STEEPEST, Axis, Chart
+from builder.tables.verify import BESIDE_BORDER, Neighbours
+from mumacro import Surrogate
+from mumacro.inputs.kind import BALL, Kind
+from mumacro.table.atlas import (
+    BORDER_PIECES,
+    CHARTS_OF,
+    MIDDLE,
+    QUANTITY_NAMES,
+    STEEPEST,
+    Axis,
+    Chart,
+    Quantity,
+)
 from mumacro.table.blocks import Block, BorderPiece
 from mumacro.table.polynomials import Border
 
@@ -106,15 +120,17 @@ def slopes_across_rays(of: SolvedContact, v: Array, y: Array, crit: Array) -> tu
     """
     root = np.sqrt(np.maximum(1.0 - v / (STEEPEST * y), 0.0))
     # not beyond the border, where it is smooth no longer
-    way = np.minimum(WAY, 0.35 * np.sqrt(np.maximum(1.0 - crit / (STEEPEST * y), 1e-300)))
+    way = np.minimum(WAY, 0.35 * np.sqrt(np.maximum(1.0 - crit / (STEEPEST * y), 0.0)))
+    here = np.flatnonzero((root > 0.0) & (root < way) & (v > crit))
+    slopes, noise = np.zeros((2, v.size)), np.full((2, v.size), np.inf)
+    v, y, root, way = v[here], y[here], root[here], way[here]
     ray = STEEPEST * (1.0 - (way[:, None] * NODES) ** 2)
     lines = (ray * y[:, None], y[:, None]), (v[:, None], v[:, None] / ray)
-    usable = (root > 0.0) & (root < way) & (v > crit)
-    slopes, noise = np.empty((2, v.size)), np.full((2, v.size), np.inf)
-    for row, (line_v, line_y) in enumerate(lines):
+    for row, (line_v, line_y) in enumerate(lines if here.size else ()):
         at_v, at_y = np.broadcast_arrays(line_v, line_y)
         solved = of.solve(at_v, at_y)
-        each = of.noise("mu_ratio", at_v, at_y, solved, False).max(axis=1)
+        each = of.noise("mu_ratio", at_v, at_y, solved, False).max(axis=1) + 4e-16  # of the sum
+        level = solved["mu_ratio"][:, :1]  # which the weights cancel to their own digits only
         found = []
         for degree in (DEGREE, DEGREE - 1):
             powers = np.array([0, *range(2, degree + 1)])
@@ -122,8 +138,87 @@ def slopes_across_rays(of: SolvedContact, v: Array, y: Array, crit: Array) -> tu
             # d/d ln t = -t/(2 root) d/d root, over the way
             rise = powers * (root / way)[:, None] ** np.maximum(powers - 2, 0)
             share = (-0.5 * (1.0 - root * root) / way**2)[:, None] * (rise @ fit)
-            found.append((share * solved["mu_ratio"]).sum(axis=1))
-        slopes[row] = found[0] if row == 0 else -found[0]
-        unsure = 2.0 * np.abs(share).sum(axis=1) * each + np.abs(found[0] - found[1])
-        noise[row, usable] = unsure[usable]
+            found.append((share * (solved["mu_ratio"] - level)).sum(axis=1))
+        slopes[row, here] = found[0] if row == 0 else -found[0]
+        amplified = 2.0 * np.abs(share).sum(axis=1) * each
+        noise[row, here] = amplified + np.abs(found[0] - found[1])
     return slopes, noise
+
+
+# --- both sides of every seam of a table ----------------------------------------------------------
+
+ON_LINE = 1e-9  # of v~: differences beside the border or the steepest ray have no step
+
+
+def beside_every_seam(
+    table: Surrogate, kind: Kind, n: int, seed: int = 0
+) -> Iterator[tuple[str, Array, Array]]:
+    """Name of the block, v~ and y~, about ``n`` for each block of a contact; then for the border.
+
+    Of a ball v~ and y~ are those of its middle spring, to the last digit as evaluation has them.
+    """
+    blocks = table.table.ball if kind == BALL else table.table.blocks
+    for index, (chart, block) in enumerate(zip(CHARTS_OF[kind.contact], blocks, strict=True)):
+        rng = np.random.default_rng([seed, kind.contact, index])
+        yield chart.name, *_asked(kind, *beside_seams(rng, chart, block, table.border, n))
+    rng = np.random.default_rng([seed, kind.contact, len(blocks)])
+    drawn = beside_border_seams(rng, table.table.border, table.border, n)
+    yield "border", *_asked(kind, *drawn)
+
+
+def _asked(kind: Kind, v: Array, y: Array) -> tuple[Array, Array]:
+    return (MIDDLE * v / MIDDLE, MIDDLE * y / MIDDLE) if kind == BALL else (v, y)
+
+
+def with_slopes(table: Surrogate, quantity: Quantity, v: Array, y: Array) -> NDArray[np.bool_]:
+    """Where slopes are compared: of what is not smooth at the border, away from it."""
+    if quantity.smooth_at_border:
+        return np.full(v.shape, True)
+    return np.asarray(np.abs(v / table.v_tilde_crit(y) - 1.0) > BESIDE_BORDER)
+
+
+def by_its_values(table: Surrogate, of: SolvedContact) -> SolvedContact:
+    """The contact as the values of a table have it, which may be wrong by their bounds."""
+
+    def solve(
+        v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
+    ) -> dict[str, Array]:
+        del eta, continuous
+        v, y = np.broadcast_arrays(v, y)
+        solved = {}
+        for name in QUANTITY_NAMES:
+            value, bound, _ = of.quantity(table, name, v.ravel(), y.ravel())
+            solved[name], solved[f"bound of {name}"] = (
+                value.reshape(v.shape),
+                bound.reshape(v.shape),
+            )
+        return solved
+
+    def noise(
+        name: str, v: Array, y: Array, solved: dict[str, Array], sliding: NDArray[np.bool_] | bool
+    ) -> Array:
+        del v, y, sliding
+        return solved[f"bound of {name}"]
+
+    return of._replace(solve=solve, noise=noise)
+
+
+def off_the_lines(table: Surrogate, v: Array, y: Array) -> NDArray[np.bool_]:
+    """Where differences have a step: beside border and steepest ray, not on them."""
+    lines = np.array([STEEPEST * y, table.v_tilde_crit(y)])
+    return np.asarray((np.abs(v / lines - 1.0) > ON_LINE).all(axis=0))
+
+
+def true_slopes(
+    table: Surrogate, of: SolvedContact, names: Sequence[str], v: Array, y: Array
+) -> Iterator[tuple[str, Array, Array]]:
+    """Name, slopes (2, n) and what they may be wrong by of some quantities, from solves around the
+    points; beside the steepest ray of a ball by a polynomial in its root."""
+    around = Neighbours(table, of, v, y)
+    for name in names:
+        slopes, noise = around.slopes(name)
+        if of.kind == BALL:
+            across, unsure = slopes_across_rays(of, v, y, around.crit)
+            better = unsure < noise
+            slopes, noise = np.where(better, across, slopes), np.where(better, unsure, noise)
+        yield name, slopes, noise

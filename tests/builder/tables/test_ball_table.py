@@ -16,9 +16,10 @@ from builder.tables.build import BuildError, springs_for
 from builder.tables.contacts import BALL_NOISE, SolvedContact, ball, ratio_of
 from builder.tables.measure import block_errors
 from builder.tables.verify import BALL_CASES, Neighbours, seam_jumps
-from mumacro import InputError, Surrogate, closed_forms, surrogate
+from mumacro import InputError, Surrogate, closed_forms
 from mumacro.inputs.kind import BALL
 from mumacro.kernel.binding import kernels
+from mumacro.table import bundled
 from mumacro.table.atlas import BALL_CHARTS, MIDDLE, QUANTITY_NAMES, SLOW, STEEPEST, STEEPEST_Y
 from mumacro.table.netcdf import read_table, write_table
 from tests.support.cases import Array, opened
@@ -66,12 +67,12 @@ def test_springs_that_the_solver_does_not_give_are_refused(
     with pytest.raises(BuildError, match=r"this table is not what the solver gives now"):
         springs_for(table, sweep)
     write_table(table, path)
-    monkeypatch.setattr(surrogate, "bundled_tables", lambda: [path])
+    monkeypatch.setattr(bundled, "bundled_tables", lambda: [path])
     coarse = opened(1e-4).table
     with pytest.raises(BuildError, match=r"not what the solver gives now; .* --tolerance 1e-12"):
         springs_for(coarse, sweep)
     for left in ([], [TABLES / "mumacro-1e-7.nc"]):
-        monkeypatch.setattr(surrogate, "bundled_tables", lambda left=left: left)
+        monkeypatch.setattr(bundled, "bundled_tables", lambda left=left: left)
         with pytest.raises(BuildError, match=r"table.*; a ball .* first: .* --tolerance 1e-12"):
             springs_for(coarse, sweep)
 
@@ -338,7 +339,7 @@ def test_plain_numbers_answer_as_arrays_do() -> None:
         assert (alone.source_code, alone.regime) == (many.source_code[i], many.regime[i])
         assert alone.gradient == {name: x[i] for name, x in many.gradient.items()}
         assert alone.regime_certain == many.regime_certain[i]
-        assert alone._border(2.0) == table.v_tilde_crit(2.0, contact="ball")
+        assert alone._border()(2.0) == table.v_tilde_crit(2.0, contact="ball")
 
 
 @pytest.mark.parametrize(("name", "value"), [("mu0", -0.3), ("v0", math.nan), ("k", 0.0)])

@@ -38,7 +38,7 @@ def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any)
     batch = pa.RecordBatch.from_pylist([dict(zip(NAMES, row, strict=True)) for row in rows])
     answers, rejects = answer(batch, surrogate, include=["gradient"])
     assert answers.num_rows == len(rows)
-    slopes = {name: answers.column(f"d_mu_macro_d_{name}").to_pylist() for name in NAMES}
+    slopes = {name: answers.column(f"gradient.{name}").to_pylist() for name in NAMES}
     bad = {reject["row"]: reject["field"] for reject in rejects.to_pylist()}
     for i, (row, row_answer) in enumerate(
         zip(rows, answers.select(list(ANSWERS)).to_pylist(), strict=True)

@@ -498,7 +498,9 @@ def test_files_know_contact_and_ends_of_k(
         *(["mu_macro_low", "mu_macro_high"] if "k_low" in inputs else []),
         *ANSWERS[1:],
     ]
-    slopes = [f"d_mu_macro_d_{field}" for field in expected.gradient]
+    slopes = [
+        f"{name}.{field}" for name in ("gradient", "gradient_bound") for field in expected.gradient
+    ]
     assert list(written[0]) == [*inputs, *names, *slopes]
     for column in names:
         read_back = [
@@ -506,4 +508,4 @@ def test_files_know_contact_and_ends_of_k(
         ]
         assert read_back == getattr(expected, column).tolist()
     for field, slope in expected.gradient.items():
-        assert [float(row[f"d_mu_macro_d_{field}"]) for row in written] == slope.tolist()
+        assert [float(row[f"gradient.{field}"]) for row in written] == slope.tolist()

@@ -1,0 +1,111 @@
+"""The types of values: a number in SI, or a text as the library reads it, such as ``"1 N/um"``.
+
+A text is checked here, so that all faults of a request are told at once, and is handed to the
+library as it came: what it says beside its number, a deviation or an interval, is not lost.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationInfo, WithJsonSchema, WrapValidator
+from pydantic_core import PydanticCustomError
+
+from mumacro.errors import InputError
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF
+from mumacro.inputs.reading import read, reason_of
+from mumacro.inputs.units import QUANTITIES
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
+RIGID = {"const": "rigid", "type": "string"}
+
+
+def fault(reason: str) -> PydanticCustomError:
+    """The error of a value, in the words of the library."""
+    return PydanticCustomError("input", "{reason}", {"reason": reason})
+
+
+def _checked(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> Any:
+    """A number as it is, and a text that the library can read."""
+    if type(value) is not str:
+        return number(value)
+    name = (info.field_name or "").removeprefix("std_")
+    try:
+        one = read(name, value)
+    except InputError as error:
+        raise fault(reason_of(error.bound)) from None
+    if not (math.isinf(one.si) and QUANTITY_OF[name] in ("stiffness", "pressure")):
+        number(one.si)
+    return value
+
+
+def _in_si(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> Any:
+    """A number in SI from a number or a text, where deviations and intervals mean nothing."""
+    if type(value) is not str:
+        return number(value)
+    _checked(value, number, info)
+    one = read(info.field_name or "", value)
+    if one.std is not None or one.low is not None:
+        raise fault("must be one number without a deviation")
+    return one.si
+
+
+def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
+    """The JSON Schema of a text, for clients: the library reads more than its pattern."""
+    digits = r"[1-9][0-9]{0,8}" if positive else r"[0-9]{1,9}"
+    known = QUANTITIES[quantity]
+    units = known.such_as.replace(":", ",").replace(";", ",").split(", ")
+    of_unit = f" ?({'|'.join(unit for unit in units if unit in known.units)})"
+    return {"type": "string", "pattern": rf"^{digits}(\.[0-9]{{1,9}})?({of_unit})?$"}
+
+
+def _schema(name: str, positive: bool, example: float | None = None) -> dict[str, Any]:
+    sign = "exclusiveMinimum" if positive else "minimum"
+    number: dict[str, Any] = {"type": "number", sign: 0}
+    if QUANTITY_OF[name] == "frequency":
+        number["maximum"] = MOST_HZ
+    kinds = [number, text_schema(QUANTITY_OF[name], positive)]
+    if QUANTITY_OF[name] in ("stiffness", "pressure") and positive:
+        kinds.append(RIGID)
+    return {"anyOf": kinds, **({} if example is None else {"examples": [example]})}
+
+
+def _is(name: str, positive: bool, example: float | None = None) -> WithJsonSchema:
+    return WithJsonSchema(_schema(name, positive, example))
+
+
+_CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
+# values of inputs: a text stays one
+Friction = Annotated[Positive, _CHECKED, _is("mu0", True, 0.3)]
+Force = Annotated[Positive, _CHECKED, _is("Fz", True, 10.0)]
+Stiffness = Annotated[Positive, _CHECKED, _is("k", True, 1e6)]
+Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False, 2e-6)]
+ForceAmplitude = Annotated[NotNegative, _CHECKED, _is("Fz_amplitude", False)]
+AngularFrequency = Annotated[NotNegative, _CHECKED, _is("omega", False)]
+Frequency = Annotated[Hertz, _CHECKED, _is("f", False, 20e3)]
+Speed = Annotated[NotNegative, _CHECKED, _is("v0", False, 0.01)]
+#: a standard deviation, in the unit of its input
+Deviation = Annotated[
+    NotNegative,
+    _CHECKED,
+    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}),
+]
+#: an end of a range; the library reads a text with the input that it belongs to
+End = Annotated[
+    NotNegative,
+    WrapValidator(lambda value, number: value if type(value) is str else number(value)),
+    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}),
+]
+# other arguments, in SI: a text becomes a number
+Length = Annotated[Positive, _IN_SI, _is("radius", True)]
+Modulus = Annotated[Positive, _IN_SI, _is("E", True)]
+Load = Annotated[Positive, _IN_SI, _is("Fz", True)]
+
+
+def interval_of(k: Any) -> tuple[float, float] | None:
+    """Both ends of an interval of k in a text that was checked."""
+    if type(k) is str and (one := read("k", k)).low is not None:
+        return one.low, one.high
+    return None

@@ -1,0 +1,229 @@
+"""One value of one input is understood or refused by its name, whatever its type."""
+
+import ast
+import decimal
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mumacro import InputError
+from mumacro.inputs.doubts import remarks
+from mumacro.inputs.fields import INPUTS
+from mumacro.inputs.numbers import read_number
+from mumacro.inputs.oscillation import read_oscillation
+from mumacro.inputs.reading import read, read_column
+from mumacro.inputs.units import QUANTITIES, canonical, scale_in
+from tests.support.comparing import close
+
+TYPED = {
+    ("y0", "2um"): 2e-6,
+    ("y0", " 2 µm "): 2e-6,
+    ("y0", "2 μm"): 2e-6,
+    ("y0", "2,5um"): 2.5e-6,
+    ("y0", "1.0D-3"): 1e-3,
+    ("y0", "2×10⁻⁶ m"): 2e-6,
+    ("y0", "10^-6"): 1e-6,
+    ("y0", "1 mil"): 25.4e-6,
+    ("y0", "1 ft"): 0.3048,
+    ("Fz", "1.234,5 N"): 1234.5,
+    ("Fz", "10 000 N"): 1e4,
+    ("Fz", "1 kgf"): 9.80665,
+    ("Fz", "1000 gf"): 9.80665,
+    ("Fz", "5 µN"): 5e-6,
+    ("k", "1N/um"): 1e6,
+    ("k", "1 newton / micrometer"): 1e6,
+    ("k", "1 N mm^-1"): 1e3,
+    ("k", "1 N·mm⁻¹"): 1e3,
+    ("k", "Rigid"): math.inf,
+    ("v0", "10 mm/sec"): 0.01,
+    ("v0", "10 mm s^-1"): 0.01,
+    ("v0", "36 km/h"): 10.0,
+    ("omega", "60 rpm"): 2.0 * math.pi,
+    ("f", "1200 rpm"): 20.0,
+    ("f", "20 kHz"): 2e4,
+    ("mu0", "30 %"): 0.3,
+    ("phase", "90 deg"): 90.0,
+    ("phase", "-1.5707963267948966 rad"): -90.0,
+}
+
+
+@pytest.mark.parametrize(("name", "text"), TYPED)
+def test_a_text_is_read_as_a_person_types_it(name: str, text: str) -> None:
+    value = read(name, text)
+    assert value.si == close(TYPED[name, text], rel=1e-15) or value.si == TYPED[name, text]
+    assert value.text == text
+
+
+DEVIATIONS = {
+    ("k", "1 ± 0.1 N/um"): (1e6, 1e5),
+    ("k", "1N/um+-10%"): (1e6, 1e5),
+    ("k", "1 N/um +/- 100 N/mm"): (1e6, 1e5),
+    ("k", "(1.00 +/- 0.10) newton / micrometer"): (1e6, 1e5),
+    ("mu0", "30 % ± 2 %"): (0.3, 0.02),
+    ("mu0", "0.3 ± 10 %"): (0.3, 0.03),
+}
+
+
+@pytest.mark.parametrize(("name", "text"), DEVIATIONS)
+def test_a_deviation_is_that_of_its_value(name: str, text: str) -> None:
+    value = read(name, text)
+    assert (value.si, value.std) == close(DEVIATIONS[name, text], rel=1e-14)
+
+
+def test_an_interval_has_its_ends_and_their_geometric_middle() -> None:
+    for text in ("0.8..1.2 N/um", "0.8N/um..1200N/mm", "8e5..1.2e6"):
+        value = read("k", text)
+        assert (value.low, value.high) == close((0.8e6, 1.2e6), rel=1e-15)
+        assert value.si == close(math.sqrt(0.8e6 * 1.2e6), rel=1e-15)
+
+
+REFUSED = {
+    "y0": [
+        "2 N",
+        "4umpp",
+        "1,000 um",
+        "1000nm..2000nm",
+        "",
+        "x",
+        "2um,90",
+        "1..2",
+        "5 g",
+        "2 um rms",
+    ],
+    "Fz": ["100 g", "10 N/m", "1,000"],
+    "k": ["rigid ± 1", "0.8..1.2 ± 0.1", "2..1", "1e999", "0.8-1.2N/um", "soft", "1 ± -0.1"],
+    "omega": ["20 kHz"],
+    "f": ["20 rad/s", "20 khz", "20 mhz"],
+    "v0": ["1200 rpm", "10 m"],
+    "mu0": ["0_3", "0x1"],
+}
+
+
+@pytest.mark.parametrize(("name", "text"), [(n, t) for n, ts in REFUSED.items() for t in ts])
+def test_what_is_not_understood_is_refused_by_its_name(name: str, text: str) -> None:
+    with pytest.raises(InputError) as refused:
+        read(name, text)
+    assert refused.value.field == name
+    assert refused.value.value == text
+
+
+#: what is typed -> what its refusal says to give, and the value of that
+ADVICE = {
+    ("y0", "4umpp"): 2e-6,
+    ("y0", "4 um p-p"): 2e-6,
+    ("y0", "2 um rms"): math.sqrt(2.0) * 2e-6,
+    ("Fz", "100 g"): 0.980665,
+    ("Fz", "1 kg"): 9.80665,
+    ("f", "20 khz"): 2e4,
+    ("k", "1 n/m"): 1.0,
+    ("k", "0.8-1.2N/um"): math.sqrt(0.8e6 * 1.2e6),
+    ("x", "2um,90"): (1, 2e-6, 90.0),
+}
+
+
+@pytest.mark.parametrize(("name", "text"), ADVICE)
+def test_advice_leads_to_the_right_number(name: str, text: str) -> None:
+    reader: Any = read_oscillation if name == "x" else read
+    with pytest.raises(InputError) as refused:
+        reader(name, text)
+    words = refused.value.bound.replace("?", " ").split()
+    given = next(
+        (words[i + 1] for i, word in enumerate(words) if word in ("give", "as", "mean")), ""
+    ).rstrip(",")
+    if name == "x":
+        assert reader(name, given) == [ADVICE[name, text]]
+    else:
+        assert read(name, given).si == close(ADVICE[name, text], rel=1e-11)
+
+
+def test_thousands_and_decimal_signs_are_read_where_they_are_clear() -> None:
+    for text in ("1,234,567.5", "1.234.567,5", "1 234 567.5", "1'234'567,5"):
+        assert read_number(text) == 1234567.5
+    assert read_number("1.000", ",") == read_number("1,000", ".") == 1000.0
+    with pytest.raises(ValueError, match=r"1000 or 1\.0"):
+        read_number("1,000")
+
+
+@pytest.mark.parametrize("number", [0.1, 1e-300, 12345.678, 1e22, 5e-324])
+def test_a_number_that_python_writes_is_read_to_the_last_bit(number: float) -> None:
+    assert read_number(repr(number)) == number
+    assert read("y0", repr(number)).si == number
+
+
+def test_every_unit_of_the_table_is_read_and_is_its_own_name() -> None:
+    for name, quantity in QUANTITIES.items():
+        for unit, scale in quantity.units.items():
+            assert scale_in(name, unit) == scale
+            if unit not in ("", "1", "-"):
+                assert quantity.units.get(canonical(unit)) == scale
+        assert quantity.units[quantity.unit].si(1.0) == 1.0
+
+
+def test_entries_of_a_column_spoil_only_themselves() -> None:
+    column, reasons = read_column("k", [1e6, "rigid", "0.8..1.2N/um", "1±0.1", "x", None, ""])
+    assert column.si[:2].tolist() == [1e6, math.inf]
+    assert (column.low[2], column.high[2], column.low[0]) == close((0.8e6, 1.2e6, 1e6), rel=1e-15)
+    assert column.std[:4].tolist() == [0.0, 0.0, 0.0, 0.1]
+    assert [*reasons] == [4, 5, 6]
+    assert np.isnan(column.si[4:]).all()
+
+
+@pytest.mark.parametrize(
+    "value", [decimal.Decimal("0.5"), np.float32(0.5), np.ma.array(0.5), [0.5], (0.5,), np.int8(1)]
+)
+def test_numbers_of_any_type_are_numbers(value: Any) -> None:
+    assert np.all(np.asarray(read("mu0", value).si) == float(np.ravel(value)[0]))
+
+
+@pytest.mark.parametrize(
+    "value", [None, 1j, b"1", {}, {1}, [[1], [1, 2]], object(), [1j], np.datetime64("2026-01-01")]
+)
+def test_what_is_no_number_is_refused_by_its_name(value: Any) -> None:
+    with pytest.raises(InputError) as refused:
+        read("y0", value)
+    assert refused.value.field == "y0"
+
+
+def test_every_input_has_an_example_that_is_usual() -> None:
+    for name, field in INPUTS.items():
+        least, most = field.usual
+        assert least <= read(name, field.example).si <= most
+        assert ast.literal_eval(repr(field.example)) == field.example
+
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2e4 * 2.0 * math.pi, "v0": 0.01}
+DOUBTED = {
+    "mu0": (30.0, 1e-4),
+    "Fz": (1e7, 1e-7),
+    "k": (1.0, 1e13, 0.5),
+    "y0": (2.0, 1e-13, 0.03),
+    "omega": (1e-4, 1e10),
+    "v0": (301.0,),
+}
+
+
+@pytest.mark.parametrize(("name", "value"), [(n, v) for n, vs in DOUBTED.items() for v in vs])
+def test_what_is_unusual_is_remarked_on_for_one_case_and_in_columns(
+    name: str, value: float
+) -> None:
+    [one] = remarks({**CASE, name: value})
+    assert (one["row"], one["field"], one["cases"]) == ("units", name, 1)
+    column = np.array([CASE[name], value, math.nan, value])
+    [many] = remarks({**CASE, name: column})
+    assert (many["row"], many["field"], many["cases"]) == ("units", name, 2)
+
+
+def test_usual_cases_zero_and_gaps_are_not_doubted() -> None:
+    assert remarks(CASE) == []
+    for name in ("y0", "omega", "v0"):
+        assert remarks({**CASE, name: 0.0}) == []
+        assert remarks({**CASE, name: np.array([0.0, CASE[name], math.nan])}) == []
+    assert remarks({name: np.zeros(0) for name in CASE}) == []
+
+
+def test_a_rigid_contact_is_told_what_it_assumes() -> None:
+    [remark] = remarks({**CASE, "k": math.inf})
+    assert (remark["row"], remark["field"]) == ("k is known", "k")
+    assert "1.5e+06 N/m" in remark["text"]

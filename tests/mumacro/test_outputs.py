@@ -1,0 +1,271 @@
+"""Outputs by name: the same numbers for one case and for many, for one kind and for several, from
+every entrance; deviations; what a kind does not have."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mumacro import InputError, Surrogate, law, settling, solve_for
+from mumacro.analysis.motion import motion
+from mumacro.contacts.element import Element
+from mumacro.inputs.cases import Cases, named
+from mumacro.inputs.kind import KINDS, Kind
+from mumacro.outputs import MEMBERS, OUTPUTS
+from tests.support.cases import CASE, Case, as_kind, tables, without
+from tests.support.comparing import close
+
+table = tables(1e-10)
+STD: Case = {"mu0": 0.01, "Fz": 0.5, "k": 5e4, "omega": 1e3, "v0": 1e-3}
+N = 40
+
+
+def names_for(kind: Kind) -> list[str]:
+    """The outputs that a kind has, without std."""
+    words = kind.names.values()
+    return [
+        name
+        for name, output in OUTPUTS.items()
+        if name != "std" and not any(word in output.lacks for word in words)
+    ]
+
+
+def draw(kind: Kind, n: int = N) -> Case:
+    """Cases of a kind in columns: of every regime, rigid and at rest among them."""
+    rng = np.random.default_rng(7)
+    _, _, case = as_kind(CASE, (kind.names["contact"], kind.names["direction"]))
+    columns = {name: np.full(n, x) for name, x in case.items()}
+    columns["v0"] = 10.0 ** rng.uniform(-4.0, 1.0, n)
+    columns["k"] *= 10.0 ** rng.uniform(-1.0, 1.0, n)
+    columns["k"][::7] = math.inf
+    columns["v0"][::11] = 0.0
+    columns["omega"][::13] = 0.0
+    return columns
+
+
+def same(one: Any, other: Any) -> bool:
+    return bool(one == other or (one != one and other != other))
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: " ".join(kind.names.values()))
+def test_one_case_has_the_outputs_that_it_has_among_many(table: Surrogate, kind: Kind) -> None:
+    columns, include = draw(kind), names_for(kind)
+    many = table.evaluate(columns, **kind.names, include=include, std={"mu0": 0.01, "v0": 1e-3})
+    assert set(many.outputs) <= {*MEMBERS}
+    for i in range(0, N, 3):
+        case = {name: float(x[i]) for name, x in columns.items()}
+        one = table.evaluate(case, **kind.names, include=include, std={"mu0": 0.01, "v0": 1e-3})
+        assert one.paths == many.paths
+        for path in one.paths:
+            assert same(one[path], many[path][i]) or one[path] == close(
+                many[path][i], rel=1e-12, abs=1e-300
+            ), (path, i)
+        listed = many.to_dict()
+        assert one.to_dict()["mu_macro"] == listed["mu_macro"][i]
+
+
+def test_cases_of_several_kinds_are_answered_in_their_places(table: Surrogate) -> None:
+    parts = [draw(kind, 6) for kind in KINDS]
+    n = 6 * len(KINDS)
+    order = np.random.default_rng(1).permutation(n)
+    columns: Case = {}
+    for name in ("mu0", "Fz", "k", "y0", "Fz_amplitude", "omega", "v0"):
+        gap = np.full(6, math.nan)
+        columns[name] = np.concatenate([part.get(name, gap) for part in parts])[order]
+    for name in ("contact", "direction"):
+        words = np.array([kind.names[name] for kind in KINDS for _ in range(6)], object)
+        columns[name] = words[order]
+    mixed = table.evaluate(columns, include=[name for name in OUTPUTS if name != "std"])
+    for i, (kind, part) in enumerate(zip(KINDS, parts, strict=True)):
+        alone = table.evaluate(part, **kind.names, include=names_for(kind))
+        mine = np.argsort(order)[6 * i : 6 * i + 6]
+        for path in alone.paths:
+            np.testing.assert_array_equal(mixed[path][mine], alone[path], err_msg=path)
+        assert alone.gradient is not None
+        np.testing.assert_array_equal(mixed.gradient["v0"][mine], alone.gradient["v0"])
+        np.testing.assert_array_equal(mixed.regime_certain[mine], alone.regime_certain)
+        for name in OUTPUTS.keys() - {*names_for(kind)}:
+            lacked = [path for path in mixed.paths if path.partition(".")[0] == name]
+            assert all(np.isnan(mixed[path][mine]).all() for path in lacked)
+    said = {(remark["row"], remark["field"]): remark["cases"] for remark in mixed.remarks}
+    assert said["include", "power"] == 6
+    assert said["include", "settling"] == 18
+
+
+def test_a_case_that_does_not_agree_with_its_kind_is_alone_and_told(table: Surrogate) -> None:
+    columns = {
+        **CASE,
+        "contact": ["spring", "cone", "ball", None, "spring"],
+        "direction": ["across", "across", "normal", "across", "normal"],
+        "y0": [2e-6, 2e-6, 2e-6, 2e-6, 2e-6],
+    }
+    answer = table.evaluate(columns, Fz_amplitude=1.0)
+    assert np.isnan(answer.mu_macro).tolist() == [False, True, True, True, True]
+    fields = [answer.cases.reason(i).field for i in range(1, 5)]
+    assert fields == ["contact", "direction", "contact", "y0"]
+    with pytest.raises(InputError) as caught:
+        table.evaluate(columns, Fz_amplitude=1.0, illegal="raise")
+    assert (caught.value.field, caught.value.index) == ("contact", 1)
+    only_across = table.evaluate({**CASE, "direction": ["across", "along"]})
+    assert not np.isnan(only_across.mu_macro).any()
+    with pytest.raises(InputError) as caught:
+        table.evaluate({**CASE, "direction": ["across", "normal"]})
+    assert caught.value.field == "Fz_amplitude"
+
+
+def test_an_amplitude_of_another_direction_is_refused_where_it_has_a_value(
+    table: Surrogate,
+) -> None:
+    with pytest.raises(InputError) as caught:
+        table.evaluate({**CASE, "Fz_amplitude": 3.0})
+    assert caught.value.field == "Fz_amplitude"
+    frame = pd.DataFrame({**CASE, "Fz_amplitude": [math.nan, 3.0]})
+    assert table.evaluate(frame)["mu_macro"].isna().tolist() == [False, True]
+
+
+def test_a_part_of_cases_is_answered_as_the_whole(table: Surrogate) -> None:
+    columns = {**draw(KINDS[0]), "contact": ["ball", "spring"] * (N // 2), "std_k": np.full(N, 1e5)}
+    columns["v0"][5] = -1.0
+    cases = Cases.of(named(None, columns))
+    whole = table.answer(cases, (OUTPUTS["std"], OUTPUTS["power"]))
+    for part in (slice(0, 7), slice(7, N), np.array([3, 30, 5])):
+        answer = table.answer(cases.part(part), (OUTPUTS["std"], OUTPUTS["power"]))
+        for path in whole.paths:
+            np.testing.assert_array_equal(answer[path], whole[path][part])
+    assert cases.reason(5).field == cases.part(slice(5, 6)).reason(0).field == "v0"
+
+
+# --- names ----------------------------------------------------------------------------------------
+
+
+def test_outputs_are_found_by_their_path_or_as_a_whole(table: Surrogate) -> None:
+    answer = table.evaluate(**CASE, include=("power", "groups"))
+    assert answer["power"] == {
+        "oscillation": answer["power.oscillation"],
+        "saved": answer["power.saved"],
+    }
+    assert answer["mu_macro"] == answer.mu_macro
+    assert answer["groups.l0"] == answer.length_scale
+    with pytest.raises(KeyError, match="include"):
+        answer["settling.periods"]
+    assert (
+        [*answer.to_frame()]
+        == answer.paths
+        == [*table.evaluate({**CASE, "v0": [0.01]}, include="groups, power").to_frame()]
+    )
+
+
+@pytest.mark.parametrize("include", ["curvature", ("power", "Groups"), 3, [None]])
+def test_an_unknown_output_is_refused(table: Surrogate, include: Any) -> None:
+    with pytest.raises(InputError) as caught:
+        table.evaluate(**CASE, include=include)
+    assert caught.value.field == "include"
+
+
+def test_an_output_that_no_case_has_is_refused_with_the_reason(table: Surrogate) -> None:
+    ends = without(CASE, "k")
+    for words, case, include in (
+        ({"direction": "along"}, CASE, {"include": ["settling"]}),
+        ({}, {**ends, "k_range": (1e6, 2e6)}, {"std": {"v0": 1e-3}}),
+    ):
+        for v0 in (0.01, [0.01, 0.02]):
+            with pytest.raises(InputError) as caught:
+                table.evaluate({**case, "v0": v0}, **words, **include)
+            assert caught.value.field == "include"
+
+
+# --- deviations -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("k", [CASE["k"], "rigid"])
+def test_a_deviation_implies_std_to_first_order_with_shares(table: Surrogate, k: Any) -> None:
+    answer = table.evaluate(**{**CASE, "k": k}, std=STD, gradient=True)
+    parts = {
+        name: 0.0 if (name, k) == ("k", "rigid") else answer.gradient[name] * x
+        for name, x in STD.items()
+    }
+    assert answer["std"] == close(math.hypot(*parts.values()), rel=1e-12)
+    for name, part in parts.items():
+        assert answer[f"std_share.{name}"] == close((part / answer["std"]) ** 2, rel=1e-12)
+    assert math.fsum(answer["std_share"].values()) == close(1.0, rel=1e-12)
+
+
+def test_deviations_come_in_every_form(table: Surrogate) -> None:
+    expected = table.evaluate(**CASE, std={"k": 1e5})["std"]
+    case = without(CASE, "k")
+    assert table.evaluate(k="1 ± 0.1 N/um", **case)["std"] == close(expected, rel=1e-12)
+    assert table.evaluate(k=["1 ± 0.1 N/um", 1e6], **case)["std"].tolist() == [expected, 0.0]
+    assert table.evaluate({**CASE, "std": {"k": "0.1 N/um"}})["std"] == expected
+    frame = pd.DataFrame({**CASE, "std_k": [1e5, 0.0]})
+    assert table.evaluate(frame)["std"].tolist() == [expected, 0.0]
+    assert table.evaluate(frame.iloc[0])["std"] == expected
+    by_f = table.evaluate(**CASE, std={"f": 1e3 / (2.0 * math.pi)})
+    assert by_f["std"] == close(table.evaluate(**CASE, std={"omega": 1e3})["std"], rel=1e-12)
+    assert table.evaluate(**CASE, std={})["std"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("std", "field"),
+    [
+        ({"k": -1.0}, "std_k"),
+        ({"k": math.nan}, "std_k"),
+        ({"k": "1 m"}, "k"),
+        ({"speed": 1.0}, "std"),
+        ({"Fz_amplitude": 1.0}, "std_Fz_amplitude"),
+        ({"omega": 1.0, "f": 1.0}, "std_f"),
+        (0.1, "std"),
+    ],
+)
+def test_a_bad_deviation_is_refused_by_name(table: Surrogate, std: Any, field: str) -> None:
+    with pytest.raises(InputError) as caught:
+        table.evaluate(**CASE, std=std)
+    assert caught.value.field == field
+
+
+def test_a_bad_deviation_spoils_its_case_alone(table: Surrogate) -> None:
+    answer = table.evaluate({**CASE, "std_k": [1e5, -1.0, math.nan, 0.0]})
+    assert np.isnan(answer["std"]).tolist() == [False, True, True, False]
+    assert answer.source_code.tolist()[1:3] == [-1, -1]
+    assert answer.cases.reason(1).field == "std_k"
+
+
+def test_where_first_order_is_not_enough_is_told_for_one_case(table: Surrogate) -> None:
+    straight = table.evaluate(**CASE, std={"k": 1e4})
+    assert straight.remarks == []
+    bent = table.evaluate(**CASE, std={"k": 6e5, "mu0": 0.01})
+    [remark] = [remark for remark in bent.remarks if remark["row"] == "std"]
+    assert (remark["field"], remark["cases"]) == ("k", 1)
+    up, down = (table.evaluate(**{**CASE, "k": k}).mu_macro for k in (1.6e6, 4e5))
+    slope = table.evaluate(**CASE, gradient=True).gradient["k"] * 6e5
+    off = max(abs(up - bent.mu_macro - slope), abs(down - bent.mu_macro + slope))
+    assert off > 0.2 * bent["std"]
+    [below] = table.evaluate(**CASE, std={"v0": 0.02}).remarks  # v0 one deviation down is negative
+    assert (below["row"], below["field"]) == ("std", "v0")
+
+
+def test_what_computes_no_deviation_refuses_one_by_name(table: Surrogate) -> None:
+    five, doubt = without(CASE, "v0", "mu0"), "0.3 ± 0.1"
+    calls: list[tuple[str, Any]] = [
+        ("mu0", lambda: law(table, start=1e-3, stop=1.0, mu0=doubt, **five)),
+        ("mu0", lambda: solve_for(table, "v0", 0.2, mu0=doubt, **five)),
+        ("mu0", lambda: settling(table, mu0=doubt, v0=0.01, **five)),
+        ("mu0", lambda: motion(mu0=doubt, v0=0.01, y=2e-6, **without(five, "y0"))),
+        ("mu0", lambda: Element(doubt, 10.0, 1e6)),
+        ("std", lambda: law(table, start=1e-3, stop=1.0, mu0=0.3, std={"mu0": 0.1}, **five)),
+        ("std_mu0", lambda: solve_for(table, "v0", 0.2, mu0=0.3, std_mu0=0.1, **five)),
+    ]
+    for field, ask in calls:
+        with pytest.raises(InputError) as caught:
+            ask()
+        assert caught.value.field == field
+
+
+def test_an_interval_and_a_deviation_stand_in_one_column(table: Surrogate) -> None:
+    case = without(CASE, "k")
+    answer = table.evaluate(k=["0.8..1.2 N/um", "1 ± 0.1 N/um", "rigid"], **case)
+    assert np.isnan(answer["std"]).tolist() == [True, False, False]
+    assert answer.mu_macro_low[0] < answer.mu_macro[0] < answer.mu_macro_high[0]
+    assert answer.mu_macro_low[1:].tolist() == answer.mu_macro_high[1:].tolist()
+    assert [r["cases"] for r in answer.remarks if r["row"] == "include"] == [1]
