@@ -54,7 +54,7 @@ enum {
 /* The search for a cycle beside a drag.  A step too long is cut to a tenth at least, cut once more
  * to a hundredth of that, and so on; the steps after it grow by 4 at most.  Where no cycle is
  * found, those of faster drags lead to it, from 1e-3 l0 per radian by tenths.  Found by search:
- * none of 6,000 random springs with drags from 1e-9 to 1e-3 is left without its cycle, see `slow
+ * 1 of 11,000 random springs with drags from 1e-9 to 1e-3 is left short of the tolerance, see `slow
  * drag` in benchmarks/motion.py. */
 #define MU_MOTION_SLOW \
     1e-6 /* l0 per radian; below, a slip that larger steps miss moves the cycle */

@@ -50,8 +50,8 @@ static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantit
     return out;
 }
 
-/* As mu_edge_share in the last cell below the border, of (T_8' at w - T_8' at the border) / (1 - w):
- * from 1344 to 64. */
+/* As mu_edge_share in the last cell below the border, of (T_8' at w - T_8' at the border) / (1 -
+ * w): from 1344 to 64. */
 MU_INLINE double mu_border_share(double w) { return 1.0 / (1.0 + 10.0 * (1.0 - w)); }
 
 /* What errors of q and of its derivatives along a and b move a logarithmic slope by, per |factor|.
@@ -179,8 +179,8 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
         along_b = 0.0;
         along_b_y /= turn.edge_y;
         share_a = mu_border_share(spot.u);
-        more = scale * (errors[1] * share_a * rays.reach_a +
-                        errors[2] * share_b * reach * rays.reach_b);
+        more = scale *
+               (errors[1] * share_a * rays.reach_a + errors[2] * share_b * reach * rays.reach_b);
     }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
     out.along_v = form.base_v + factor * (form.factor_v * slope.q + along_a + along_b);
