@@ -1,19 +1,21 @@
 """JSON of a batch: its body, columns or rows, becomes columns; the answers become JSON again.
 
-jiter reads JSON fast, but no other thread runs meanwhile.  Long lists are therefore read slice by
-slice, and written so.  What jiter refuses, or what is shaped in another way, is left to Python's
-``json``: that is slow, lets other threads run, and gives the reason.
+orjson and jiter read JSON fast, but no other thread runs meanwhile.  Long lists are therefore read
+slice by slice, and written so.  What they refuse, or what is shaped in another way, is left to
+Python's ``json``: that is slow, lets other threads run, and gives the reason.
 """
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import chain
+from operator import itemgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import jiter
 import numpy as np
+import orjson
 from pydantic import ValidationError
 
 from mumacro.answer import TEXTS, Answer, nested
@@ -116,7 +118,9 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
             raise ValueError("no comma for long")
         opening = b"[" if start else b""
         between = text[start : end.start()] + b"]" if end else text[start:]
-        values = jiter.from_json(opening + between, catch_duplicate_keys=True)
+        values = orjson.loads(opening + between)
+        if b"{" in between and _count(between, b":") != _members_in(values):
+            raise ValueError("a name is given twice, or a text has a colon")
         if not values and (start or end):
             raise ValueError("nothing beside a comma")
         size += len(values)
@@ -124,6 +128,11 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
             raise too_large(max_batch)
         yield values
         start = end.end() if end else len(text)
+
+
+def _members_in(rows: list[Any]) -> int:
+    """How many members the objects of a list have."""
+    return sum(len(row) for row in rows if isinstance(row, dict))
 
 
 def _numbers(values: list[Any]) -> Any:
@@ -195,10 +204,15 @@ def _columns_of(slices: Iterable[list[Any]], words: Mapping[str, Any]) -> dict[s
     for rows in slices:
         if not columns:
             columns = {name: [] for name in _names_of_case(rows, words)}
-        if not all(isinstance(row, dict) and row.keys() == columns.keys() for row in rows):
+        try:
+            same = sum(map(len, rows)) == len(columns) * len(rows)
+            lists = [*zip(*map(itemgetter(*columns), rows), strict=True)]
+        except (TypeError, LookupError):
+            same = False
+        if not same:
             raise ValueError("rows of other names")
-        for name, parts in columns.items():
-            values = _numbers([row[name] for row in rows])
+        for parts, entries in zip(columns.values(), lists, strict=True):
+            values = _numbers([*entries])
             if isinstance(values, list) and None in values:
                 raise ValueError("a null")
             parts.append(values)
@@ -303,22 +317,26 @@ def _array(name: str, parts: Iterable[Any]) -> Iterator[bytes]:
 
 def write_rows(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
     """An object with the list ``results``, null for a bad case, without its closing brace."""
-    opening = b'{"results":['
+    opening, rows = b'{"results":[', {-1: b"null"}  # by source code: a row with places for numbers
     for answer in answers:
-        rows = _rows(nested({path: listed(path, answer[path]) for path in answer.paths}))
-        legal = (answer.source_code >= 0).tolist()
-        yield opening + dump([row if x else None for row, x in zip(rows, legal, strict=True)])[1:-1]
+        codes = answer.source_code.tolist()
+        for code in {*codes} - rows.keys():
+            rows[code] = _row_of(answer, codes.index(code))
+        numbers = [answer[path] for path in answer.paths if path not in TEXTS]
+        legal = np.column_stack(numbers)[answer.source_code >= 0].ravel()
+        text = b",".join(map(rows.__getitem__, codes))
+        yield opening + (text % (*dump(legal)[1:-1].split(b","),) if legal.size else text)
         opening = b","
     yield b"]"
+
+
+def _row_of(answer: Answer[Any], index: int) -> bytes:
+    """The row of a case as text, with a place for each number: the words follow from the source."""
+    words = {path: answer[path][index] if path in TEXTS else "\0" for path in answer.paths}
+    return dump(nested(words)).replace(b"%", b"%%").replace(dump("\0"), b"%b")
 
 
 def listed(path: str, column: Any) -> list[Any]:
     """A column as JSON lists it: NaN is written as null, and so is no text."""
     values: list[Any] = column.tolist()
     return [value or None for value in values] if path in TEXTS else values
-
-
-def _rows(tree: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Lists by name as a list of objects."""
-    columns = [_rows(value) if isinstance(value, dict) else value for value in tree.values()]
-    return [dict(zip(tree, values, strict=True)) for values in zip(*columns, strict=True)]

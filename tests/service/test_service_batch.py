@@ -168,3 +168,21 @@ def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(
     assert all(columns[name] == [] for name in VALUES)
     assert columns["limits"] == {"mu_static": [], "v0_crit": [], "mu_crit": []}
     assert len(client.post(BATCH, json=case).json()["mu_macro"]) == 1
+
+
+@pytest.mark.parametrize("entry", [3, "a:b", None, True, [1], {}, {"mu0": {"a": 1}}], ids=repr)
+def test_an_entry_that_is_no_case_is_bad_alone(client: Any, case: Case, entry: Any) -> None:
+    reply = client.post("/v1/mu-macro/batch", json=[case, entry, case])
+    assert reply.status_code == 200
+    answer = reply.json()
+    assert [row is None for row in answer["results"]] == [False, True, False]
+    assert [error["index"] for error in answer["errors"]] == [1]
+
+
+def test_a_name_that_is_given_twice_in_a_row_is_refused(client: Any, case: Case) -> None:
+    row = json.dumps(case)
+    text = f'[{row}, {row[:-1]}, "v0": 1.0}}]'
+    reply = client.post(
+        "/v1/mu-macro/batch", content=text, headers={"Content-Type": "application/json"}
+    )
+    assert reply.status_code == 422
