@@ -542,11 +542,11 @@ class Surrogate:
         >>> s.evaluate(k=1e6, contact="ball", **case).regime
         'partial_slip'
         >>> a = s.evaluate(k_range=(0.8e6, 1.2e6), **case)
-        >>> a.mu_macro_low < a.mu_macro < a.mu_macro_high
-        True
+        >>> f"{a.mu_macro_low:.4f} {a.mu_macro:.4f} {a.mu_macro_high:.4f}"
+        '0.2095 0.2432 0.2640'
         >>> a = s.evaluate(k=1e6, include=("power",), std={"k": 1e5, "v0": 1e-3}, **case)
         >>> f"{a['power.saved']:.6f} {a['std']:.4f} {a['std_share.k']:.2f}"
-        '0.005953 0.0117 0.92'
+        '0.005953 0.0136 0.99'
         """
         if (
             cases is std is None

@@ -37,6 +37,7 @@ from .values import (
     Positive,
     Speed,
     Stiffness,
+    StiffnessEnd,
     fault,
     interval_of,
 )
@@ -145,8 +146,8 @@ class OneCase(Strict):
     f: Frequency | None = optional(_F, examples=[20e3])
     v0: Speed = Field(description=_V0, examples=[0.01])
     Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
-    k_low: Stiffness | None = optional(_LOW)
-    k_high: Stiffness | None = optional(_HIGH)
+    k_low: StiffnessEnd | None = optional(_LOW)
+    k_high: StiffnessEnd | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -173,8 +174,8 @@ class OtherInputs(Strict):
     f: Frequency | None = optional(_F, examples=[20e3])
     v0: Speed | None = optional(_V0)
     Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
-    k_low: Stiffness | None = optional(_LOW)
-    k_high: Stiffness | None = optional(_HIGH)
+    k_low: StiffnessEnd | None = optional(_LOW)
+    k_high: StiffnessEnd | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:

@@ -81,6 +81,8 @@ _CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
 Friction = Annotated[Positive, _CHECKED, _is("mu0", True, 0.3)]
 Force = Annotated[Positive, _CHECKED, _is("Fz", True, 10.0)]
 Stiffness = Annotated[Positive, _CHECKED, _is("k", True, 1e6)]
+#: stands in place of k, so the example of a whole request has none
+StiffnessEnd = Annotated[Positive, _CHECKED, _is("k", True)]
 Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False, 2e-6)]
 ForceAmplitude = Annotated[NotNegative, _CHECKED, _is("Fz_amplitude", False)]
 AngularFrequency = Annotated[NotNegative, _CHECKED, _is("omega", False)]

@@ -57,7 +57,7 @@ def test_a_doubtful_case_is_answered_with_a_remark(case: Any, tmp_path: Path) ->
 def test_a_body_as_clients_send_it_is_answered(live_server: Any, case: Any) -> None:
     if "headers" in case:
         pytest.skip("an upgrade of the connection is tried with the connection's tests")
-    status, _, text = live_server.ask("POST", "/v1/mu-macro", case["body"])
+    status, _, text = live_server.ask("POST", "/v1/mu-macro", case["body"].encode())
     assert status == 200
     assert json.loads(text)["mu_macro"] == close(case["value"], rel=1e-12)
 
