@@ -34,6 +34,7 @@ from .values import (
     ForceAmplitude,
     Frequency,
     Friction,
+    OtherSpeed,
     Positive,
     Speed,
     Stiffness,
@@ -172,7 +173,7 @@ class OtherInputs(Strict):
     y0: Amplitude | None = optional(_Y0, examples=[2e-6])
     omega: AngularFrequency | None = optional(_OMEGA)
     f: Frequency | None = optional(_F, examples=[20e3])
-    v0: Speed | None = optional(_V0)
+    v0: OtherSpeed | None = optional(_V0)
     Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
     k_low: StiffnessEnd | None = optional(_LOW)
     k_high: StiffnessEnd | None = optional(_HIGH)
