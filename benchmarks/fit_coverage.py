@@ -122,8 +122,8 @@ def clean_friction(set_up: SetUp) -> Array:
         y0=set_up.y0,
         f=set_up.f,
         v0=np.array(set_up.v0),
-        contact=set_up.contact,  # type: ignore[arg-type]
-        direction=set_up.direction,  # type: ignore[arg-type]
+        contact=set_up.contact,
+        direction=set_up.direction,
     )
     return np.asarray(mu.mu_macro)
 
@@ -131,11 +131,11 @@ def clean_friction(set_up: SetUp) -> Array:
 def fitted(set_up: SetUp, mu_macro: Array) -> Any:
     """The fit of measured friction; the unknowns it was not asked for are given."""
     unknowns = set_up.unknowns.split(",")
-    known = {name: getattr(set_up, name) for name in ("k", "mu0") if name not in unknowns}
+    known: Any = {name: getattr(set_up, name) for name in ("k", "mu0") if name not in unknowns}
     columns = {"v0": np.array(set_up.v0), "mu_macro": mu_macro}
     if set_up.has_std:
         columns["std"] = np.full(mu_macro.size, set_up.spread)
-    rig = {"Fz": set_up.Fz, "y0": set_up.y0, "f": set_up.f}
+    rig: Any = {"Fz": set_up.Fz, "y0": set_up.y0, "f": set_up.f}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return fit(
@@ -148,7 +148,7 @@ def fitted(set_up: SetUp, mu_macro: Array) -> Any:
         )
 
 
-def random_contact(chance: np.random.Generator) -> tuple[dict[str, float], Array]:
+def random_contact(chance: np.random.Generator) -> tuple[dict[str, Any], Array]:
     """A contact in its rig by the names of ``evaluate``, and 3 to 8 speeds from creep to
     sliding."""
     mu0, force = chance.uniform(0.1, 0.8), 10.0 ** chance.uniform(-1.0, 2.0)

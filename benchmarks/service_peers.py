@@ -35,14 +35,14 @@ def fastapi() -> Any:
 
     from mumacro import Surrogate
     from service.models.answers import CaseAnswer
-    from service.models.inputs import Case
+    from service.models.inputs import CaseInputs
 
     surrogate = Surrogate.open(FINEST)
     label = {"id": surrogate.id, "tolerance": surrogate.tolerance}
     app = FastAPI()
 
     @app.post("/v1/mu-macro", response_model=CaseAnswer)
-    async def one(case: Case) -> Any:
+    async def one(case: CaseInputs) -> Any:
         answer = surrogate.evaluate(**case.model_dump(exclude_none=True))
         names = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
         return {

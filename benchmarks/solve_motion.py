@@ -6,7 +6,7 @@ Problems are springs with oscillations in x, y and the load, an unknown, and a t
 the unknown crosses.
 """
 
-from benchmarks.measuring import IMAGES, main, sections  # isort: split
+from tests.support.measuring import IMAGES, main, sections  # isort: split
 
 import math
 import time

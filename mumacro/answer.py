@@ -72,7 +72,7 @@ class Answer(Generic[Number]):
     >>> f"{a.mu_macro:.6f} {a.regime} {a.source}"
     '0.240467 stick_slip stick_slip_low'
     >>> f"{a['power.oscillation']:.5f} W"
-    '0.01117 W'
+    '0.01340 W'
     """
 
     __slots__ = (

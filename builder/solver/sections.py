@@ -23,7 +23,7 @@ from .compiled import solver_kernel
 from .slip import OK, rechart, slip
 from .stick import stick_end
 
-BORDER_SLOPE = BORDER_CONSTANT**-0.5  # v~crit / sqrt(y~) for y~ -> infinity
+BORDER_SLOPE: float = BORDER_CONSTANT**-0.5  # v~crit / sqrt(y~) for y~ -> infinity
 NOT_CONVERGED = 10
 ANGLE_SECTION, TIME_SECTION = 0, 1
 

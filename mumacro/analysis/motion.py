@@ -2,7 +2,7 @@
 oscillates, too.
 
 No table holds these.  The steady cycle is computed from the equations of the contact, those of
-:class:`mumacro.Element`, in ``kernel/motion.c``: a method of order 5 follows slip to its end, and
+:class:`mumacro.Element`, in ``kernel/motion*.c``: a method of order 5 follows slip to its end, and
 the cycle is the fixed point of the map of a period.
 """
 

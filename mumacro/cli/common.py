@@ -174,10 +174,7 @@ def dialect_in(chosen: argparse.Namespace) -> Dialect:
 
 def add_exponent(parser: OneLineParser) -> None:
     """The option for a stiffness that grows with the load."""
-    text = (
-        "with Fz as the input: k grows as Fz^M, M from 0 to 1, from its value at the Fz= of the "
-        "case; default for a ball: 1/3"
-    )
+    text = "k grows as Fz^M from its value at the case's Fz; of a ball: 1/3"
     parser.add_argument("--stiffness-exponent", type=float, metavar="M", help=text)
 
 

@@ -43,12 +43,12 @@ def run(words: Sequence[str]) -> str:
     )
     parser.add_argument("words", nargs="+", metavar="name=value", help="a case without y0")
     helps = (
-        "amplitude along the drag [m], half of peak to peak",
-        "across it [m], likewise",
+        "A: amplitude [m] along the drag, half of peak to peak",
+        "across it, likewise",
         "of the normal force [N], likewise",
     )
     for name, text in zip(PARTS, helps, strict=True):
-        parser.add_argument(f"--{name}", metavar="AMPLITUDE[@PHASE]", help=text)
+        parser.add_argument(f"--{name}", metavar="A[@PHASE]", help=text)
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
     text = "of the mean force over mu0 Fz, 1e-9 to 1e-2; default: 1e-6"
     parser.add_argument("--tolerance", type=float, default=1e-6, help=text)

@@ -15,12 +15,12 @@ EXAMPLE = "mumacro solve-for v0 'mu0=0.3 Fz=10N k=0.1N/um f=50Hz' --x 0.1mm --no
 def add_parts(parser: argparse.ArgumentParser) -> None:
     """The options of a motion."""
     helps = (
-        "over any motion: amplitude along the drag [m], half of peak to peak",
-        "across it [m], likewise",
+        "A: amplitude [m] along the drag, half of peak to peak",
+        "across it, likewise",
         "of the normal force [N], likewise",
     )
     for name, text in zip(PARTS, helps, strict=True):
-        parser.add_argument(f"--{name}", metavar="AMPLITUDE[@PHASE]", help=text)
+        parser.add_argument(f"--{name}", metavar="A[@PHASE]", help=text)
 
 
 def is_motion(chosen: argparse.Namespace) -> bool:

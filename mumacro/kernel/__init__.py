@@ -13,6 +13,7 @@ the library is loaded.
 - ``directions.c``, ``contact.c``: along and normal, of one spring and of a ball; the dispatch over
   contact and direction
 - ``dimensional.c``, ``interval.c``: cases in SI units, an interval of k
-- ``element.c``, ``motion.c``: steps in time, steady cycles of any motion
+- ``element.c``: steps in time; ``motion.c``, ``motion_slip.c``, ``motion_cycle.c``,
+  ``motion_ball.c``: steady cycles of any motion
 - ``binding.py``, ``arrays.py``, ``threads.py``: the shared object from Python, and long arrays
 """

@@ -88,8 +88,8 @@ MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_la
     const mu_lanes entry =
         mu_entry(mu_select(ring, t, one), half & ring, mu_select(ring, root, zero));
     const mu_lanes on_ray = y / entry, beyond = mu_higher(on_ray - 1.0, zero);
-    /* where the last digits of t have y~ beyond the entry, the ray gives way: at fixed y~ a quantity
-     * depends on root by its square only */
+    /* where the last digits of t have y~ beyond the entry, the ray gives way: at fixed y~ a
+     * quantity depends on root by its square only */
     const mu_lanes nearer = mu_fma(beyond, mu_all(-MU_ENTRY_WAY), root);
     const mu_lanes first = mu_folded(half, mu_select(half, root, mu_higher(nearer, zero)));
     /* second ones */

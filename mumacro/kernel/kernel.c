@@ -10,7 +10,8 @@
 #if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || \
     defined __ASSOCIATIVE_MATH__ || defined __RECIPROCAL_MATH__ || defined _M_FP_FAST
 #error \
-    "mumacro needs infinities, NaN and the order of its sums: compile without -ffast-math, -funsafe-math-optimizations, -ffinite-math-only and /fp:fast"
+    "mumacro needs infinities, NaN and the order of its sums: compile without -ffast-math, " \
+    "-funsafe-math-optimizations, -ffinite-math-only and /fp:fast"
 #endif
 
 #include "data.h"

@@ -1,6 +1,9 @@
 /* The shared object's functions for one instruction level; compiled once for each. */
 #include "kernel.c"
 #include "motion.c"
+#include "motion_slip.c"
+#include "motion_cycle.c"
+#include "motion_ball.c"
 #include "library.h"
 #include "interval.c"
 

@@ -184,8 +184,8 @@ MUMACRO_API int mumacro_evaluate_force(int contact, int direction, double v0, do
  * stay the same; 32 give its mean to 1.1e-3 mu0.  Of one spring Fz >= 0 may change between steps,
  * k must be finite.  state: 2 * springs numbers, the springs' forces [N], zeros at first.  A
  * straight step is exact; the error of a curved motion falls with the square of the steps, 400 a
- * period give 4e-5 up to an amplitude of 9 mu0 Fz/k, and 1.3e-4 at 100.  Returns 0, 1 to 3 for a bad mu0, Fz or k, MUMACRO_NO_STEP, or
- * MUMACRO_NO_OUTPUT; then nothing is moved. */
+ * period give 4e-5 up to an amplitude of 9 mu0 Fz/k, and 1.3e-4 at 100.  Returns 0, 1 to 3 for a
+ * bad mu0, Fz or k, MUMACRO_NO_STEP, or MUMACRO_NO_OUTPUT; then nothing is moved. */
 MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double k, double dx,
                                      double dy, double *state, double force[2]);
 

@@ -50,8 +50,8 @@ static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantit
     return out;
 }
 
-/* As mu_edge_share in the last cell below the border, of (T_8' at w - T_8' at the border) / (1 - w):
- * from 1344 to 64. */
+/* As mu_edge_share in the last cell below the border, of (T_8' at w - T_8' at the border) /
+ * (1 - w): from 1344 to 64. */
 MU_INLINE double mu_border_share(double w) { return 1.0 / (1.0 + 10.0 * (1.0 - w)); }
 
 /* What errors of q and of its derivatives along a and b move a logarithmic slope by, per |factor|.

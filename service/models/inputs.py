@@ -34,9 +34,11 @@ from .values import (
     ForceAmplitude,
     Frequency,
     Friction,
+    OtherSpeed,
     Positive,
     Speed,
     Stiffness,
+    StiffnessEnd,
     fault,
     interval_of,
 )
@@ -145,8 +147,8 @@ class OneCase(Strict):
     f: Frequency | None = optional(_F, examples=[20e3])
     v0: Speed = Field(description=_V0, examples=[0.01])
     Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
-    k_low: Stiffness | None = optional(_LOW)
-    k_high: Stiffness | None = optional(_HIGH)
+    k_low: StiffnessEnd | None = optional(_LOW)
+    k_high: StiffnessEnd | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -171,10 +173,10 @@ class OtherInputs(Strict):
     y0: Amplitude | None = optional(_Y0, examples=[2e-6])
     omega: AngularFrequency | None = optional(_OMEGA)
     f: Frequency | None = optional(_F, examples=[20e3])
-    v0: Speed | None = optional(_V0)
+    v0: OtherSpeed | None = optional(_V0)
     Fz_amplitude: ForceAmplitude | None = optional(_AMPLITUDE)
-    k_low: Stiffness | None = optional(_LOW)
-    k_high: Stiffness | None = optional(_HIGH)
+    k_low: StiffnessEnd | None = optional(_LOW)
+    k_high: StiffnessEnd | None = optional(_HIGH)
 
     @property
     def inputs(self) -> dict[str, Any]:

@@ -40,7 +40,7 @@ from .inputs import (
 )
 from .motion import FORMS, Oscillation
 from .options import Choice, Options, QueryOptions
-from .values import End, Length, Load, Modulus, Ratio, fault, text_schema
+from .values import End, Length, Load, Modulus, Ratio, Start, Stop, fault, text_schema
 
 MAX_VALUES = 10_001  # of a law
 _OF_A_MOTION = ("mu0", "Fz", "k", "omega", "f", "v0", "contact")
@@ -75,10 +75,8 @@ class Sweep(Strict):
     """The values of a law."""
 
     along: Name = Field("v0", description="The swept input, which is left out of the case")
-    start: End = Field(
-        description="First value [SI], or with a unit; > 0 on a logarithmic scale", examples=[1e-4]
-    )
-    stop: End = Field(description="Last value [SI], or with a unit; > start", examples=[10.0])
+    start: Start = Field(description="First value [SI], or with a unit; > 0 on a logarithmic scale")
+    stop: Stop = Field(description="Last value [SI], or with a unit; > start")
     points: _Whole = Field(201, description="Number of values")
     scale: Literal["log", "linear"] = Field("log", description="Spacing of the values")
     stiffness_exponent: _Exponent | None = optional(_EXPONENT)

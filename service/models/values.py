@@ -81,23 +81,31 @@ _CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
 Friction = Annotated[Positive, _CHECKED, _is("mu0", True, 0.3)]
 Force = Annotated[Positive, _CHECKED, _is("Fz", True, 10.0)]
 Stiffness = Annotated[Positive, _CHECKED, _is("k", True, 1e6)]
+#: stands in place of k, so the example of a whole request has none
+StiffnessEnd = Annotated[Positive, _CHECKED, _is("k", True)]
 Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False, 2e-6)]
 ForceAmplitude = Annotated[NotNegative, _CHECKED, _is("Fz_amplitude", False)]
 AngularFrequency = Annotated[NotNegative, _CHECKED, _is("omega", False)]
 Frequency = Annotated[Hertz, _CHECKED, _is("f", False, 20e3)]
 Speed = Annotated[NotNegative, _CHECKED, _is("v0", False, 0.01)]
+#: beside a law, which sweeps v0 unless another input is named, so the example has none
+OtherSpeed = Annotated[NotNegative, _CHECKED, _is("v0", False)]
 #: a standard deviation, in the unit of its input
 Deviation = Annotated[
     NotNegative,
     _CHECKED,
     WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}),
 ]
+_END: Any = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}
 #: an end of a range; the library reads a text with the input that it belongs to
 End = Annotated[
     NotNegative,
     WrapValidator(lambda value, number: value if type(value) is str else number(value)),
-    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}),
+    WithJsonSchema(_END),
 ]
+# ends of a law; the schema holds their examples, because FastAPI drops those of a query's field
+Start = Annotated[End, WithJsonSchema({**_END, "examples": [1e-4]})]
+Stop = Annotated[End, WithJsonSchema({**_END, "examples": [10.0]})]
 # other arguments, in SI: a text becomes a number
 Length = Annotated[Positive, _IN_SI, _is("radius", True)]
 Modulus = Annotated[Positive, _IN_SI, _is("E", True)]

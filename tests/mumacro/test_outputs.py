@@ -84,6 +84,7 @@ def test_cases_of_several_kinds_are_answered_in_their_places(table: Surrogate) -
         for path in alone.paths:
             np.testing.assert_array_equal(mixed[path][mine], alone[path], err_msg=path)
         assert alone.gradient is not None
+        assert mixed.gradient is not None
         np.testing.assert_array_equal(mixed.gradient["v0"][mine], alone.gradient["v0"])
         np.testing.assert_array_equal(mixed.regime_certain[mine], alone.regime_certain)
         for name in OUTPUTS.keys() - {*names_for(kind)}:
@@ -166,10 +167,11 @@ def test_an_unknown_output_is_refused(table: Surrogate, include: Any) -> None:
 
 def test_an_output_that_no_case_has_is_refused_with_the_reason(table: Surrogate) -> None:
     ends = without(CASE, "k")
-    for words, case, include in (
+    asked: list[tuple[Any, Any, Any]] = [
         ({"direction": "along"}, CASE, {"include": ["settling"]}),
         ({}, {**ends, "k_range": (1e6, 2e6)}, {"std": {"v0": 1e-3}}),
-    ):
+    ]
+    for words, case, include in asked:
         for v0 in (0.01, [0.01, 0.02]):
             with pytest.raises(InputError) as caught:
                 table.evaluate({**case, "v0": v0}, **words, **include)
@@ -264,7 +266,7 @@ def test_what_computes_no_deviation_refuses_one_by_name(table: Surrogate) -> Non
 
 def test_an_interval_and_a_deviation_stand_in_one_column(table: Surrogate) -> None:
     case = without(CASE, "k")
-    answer = table.evaluate(k=["0.8..1.2 N/um", "1 ± 0.1 N/um", "rigid"], **case)
+    answer: Any = table.evaluate(k=["0.8..1.2 N/um", "1 ± 0.1 N/um", "rigid"], **case)
     assert np.isnan(answer["std"]).tolist() == [True, False, False]
     assert answer.mu_macro_low[0] < answer.mu_macro[0] < answer.mu_macro_high[0]
     assert answer.mu_macro_low[1:].tolist() == answer.mu_macro_high[1:].tolist()

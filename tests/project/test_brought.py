@@ -21,7 +21,7 @@ BASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
 BROUGHT = json.loads((FOLDER / "cases.json").read_text("utf-8"))
 
 
-def of(*ways: str) -> Any:
+def of(*ways: str) -> pytest.MarkDecorator:
     """The cases that are tried in one of these ways."""
     cases = [case for case in BROUGHT if case["how"] in ways]
     return pytest.mark.parametrize("case", cases, ids=lambda case: str(case["id"]))
@@ -33,7 +33,7 @@ def test_a_value_in_python_is_understood_or_refused(case: Any) -> None:
         reason = f"{package} of requirements/peers.txt is not installed"
         pytest.importorskip(package, reason=reason)
     tree = ast.parse(case["code"])
-    last = ast.Expression(tree.body.pop().value)  # type: ignore[attr-defined]
+    last = ast.Expression(tree.body.pop().value)
     space: dict[str, Any] = {"mumacro": mumacro, "s": mumacro.open(), "case": dict(BASE)}
     exec(compile(tree, "case", "exec"), space)  # noqa: S102 - the code of our own cases
     if "refused" in case:
@@ -57,7 +57,7 @@ def test_a_doubtful_case_is_answered_with_a_remark(case: Any, tmp_path: Path) ->
 def test_a_body_as_clients_send_it_is_answered(live_server: Any, case: Any) -> None:
     if "headers" in case:
         pytest.skip("an upgrade of the connection is tried with the connection's tests")
-    status, _, text = live_server.ask("POST", "/v1/mu-macro", case["body"])
+    status, _, text = live_server.ask("POST", "/v1/mu-macro", case["body"].encode())
     assert status == 200
     assert json.loads(text)["mu_macro"] == close(case["value"], rel=1e-12)
 

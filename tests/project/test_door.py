@@ -193,7 +193,7 @@ PYTHON = {
 
 
 #: what an entrance calls the amplitude
-_AMPLITUDE_OF = {moved: "y, amplitude", stepped: "dx"}
+_AMPLITUDE_OF: dict[Callable[[Read], Any], str] = {moved: "y, amplitude", stepped: "dx"}
 
 
 def judged(entrance: Callable[[Read], Any], kind: Kind, right: Callable[[Read], Any]) -> None:

@@ -85,7 +85,11 @@ def test_an_application_answers_requests_of_other_versions() -> None:
         version: str, host: bool, method: str, path: str, body: bytes = b""
     ) -> tuple[int, bytes]:
         headers = [(b"content-type", b"application/json"), *([(b"host", b"x")] if host else [])]
-        scope = {"type": "http", "asgi": {"version": "3.0"}, "http_version": version}
+        scope: dict[str, Any] = {
+            "type": "http",
+            "asgi": {"version": "3.0"},
+            "http_version": version,
+        }
         scope |= {"method": method, "path": path, "raw_path": path.encode(), "query_string": b""}
         scope |= {"root_path": "", "scheme": "https", "headers": headers}
         scope |= {"client": ("127.0.0.1", 1), "server": ("127.0.0.1", 2)}

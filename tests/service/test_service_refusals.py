@@ -57,11 +57,24 @@ REFUSED = [
     *(
         ("POST mu-macro", {name: value}, f"#/{name}")
         for name in ("mu0", "k", "v0", "tolerance")
-        for value in ("0.3", True, [0.3], {"value": 0.3}, "")
+        for value in ("0.3 kN", True, [0.3], {"value": 0.3}, "")
     ),
     *(
         ("GET mu-macro", {"k": text}, "?k")
-        for text in ("abc", "", " ", "1_000", "0x10", "１", "1e", "1,5", "--1", "1 2", "null", "0")
+        for text in (
+            "abc",
+            "",
+            " ",
+            "1_000",
+            "0x10",
+            "１",
+            "1e",
+            "1,500",
+            "--1",
+            "1 2",
+            "null",
+            "0",
+        )
     ),
     *(
         (f"POST {path}", {name: zero}, f"#/{name}")
@@ -85,7 +98,7 @@ REFUSED = [
     *((f"POST {path}", {"include": ["std"]}, "#/std") for path in ("mu-macro", "mu-macro/batch")),
     *(
         ("POST mu-macro", {"include": ["std"], "std": {name: value}}, f"#/std/{name}")
-        for name, value in (("mu0", -1), ("mu0", "0.1"), ("speed", 1))
+        for name, value in (("mu0", -1), ("mu0", "0.1 mm"), ("speed", 1))
     ),
     ("POST mu-macro", {"include": ["std"], "std": [1, 2]}, "#/std"),
     ("POST mu-macro", {"include": ["std"], "std": {"omega": 1.0, "f": 1.0}}, "#/std/f"),
@@ -174,7 +187,7 @@ REFUSED = [
             ("target", []),
             ("target", [0.1] * 10_001),
             ("Fz", 0),
-            ("Fz", "10"),
+            ("Fz", "10 mm"),
             ("range", [1]),
             ("range", [2, 1]),
             ("extra", 1),
@@ -190,7 +203,7 @@ REFUSED = [
         for name, value in (
             ("radius", -1.0),
             ("nu", 0.7),
-            ("E", "210GPa"),
+            ("E", "210 mm"),
             ("a", 1),
             ("Fz", None),
             ("geometry", "cone"),
@@ -201,7 +214,7 @@ REFUSED = [
         ("POST fit", {name: value}, f"#/{place}")
         for name, value, place in (
             ("mu_macro", [0.2], "data"),
-            ("y0", "2um", "y0"),
+            ("y0", "2 kN", "y0"),
             ("include", ["power"], "include"),
             ("v0", [0.1, 0.2, None], "v0/2"),
             ("contact", "cone", "contact"),
@@ -254,10 +267,10 @@ HINTS = [
     ("POST mu-macro", {"k": ...}, "#/k", "rigid"),
     ("GET mu-macro", {"k": ""}, "?k", "rigid"),
     ("POST mu-macro", {"omega": ..., "v0": -1}, "#/omega", "f [Hz]"),
-    ("GET mu-macro", {"v0": "0,01"}, "?v0", "0.01"),
-    ("GET mu-macro", {"y0": "2um"}, "?y0", "give metres, 2e-06"),
-    ("GET mu-macro", {"v0": "5 mm/s"}, "?v0", "give metres per second, 0.005"),
-    ("POST mu-macro", {"v0": "0.01"}, "#/v0", "leave out the quotes"),
+    ("GET mu-macro", {"v0": "1,000"}, "?v0", "1000 or 1.0"),
+    ("GET mu-macro", {"y0": "2 kN"}, "?y0", "mm, um"),
+    ("GET mu-macro", {"v0": "5 mm"}, "?v0", "metres per second"),
+    ("POST mu-macro", {"v0": "0.01 mm"}, "#/v0", "mm/s"),
     ("POST mu-macro", {**NORMAL, "Fz_amplitude": 10.0}, "#/Fz_amplitude", "lifts off"),
     ("POST mu-macro", {"contact": "cone"}, "#/contact", "spring, ball"),
     ("POST mu-macro", {"include": ["curvature"]}, "#/include/0", "groups, limits"),
@@ -298,7 +311,10 @@ def test_a_number_out_of_bounds_is_refused_and_shown(
     (fault,) = problem(client.post(SINGLE, content=body), 422)["errors"]
     expected = {"pointer": f"#/{name}", "field": name, "value": BEYOND[text], "reason": reason}
     assert fault == {**expected, "bound": bound}
-    if len(text) < 500:
+    if (name, text) == ("k", "Infinity"):  # a text may have it: the contact is rigid
+        answer = client.get(SINGLE, params={**CASE, name: text})
+        assert answer.json()["source"] == "rigid"
+    elif len(text) < 500:
         (fault,) = problem(client.get(SINGLE, params={**CASE, name: text}), 422)["errors"]
         assert (fault["parameter"], fault["field"]) == (name, name)
     listed = json.dumps({**CASE, name: [CASE[name], "@"]}).replace('"@"', text)
@@ -314,7 +330,7 @@ def test_a_number_out_of_bounds_is_refused_and_shown(
 def test_all_faults_are_reported_at_once_and_their_list_is_bounded(
     client: Any, problem: Any
 ) -> None:
-    body = {"mu0": -1, "Fz": "10", "amplitude": 3, "omega": None}
+    body = {"mu0": -1, "Fz": "10 mm", "amplitude": 3, "omega": None}
     faults = problem(client.post(SINGLE, json=body), 422)["errors"]
     assert sorted(fault["field"] for fault in faults) == [
         "Fz",
@@ -327,6 +343,7 @@ def test_all_faults_are_reported_at_once_and_their_list_is_bounded(
     ]
     faults = problem(client.get(SINGLE, params=body), 422)["errors"]
     assert sorted(fault["field"] for fault in faults) == [
+        "Fz",
         "amplitude",
         "k",
         "mu0",

@@ -69,7 +69,7 @@ def plain(command: str) -> str:
 
 def is_command(text: str) -> bool:
     """Whether it begins with a program and says more than its name."""
-    program, _, rest = text.strip().partition(" ")
+    program, _, rest = text.strip().removeprefix("nice ").partition(" ")
     return program in PROGRAMS and bool(rest)
 
 

@@ -59,7 +59,7 @@ def _accepts(node: Node, character: str) -> bool:
     if kind == "NOT_LITERAL":
         return character != chr(value)
     if kind == "RANGE":
-        return value[0] <= ord(character) <= value[1]
+        return bool(value[0] <= ord(character) <= value[1])
     if kind == "CATEGORY":
         return _CATEGORIES[str(value)].match(character) is not None
     if kind == "IN":
@@ -199,7 +199,8 @@ def growth(pattern: str | bytes, flags: int, method: str) -> Iterator[tuple[str,
         return _best(run, text if isinstance(pattern, str) else text.encode(), times)
 
     for repetition in _repetitions(tree, characters):
-        slowest, worst, ratio = 0.0, str, None
+        slowest, ratio = 0.0, None
+        worst: Callable[[int], str] = str
         for size, make in product(_LOOK, _texts(repetition, characters)):
             limit = _TOO_LONG_S * size / _LOOK[-1]
             if seconds(make, 2, size) > limit and seconds(make, 5, size) > limit:

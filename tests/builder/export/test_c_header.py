@@ -3,6 +3,7 @@ input."""
 
 import ctypes
 import functools
+import os
 import re
 import runpy
 import subprocess
@@ -213,6 +214,9 @@ def test_no_compiler_warns(
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_arithmetic_that_breaks_bounds_is_refused(folder: Path, name: str, option: Any) -> None:
     command = [*compilers.compiler(name), "-std=c99", "-O1", option, "-fsyntax-only"]
+    macros = [*compilers.compiler(name), "-O1", "-dM", "-E", "-x", "c", os.devnull]
+    if compilers.run(*macros) == compilers.run(*macros, option):
+        pytest.skip(f"{name} {option} defines no macro, so a program cannot refuse it; docs/c.md")
     for source in ("one/main.c", "three/mumacro.c"):
         done = subprocess.run(
             [*command, folder / source], capture_output=True, text=True, check=False

@@ -233,8 +233,8 @@ def test_a_ball_that_is_hardly_dragged_has_an_answer_or_a_refusal(v: float) -> N
 
 
 def test_a_slow_drag_whose_map_has_kinks_has_an_answer() -> None:
-    """The search went to and fro between two pieces of the map, at 1e-4 for 51 periods, below for
-    ever."""
+    """The search went back and forth between two pieces of the map, at 1e-4 for 51 periods,
+    below for ever."""
     case = [*slow_motions(16, ball=True, seed=77)][15]
     for v in (1e-4, 1e-7, 1e-9):
         case["v0"] = v * L0 * CASE["omega"]
@@ -416,9 +416,9 @@ def test_a_contact_that_only_sticks_keeps_what_its_start_gave_it() -> None:
 def test_springs_that_rest_keep_what_the_start_without_force_left_them(
     contact: str, size: float
 ) -> None:
-    """A spring with a limit L above y0 comes to stick.  From no force at y0 sin(phase) it goes to
-    and fro by y0, and slips on its first way until it fits: it keeps y0 sin(phase), but at most
-    L - y0, in the mean.  One with a lower limit slips in every period and keeps nothing."""
+    """A spring with a limit L above y0 comes to stick.  From no force at y0 sin(phase) it goes
+    back and forth by y0, and slips on its first way until it fits: it keeps y0 sin(phase), but
+    at most L - y0, in the mean.  One with a lower limit slips in every period and keeps nothing."""
     limits = np.array([1.0])
     if contact == "ball":
         edges = np.linspace(0.0, 1.0, 20_001)

@@ -71,7 +71,7 @@ def test_the_other_way_is_named_where_a_speed_would_be_negative() -> None:
 
 
 def test_lateral_friction_is_a_target_too() -> None:
-    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02, "x": 2e-6}
+    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02, "x": 2e-6}
     solution = mumacro.solve_motion("y.amplitude", -0.05, of="mu_lateral", **case)
     for root in solution.roots[0]:
         there = mumacro.motion(**case, y=root.value)

@@ -249,7 +249,7 @@ def test_the_first_sheet_of_a_workbook_is_read(tmp_path: Path, workbook: Path) -
 def test_a_text_that_may_be_two_numbers_is_none_in_a_workbook(
     tmp_path: Path, workbook: Path
 ) -> None:
-    import openpyxl
+    openpyxl = pytest.importorskip("openpyxl")
 
     book = openpyxl.load_workbook(workbook)
     book.worksheets[0]["C5"] = "1.000"
@@ -259,7 +259,7 @@ def test_a_text_that_may_be_two_numbers_is_none_in_a_workbook(
 
 
 def test_a_corner_far_away_and_a_damaged_workbook(tmp_path: Path, workbook: Path) -> None:
-    import openpyxl
+    openpyxl = pytest.importorskip("openpyxl")
 
     book = openpyxl.load_workbook(workbook)
     book.worksheets[0].cell(30_000, 16_384, "far")

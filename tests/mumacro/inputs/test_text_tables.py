@@ -167,7 +167,7 @@ def test_a_table_is_read_as_it_was_written_or_refused(
     for row in [head, *([["µm/s", "-"]] if units == "below" else []), *cells]:
         stream = io.StringIO(newline="")
         separator = "\t" if sep == BLANKS else sep
-        style = csv.QUOTE_ALL if quoted and sep != BLANKS else csv.QUOTE_MINIMAL
+        style: Any = csv.QUOTE_ALL if quoted and sep != BLANKS else csv.QUOTE_MINIMAL
         csv.writer(stream, delimiter=separator, quoting=style, lineterminator="").writerow(row)
         text = stream.getvalue().replace("\t", "  ") if sep == BLANKS else stream.getvalue()
         lines.append(text + sep * (more == "trailing" and sep != BLANKS))
