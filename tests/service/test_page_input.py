@@ -146,7 +146,10 @@ def test_back_and_forward_go_through_the_inputs(open_page: Any) -> None:
     page.type("#field-y0", "3 um")
     page.type("#field-mu0", "0.2")
     page.click("[name=contact][value=ball]")
-    values = lambda: (page.value("#field-y0"), page.value("#field-mu0"))  # noqa: E731
+
+    def values() -> tuple[str, str]:
+        return page.value("#field-y0"), page.value("#field-mu0")
+
     back(page)
     assert page.find("[name=contact][value=spring]").is_selected()
     assert values() == ("3 um", "0.2")
