@@ -50,7 +50,7 @@ empty.__path__ = ["mumacro"]
 kernels = importlib.import_module("mumacro.kernel.binding").kernels
 kernels[:] = [kernel for kernel in kernels if kernel.level in levels.split()]
 del sys.modules["mumacro"]
-assert importlib.import_module("mumacro.surrogate")._KERNEL is kernels[-1]
+assert importlib.import_module("mumacro.outputs.tabulated")._KERNEL is kernels[-1]
 sys.argv = [module, *words]
 runpy.run_module(module, run_name="__main__", alter_sys=True)
 """
