@@ -526,7 +526,8 @@ class _Scan:
         mean, error = self.curve.at(np.array([left, x, right]))
         slope = abs(float(mean[2] - mean[0])) / (right - left)
         estimate = float(error[1])
-        width = estimate / slope if slope * step > estimate else step
+        # where the mean force hardly changes, a root is known to a wide range only
+        width = min(estimate / slope, self.high - self.low) if slope > 0.0 else step
         return MotionRoot(float(x), float(x - width), float(x + width), float(mean[1]), estimate)
 
 
