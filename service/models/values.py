@@ -20,6 +20,8 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 RIGID = {"const": "rigid", "type": "string"}
+#: a number as text; the library reads more than this pattern
+PLAIN_TEXT = {"type": "string", "pattern": r"^[0-9]{1,9}(\.[0-9]{1,9})?$"}
 
 
 def fault(reason: str) -> PydanticCustomError:
@@ -94,9 +96,9 @@ OtherSpeed = Annotated[NotNegative, _CHECKED, _is("v0", False)]
 Deviation = Annotated[
     NotNegative,
     _CHECKED,
-    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}),
+    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, PLAIN_TEXT]}),
 ]
-_END: Any = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}
+_END: Any = {"anyOf": [{"type": "number", "minimum": 0}, PLAIN_TEXT]}
 #: an end of a range; the library reads a text with the input that it belongs to
 End = Annotated[
     NotNegative,
