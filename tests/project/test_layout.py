@@ -25,7 +25,11 @@ KINDS = {
     ".cff",
 }
 #: written by others
-FOREIGN = (ROOT / "service" / "static" / "swagger-ui", ROOT / "tests" / "data")
+FOREIGN = (
+    ROOT / "service" / "static" / "swagger-ui",
+    ROOT / "service" / "static" / "lib",
+    ROOT / "tests" / "data",
+)
 
 
 def _is_source(path: Path) -> bool:

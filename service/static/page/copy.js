@@ -13,12 +13,18 @@ export function textsOf(state) {
   const chosen = Object.entries(kind).filter(([name, value]) => value !== usual[name]);
   const body = JSON.stringify({ ...inputs, ...Object.fromEntries(chosen) });
   const base = location.origin + location.pathname;
-  const keywords = [...Object.entries(inputs), ...chosen].map(([name, text]) => `${name}=${asText(text)}`);
-  const words = Object.entries(inputs).map(([name, text]) => `${name}=${text.replaceAll(/\s/g, "")}`);
+  const keywords = [...Object.entries(inputs), ...chosen].map(
+    ([name, text]) => `${name}=${asText(text)}`,
+  );
+  const words = Object.entries(inputs).map(
+    ([name, text]) => `${name}=${text.replaceAll(/\s/g, "")}`,
+  );
   const options = chosen.map(([name, value]) => ` --${name} ${value}`).join("");
   return {
     link: base + toAddress(state),
-    curl: `curl -s ${base}v1/mu-macro -H "Content-Type: application/json" -d '${body.replaceAll("'", "\\u0027")}'`,
+    curl:
+      `curl -s ${base}v1/mu-macro -H "Content-Type: application/json" ` +
+      `-d '${body.replaceAll("'", "\\u0027")}'`,
     python: `import mumacro\nmumacro.open().evaluate(${keywords.join(", ")})`,
     command: `mumacro "${words.join(" ")}"${options}`,
   };

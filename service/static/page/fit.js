@@ -47,10 +47,17 @@ export function fitPanel(store, moved, openCase) {
 
   /** What is asked: the case above without what the table has and what is unknown. */
   function question(more = {}) {
-    const unknowns = $("unknowns").value.split(" ").filter((name) => !(table && name in table.columns));
+    const unknowns = $("unknowns")
+      .value.split(" ")
+      .filter((name) => !(table && name in table.columns));
     const columns = table ? Object.keys(table.columns) : [];
-    const body = caseOf(store.state, ["v0", ...unknowns, ...columns.map((name) => (name === "omega" ? "f" : name))]);
-    for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {})) if (std && name in body) body[name] = value;
+    const body = caseOf(store.state, [
+      "v0",
+      ...unknowns,
+      ...columns.map((name) => (name === "omega" ? "f" : name)),
+    ]);
+    for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {}))
+      if (std && name in body) body[name] = value;
     return { ...body, unknowns, ...source, ...dialect(), ...more };
   }
 
@@ -100,19 +107,35 @@ export function fitPanel(store, moved, openCase) {
     const names = Object.keys(values).filter((name) => values[name] !== null);
     const equals = (name, one) => `${about.inputs[name].symbol} = ${text(name, one[name])}`;
     const best = names.map((name) => {
-      const spread = std[name] === null ? "not determined" : `± ${text(name, std[name], 2, values[name])}`;
-      return `${equals(name, values)} ${spread} (95 %: ${interval[name].map((end) => text(name, end, 4, values[name])).join(" to ")})`;
+      const spread =
+        std[name] === null ? "not determined" : `± ${text(name, std[name], 2, values[name])}`;
+      const ends = interval[name].map((end) => text(name, end, 4, values[name]));
+      return `${equals(name, values)} ${spread} (95 %: ${ends.join(" to ")})`;
     });
     const use = (one) => () => {
-      const numbers = Object.entries(one).filter(([name, value]) => names.includes(name) && typeof value === "number");
+      const numbers = Object.entries(one).filter(
+        ([name, value]) => names.includes(name) && typeof value === "number",
+      );
       moved(Object.fromEntries(numbers), 6, one.k === "rigid" ? { contact: "rigid" } : {});
     };
     const line = (words, one) =>
-      html`<li><span>${words}</span><button class="use" aria-label=${`Use ${words}`} @click=${use(one)}>Use</button></li>`;
+      html`<li>
+        <span>${words}</span
+        ><button class="use" aria-label=${`Use ${words}`} @click=${use(one)}>Use</button>
+      </li>`;
     return [
       line(best.join("; "), values),
-      ...solutions.slice(1).map((other) => line(`The points allow as well: ${names.map((name) => equals(name, other)).join(", ")}`, other)),
-      fit.question && table?.columns.std && scatter !== null ? html`<li>reduced χ² = ${show(scatter, 3)}</li>` : nothing,
+      ...solutions
+        .slice(1)
+        .map((other) =>
+          line(
+            `The points allow as well: ${names.map((name) => equals(name, other)).join(", ")}`,
+            other,
+          ),
+        ),
+      fit.question && table?.columns.std && scatter !== null
+        ? html`<li>reduced χ² = ${show(scatter, 3)}</li>`
+        : nothing,
       ...warnings.map((words) => html`<li class="doubt">${prose(words)}</li>`),
     ];
   }
@@ -123,14 +146,29 @@ export function fitPanel(store, moved, openCase) {
     const { columns, units, skipped_lines: skipped, read_as: how } = table;
     const names = Object.keys(columns);
     const count = columns[names[0]]?.length ?? 0;
-    const head = (name) => `${name}${units[name] && units[name] !== "-" ? ` [${units[name]}]` : ""}`;
-    const row = (i) => html`<tr>${names.map((name) => html`<td>${show(columns[name][i], 6)}</td>`)}</tr>`;
-    const more = skipped.length ? `; lines that were skipped: ${skipped.slice(0, 8).join(", ")}${skipped.length > 8 ? ", …" : ""}` : "";
+    const head = (name) =>
+      `${name}${units[name] && units[name] !== "-" ? ` [${units[name]}]` : ""}`;
+    const row = (i) =>
+      html`<tr>
+        ${names.map((name) => html`<td>${show(columns[name][i], 6)}</td>`)}
+      </tr>`;
+    const more = skipped.length
+      ? `; lines that were skipped: ${skipped.slice(0, 8).join(", ")}` +
+        (skipped.length > 8 ? ", …" : "")
+      : "";
     return html`<p class="hint">${how ? `Read as: ${how}; ` : ""}${count} points${more}.</p>
-      <div class="scroll"><table>
-        <thead><tr>${names.map((name) => html`<th scope="col">${head(name)}</th>`)}</tr></thead>
-        <tbody>${Array.from({ length: Math.min(count, ROWS) }, (_, i) => row(i))}</tbody>
-      </table></div>
+      <div class="scroll">
+        <table>
+          <thead>
+            <tr>
+              ${names.map((name) => html`<th scope="col">${head(name)}</th>`)}
+            </tr>
+          </thead>
+          <tbody>
+            ${Array.from({ length: Math.min(count, ROWS) }, (_, i) => row(i))}
+          </tbody>
+        </table>
+      </div>
       ${count > ROWS ? html`<p class="hint">and ${count - ROWS} more</p>` : nothing}`;
   }
 
@@ -155,10 +193,13 @@ export function fitPanel(store, moved, openCase) {
     const x = speeds.map((value) => toUnit("v0", value, unit));
     const moving = x.filter((value) => value > 0);
     const log = Math.min(...moving) < Math.max(...moving) / 10;
-    const domain = log ? [Math.min(...moving) / 1.3, Math.max(...moving) * 1.3] : [0, 1.05 * Math.max(...x)];
+    const domain = log
+      ? [Math.min(...moving) / 1.3, Math.max(...moving) * 1.3]
+      : [0, 1.05 * Math.max(...x)];
     const std = table.columns.std ? column("std") : x.map(() => 0);
     const curve = fit?.curve;
-    const top = 1.08 * Math.max(...measured.map((mu, i) => mu + (std[i] || 0)), ...(curve?.high ?? [0]));
+    const top =
+      1.08 * Math.max(...measured.map((mu, i) => mu + (std[i] || 0)), ...(curve?.high ?? [0]));
     const residuals = fit?.residuals ?? [];
     const worst = Math.max(...residuals.map((one, i) => Math.abs(one) + (std[i] || 0)), 1e-12);
     const share = residuals.length ? 0.3 : 0; // of the height, for the residuals
@@ -169,12 +210,31 @@ export function fitPanel(store, moved, openCase) {
     const { inside } = plot;
     if (curve) {
       const at = curve.v0.map((value) => toUnit("v0", value, unit));
-      const band = area().x((_, i) => plot.x(at[i])).y0((_, i) => plot.y(curve.low[i])).y1((_, i) => plot.y(curve.high[i]));
+      const band = area()
+        .x((_, i) => plot.x(at[i]))
+        .y0((_, i) => plot.y(curve.low[i]))
+        .y1((_, i) => plot.y(curve.high[i]));
       inside.append("path").attr("class", "band").attr("d", band(at));
-      plot.path(at.map((one, i) => [one, curve.mu_macro[i]]), "curve");
+      plot.path(
+        at.map((one, i) => [one, curve.mu_macro[i]]),
+        "curve",
+      );
     }
-    const bar = (i, y, size) => plot.path([[x[i], y - size], [x[i], y + size]], "measured");
-    const dot = (i, y) => inside.append("circle").attr("class", "measured").attr("r", 3.5).attr("cx", plot.x(x[i])).attr("cy", plot.y(y));
+    const bar = (i, y, size) =>
+      plot.path(
+        [
+          [x[i], y - size],
+          [x[i], y + size],
+        ],
+        "measured",
+      );
+    const dot = (i, y) =>
+      inside
+        .append("circle")
+        .attr("class", "measured")
+        .attr("r", 3.5)
+        .attr("cx", plot.x(x[i]))
+        .attr("cy", plot.y(y));
     measured.forEach((mu, i) => {
       if (std[i]) bar(i, mu, std[i]);
       dot(i, mu);
@@ -182,13 +242,31 @@ export function fitPanel(store, moved, openCase) {
     if (!residuals.length) return;
     const middle = (-0.5 * share * top) / (1 - share);
     const scale = (0.4 * share * top) / (1 - share) / worst;
-    plot.path([[domain[0], 0], [domain[1], 0]], "rule");
-    plot.path([[domain[0], middle], [domain[1], middle]], "still");
+    plot.path(
+      [
+        [domain[0], 0],
+        [domain[1], 0],
+      ],
+      "rule",
+    );
+    plot.path(
+      [
+        [domain[0], middle],
+        [domain[1], middle],
+      ],
+      "still",
+    );
     residuals.forEach((one, i) => {
       bar(i, middle + scale * one, scale * (std[i] || 0));
       dot(i, middle + scale * one);
     });
-    plot.text(`residuals, ± ${show(worst, 2)} at most`, plot.box.x + 6, plot.y(0) + 13, "note", "start");
+    plot.text(
+      `residuals, ± ${show(worst, 2)} at most`,
+      plot.box.x + 6,
+      plot.y(0) + 13,
+      "note",
+      "start",
+    );
   }
 
   $("points").addEventListener("change", ({ target }) => {
@@ -216,7 +294,8 @@ export function fitPanel(store, moved, openCase) {
     zone.classList.remove("over");
     take(event.dataTransfer.files[0]);
   });
-  for (const name of ["sep", "decimal", "encoding"]) $(`points-${name}`).addEventListener("change", read);
+  for (const name of ["sep", "decimal", "encoding"])
+    $(`points-${name}`).addEventListener("change", read);
   $("unknowns").addEventListener("change", () => show_());
   $("fit-form").addEventListener("submit", (event) => {
     event.preventDefault();
@@ -229,7 +308,15 @@ export function fitPanel(store, moved, openCase) {
     openCase(about.example.case);
     read();
   });
-  $("fit-image").addEventListener("click", () => fit && plot.save($("fit-lines").textContent.replaceAll(/\s+/g, " ").trim().slice(0, 200), "friction-fit.svg"));
+  $("fit-image").addEventListener(
+    "click",
+    () =>
+      fit &&
+      plot.save(
+        $("fit-lines").textContent.replaceAll(/\s+/g, " ").trim().slice(0, 200),
+        "friction-fit.svg",
+      ),
+  );
 
   return (latest) => {
     answer = latest;

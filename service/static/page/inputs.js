@@ -45,7 +45,9 @@ function understood(name, { text, value, unit, std, low, high } = {}) {
 export function withUnit(name, text, answer) {
   const unit = answer?.inputs[name]?.unit;
   const bare = text.trim() && !/[^\d\s.,e+±%-]/i.test(text) && /\d\s*$/.test(text.trim());
-  return bare && unit && unit !== "-" && /[^-\d]/.test(unit) ? `${text.trim()} ${inPrint(unit)}` : text;
+  return bare && unit && unit !== "-" && /[^-\d]/.test(unit)
+    ? `${text.trim()} ${inPrint(unit)}`
+    : text;
 }
 
 /** `moved({ name: value [SI] })` takes the value of a slider. */
@@ -138,9 +140,9 @@ export function inputsPanel(store, moved) {
       $("choices"),
     );
     sketch();
-    const doubts = (name) => answer?.remarks?.find(({ row, field: one }) => row === "units" && one === name)?.text;
+    const doubts = (name) =>
+      answer?.remarks?.find(({ row, field: one }) => row === "units" && one === name)?.text;
     const rows = inputsOf(store.state).map((name) => field(name, faults.get(name), doubts(name)));
     render(rows, $("fields"));
   };
 }
-

@@ -20,10 +20,12 @@ function usualRange(state, { inputs, limits }) {
   if (marks.length) {
     const exponents = marks.map(Math.log10);
     low = scale === "linear" ? 0 : 10 ** (Math.floor(Math.min(...exponents)) - 2);
-    high = scale === "linear" ? 2 * Math.max(...marks) : 10 ** (Math.ceil(Math.max(...exponents)) + 1);
+    high =
+      scale === "linear" ? 2 * Math.max(...marks) : 10 ** (Math.ceil(Math.max(...exponents)) + 1);
   } else if (scale === "linear") low = 0;
   // at Fz the contact lifts off
-  if (along === "Fz" && state.direction === "normal") low = Math.max(low, 1.01 * inputs.Fz_amplitude.value);
+  if (along === "Fz" && state.direction === "normal")
+    low = Math.max(low, 1.01 * inputs.Fz_amplitude.value);
   if (along === "Fz_amplitude") high = Math.min(high, 0.99 * inputs.Fz.value);
   if (scale === "linear" && POSITIVE.includes(along)) low = Math.max(low, 1e-3 * high);
   return [Math.max(low, scale === "linear" ? 0 : EXTREMES[0]), Math.min(high, EXTREMES[1])];
@@ -32,7 +34,8 @@ function usualRange(state, { inputs, limits }) {
 /** The question of a law: the case without deviations, which a law does not have. */
 export function lawQuestion(state, answer) {
   const { along, scale } = state;
-  const grows = along === "Fz" && (state.exponent || state.contact === "ball") && state.contact !== "rigid";
+  const grows =
+    along === "Fz" && (state.exponent || state.contact === "ball") && state.contact !== "rigid";
   const question = caseOf(state, grows ? [] : [along]);
   for (const [name, { std, value }] of Object.entries(answer.inputs)) {
     if (std && name in question) question[name] = value;
@@ -59,7 +62,8 @@ export function lawPanel(store, moved) {
   /** The unit of the axis: that of the input as it was typed. */
   const unit = () => answer?.inputs[along()]?.unit || unitFor(along(), law?.values.at(-1) ?? 1);
   const text = (value) => `${about.inputs[along()].symbol} = ${inUnit(along(), value, unit())}`;
-  const heading = () => `${about.inputs[along()].symbol}${unit() === "-" ? "" : ` [${inPrint(unit())}]`}`;
+  const heading = () =>
+    `${about.inputs[along()].symbol}${unit() === "-" ? "" : ` [${inPrint(unit())}]`}`;
   const channel = new Channel(
     (question) => post("v1/law", question),
     (reply, { scale }) => {
@@ -76,14 +80,17 @@ export function lawPanel(store, moved) {
 
   function show_() {
     const at = (i) => `${show(law.mu_macro.at(i))} at ${text(law.values.at(i))}`;
-    const marks = law.border.map(({ value }) => `; border of continuous sliding at ${text(value)}`).join("");
+    const marks = law.border
+      .map(({ value }) => `; border of continuous sliding at ${text(value)}`)
+      .join("");
     $("law").setAttribute("aria-label", `Friction law from ${at(0)} to ${at(-1)}${marks}.`);
     read(pointer);
     plot.redraw();
   }
 
   /** µ₀ at each value of the law. */
-  const heights = () => (law.along === "mu0" ? law.values : law.values.map(() => answer.inputs.mu0.value));
+  const heights = () =>
+    law.along === "mu0" ? law.values : law.values.map(() => answer.inputs.mu0.value);
 
   function paint() {
     if (!law || !answer) return;
@@ -96,19 +103,34 @@ export function lawPanel(store, moved) {
     });
     const { inside, over, box } = plot;
     bands(shown, mu0);
-    plot.path(shown.map((x, i) => [x, law.mu_static[i]]), "still");
+    plot.path(
+      shown.map((x, i) => [x, law.mu_static[i]]),
+      "still",
+    );
     if (law.mu_macro_low) range(shown, law.mu_macro_low, law.mu_macro_high, "band");
-    plot.path(shown.map((x, i) => [x, law.mu_macro[i]]), "curve");
+    plot.path(
+      shown.map((x, i) => [x, law.mu_macro[i]]),
+      "curve",
+    );
     for (const { value } of law.border) {
       const x = plot.x(toUnit(law.along, value, unit()));
       inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
       const left = x > box.x + box.width - 60;
-      plot.text("border", x + (left ? -5 : 5), box.y + box.height - 6, "mark", left ? "end" : "start");
+      plot.text(
+        "border",
+        x + (left ? -5 : 5),
+        box.y + box.height - 6,
+        "mark",
+        left ? "end" : "start",
+      );
     }
     const still = plot.y(law.mu_static[0]);
     plot.text("static", box.x + 5, Math.min(still + 14, box.y + box.height - 6), "note", "start");
     if (target?.along === law.along) {
-      plot.path(shown.map((x) => [x, target.mu_macro]), "target");
+      plot.path(
+        shown.map((x) => [x, target.mu_macro]),
+        "target",
+      );
     }
     const rigid = law.along === "k" && store.state.contact === "rigid";
     const here = rigid ? Infinity : numberOf(answer.inputs[law.along]);
@@ -116,7 +138,11 @@ export function lawPanel(store, moved) {
     const x = toUnit(law.along, here, unit());
     if (answer.std) {
       const ends = [answer.mu_macro - answer.std, answer.mu_macro + answer.std];
-      plot.path(ends.map((mu) => [x, mu]), "deviation", over);
+      plot.path(
+        ends.map((mu) => [x, mu]),
+        "deviation",
+        over,
+      );
     }
     plot.point(x, answer.mu_macro);
   }
@@ -149,13 +175,15 @@ export function lawPanel(store, moved) {
     if (!law) return;
     if (!place || !plot.box || !plot.holds(place)) {
       const one = numberOf(answer?.inputs[law.along]);
-      const words = one === undefined ? "" : `Your case: ${text(one)}: µ = ${show(answer.mu_macro)}`;
+      const words =
+        one === undefined ? "" : `Your case: ${text(one)}: µ = ${show(answer.mu_macro)}`;
       $("law-read").textContent = words;
       return;
     }
     const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));
     $("law-read").textContent =
-      `At the pointer: ${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ${inWords(law.regime[i])}`;
+      `At the pointer: ${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ` +
+      inWords(law.regime[i]);
   }
 
   plot.follow({
@@ -182,12 +210,21 @@ export function lawPanel(store, moved) {
       ...(low && { "mu_macro_low [-]": low, "mu_macro_high [-]": high }),
     };
     const rows = values.map((_, i) => Object.values(columns).map((column) => column[i]));
-    return [Object.keys(columns), ...rows].map((cells) => `${cells.join(",")}\r\n`).join(""); // no cell holds a comma
+    return [Object.keys(columns), ...rows].map((cells) => `${cells.join(",")}\r\n`).join("");
   }
-  const caption = () => inputsOf(store.state).filter((name) => name !== law.along)
-    .map((name) => `${about.inputs[name].symbol} = ${answer.inputs[name]?.text}`).join(", ");
-  $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${law.along}.csv`));
-  $("law-image").addEventListener("click", () => law && plot.save(caption(), `friction-law-${law.along}.svg`));
+  const caption = () =>
+    inputsOf(store.state)
+      .filter((name) => name !== law.along)
+      .map((name) => `${about.inputs[name].symbol} = ${answer.inputs[name]?.text}`)
+      .join(", ");
+  $("csv").addEventListener(
+    "click",
+    () => law && save(csv(), "text/csv", `friction-law-${law.along}.csv`),
+  );
+  $("law-image").addEventListener(
+    "click",
+    () => law && plot.save(caption(), `friction-law-${law.along}.svg`),
+  );
 
   return (state, reply, scale, wanted, old) => {
     [answer, colours, target] = [reply, scale, wanted];

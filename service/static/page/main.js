@@ -26,7 +26,10 @@ const store = new Store(() => {
 /** The question of a state: the texts as they are typed, and all outputs that its kind has. */
 function questionOf(state) {
   const body = caseOf(state);
-  return { ...body, include: ["inputs", "model", ...about.outputs[`${body.contact} ${body.direction}`]] };
+  return {
+    ...body,
+    include: ["inputs", "model", ...about.outputs[`${body.contact} ${body.direction}`]],
+  };
 }
 
 const point = new Channel(
@@ -51,7 +54,9 @@ function moved(values, digits = 4, more = {}) {
   const texts = Object.entries(values).filter(([, value]) => Number.isFinite(value));
   if (!answer || !texts.length) return store.change(more);
   return store.change({
-    ...Object.fromEntries(texts.map(([name, value]) => [name, textAt(answer, name, value, digits)])),
+    ...Object.fromEntries(
+      texts.map(([name, value]) => [name, textAt(answer, name, value, digits)]),
+    ),
     ...more,
   });
 }
@@ -82,7 +87,9 @@ function start(names) {
   $("version").textContent = about.version;
   for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
   const options = (id) =>
-    $(id).append(...Object.entries(about.inputs).map(([name, { symbol }]) => new Option(symbol, name)));
+    $(id).append(
+      ...Object.entries(about.inputs).map(([name, { symbol }]) => new Option(symbol, name)),
+    );
   options("along");
   panels = {
     inputs: inputsPanel(store, moved),
@@ -101,7 +108,8 @@ function start(names) {
   tabs("panel-tabs");
   store.open();
   $("notice").hidden = !store.unknown.length;
-  $("notice-text").textContent = `The page does not know this part of the link, and leaves it out: ${store.unknown.join(", ")}.`;
+  $("notice-text").textContent =
+    `The page does not know this part of the link, and leaves it out: ${store.unknown.join(", ")}.`;
 }
 
 $("reset").addEventListener("click", () => store.change(startState()));
@@ -112,7 +120,9 @@ for (const name of ["along", "scale", "from", "to", "exponent"])
   $(name).addEventListener("change", ({ target: { value } }) =>
     store.change(name === "along" ? { along: value, from: "", to: "" } : { [name]: value }),
   );
-$("digits").addEventListener("change", ({ target: { checked } }) => store.change({ digits: checked ? "all" : "few" }));
+$("digits").addEventListener("change", ({ target: { checked } }) =>
+  store.change({ digits: checked ? "all" : "few" }),
+);
 $("print").addEventListener("click", () => window.print());
 new Channel(
   () => get("static/page/names.json"),

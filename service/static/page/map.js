@@ -10,13 +10,20 @@ const { contours } = globalThis.d3;
 export function textAt(answer, name, value, digits = 4) {
   const { unit, std, value: before } = answer.inputs[name] ?? {};
   const number = unit ? Math.abs(toUnit(name, value, unit)) : NaN; // how it would read
-  const text = inUnit(name, value, number >= 1e-3 && number < 1e5 ? unit : unitFor(name, value), digits);
+  const text = inUnit(
+    name,
+    value,
+    number >= 1e-3 && number < 1e5 ? unit : unitFor(name, value),
+    digits,
+  );
   return std ? `${text} ± ${show((100 * std) / before, 3)} %` : text;
 }
 
 /** The relative deviation of a product of powers of inputs; 0 where none has one. */
 function deviationOf(inputs, names) {
-  const relative = names.map((name) => (inputs[name]?.std ? inputs[name].std / inputs[name].value : 0));
+  const relative = names.map((name) =>
+    inputs[name]?.std ? inputs[name].std / inputs[name].value : 0,
+  );
   return Math.hypot(...relative);
 }
 
@@ -33,9 +40,9 @@ export function mapPanel(store, moved, loaded) {
     (kind) => get(`static/page/map.json?${new URLSearchParams(kind)}`),
     (data, { contact, direction }) => {
       map = { ...data, contact, direction };
-      map.shades = contours()
-        .size([data.v_tilde.n, data.y_tilde.n])
-        .thresholds(data.levels)(data.mu_ratio.map((one) => one * data.unit));
+      map.shades = contours().size([data.v_tilde.n, data.y_tilde.n]).thresholds(data.levels)(
+        data.mu_ratio.map((one) => one * data.unit),
+      );
       loaded();
     },
     (reason) => ($("map-read").textContent = reason ?? ""),
@@ -47,7 +54,10 @@ export function mapPanel(store, moved, loaded) {
     const x = (at) => box.x + ((at - 0.5) / (map.v_tilde.n - 1)) * box.width;
     const y = (at) => box.y + box.height - ((at - 0.5) / (map.y_tilde.n - 1)) * box.height;
     const place = ([a, b]) => `${x(a).toFixed(1)} ${y(b).toFixed(1)}`;
-    return coordinates.flat().map((ring) => `M${ring.map(place).join("L")}Z`).join("");
+    return coordinates
+      .flat()
+      .map((ring) => `M${ring.map(place).join("L")}Z`)
+      .join("");
   }
 
   function paint() {
@@ -66,11 +76,19 @@ export function mapPanel(store, moved, loaded) {
     const ground = inside.append("rect").attr("class", "shade").style("fill", map.colours[0]);
     ground.attr("x", box.x).attr("y", box.y).attr("width", box.width).attr("height", box.height);
     map.shades.forEach((shade, i) => {
-      inside.append("path").attr("class", "shade").style("fill", map.colours[i + 1]).attr("d", outline(shade));
+      inside
+        .append("path")
+        .attr("class", "shade")
+        .style("fill", map.colours[i + 1])
+        .attr("d", outline(shade));
     });
-    plot.path(map.border.filter(([v, y]) => v > 0 && y > 0), "border");
+    plot.path(
+      map.border.filter(([v, y]) => v > 0 && y > 0),
+      "border",
+    );
     const at = (u, w) => [box.x + u * box.width, box.y + (1 - w) * box.height];
-    for (const [level, u, w] of map.labels) plot.text(show(level), ...at(u, w), "tag").attr("dy", "0.35em");
+    for (const [level, u, w] of map.labels)
+      plot.text(show(level), ...at(u, w), "tag").attr("dy", "0.35em");
     for (const [u, w, words] of map.areas) plot.text(words, ...at(u, w), "area");
     legend(over);
     if (target) {
@@ -89,10 +107,25 @@ export function mapPanel(store, moved, loaded) {
     const group = over.append("g").attr("class", "legend");
     map.colours.forEach((colour, i) => {
       const y = box.y + box.height - (i + 1) * tall;
-      group.append("rect").attr("x", left).attr("y", y).attr("width", 12).attr("height", tall + 0.5).style("fill", colour);
-      if (i) group.append("text").attr("x", left + 16).attr("y", y + tall + 4).text(show(map.levels[i - 1]));
+      group
+        .append("rect")
+        .attr("x", left)
+        .attr("y", y)
+        .attr("width", 12)
+        .attr("height", tall + 0.5)
+        .style("fill", colour);
+      if (i)
+        group
+          .append("text")
+          .attr("x", left + 16)
+          .attr("y", y + tall + 4)
+          .text(show(map.levels[i - 1]));
     });
-    group.append("text").attr("x", left + 16).attr("y", box.y + 6).text("µ/µ₀");
+    group
+      .append("text")
+      .attr("x", left + 16)
+      .attr("y", box.y + 6)
+      .text("µ/µ₀");
   }
 
   /** The user's point, with a bar for its deviation or for the interval of k. */
@@ -111,7 +144,8 @@ export function mapPanel(store, moved, loaded) {
   }
 
   function outside() {
-    if (store.state.contact === "rigid") return "A rigid contact has no point on this map: ṽ and ỹ are infinite.";
+    if (store.state.contact === "rigid")
+      return "A rigid contact has no point on this map: ṽ and ỹ are infinite.";
     if (!answer?.groups || !map) return "";
     const { v_tilde: v, y_tilde: y } = answer.groups;
     const beyond = (value, { start, stop }) => value === null || value < start || value > stop;
@@ -129,7 +163,10 @@ export function mapPanel(store, moved, loaded) {
     const at = place && plot.holds(place) ? place : null;
     if (!at) {
       const { v_tilde: v, y_tilde: y } = answer?.groups ?? {};
-      const words = answer?.groups ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}: µ/µ₀ = ${show(answer.mu_ratio)}` : "";
+      const words = answer?.groups
+        ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}: ` +
+          `µ/µ₀ = ${show(answer.mu_ratio)}`
+        : "";
       $("map-read").textContent = outside() || words;
       return;
     }
@@ -138,7 +175,8 @@ export function mapPanel(store, moved, loaded) {
     const column = cell(at[0], plot.box.x, plot.box.width, map.v_tilde.n);
     const row = cell(plot.box.y + plot.box.height - at[1], 0, plot.box.height, map.y_tilde.n);
     const ratio = map.mu_ratio[row * map.v_tilde.n + column] * map.unit;
-    $("map-read").textContent = `At the pointer: ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}: µ/µ₀ ≈ ${show(ratio, 3)}`;
+    $("map-read").textContent =
+      `At the pointer: ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}: µ/µ₀ ≈ ${show(ratio, 3)}`;
   }
 
   /** The values of the case at a place of the map. */
@@ -159,14 +197,17 @@ export function mapPanel(store, moved, loaded) {
       const names = { v0: right, [amplitude()]: up };
       const changed = Object.entries(names).filter(([, way]) => way);
       moved(
-        Object.fromEntries(changed.map(([name, way]) => [name, answer.inputs[name].value * factor ** way])),
+        Object.fromEntries(
+          changed.map(([name, way]) => [name, answer.inputs[name].value * factor ** way]),
+        ),
         6,
       );
       return true;
     },
   });
   $("map-image").addEventListener("click", () => map && plot.save(caption(), "friction-map.svg"));
-  const caption = () => `${about.choices.contact[map.contact]}, ${about.choices.direction[map.direction]}`;
+  const caption = () =>
+    `${about.choices.contact[map.contact]}, ${about.choices.direction[map.direction]}`;
 
   let asked;
   return (latest, ratio) => {
@@ -180,7 +221,8 @@ export function mapPanel(store, moved, loaded) {
     $("map").setAttribute(
       "aria-label",
       answer?.groups
-        ? `Map of µ/µ₀. Your point: speed ${show(answer.groups.v_tilde ?? Infinity, 3)}, amplitude ` +
+        ? `Map of µ/µ₀. Your point: speed ${show(answer.groups.v_tilde ?? Infinity, 3)}, ` +
+            "amplitude " +
             `${show(answer.groups.y_tilde ?? Infinity, 3)}, ${inWords(answer.regime)}.`
         : "Map of µ/µ₀ over dimensionless speed and amplitude",
     );
@@ -189,4 +231,3 @@ export function mapPanel(store, moved, loaded) {
     return map;
   };
 }
-

@@ -36,7 +36,8 @@ export function motionPanel(store) {
   /** The motion that is asked: the inputs of the form but y0, and the three oscillations. */
   function question(without = []) {
     const { direction: _, ...body } = caseOf(store.state, ["y0", "Fz_amplitude", ...without]);
-    for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {})) if (std && name in body) body[name] = value;
+    for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {}))
+      if (std && name in body) body[name] = value;
     const parts = Object.entries(typed).filter(([, text]) => text.trim());
     return { ...body, ...Object.fromEntries(parts) };
   }
@@ -66,7 +67,9 @@ export function motionPanel(store) {
     const [meaning] = PARTS[name];
     const fault = faults.get(name);
     return html`<div class="field ${fault ? "bad" : ""}">
-      <label for=${`motion-${name}`}>${typeset(name === "normal" ? "ΔFz" : name)} <span class="label">${meaning}</span></label>
+      <label for=${`motion-${name}`}
+        >${typeset(name === "normal" ? "ΔFz" : name)} <span class="label">${meaning}</span></label
+      >
       <input
         id=${`motion-${name}`}
         spellcheck="false"
@@ -79,14 +82,17 @@ export function motionPanel(store) {
           show_();
         }}
       />
-      <p id=${`motion-note-${name}`} class="note">${fault ?? "amplitude, and @ phase in degrees"}</p>
+      <p id=${`motion-note-${name}`} class="note">
+        ${fault ?? "amplitude, and @ phase in degrees"}
+      </p>
     </div>`;
   }
 
   function numbers() {
     if (!motion) return nothing;
     const { error_estimate: error } = motion;
-    const known = (mu) => (Math.abs(mu) <= error ? "0" : friction(mu, Math.min(digitsWithin(mu, error), 6)));
+    const known = (mu) =>
+      Math.abs(mu) <= error ? "0" : friction(mu, Math.min(digitsWithin(mu, error), 6));
     const rows = [
       ["µ", "mean force along the drag, over Fz", known(motion.mu_macro)],
       ["µ across", "mean force across it, over Fz", known(motion.mu_lateral)],
@@ -94,9 +100,19 @@ export function motionPanel(store) {
       ["sticks", "share of the period", `${show(100 * motion.stick_fraction, 3)} %`],
       ["slip path", "of the foot in a period", prefixed(motion.slip_path, "m", 3)],
       ["shaker power", "mean, along and across", prefixed(motion.power, "W", 3)],
-      ["settles in", "periods until a small disturbance has fallen to 1 %", show(motion.periods ?? Infinity, 3)],
+      [
+        "settles in",
+        "periods until a small disturbance has fallen to 1 %",
+        show(motion.periods ?? Infinity, 3),
+      ],
     ];
-    return rows.map(([name, meaning, value]) => html`<div><dt title=${meaning} tabindex="0">${name}</dt><dd>${value}</dd></div>`);
+    return rows.map(
+      ([name, meaning, value]) =>
+        html`<div>
+          <dt title=${meaning} tabindex="0">${name}</dt>
+          <dd>${value}</dd>
+        </div>`,
+    );
   }
 
   function roots() {
@@ -107,8 +123,12 @@ export function motionPanel(store) {
     const unit = UNITS[unknown] ?? UNITS[last] ?? (unknown.startsWith("normal") ? "N" : "m");
     const text = (value) => (unit === "°" ? `${show(value)}°` : prefixed(value, unit, 5));
     const line = ({ value }) => html`<li><b>${UNKNOWNS[unknown]} = ${text(value)}</b></li>`;
-    const range = reachable ? `; here it can be ${show(reachable.min)} to ${show(reachable.max)}` : "";
-    return found.length ? found.map(line) : html`<li>${prose(reason ?? `No value gives that${range}.`)}</li>`;
+    const range = reachable
+      ? `; here it can be ${show(reachable.min)} to ${show(reachable.max)}`
+      : "";
+    return found.length
+      ? found.map(line)
+      : html`<li>${prose(reason ?? `No value gives that${range}.`)}</li>`;
   }
 
   function show_() {
@@ -116,7 +136,8 @@ export function motionPanel(store) {
     render(numbers(), $("motion-values"));
     render(roots(), $("motion-roots"));
     const old = motion && JSON.stringify({ ...question(), cycle: true }) !== asked;
-    for (const part of ["motion-values", "forces", "path"]) $(part).classList.toggle("old", Boolean(old));
+    for (const part of ["motion-values", "forces", "path"])
+      $(part).classList.toggle("old", Boolean(old));
     forces.redraw();
     path.redraw();
   }
@@ -139,10 +160,25 @@ export function motionPanel(store) {
       y: { domain: padded([0, ...all]), log: false, title: "force [N]" },
       right: 30,
     });
-    forces.path([[0, 0], [1, 0]], "rule");
+    forces.path(
+      [
+        [0, 0],
+        [1, 0],
+      ],
+      "rule",
+    );
     for (const name of ["Fx", "Fy", "Fz"]) {
-      forces.path(phase.map((x, i) => [x, cycle[name][i] ?? NaN]), `curve ${name}`);
-      forces.text(name, forces.width - 26, forces.y(cycle[name].at(-1) ?? 0) + 4, `note ${name}`, "start");
+      forces.path(
+        phase.map((x, i) => [x, cycle[name][i] ?? NaN]),
+        `curve ${name}`,
+      );
+      forces.text(
+        name,
+        forces.width - 26,
+        forces.y(cycle[name].at(-1) ?? 0) + 4,
+        `note ${name}`,
+        "start",
+      );
     }
   }
 
@@ -153,15 +189,23 @@ export function motionPanel(store) {
     const drift = (cycle.x.at(-1) - cycle.x[0]) / cycle.t.at(-1);
     const along = cycle.x.map((x, i) => 1e6 * (x - drift * cycle.t[i]));
     const across = cycle.y.map((y) => 1e6 * y);
-    const half = 0.55 * Math.max(...[along, across].map((one) => Math.max(...one) - Math.min(...one)), 1e-9);
+    const half =
+      0.55 * Math.max(...[along, across].map((one) => Math.max(...one) - Math.min(...one)), 1e-9);
     const middle = (one) => (Math.max(...one) + Math.min(...one)) / 2;
     const ratio = Math.max(path.width - 64, 1) / Math.max(path.height - 52, 1);
     const [wide, tall] = ratio > 1 ? [half * ratio, half] : [half, half / ratio];
     path.axes({
-      x: { domain: [middle(along) - wide, middle(along) + wide], log: false, title: "x − drag [µm]" },
+      x: {
+        domain: [middle(along) - wide, middle(along) + wide],
+        log: false,
+        title: "x − drag [µm]",
+      },
       y: { domain: [middle(across) - tall, middle(across) + tall], log: false, title: "y [µm]" },
     });
-    path.path(along.map((x, i) => [x, across[i]]), "curve");
+    path.path(
+      along.map((x, i) => [x, across[i]]),
+      "curve",
+    );
   }
 
   $("motion-form").addEventListener("submit", (event) => {

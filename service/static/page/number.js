@@ -12,8 +12,16 @@ const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
 
 /** The number and its deviation as texts. */
 function numberOf(answer, all) {
-  const { mu_macro: mu, std, error_bound: bound, mu_macro_low: low, mu_macro_high: high, digits = 4 } = answer;
-  if (all) return { value: friction(mu, digitsWithin(mu, bound) + 1), std: std ? show(std, 6) : null };
+  const {
+    mu_macro: mu,
+    std,
+    error_bound: bound,
+    mu_macro_low: low,
+    mu_macro_high: high,
+    digits = 4,
+  } = answer;
+  if (all)
+    return { value: friction(mu, digitsWithin(mu, bound) + 1), std: std ? show(std, 6) : null };
   if (std) {
     const [value, deviation] = withDeviation(mu, std);
     return { value, std: deviation };
@@ -31,7 +39,9 @@ function spread(answer, rows) {
   }
   if (shares) {
     const parts = Object.entries(shares).filter(([, share]) => share >= 0.005);
-    const words = parts.sort(([, a], [, b]) => b - a).map(([name, share]) => `${symbolOf(name)} ${Math.round(100 * share)} %`);
+    const words = parts
+      .sort(([, a], [, b]) => b - a)
+      .map(([name, share]) => `${symbolOf(name)} ${Math.round(100 * share)} %`);
     return words.length ? `The variance comes from ${words.join(", ")}.` : "";
   }
   const known = rows.find(({ row }) => row === "k is known");
@@ -45,7 +55,9 @@ export function numberPanel(store) {
     if (target === currentTarget || target.closest("button")) currentTarget.close();
   });
   return (answer, trouble, old) => {
-    $("status").textContent = trouble?.text ? `${prose(trouble.text)}${old ? " The last answer stays." : ""}` : "";
+    $("status").textContent = trouble?.text
+      ? `${prose(trouble.text)}${old ? " The last answer stays." : ""}`
+      : "";
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
     if (!answer) {
@@ -59,16 +71,19 @@ export function numberPanel(store) {
     const doubt = rows.find(({ row }) => row === "units");
     const warning = doubt ?? rows.find(({ row }) => row === "first order");
     render(
-      html`<output id="mu" for="fields">${value}</output>${std
-          ? html`<span id="std"> ± ${std}</span>`
-          : nothing}`,
+      html`<output id="mu" for="fields">${value}</output>${
+          std ? html`<span id="std"> ± ${std}</span>` : nothing
+        }`,
       $("number"),
     );
     $("regime").textContent = inWords(answer.regime);
     $("spread").textContent = spread(answer, rows);
-    $("doubt").textContent = warning ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}` : "";
+    $("doubt").textContent = warning
+      ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}`
+      : "";
     const lines = rows.filter(({ row }) => !BESIDE.includes(row));
-    const line = ({ row, text }) => html`<li title=${prose(text)}><b>${row}:</b> ${prose(text)}</li>`;
+    const line = ({ row, text }) =>
+      html`<li title=${prose(text)}><b>${row}:</b> ${prose(text)}</li>`;
     render(lines.slice(0, SHOWN).map(line), $("rows"));
     render(
       rows.map(({ row, text }) => html`<p><b>${row}.</b> ${prose(text)}</p>`),

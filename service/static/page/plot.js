@@ -19,7 +19,19 @@ const LOOKS = [
   "paint-order",
   "opacity",
 ];
-const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+const RAISED = {
+  "-": "⁻",
+  0: "⁰",
+  1: "¹",
+  2: "²",
+  3: "³",
+  4: "⁴",
+  5: "⁵",
+  6: "⁶",
+  7: "⁷",
+  8: "⁸",
+  9: "⁹",
+};
 
 /** A power of ten as people write it; other ticks of a logarithmic axis have no number. */
 function decade(value) {
@@ -33,7 +45,10 @@ function decades(scale, most) {
   const [low, high] = scale.domain().map(Math.log10);
   const [first, last] = [Math.ceil(low - 1e-9), Math.floor(high + 1e-9)];
   const step = Math.max(1, Math.ceil((last - first + 1) / most));
-  return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, i) => 10 ** (first + i * step));
+  return Array.from(
+    { length: Math.floor((last - first) / step) + 1 },
+    (_, i) => 10 ** (first + i * step),
+  );
 }
 
 /** An axis of d3 with ticks that suit its length. */
@@ -75,8 +90,14 @@ export class Plot {
   /** Two axes with titles; `right` pixels are left free beside them. */
   axes({ x, y, right = 12 }) {
     const [left, top, foot] = [52, 10, 42];
-    const made = ({ domain, log }) => (log ? scaleLog() : scaleLinear()).domain(domain).clamp(false);
-    this.box = { x: left, y: top, width: this.width - left - right, height: this.height - top - foot };
+    const made = ({ domain, log }) =>
+      (log ? scaleLog() : scaleLinear()).domain(domain).clamp(false);
+    this.box = {
+      x: left,
+      y: top,
+      width: this.width - left - right,
+      height: this.height - top - foot,
+    };
     this.x = made(x).range([left, this.width - right]);
     this.y = made(y).range([this.height - foot, top]);
     const root = select(this.svg);
@@ -92,11 +113,15 @@ export class Plot {
       .attr("width", box.width)
       .attr("height", box.height);
     this.inside = root.append("g").attr("clip-path", `url(#${clip})`);
-    const bottom = root.append("g").attr("class", "axis").attr("transform", `translate(0 ${box.y + box.height})`);
+    const bottom = root
+      .append("g")
+      .attr("class", "axis")
+      .attr("transform", `translate(0 ${box.y + box.height})`);
     const side = root.append("g").attr("class", "axis").attr("transform", `translate(${box.x} 0)`);
     bottom.call(ticked(axisBottom(this.x).tickSizeOuter(0), this.x, 44));
     side.call(ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 34));
-    const title = (text, place) => root.append("text").attr("class", "title").attr("transform", place).text(text);
+    const title = (text, place) =>
+      root.append("text").attr("class", "title").attr("transform", place).text(text);
     title(x.title, `translate(${box.x + box.width / 2} ${this.height - 8})`);
     title(y.title, `translate(13 ${box.y + box.height / 2}) rotate(-90)`);
     this.over = root.append("g");
@@ -132,7 +157,9 @@ export class Plot {
     };
     const at = [far(this.x, x, -Infinity, Infinity), far(this.y, y, Infinity, -Infinity)];
     const place = [clamp(at[0], box.x, box.x + box.width), clamp(at[1], box.y, box.y + box.height)];
-    const [right, down] = at.map((value, i) => Math.sign(Math.trunc(100 * clamp(value - place[i], -1e6, 1e6))));
+    const [right, down] = at.map((value, i) =>
+      Math.sign(Math.trunc(100 * clamp(value - place[i], -1e6, 1e6))),
+    );
     const outside = right !== 0 || down !== 0;
     const turn = (Math.atan2(down, right) * 180) / Math.PI;
     return this.over
@@ -148,8 +175,8 @@ export class Plot {
   }
 
   /**
-   * Calls back with the place of the pointer in the plot: `read(place)` while it moves, `read(null)`
-   * when it leaves; `pull(place)` for a click and each step of a drag; `grab(moving)` around it;
+   * Calls back with the place of the pointer in the plot: `read(place)` while it moves,
+   * `read(null)` when it leaves; `pull(place)` for a click and each step of a drag; `grab(moving)` around it;
    * and `step(right, up, factor)` for the arrow keys.
    */
   follow({ read, pull, grab, step }) {
@@ -200,12 +227,24 @@ export class Plot {
       const seen = getComputedStyle(originals[i]);
       for (const look of LOOKS) style.setProperty(look, seen.getPropertyValue(look));
     });
-    const root = select(copy).attr("width", width).attr("height", height + 24).attr("class", null);
+    const root = select(copy)
+      .attr("width", width)
+      .attr("height", height + 24)
+      .attr("class", null);
     root.attr("viewBox", `0 0 ${width} ${height + 24}`).attr("xmlns", "http://www.w3.org/2000/svg");
-    root.insert("rect", ":first-child").attr("width", width).attr("height", height + 24).attr("fill", backgroundColor);
-    const words = root.append("text").attr("x", 12).attr("y", height + 14).attr("fill", color);
+    root
+      .insert("rect", ":first-child")
+      .attr("width", width)
+      .attr("height", height + 24)
+      .attr("fill", backgroundColor);
+    const words = root
+      .append("text")
+      .attr("x", 12)
+      .attr("y", height + 14)
+      .attr("fill", color);
     words.attr("font-family", "sans-serif").attr("font-size", 12).text(text);
-    if (6.6 * text.length > width - 24) words.attr("textLength", width - 24).attr("lengthAdjust", "spacingAndGlyphs");
+    if (6.6 * text.length > width - 24)
+      words.attr("textLength", width - 24).attr("lengthAdjust", "spacingAndGlyphs");
     save(new XMLSerializer().serializeToString(copy), "image/svg+xml", name);
   }
 }

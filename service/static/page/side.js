@@ -37,15 +37,43 @@ function numbers(answer, all) {
   const rows = [
     ["µ/µ₀", "share of the friction that remains", show(answer.mu_ratio, digits)],
     ["static µ", "µ where v₀ goes to 0", show(limits.mu_static, digits)],
-    ["border v₀", "from this speed on the contact slides all the time", prefixed(limits.v0_crit, "m/s")],
+    [
+      "border v₀",
+      "from this speed on the contact slides all the time",
+      prefixed(limits.v0_crit, "m/s"),
+    ],
     ["peak y₀ω", "largest speed of the oscillation", prefixed(peak, "m/s")],
-    ["sticks", "share of the period in which the contact sticks", stick === undefined || stick === null ? "–" : `${show(100 * stick, digits)} %`],
-    ["shaker power", "mean power that the oscillation takes", prefixed(power?.oscillation, "W", digits)],
-    ["power saved", "what the drive needs less than without oscillation: (µ₀ − µ) Fz v₀", prefixed(power?.saved, "W", digits)],
-    ["settles in", "periods until a small disturbance has fallen to 1 %", settling === undefined ? "–" : `${show(settling.periods ?? Infinity, 3)} periods`],
+    [
+      "sticks",
+      "share of the period in which the contact sticks",
+      stick === undefined || stick === null ? "–" : `${show(100 * stick, digits)} %`,
+    ],
+    [
+      "shaker power",
+      "mean power that the oscillation takes",
+      prefixed(power?.oscillation, "W", digits),
+    ],
+    [
+      "power saved",
+      "what the drive needs less than without oscillation: (µ₀ − µ) Fz v₀",
+      prefixed(power?.saved, "W", digits),
+    ],
+    [
+      "settles in",
+      "periods until a small disturbance has fallen to 1 %",
+      settling === undefined ? "–" : `${show(settling.periods ?? Infinity, 3)} periods`,
+    ],
     ["ṽ", "v₀/(l₀ω), dimensionless speed", show(groups.v_tilde ?? Infinity, digits)],
-    ["ỹ", inputs.y0 ? "y₀/l₀, dimensionless amplitude" : "ΔFz/Fz", show(groups.y_tilde ?? Infinity, digits)],
-    ["l₀", "µ₀Fz/k: how far the contact is drawn before it slips", prefixed(groups.l0, "m", digits)],
+    [
+      "ỹ",
+      inputs.y0 ? "y₀/l₀, dimensionless amplitude" : "ΔFz/Fz",
+      show(groups.y_tilde ?? Infinity, digits),
+    ],
+    [
+      "l₀",
+      "µ₀Fz/k: how far the contact is drawn before it slips",
+      prefixed(groups.l0, "m", digits),
+    ],
     ["error ≤", "bound of the numerical error of µ", show(answer.error_bound, 2)],
   ];
   return rows;
@@ -58,7 +86,8 @@ function bars({ gradient, mu_macro: mu, inputs }) {
   const shares = names.map((name) => {
     const [input, per] = name === "omega" ? ["f", 2 * Math.PI] : [name, 1];
     const value = numberOf(inputs[input]);
-    const share = gradient[name] === null || value === undefined ? null : (gradient[name] * per * value) / mu;
+    const share =
+      gradient[name] === null || value === undefined ? null : (gradient[name] * per * value) / mu;
     return [input, share];
   });
   const most = Math.max(1, ...shares.map(([, share]) => Math.abs(share)));
@@ -70,10 +99,19 @@ function bars({ gradient, mu_macro: mu, inputs }) {
           <th scope="row">${typeset(about.inputs[name].symbol)}</th>
           <td>
             <svg class="bar" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">
-              ${svg`<rect x=${share < 0 ? 50 - width : 50} width=${width} height="10" class=${share < 0 ? "less" : "more"} /><path d="M50 0v10" />`}
+              ${svg`
+                <rect
+                  x=${share < 0 ? 50 - width : 50}
+                  width=${width}
+                  height="10"
+                  class=${share < 0 ? "less" : "more"}
+                />
+                <path d="M50 0v10" />`}
             </svg>
           </td>
-          <td>${share === null ? "–" : `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`}</td>
+          <td>
+            ${share === null ? "–" : `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`}
+          </td>
         </tr>`;
       })}
     </tbody>
@@ -102,17 +140,24 @@ export function sidePanel(store, moved, found) {
   function markOf() {
     const { reply, question } = solved;
     const mu0 = answer.inputs.mu0.value;
-    const mu = reply.quantity === "mu_ratio" ? reply.results[0].target * mu0 : reply.results[0].target;
+    const mu =
+      reply.quantity === "mu_ratio" ? reply.results[0].target * mu0 : reply.results[0].target;
     return { along: reply.unknown, mu_macro: mu, mu_ratio: mu / mu0, question };
   }
 
   function question() {
     const { unknown, quantity, target } = store.state;
-    const without = unknown === "Fz" && (store.state.exponent || store.state.contact === "ball") ? [] : [unknown];
+    const without =
+      unknown === "Fz" && (store.state.exponent || store.state.contact === "ball") ? [] : [unknown];
     const body = caseOf(store.state, without);
-    for (const [name, { std, value }] of Object.entries(answer.inputs)) if (std && name in body) body[name] = value;
-    const exponent = unknown === "Fz" && store.state.exponent ? { stiffness_exponent: store.state.exponent } : {};
-    const power = store.state.direction !== "normal" && store.state.contact !== "rigid" ? { include: ["power"] } : {};
+    for (const [name, { std, value }] of Object.entries(answer.inputs))
+      if (std && name in body) body[name] = value;
+    const exponent =
+      unknown === "Fz" && store.state.exponent ? { stiffness_exponent: store.state.exponent } : {};
+    const power =
+      store.state.direction !== "normal" && store.state.contact !== "rigid"
+        ? { include: ["power"] }
+        : {};
     return { ...body, unknown, quantity, target, ...exponent, ...power };
   }
 
@@ -126,10 +171,17 @@ export function sidePanel(store, moved, found) {
       const shaker = power ? `, shaker ${prefixed(power.oscillation, "W")}` : "";
       return html`<li>
         <span><b>${text}</b>: µ = ${friction(mu, 4)}, ${inWords(regime)}${shaker}</span>
-        <button class="use" aria-label=${`Use ${text}`} @click=${() => moved({ [unknown]: value }, 12)}>Use</button>
+        <button
+          class="use"
+          aria-label=${`Use ${text}`}
+          @click=${() => moved({ [unknown]: value }, 12)}
+        >
+          Use
+        </button>
       </li>`;
     };
-    const none = `No value gives that: here it can be ${show(reachable.min)} to ${show(reachable.max)}.`;
+    const range = `${show(reachable.min)} to ${show(reachable.max)}`;
+    const none = `No value gives that: here it can be ${range}.`;
     render(roots.length ? roots.map(line) : html`<li>${none}</li>`, $("solve-result"));
     compare();
   }
@@ -148,26 +200,37 @@ export function sidePanel(store, moved, found) {
     store.change(Object.fromEntries(form));
     if (answer) channel.push(question());
   });
-  $("solve-form").addEventListener("change", ({ target: { name, value } }) => store.change({ [name]: value }));
+  $("solve-form").addEventListener("change", ({ target: { name, value } }) =>
+    store.change({ [name]: value }),
+  );
   tabs("side-tabs");
 
   return (latest) => {
     answer = latest;
     const names = inputsOf(store.state);
     const option = (name) =>
-      html`<option value=${name} ?selected=${store.state.unknown === name}>${about.inputs[name].symbol}</option>`;
+      html`<option value=${name} ?selected=${store.state.unknown === name}>
+        ${about.inputs[name].symbol}
+      </option>`;
     render(names.map(option), $("unknown"));
     $("quantity").value = store.state.quantity;
     $("target").value = store.state.target;
     if (!answer) return;
     const rows = numbers(answer, store.state.digits === "all");
     render(
-      rows.map(([name, meaning, value]) => html`<div><dt title=${meaning} tabindex="0">${name}</dt><dd>${value}</dd></div>`),
+      rows.map(
+        ([name, meaning, value]) =>
+          html`<div>
+            <dt title=${meaning} tabindex="0">${name}</dt>
+            <dd>${value}</dd>
+          </div>`,
+      ),
       $("values"),
     );
-    $("origin").textContent = `Block ${answer.source} of the table ${answer.table.id}, built to ${show(answer.table.tolerance)}.`;
+    $("origin").textContent =
+      `Block ${answer.source} of the table ${answer.table.id}, ` +
+      `built to ${show(answer.table.tolerance)}.`;
     render(bars(answer), $("bars"));
     compare();
   };
 }
-

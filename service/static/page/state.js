@@ -41,7 +41,8 @@ export const startState = () => ({
 export function toAddress(state) {
   const start = startState();
   const words = new URLSearchParams();
-  for (const name of inputsOf(state)) words.set(name, name === "k" ? stiffnessOf(state) : state[name]);
+  for (const name of inputsOf(state))
+    words.set(name, name === "k" ? stiffnessOf(state) : state[name]);
   if (state.contact === "ball") words.set("contact", "ball");
   if (state.direction !== "across") words.set("direction", state.direction);
   for (const name of [...Object.keys(CHOICES).slice(2), ...Object.keys(TEXTS)]) {
@@ -58,7 +59,8 @@ export function fromAddress(hash) {
     if (name in CHOICES ? CHOICES[name].includes(value) : name in state) state[name] = value;
     else unknown.push(`${name}=${value}`);
   }
-  if (state.k.trim().toLowerCase() === "rigid") Object.assign(state, { contact: "rigid", k: usual.k });
+  if (state.k.trim().toLowerCase() === "rigid")
+    Object.assign(state, { contact: "rigid", k: usual.k });
   return { state: allowed(state), unknown };
 }
 

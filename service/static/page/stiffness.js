@@ -13,7 +13,11 @@ export function stiffnessPanel(store, moved) {
   const question = () => {
     const names = about.geometries[typed.geometry].arguments;
     const filled = names.filter((name) => name !== "Fz" && typed[name]?.trim());
-    return { geometry: typed.geometry, Fz: store.state.Fz, ...Object.fromEntries(filled.map((name) => [name, typed[name]])) };
+    return {
+      geometry: typed.geometry,
+      Fz: store.state.Fz,
+      ...Object.fromEntries(filled.map((name) => [name, typed[name]])),
+    };
   };
   const channel = new Channel(
     (body) => post("v1/stiffness", body),
@@ -52,7 +56,9 @@ export function stiffnessPanel(store, moved) {
           @change=${({ target }) => change(name, target.value)}
         />`;
     return html`<div class="field ${fault ? "bad" : ""}">
-      <label for=${shared.id}>${typeset(name)} <span class="label">${/\w/.test(unit) ? unit : ""}</span></label>
+      <label for=${shared.id}
+        >${typeset(name)} <span class="label">${/\w/.test(unit) ? unit : ""}</span></label
+      >
       ${input}
       <p id=${`about-${name}`} class="note">${fault ?? meaning}</p>
     </div>`;
@@ -70,9 +76,13 @@ export function stiffnessPanel(store, moved) {
       <label for=${`material-${number}`}>body ${number}</label>
       <select id=${`material-${number}`} @change=${take}>
         <option value="">choose a material, or type E and ν</option>
-        ${about.materials.rows.map(({ name, E: modulus }) => html`<option value=${name}>${name}, ${modulus}</option>`)}
+        ${about.materials.rows.map(
+          ({ name, E: modulus }) => html`<option value=${name}>${name}, ${modulus}</option>`,
+        )}
       </select>
-      <p class="note">${number === 2 ? "Left out: both are of one material." : about.materials.source}</p>
+      <p class="note">
+        ${number === 2 ? "Left out: both are of one material." : about.materials.source}
+      </p>
     </div>`;
   }
 
@@ -96,7 +106,10 @@ export function stiffnessPanel(store, moved) {
           <label for="geometry">contact of</label>
           <select id="geometry" @change=${({ target }) => change("geometry", target.value)}>
             ${Object.entries(about.geometries).map(
-              ([name, { meaning }]) => html`<option value=${name} ?selected=${name === typed.geometry}>${meaning}</option>`,
+              ([name, { meaning }]) =>
+                html`<option value=${name} ?selected=${name === typed.geometry}>
+                  ${meaning}
+                </option>`,
             )}
           </select>
           <p class="note">Fz is that of the form above.</p>

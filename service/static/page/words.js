@@ -65,7 +65,9 @@ export function friction(value, digits) {
   if (value === null) return "–";
   if (value === 0) return "0";
   const places = digits - 1 - Math.floor(Math.log10(Math.abs(value)));
-  return Math.abs(value) < SMALL ? show(value, digits) : value.toFixed(Math.max(places, 0)).replace("-", "−");
+  return Math.abs(value) < SMALL
+    ? show(value, digits)
+    : value.toFixed(Math.max(places, 0)).replace("-", "−");
 }
 
 /** A friction coefficient and its deviation, both to the second digit of the deviation. */
@@ -98,5 +100,7 @@ const LETTERS = { nu: "ν", nu2: "ν₂", E2: "E₂" };
 /** A symbol as it is typeset: letters slanted, indices below. */
 export function typeset(symbol) {
   const [, upright, letter, index] = (LETTERS[symbol] ?? symbol).match(/^(Δ?)(\p{L}+?)([₀₂z]?)$/u);
-  return html`<span class="symbol">${upright}<i>${letter}</i>${index && html`<sub>${INDEX[index]}</sub>`}</span>`;
+  return html`<span class="symbol"
+    >${upright}<i>${letter}</i>${index && html`<sub>${INDEX[index]}</sub>`}</span
+  >`;
 }
