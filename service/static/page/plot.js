@@ -176,8 +176,8 @@ export class Plot {
 
   /**
    * Calls back with the place of the pointer in the plot: `read(place)` while it moves,
-   * `read(null)` when it leaves; `pull(place)` for a click and each step of a drag; `grab(moving)` around it;
-   * and `step(right, up, factor)` for the arrow keys.
+   * `read(null)` when it leaves; `pull(place)` for a click and each step of a drag;
+   * `grab(moving)` around it; and `step(right, up, factor)` for the arrow keys.
    */
   follow({ read, pull, grab, step }) {
     const { svg } = this;
