@@ -61,7 +61,7 @@ def test_it_loads_and_shows_the_known_value(
     assert answer.source in page.text("#origin")
     page.click("#tab-bars")
     shares = [
-        float(text.replace("−", "-").removesuffix(" %"))
+        float(text.strip().replace("−", "-").removesuffix(" %"))
         for text in page.texts("#bars td:last-child")
     ]
     for share, (name, value) in zip(shares, START.items(), strict=True):
