@@ -1,5 +1,6 @@
 """``mumacro motion``: the friction under any periodic motion."""
 
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -33,6 +34,17 @@ _ROWS = (
 _SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N"}
 
 
+def add_parts(parser: argparse.ArgumentParser) -> None:
+    """The options of a motion."""
+    helps = (
+        "A: amplitude [m] along the drag, half of peak to peak",
+        "across it, likewise",
+        "of the normal force [N], likewise",
+    )
+    for name, text in zip(PARTS, helps, strict=True):
+        parser.add_argument(f"--{name}", metavar="A[@PHASE]", help=text)
+
+
 def run(words: Sequence[str]) -> str:
     """``mumacro motion``."""
     parser = OneLineParser(
@@ -42,13 +54,7 @@ def run(words: Sequence[str]) -> str:
         epilog=f"{_INPUTS}\nexamples:\n  {EXAMPLE}\n  {EXAMPLE} -o cycle.png",
     )
     parser.add_argument("words", nargs="+", metavar="name=value", help="a case without y0")
-    helps = (
-        "A: amplitude [m] along the drag, half of peak to peak",
-        "across it, likewise",
-        "of the normal force [N], likewise",
-    )
-    for name, text in zip(PARTS, helps, strict=True):
-        parser.add_argument(f"--{name}", metavar="A[@PHASE]", help=text)
+    add_parts(parser)
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
     text = "of the mean force over mu0 Fz, 1e-9 to 1e-2; default: 1e-6"
     parser.add_argument("--tolerance", type=float, default=1e-6, help=text)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.solve_for import solve_for
 from mumacro.analysis.solve_motion import UNKNOWNS
-from mumacro.cli import common, solve_motion
+from mumacro.cli import common, motion, solve_motion
 from mumacro.cli.common import (
     CURVE,
     ImpossibleError,
@@ -58,7 +58,7 @@ def run(words: Sequence[str]) -> str:
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     common.add_exponent(parser)
-    solve_motion.add_parts(parser)
+    motion.add_parts(parser)
     chosen = parser.parse_intermixed_args(words)
     if solve_motion.is_motion(chosen):
         return solve_motion.run(chosen, chosen.between)

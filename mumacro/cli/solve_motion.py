@@ -12,17 +12,6 @@ from mumacro.inputs.oscillation import read_oscillation
 EXAMPLE = "mumacro solve-for v0 'mu0=0.3 Fz=10N k=0.1N/um f=50Hz' --x 0.1mm --normal 8N@-90deg"
 
 
-def add_parts(parser: argparse.ArgumentParser) -> None:
-    """The options of a motion."""
-    helps = (
-        "A: amplitude [m] along the drag, half of peak to peak",
-        "across it, likewise",
-        "of the normal force [N], likewise",
-    )
-    for name, text in zip(PARTS, helps, strict=True):
-        parser.add_argument(f"--{name}", metavar="A[@PHASE]", help=text)
-
-
 def is_motion(chosen: argparse.Namespace) -> bool:
     """Whether a motion is given, or one of its members is the unknown."""
     return "." in chosen.unknown or any(getattr(chosen, name) is not None for name in PARTS)
