@@ -4,7 +4,7 @@ import { $, Channel } from "./ask.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
-import { caseOf } from "./state.js";
+import { exactCase } from "./state.js";
 import { about, inUnit, prose, show, toSI, toUnit, unitFor } from "./words.js";
 const { area } = globalThis.d3;
 
@@ -51,13 +51,11 @@ export function fitPanel(store, moved, openCase) {
       .value.split(" ")
       .filter((name) => !(table && name in table.columns));
     const columns = table ? Object.keys(table.columns) : [];
-    const body = caseOf(store.state, [
+    const body = exactCase(store.state, answer, [
       "v0",
       ...unknowns,
       ...columns.map((name) => (name === "omega" ? "f" : name)),
     ]);
-    for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {}))
-      if (std && name in body) body[name] = value;
     return { ...body, unknowns, ...source, ...dialect(), ...more };
   }
 
@@ -67,12 +65,12 @@ export function fitPanel(store, moved, openCase) {
       table = reply;
       fit = undefined;
       say("");
-      show_();
+      draw();
     },
     (reason) => {
       if (reason) {
         table = fit = undefined;
-        show_();
+        draw();
       }
       say(reason, true);
     },
@@ -82,7 +80,7 @@ export function fitPanel(store, moved, openCase) {
     (reply, body) => {
       fit = { ...reply, question: body, unknowns: body.unknowns };
       say("");
-      show_();
+      draw();
     },
     (reason) => say(reason, true),
   );
@@ -91,7 +89,7 @@ export function fitPanel(store, moved, openCase) {
     if (empty) {
       table = fit = undefined;
       say("");
-      show_();
+      draw();
     } else readings.push({ ...question(), read_only: true });
   };
 
@@ -172,7 +170,7 @@ export function fitPanel(store, moved, openCase) {
       ${count > ROWS ? html`<p class="hint">and ${count - ROWS} more</p>` : nothing}`;
   }
 
-  function show_() {
+  function draw() {
     render(readTable(), $("points-read"));
     $("fit-button").disabled = !table;
     render(result(), $("fit-lines"));
@@ -296,7 +294,7 @@ export function fitPanel(store, moved, openCase) {
   });
   for (const name of ["sep", "decimal", "encoding"])
     $(`points-${name}`).addEventListener("change", read);
-  $("unknowns").addEventListener("change", () => show_());
+  $("unknowns").addEventListener("change", () => draw());
   $("fit-form").addEventListener("submit", (event) => {
     event.preventDefault();
     fits.push(question());
@@ -320,6 +318,6 @@ export function fitPanel(store, moved, openCase) {
 
   return (latest) => {
     answer = latest;
-    if (table) show_();
+    if (table) draw();
   };
 }

@@ -2,7 +2,7 @@
 import { $, Channel } from "./ask.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
-import { caseOf, inputsOf } from "./state.js";
+import { caseAround, inputsOf } from "./state.js";
 import { about, inPrint, inUnit, inWords, numberOf, show, toSI, toUnit, unitFor } from "./words.js";
 const { area, bisectCenter } = globalThis.d3;
 
@@ -31,24 +31,17 @@ function usualRange(state, { inputs, limits }) {
   return [Math.max(low, scale === "linear" ? 0 : EXTREMES[0]), Math.min(high, EXTREMES[1])];
 }
 
-/** The question of a law: the case without deviations, which a law does not have. */
-export function lawQuestion(state, answer) {
+/** The question of a law. */
+function lawQuestion(state, answer) {
   const { along, scale } = state;
-  const grows =
-    along === "Fz" && (state.exponent || state.contact === "ball") && state.contact !== "rigid";
-  const question = caseOf(state, grows ? [] : [along]);
-  for (const [name, { std, value }] of Object.entries(answer.inputs)) {
-    if (std && name in question) question[name] = value;
-  }
   const [start, stop] = usualRange(state, answer);
   return {
-    ...question,
+    ...caseAround(state, answer, along),
     along,
     start: state.from || start,
     stop: state.to || stop,
     points: POINTS,
     scale,
-    ...(grows && state.exponent ? { stiffness_exponent: state.exponent } : {}),
   };
 }
 
@@ -69,7 +62,7 @@ export function lawPanel(store, moved) {
     (reply, { scale }) => {
       law = { ...reply, scale };
       $("law-status").textContent = "";
-      show_();
+      describe();
     },
     (reason) => {
       refused = reason;
@@ -78,7 +71,7 @@ export function lawPanel(store, moved) {
     },
   );
 
-  function show_() {
+  function describe() {
     const at = (i) => `${show(law.mu_macro.at(i))} at ${text(law.values.at(i))}`;
     const marks = law.border
       .map(({ value }) => `; border of continuous sliding at ${text(value)}`)
@@ -234,7 +227,7 @@ export function lawPanel(store, moved) {
     const [start, stop] = [question.start, question.stop];
     $("from").placeholder = typeof start === "number" ? inUnit(state.along, start, unit(), 3) : "";
     $("to").placeholder = typeof stop === "number" ? inUnit(state.along, stop, unit(), 3) : "";
-    if (law) show_();
+    if (law) describe();
     const words = JSON.stringify(question);
     if (words === latest) return;
     latest = words;

@@ -4,7 +4,7 @@ import { $, Channel } from "./ask.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
-import { caseOf } from "./state.js";
+import { exactCase } from "./state.js";
 import { digitsWithin, friction, prefixed, prose, show, typeset } from "./words.js";
 const { extent } = globalThis.d3;
 
@@ -35,22 +35,21 @@ export function motionPanel(store) {
 
   /** The motion that is asked: the inputs of the form but y0, and the three oscillations. */
   function question(without = []) {
-    const { direction: _, ...body } = caseOf(store.state, ["y0", "Fz_amplitude", ...without]);
-    for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {}))
-      if (std && name in body) body[name] = value;
+    const left = ["y0", "Fz_amplitude", ...without];
+    const { direction: _, ...body } = exactCase(store.state, answer, left);
     const parts = Object.entries(typed).filter(([, text]) => text.trim());
     return { ...body, ...Object.fromEntries(parts) };
   }
   const report = (status) => (reason, _, reply) => {
     $(status).textContent = reason ? prose(reason) : "";
     faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
-    show_();
+    draw();
   };
   const motions = new Channel(
     (body) => post("v1/motion", body),
     (reply, body) => {
       [motion, asked] = [reply, JSON.stringify(body)];
-      show_();
+      draw();
     },
     report("motion-status"),
   );
@@ -58,7 +57,7 @@ export function motionPanel(store) {
     (body) => post("v1/solve-for", body),
     (reply) => {
       solved = reply;
-      show_();
+      draw();
     },
     report("motion-target-status"),
   );
@@ -79,7 +78,7 @@ export function motionPanel(store) {
         .value=${typed[name]}
         @change=${({ target }) => {
           typed[name] = target.value;
-          show_();
+          draw();
         }}
       />
       <p id=${`motion-note-${name}`} class="note">
@@ -131,7 +130,7 @@ export function motionPanel(store) {
       : html`<li>${prose(reason ?? `No value gives that${range}.`)}</li>`;
   }
 
-  function show_() {
+  function draw() {
     render(Object.keys(PARTS).map(field), $("motion-fields"));
     render(numbers(), $("motion-values"));
     render(roots(), $("motion-roots"));
@@ -224,6 +223,6 @@ export function motionPanel(store) {
   );
   return (latest) => {
     answer = latest;
-    show_();
+    draw();
   };
 }

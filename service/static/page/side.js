@@ -3,7 +3,7 @@
 import { $, Channel } from "./ask.js";
 import { html, render, svg } from "../lib/lit-html.js";
 import { post } from "./service.js";
-import { caseOf, inputsOf } from "./state.js";
+import { caseAround, inputsOf } from "./state.js";
 import { about, friction, inUnit, inWords, numberOf, prefixed, show, typeset } from "./words.js";
 
 /** Tabs: buttons that show one of several parts. */
@@ -127,7 +127,7 @@ export function sidePanel(store, moved, found) {
     (reply, question) => {
       asked = JSON.stringify(question);
       solved = { reply, question };
-      show_();
+      draw();
       found(markOf());
     },
     (reason) => {
@@ -147,21 +147,14 @@ export function sidePanel(store, moved, found) {
 
   function question() {
     const { unknown, quantity, target } = store.state;
-    const without =
-      unknown === "Fz" && (store.state.exponent || store.state.contact === "ball") ? [] : [unknown];
-    const body = caseOf(store.state, without);
-    for (const [name, { std, value }] of Object.entries(answer.inputs))
-      if (std && name in body) body[name] = value;
-    const exponent =
-      unknown === "Fz" && store.state.exponent ? { stiffness_exponent: store.state.exponent } : {};
     const power =
       store.state.direction !== "normal" && store.state.contact !== "rigid"
         ? { include: ["power"] }
         : {};
-    return { ...body, unknown, quantity, target, ...exponent, ...power };
+    return { ...caseAround(store.state, answer, unknown), unknown, quantity, target, ...power };
   }
 
-  function show_() {
+  function draw() {
     const { reply } = solved;
     const { unknown, reachable, results } = reply;
     const unit = answer.inputs[unknown]?.unit ?? undefined;

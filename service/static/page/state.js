@@ -78,6 +78,29 @@ export function caseOf(state, without = []) {
   };
 }
 
+/**
+ * The inputs without deviations, for questions that have none (laws, targets, fits, motions):
+ * the value that the service understood stands in place of a text with a deviation.
+ */
+export function exactCase(state, answer, without = []) {
+  const question = caseOf(state, without);
+  for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {})) {
+    if (std && name in question) question[name] = value;
+  }
+  return question;
+}
+
+/**
+ * The case around one input that is swept or solved for.  Where that is Fz and k grows with it, the
+ * Fz of the case stays, as the load at which k holds.
+ */
+export function caseAround(state, answer, name) {
+  const { contact, exponent } = state;
+  const grows = name === "Fz" && contact !== "rigid" && (exponent || contact === "ball");
+  const question = exactCase(state, answer, grows ? [] : [name]);
+  return grows && exponent ? { ...question, stiffness_exponent: exponent } : question;
+}
+
 /** The state with what is chosen of the inputs that the direction has. */
 function allowed(state) {
   const names = inputsOf(state);

@@ -24,18 +24,18 @@ export function stiffnessPanel(store, moved) {
     (reply, body) => {
       [answer, asked, faults] = [reply, JSON.stringify(body), new Map()];
       $("stiffness-status").textContent = "";
-      show_();
+      draw();
     },
     (reason, _, reply) => {
       $("stiffness-status").textContent = reason ?? "";
       faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
-      show_();
+      draw();
     },
   );
 
   const change = (name, value) => {
     typed[name] = value;
-    show_();
+    draw();
   };
 
   function field(name) {
@@ -70,7 +70,7 @@ export function stiffnessPanel(store, moved) {
       const one = about.materials.rows.find(({ name }) => name === target.value);
       if (!one) return;
       Object.assign(typed, { [E]: one.E, [nu]: one.nu });
-      show_();
+      draw();
     };
     return html`<div class="field">
       <label for=${`material-${number}`}>body ${number}</label>
@@ -98,7 +98,7 @@ export function stiffnessPanel(store, moved) {
       ${answer.warnings.map((text) => html`<li class="doubt">${prose(text)}</li>`)}`;
   }
 
-  function show_() {
+  function draw() {
     const names = about.geometries[typed.geometry].arguments.filter((name) => name !== "Fz");
     const of = (list) => names.filter((name) => list.includes(name)).map(field);
     render(
@@ -128,5 +128,5 @@ export function stiffnessPanel(store, moved) {
   $("stiffness-form").addEventListener("keydown", (event) => {
     if (event.key === "Enter") event.target.dispatchEvent(new Event("change", { bubbles: true }));
   });
-  return show_;
+  return draw;
 }
