@@ -337,8 +337,10 @@ def of_input(error: InputError, **members: Any) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
     name = error.field.removeprefix("std_")  # a deviation is a member of std
-    steps = (name,) if name == error.field else ("std", name)
-    return refused([FieldFault(steps, reason_of(error), value)], **members)
+    path: tuple[str | int, ...] = (name,) if name == error.field else ("std", name)
+    if error.index is not None:
+        path = (*path, error.index)
+    return refused([FieldFault(path, reason_of(error), value)], **members)
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:

@@ -370,7 +370,7 @@ def _columns_in(
             if hasattr(cases, "keys")
             else getattr(cases, "column_names", None) or cases.columns
         )
-        names = {*names}
+        names = dict.fromkeys(names)  # in their order: the first one is named where two are wrong
         found = {name: cases[name] for name in names if name in present}
         for head in present:
             name, unit = split_unit(head) if isinstance(head, str) else (head, None)

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, TableError
-from mumacro.kernel import threads as shared_out
 from mumacro.kernel.threads import processors
 from mumacro.table.netcdf import read_table
 from tests.support.cases import CASE, UNIT, Array
@@ -79,7 +78,6 @@ def test_one_thread_means_that_none_is_started(
         raise AssertionError("a thread was started")
 
     expected = everything(table)
-    monkeypatch.setattr(shared_out, "ThreadPoolExecutor", refuse)
     monkeypatch.setattr(threading.Thread, "start", refuse)
     assert everything(alone) == expected
     assert everything(table.on_one_thread()) == expected

@@ -7,6 +7,7 @@ import re
 import time
 from typing import Any
 from unittest.mock import Mock
+from urllib.parse import urljoin
 
 import pytest
 from fastapi import APIRouter, Depends, Request
@@ -23,7 +24,7 @@ FILES = {
     f"/static/{folder.name}/{path.name}": {".js": "text/javascript", ".css": "text/css"}[
         path.suffix
     ]
-    for folder in (STATIC / "page", STATIC / "swagger-ui")
+    for folder in (STATIC / "page", STATIC / "lib", STATIC / "swagger-ui")
     for path in folder.iterdir()
     if path.suffix in (".js", ".css")
 }
@@ -416,10 +417,10 @@ def test_the_page_loads_nothing_from_elsewhere(client: Any) -> None:
         assert path[1:] in page.text or "swagger" not in path
         asset = client.get(path)
         assert (asset.status_code, asset.headers["content-type"].split(";")[0]) == (200, media_type)
-        if "swagger" not in path:  # every part is served; a name of XML is no address
+        if path.startswith("/static/page/"):  # every part is served; a name of XML is no address
             assert "://" not in asset.text.replace("http://www.w3.org/2000/svg", "")
             assert {
-                f"/static/page/{name}" for name in re.findall(r'from "\./([^"]+)"', asset.text)
+                urljoin(path, name) for name in re.findall(r'from "(\.\.?/[^"]+)"', asset.text)
             } <= FILES.keys()
 
 

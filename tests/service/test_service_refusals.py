@@ -195,7 +195,7 @@ REFUSED = [
         )
     ),
     ("POST solve-for", {"target": -0.1}, "#/target/0"),
-    *(("POST solve-for", {"target": [0.1, value]}, "#/target/1") for value in ("0.1", True)),
+    *(("POST solve-for", {"target": [0.1, value]}, "#/target/1") for value in ("ten", True, -0.1)),
     ("POST solve-for", {"range": [0, -1]}, "#/range/1"),
     # stiffness and fit
     *(
