@@ -59,8 +59,8 @@ def missing(extra: str, error: ImportError) -> str:
     be hidden.
 
     >>> missing("files", ModuleNotFoundError("No module named 'pyarrow'", name="pyarrow"))
-    "pyarrow is not installed: pip install 'mumacro[files]' (in a checkout: pip install -e
-    '.[files]')"
+    'pyarrow is not installed: pip install "mumacro[files]" (in a checkout: pip install -e
+    ".[files]")'
     """
     if error.name is None:  # a sentence of our own: the compiled kernel is missing
         return str(error)
@@ -69,6 +69,6 @@ def missing(extra: str, error: ImportError) -> str:
         raise error
     brackets = f"[{extra}]" if extra else ""
     return (
-        f"{package} is not installed: pip install 'mumacro{brackets}' (in a checkout: pip "
-        f"install -e '.{brackets}')"
+        f'{package} is not installed: pip install "mumacro{brackets}" (in a checkout: pip '
+        f'install -e ".{brackets}")'
     )

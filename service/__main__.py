@@ -32,8 +32,8 @@ except ModuleNotFoundError as error:
     # Without mumacro.errors.missing: perhaps no package is installed here.
     command = "python -m service" if __name__ == "__main__" else "mumacro serve"
     raise SystemExit(
-        f"{command}: {error.name} is not installed: pip install 'mumacro[service]' "
-        "(in a checkout: pip install -e '.[service]')"
+        f'{command}: {error.name} is not installed: pip install "mumacro[service]" '
+        '(in a checkout: pip install -e ".[service]")'
     ) from None
 
 _COMMANDS = ("serve", "healthcheck")

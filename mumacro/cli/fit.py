@@ -18,7 +18,7 @@ from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.validity import digits
 
-EXAMPLE = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
+EXAMPLE = 'mumacro fit measured.csv "Fz=10N y0=2um f=20kHz" -o fit.png'
 _COLUMNS = f"""\
 columns by name, in SI or with a unit as in v0 [mm/s], which may stand below the name; others are
   ignored, and so are lines before the names:

@@ -11,7 +11,7 @@ from mumacro.inputs.fields import unit_of
 from mumacro.inputs.reading import read_one
 from mumacro.validity import load_rows
 
-EXAMPLE = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz' --along v0 0.1mm/s 1m/s"
+EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
 
 
 def run(words: Sequence[str]) -> str:

@@ -21,18 +21,18 @@ from mumacro.inputs.fields import NAMES
 from mumacro.table.bundled import bundled_tables
 
 FIRST = f"""\
-friction of one case:      mumacro '{one_case.EXAMPLE}'
+friction of one case:      mumacro "{one_case.EXAMPLE}"
 friction along the speed:  {law.EXAMPLE}
 which amplitude halves it: {solve_for.EXAMPLE}
 everything else:           mumacro --help"""
 _TASKS = {
-    f"mumacro '{one_case.EXAMPLE}'": "one case",
+    f'mumacro "{one_case.EXAMPLE}"': "one case",
     "mumacro eval cases.parquet -o out.parquet": "files: csv, ndjson, parquet",
-    "mumacro law 'mu0=0.3 ...' --along v0 1mm/s 1m/s -o law.png": "mu_macro along one input",
-    "mumacro solve-for y0 'mu0=0.3 ...' --target 0.15": "the input for a mu_macro",
+    'mumacro law "mu0=0.3 ..." --along v0 1mm/s 1m/s -o law.png': "mu_macro along one input",
+    'mumacro solve-for y0 "mu0=0.3 ..." --target 0.15': "the input for a mu_macro",
     "mumacro map -o map.png": "the map of all cases",
-    "mumacro motion 'mu0=0.3 ...' --x 1um@90deg --y 2um": "any periodic motion",
-    "mumacro fit measured.csv 'Fz=10N ...' -o fit.png": "k from measured points",
+    'mumacro motion "mu0=0.3 ..." --x 1um@90deg --y 2um': "any periodic motion",
+    'mumacro fit measured.csv "Fz=10N ..." -o fit.png': "k from measured points",
     "mumacro stiffness ball --radius 5mm --Fz 10N ...": "k from materials",
     "mumacro table": "the table in use, its errors",
     "mumacro export --format csv": "the table for other tools",
@@ -52,7 +52,7 @@ def _part(name: str) -> Any:
     if (package / name).is_dir():
         return importlib.import_module(f"mumacro.{name}.__main__")
     if not (package.parent / name).is_dir():
-        raise ImpossibleError(f"this installation has no {name}: pip install 'mumacro[{name}]'")
+        raise ImpossibleError(f'this installation has no {name}: pip install "mumacro[{name}]"')
     if str(package.parent) not in sys.path:
         sys.path.insert(0, str(package.parent))
     return importlib.import_module(f"{name}.__main__")

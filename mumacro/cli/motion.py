@@ -12,7 +12,7 @@ from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, r
 from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.oscillation import read_oscillation
 
-EXAMPLE = "mumacro motion 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s' --x 1um@90deg --y 2um"
+EXAMPLE = 'mumacro motion "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s" --x 1um@90deg --y 2um'
 _INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in v0=1cm/s:
   mu0    Coulomb friction coefficient [-], > 0

@@ -1,4 +1,4 @@
-"""``mumacro 'mu0=0.3 Fz=10N ...'``: the friction of one case."""
+"""``mumacro "mu0=0.3 Fz=10N ..."``: the friction of one case."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ ROW_OF_K = ("k is known", True)  # the answer for an interval tells that already
 
 
 def run(words: Sequence[str], description: str) -> str:
-    """``mumacro 'mu0=0.3 ...'``; ``description`` is what the help says of the whole command."""
+    """``mumacro "mu0=0.3 ..."``; ``description`` is what the help says of the whole command."""
     parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
     common.add_include(parser)

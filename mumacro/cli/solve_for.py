@@ -21,7 +21,7 @@ from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.reading import read_one
 from mumacro.validity import load_rows
 
-EXAMPLE = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s' --target 0.15"
+EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 
 
 def _target(text: str) -> float:

@@ -9,7 +9,7 @@ from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, read_case
 from mumacro.inputs.oscillation import read_oscillation
 
-EXAMPLE = "mumacro solve-for v0 'mu0=0.3 Fz=10N k=0.1N/um f=50Hz' --x 0.1mm --normal 8N@-90deg"
+EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --normal 8N@-90deg'
 
 
 def is_motion(chosen: argparse.Namespace) -> bool:

@@ -48,7 +48,7 @@ result = doctest.DocTestRunner(verbose=False).run(test)
 sys.exit(0 if result.attempted and not result.failed else 1)
 """
 #: these make the environments
-INSTALLS = {"bare": "pip install .", "service": "pip install '.[service]'"}
+INSTALLS = {"bare": "pip install .", "service": 'pip install ".[service]"'}
 #: the file that runs a command, perhaps with smaller numbers, and the words there that do
 ELSEWHERE = {
     "python3 dev.py test": ("dev.py", 'if "--all" in arguments'),  # by dev.py test --all
@@ -189,6 +189,15 @@ def test_every_command_and_program_is_run_or_said_not_to_be(page: Path) -> None:
             if not is_covered(block)
         ]
     assert missing == [], REMEDY
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_commands_have_quotes_that_every_shell_takes(page: Path) -> None:
+    """cmd.exe knows no single quotes."""
+    commands = [command for block in blocks(page, *SHELL) for command, _ in block.entries()]
+    commands += [mention.command for mention in mentions(page)]
+    own = [one for one in commands if re.match(r"mumacro |pip install ", one)]
+    assert [one for one in own if "'" in plain(one)] == []
 
 
 def test_what_runs_elsewhere_is_there_and_is_still_told() -> None:

@@ -223,7 +223,7 @@ def test_a_package_finds_its_own_tables(
 
 
 PARTS = ("service", "builder", "mumacro")
-LACKS = [(name, "packages", r".*(\w+) is not installed: pip install 'mumacro.*") for name in PARTS]
+LACKS = [(name, "packages", r'.*(\w+) is not installed: pip install "mumacro.*') for name in PARTS]
 LACKS += [
     (name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*")
     for name in PARTS[1:]

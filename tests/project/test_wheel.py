@@ -231,4 +231,4 @@ def test_without_an_extra_one_line_says_what_to_install(
 ) -> None:
     message = installed.run(*words.split(), code=1)
     assert len(message.splitlines()) == 1
-    assert f"pip install 'mumacro[{extra}]'" in message
+    assert f'pip install "mumacro[{extra}]"' in message

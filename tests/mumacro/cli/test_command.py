@@ -586,7 +586,7 @@ def test_a_picture_names_the_extra_it_needs(
     for name in ("figure", "pyplot"):
         monkeypatch.setitem(sys.modules, f"matplotlib.{name}", None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert "pip install 'mumacro[plot]'" in output_of(
+    assert 'pip install "mumacro[plot]"' in output_of(
         capsys, 1, "map", "-o", str(tmp_path / "map.png")
     )
 
@@ -834,9 +834,9 @@ def test_headings_and_numbers_are_read_as_they_are_written() -> None:
 @pytest.mark.parametrize(
     ("words", "fault"),
     [
-        (("law", CASE), "missing: --along, as in mumacro law '"),
-        (("law", CASE, "--along", "v0"), "expected 3 arguments, as in mumacro law '"),
-        (("solve-for", "y0", CASE), "missing: --target, as in mumacro solve-for y0 '"),
+        (("law", CASE), 'missing: --along, as in mumacro law "'),
+        (("law", CASE, "--along", "v0"), 'expected 3 arguments, as in mumacro law "'),
+        (("solve-for", "y0", CASE), 'missing: --target, as in mumacro solve-for y0 "'),
         (("stiffness",), "missing: GEOMETRY, as in mumacro stiffness ball"),
         (("solve-for", "y0", CASE, "--target", "50%"), "'50%' is not a number: give mu_macro"),
     ],
