@@ -34,13 +34,13 @@ ROWS = (
 K_UNCERTAINTY = (
     0.1  # relative uncertainty of k by default: materials and geometry give no better one
 )
-_FAR = 1e4  # y~ that no contact has
-_LARGEST_AMPLITUDE, _LARGEST_STIFFNESS = 1e-3, 1e10  # m, N/m: of contacts that are shaken
+_FAR = 1e4  # no contact has such a y~
+_LARGEST_AMPLITUDE, _LARGEST_STIFFNESS = 1e-3, 1e10  # [m], [N/m]: no shaken contact has more
 _RATE = 0.01  # a of mu0 + a ln(slip speed), rock, polymers and metals (docs/validity.md)
 _TILT, _NORMAL = 0.01, 1.21  # misalignment; normal over tangential stiffness of steel on steel
-# slip paths [m] around the micrometres after which friction has adapted to a new speed
+# slip paths [m] between which a row is shown: friction follows a new slip speed after micrometres
 _ADAPTS = 1e-7, 1e-4
-_PERIODS, _WATTS = 100.0, 0.1  # above them a row on settling, on heat
+_PERIODS, _WATTS = 100.0, 0.1  # above them there is a row on settling, and one on heat
 
 
 class Row(TypedDict):
@@ -209,7 +209,7 @@ def _other_contact(
     )
     if abs(change) < 1e-4:
         return None
-    names = {"ball": "a ball on a flat", "spring": "a contact that slips as one"}
+    names = {"ball": "a ball on a flat", "spring": "a flat contact, which is one spring,"}
     text = (
         f"{names[alternative]} with the same k has mu_macro = {alternative_mu:.4g} in place of "
         f"{mu:.4g}"
@@ -227,7 +227,7 @@ def _stiffness(
     elif y > HARDLY:
         text = (
             f"y~ = {y:.3g}, above {HARDLY:g}: k off by {margin} moves mu_macro by {change}; "
-            "measured points hardly tell k"
+            "measured points hardly determine k"
         )
     else:
         return None
@@ -239,8 +239,8 @@ def _tilt(mu0: float, y: float) -> Row | None:
     if not effect >= 0.01:
         return None
     text = (
-        f"a misalignment of {_TILT:g} changes Fz by {100.0 * min(effect, 1e3):.2g} % within "
-        "each period"
+        f"a surface that is tilted by {_TILT:g} rad changes Fz by "
+        f"{100.0 * min(effect, 1e3):.2g} % within each period"
     )
     return {"row": "constant normal force", "text": text, "effect": effect}
 
@@ -264,10 +264,10 @@ def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
         text = (
-            f"slip path {1e6 * slip_path:.3g} um a period, near the micrometres in which friction "
-            "adapts to speed; "
+            f"the foot slips {1e6 * slip_path:.3g} um a period, and mu0 of real surfaces follows a "
+            "change of slip speed only after micrometres; "
         )
-        text += f"a factor of 100 in slip speed changes mu0 by {100.0 * effect:.2g} %"
+        text += f"100 times the slip speed changes mu0 by about {100.0 * effect:.2g} %"
         rows.append({"row": "Coulomb friction", "text": text, "effect": effect})
     if watts > _WATTS:
         text = (

@@ -94,7 +94,7 @@ class Batch:
 
     @property
     def cost(self) -> float:
-        """The time of all cases, in times of a plain one."""
+        """The cost of all cases together, see :mod:`service.limits`."""
         names = tuple(output.name for output in self.outputs)
         return self.cases.size * cost(names, self.cases.kinds, self.cases.ends is not None)
 

@@ -3,6 +3,9 @@
 A request that may take longer than one case needs a slot and runs in a thread.  Batches
 share the slots of ``MUMACRO_MAX_BATCHES``; the questions of a person (law, solve-for, the page)
 have slots and threads of their own, and so have questions that may take longer than a person waits.
+
+A *cost*, here and in the models and routers, is the time of a computation divided by the time of
+mu_macro of one spring that is shaken across, one case of a long column.
 """
 
 import asyncio
@@ -26,14 +29,16 @@ from .settings import Settings
 
 T = TypeVar("T")
 JSON = b"application/json"
-SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
-# largest cost without a thread, in times of a plain case: under half a millisecond
+SMALL_BODY = 64 * 1024  # bytes; a larger body needs a slot
+# the largest cost that is computed without a thread: under half a millisecond
 AT_ONCE = 4000.0
 QUESTIONS = 8  # questions that are answered at the same time
-LONG_QUESTIONS = 4  # of those that take longer, such as the motion of a ball: up to seconds each
+# the same of questions that take longer, such as the motion of a ball: up to seconds each
+LONG_QUESTIONS = 4
 #: largest cost of a question that is not long: about 50 ms
 LONG = 100.0 * AT_ONCE
-# that is added to the threads of batches and long questions: short requests are answered first
+# added to the niceness of the threads of batches and long questions, so that short requests are
+# answered first
 _NICENESS = 5
 _CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
 
@@ -140,8 +145,8 @@ class Work:
             slots.threads.shutdown(wait=False, cancel_futures=True)
 
     async def question(self, work: Callable[[], T], cost: float = 0.0) -> T:
-        """Do the work of a question, of this cost in times of a plain case, in a thread; its slot
-        is held until it is done, even without a client."""
+        """Do the work of a question of this cost in a thread; its slot is held until it is done,
+        even without a client."""
         slots = self.long_questions if cost > LONG else self.questions
         slots.take()
         loop = asyncio.get_running_loop()

@@ -333,10 +333,10 @@ class _Problem(Measured):
         if "k" in values and self.amplitude == "y0":
             mu0 = values["mu0"] if "mu0" in values else self.columns["mu0"]
             y = self.columns["y0"] / (mu0 * self.columns["Fz"]) * values["k"]
-            if y.min() > HARDLY:
+            if HARDLY < y.min() < math.inf:
                 messages.append(
-                    f"y~ >= {y.min():.3g} in all points: above {HARDLY:g} mu_macro hardly depends "
-                    "on k"
+                    f"every point has a y~ above {HARDLY:g} (the smallest is {y.min():.3g}), where "
+                    "mu_macro hardly depends on k"
                 )
         if len(solutions) > 1:
             listing = "; ".join(

@@ -15,15 +15,17 @@ import numpy as np
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
 
-SLICE = 16_384  # points of a slice: its arrays stay in the second cache
+SLICE = 16_384  # points of a slice, whose arrays stay in the second-level cache
 FEW = 65_536  # points that one thread evaluates before a second one has started
-COST = 64  # of a ball that is shaken along, about, in springs
-INTERVAL = 64  # of an interval of k, about, in cases
+# the time of a ball that is shaken along, about, divided by that of a spring that is shaken across
+COST = 64
+# the time of a case with an interval of k, about, divided by that of a case with one k
+INTERVAL = 64
 _KERNEL = kernels[-1]
 
 
 def _cost(kind: tuple[int, int]) -> int:
-    """Of a point of a kind, about, in springs that are shaken across."""
+    """The time of a point of a kind, about, divided by that of a spring that is shaken across."""
     contact, direction = kind
     return COST if direction else 1 + contact
 

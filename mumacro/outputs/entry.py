@@ -20,14 +20,14 @@ class Output(NamedTuple):
     """One output of cases: a new one is a file with such an entry, and a line in the list."""
 
     name: str
-    #: all of its values, those of ``members``
+    #: computes all of its values, those of ``members``
     compute: Callable[[Evaluated], Values]
     #: by path: ``power.saved`` is ``saved`` within ``power``, as JSON nests them
     members: Mapping[str, Member]
-    #: time of a case, in times of mu_macro alone for one spring across
+    #: its time for one case, divided by the time of mu_macro of one spring across
     cost: float
     gradient: bool = False  #: whether it needs the slopes of mu_macro
-    #: direction, or k_range for an interval of k, that it does not exist for -> why
+    #: a direction, or k_range for an interval of k, for which the output does not exist -> why
     lacks: Mapping[str, str] = {}
 
     def paths(self, fields: tuple[str, ...]) -> list[str]:

@@ -27,9 +27,9 @@ from mumacro.outputs.entry import Output, Values
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.tabulated import Tabulated
 
-# in times of one spring across at one k
+# times of kinds, divided by that of one spring across at one k
 _COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0}
-_BALL_ALONG = 5.0  # times both: a sum over springs
+_BALL_ALONG = 5.0  # a further factor: a ball along is a sum over springs
 _INTERVAL = 200.0
 
 
@@ -72,8 +72,8 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
 
 @cache
 def cost(outputs: tuple[str, ...], kinds: tuple[Kind, ...], interval: bool) -> float:
-    """The time of a case, about, in times of mu_macro alone for one spring across; of several kinds
-    that of the slowest."""
+    """The time of a case, about, divided by the time of mu_macro of one spring across; of several
+    kinds that of the slowest."""
     slowest = 1.0
     for kind in kinds:
         words = [*kind.names.values()]

@@ -37,11 +37,12 @@ from .values import (
     text_schema,
 )
 
-MAX_TERMS = 10  # of one part of the motion
-# of a ball, whose hundreds of springs each follow every turn of the motion
+MAX_TERMS = 10  # harmonics of one part of the motion
+# the highest harmonic and the least tolerance of a ball, whose hundreds of springs each follow every
+# turn of the motion
 MOST_OF_A_BALL, LEAST_OF_A_BALL = 20, 1e-7
-MOTIONS_OF_A_SEARCH = 150  # about, of solve_motion
-# in times of a plain case, from random motions; within a factor of 10
+MOTIONS_OF_A_SEARCH = 150  # that solve_motion computes, about
+# costs, see service/limits.py: found with random motions, right to a factor of 10
 _COST, _COST_OF_A_TERM, _SPRINGS_OF_A_BALL = 4000.0, 400.0, 250.0
 
 
@@ -125,8 +126,8 @@ FORMS = (
 
 
 def cost_of(contact: str, *parts: Any) -> float:
-    """Time of a motion, in times of a plain case: each term is followed through every turn of the
-    highest harmonic."""
+    """The cost of a motion, see :mod:`service.limits`: each term is followed through every turn of
+    the highest harmonic."""
     terms = [one for part in parts if isinstance(part, list) for one in part]
     plain = sum(isinstance(part, (float, tuple)) for part in parts)
     highest: int = max([1, *(harmonic for harmonic, *_ in terms)])
@@ -194,7 +195,7 @@ class MotionRequest(Strict):
 
     @property
     def cost(self) -> float:
-        """Time of the answer, in times of a plain case."""
+        """The cost of the answer, see :mod:`service.limits`."""
         return cost_of(self.contact, self.x, self.y, self.normal)
 
     @property

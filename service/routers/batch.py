@@ -25,8 +25,8 @@ from . import POST_PROBLEMS, router_of
 
 router = router_of("answers", DirectRoute)
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
-_BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
-# in times of a plain case, where Python reads them one by one: a row, and a text or a null
+_BYTES_PER_UNIT = 16  # bytes of a body whose reading has the cost 1, see service/limits.py
+# costs of reading a row, and a text or a null, where Python reads them one by one
 _ROW, _WORD = 400.0, 160.0
 
 
@@ -104,7 +104,7 @@ class _Answer(Response):
 
 
 def _by_one(text: bytearray) -> float:
-    """The cost of what Python may have to read one by one, in times of a plain case."""
+    """The cost of reading what Python may have to read one by one."""
     return _ROW * text.count(b"{") + _WORD * (text.count(b'"') / 2 + text.count(b"null"))
 
 

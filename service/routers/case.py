@@ -23,7 +23,7 @@ router = router_of("answers", DirectRoute)
 #: members of a case of which nothing but the default is asked
 _PLAIN = frozenset(("mu0", "Fz", "k", "y0", "omega", "f", "v0", "tolerance", "value"))
 _INTERVAL = frozenset(("k_range", *ENDS))
-_LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
+_LARGE = 100  # cost, see service/limits.py, from which one case is computed in a thread
 _CACHED: Any = {
     "model": CaseAnswer,
     "headers": {
