@@ -209,7 +209,7 @@ def _other_contact(
     )
     if abs(change) < 1e-4:
         return None
-    names = {"ball": "a ball on a flat", "spring": "a flat contact, which is one spring,"}
+    names = {"ball": "a ball on a flat", "spring": "a flat contact"}
     text = (
         f"{names[alternative]} with the same k has mu_macro = {alternative_mu:.4g} in place of "
         f"{mu:.4g}"
@@ -264,10 +264,10 @@ def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
         text = (
-            f"the foot slips {1e6 * slip_path:.3g} um a period, and mu0 of real surfaces follows a "
-            "change of slip speed only after micrometres; "
+            f"the foot slips {1e6 * slip_path:.3g} um a period; real friction follows a new slip "
+            "speed within micrometres, and 100 times the slip speed changes mu0 by about "
+            f"{100.0 * effect:.2g} %"
         )
-        text += f"100 times the slip speed changes mu0 by about {100.0 * effect:.2g} %"
         rows.append({"row": "Coulomb friction", "text": text, "effect": effect})
     if watts > _WATTS:
         text = (

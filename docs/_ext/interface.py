@@ -1,8 +1,9 @@
-"""Two directives that let the interface describe itself: ``command-help`` and
-``rest-reference``."""
+"""Three directives that let the program describe itself: ``command-help``, ``rest-reference`` and
+``script-list``."""
 
 from __future__ import annotations
 
+import ast
 import importlib
 import io
 from collections.abc import Iterator
@@ -15,7 +16,8 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-TABLES = Path(__file__).resolve().parent.parent.parent / "tables"
+ROOT = Path(__file__).resolve().parent.parent.parent
+TABLES = ROOT / "tables"
 COLUMNS = "100"
 
 
@@ -45,8 +47,23 @@ class CommandHelp(SphinxDirective):
         if "usage" not in text.lower():
             raise self.error(f"{command} --help prints no usage: {text!r}")
         return self.parse_text_to_nodes(
-            f"### `{command} --help`\n\n```text\n{text}\n```\n", allow_section_headings=True
+            f"## `{command} --help`\n\n```text\n{text}\n```\n", allow_section_headings=True
         )
+
+
+class ScriptList(SphinxDirective):
+    """``{script-list} benchmarks``: the scripts of a folder, with the first sentence of each."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        (folder,) = self.arguments
+        rows = ["| script | what it does |", "| --- | --- |"]
+        for path in sorted((ROOT / folder).glob("*.py")):
+            text = ast.get_docstring(ast.parse(path.read_text("utf-8"))) or ""
+            first = text.partition("\n\n")[0].replace("\n", " ").replace("|", "\\|")
+            rows.append(f"| `{folder}/{path.name}` | {first.replace('``', '`')} |")
+        return self.parse_text_to_nodes("\n".join(rows) + "\n")
 
 
 class RestReference(SphinxDirective):
@@ -162,4 +179,5 @@ def _kind(schema: dict[str, Any], schemas: dict[str, Any]) -> str:
 def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("command-help", CommandHelp)
     app.add_directive("rest-reference", RestReference)
+    app.add_directive("script-list", ScriptList)
     return {"parallel_read_safe": True}

@@ -38,8 +38,8 @@ from .values import (
 )
 
 MAX_TERMS = 10  # harmonics of one part of the motion
-# the highest harmonic and the least tolerance of a ball, whose hundreds of springs each follow every
-# turn of the motion
+# the highest harmonic and the least tolerance of a ball: each of its hundreds of springs follows
+# every turn of the motion
 MOST_OF_A_BALL, LEAST_OF_A_BALL = 20, 1e-7
 MOTIONS_OF_A_SEARCH = 150  # that solve_motion computes, about
 # costs, see service/limits.py: found with random motions, right to a factor of 10

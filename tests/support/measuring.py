@@ -35,7 +35,7 @@ PAGES = tuple(
         "docs/accuracy.md",
         "docs/python.md",
         "docs/service.md",
-        "docs/validation.md",
+        "docs/fits-and-motions.md",
         "tables/README.md",
     )
 )
