@@ -70,9 +70,9 @@ def test_the_demo_prints_the_answer_of_the_readme(repository: Path) -> None:
     text = run(repository, sys.executable, "dev.py", "demo")  # examples/demo.py
     readme = (repository / "README.md").read_text("utf-8")
     stated = number(r'^\{"mu_macro":([0-9.]+)', readme[readme.index('{"mu_macro":') :])
-    # another processor may round the last digit otherwise
-    assert number(r'"mu_macro": ([0-9.]+)', text) == close(stated, rel=1e-14)
-    assert number(r"Answer: +mu_macro = ([0-9.]+) ", text) == close(stated, rel=1e-11)
+    # the README has ten digits: the last ones of a double depend on the processor
+    assert number(r'"mu_macro": ([0-9.]+)', text) == close(stated, abs=5e-11)
+    assert number(r"Answer: +mu_macro = ([0-9.]+) ", text) == close(stated, abs=5e-11)
     # what comes next is what the README says
     for step in ("python3 dev.py serve", "open http://127.0.0.1:8000"):
         assert step in text
