@@ -371,7 +371,9 @@ def test_a_number_of_the_guide_has_a_last_place() -> None:
 def test_no_page_shows_digits_that_depend_on_the_processor(page: Path) -> None:
     shown = (shown for block in blocks(page, "console") for _, shown in block.entries())
     numbers = (number for text in shown for number in NUMBER.findall(text))
-    digits = ((number.partition("e")[0].replace(".", "").lstrip("-0"), number) for number in numbers)
+    digits = (
+        (number.partition("e")[0].replace(".", "").lstrip("-0"), number) for number in numbers
+    )
     assert [number for mantissa, number in digits if len(mantissa) > 12] == []
 
 

@@ -1,10 +1,14 @@
-"""The page of units is the table of units."""
+"""The page of units is the table of units, that of outputs the list of outputs."""
 
 from collections.abc import Iterable
 
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.units import QUANTITIES
+from mumacro.outputs import OUTPUTS
 from tests.support.places import ROOT
+
+PAGE = ROOT / "docs" / "units.md"
+NAMED = ("mu0", "Fz", "k", "y0", "f", "v0", "Fz_amplitude")
 
 
 def _code(unit: str) -> str:
@@ -32,5 +36,24 @@ def lines() -> list[str]:
 
 
 def test_the_page_has_every_unit_of_the_table() -> None:
-    page = (ROOT / "docs" / "units.md").read_text("utf-8")
-    assert "\n".join(lines()) in page
+    assert "\n".join(lines()) in PAGE.read_text("utf-8")
+
+
+def _cells(row: str) -> list[str]:
+    return [cell.strip() for cell in row.strip("|").split("|")]
+
+
+def test_the_page_has_the_usual_ranges() -> None:
+    head, _, ranges = next(
+        part for part in PAGE.read_text("utf-8").split("\n\n") if "| 0.001 to 2 |" in part
+    ).splitlines()
+    shown = dict(zip(_cells(head), _cells(ranges), strict=True))
+    assert shown == {_code(name): "{:g} to {:g}".format(*INPUTS[name].usual) for name in NAMED}
+
+
+def test_the_page_of_outputs_has_every_output() -> None:
+    page = (ROOT / "docs" / "outputs.md").read_text("utf-8")
+    for name, output in OUTPUTS.items():
+        assert f"| `{name}` |" in page
+        tops = {path.partition(".")[0] for path in output.members}
+        assert [top for top in tops if f"`{top}" not in page] == []
