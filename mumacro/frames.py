@@ -132,7 +132,8 @@ def _of_pandas(
     """Series become arrays, and the arrays of the answer Series."""
     import pandas as pd
 
-    index = next(x.index for x in values.values() if isinstance(x, pd.Series))
+    # a frame as one of the inputs is refused below, by its name
+    index = next((x.index for x in values.values() if isinstance(x, pd.Series)), None)
     arrays = _plain(values, index)
     try:
         cases = Cases.of(arrays, strict=strict)

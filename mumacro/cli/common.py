@@ -19,7 +19,7 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.cases import check, without_interval
+from mumacro.inputs.cases import KIND, check, without_interval
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.names import suggestion
@@ -309,11 +309,19 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
         last, value = pairs[-1] if pairs else ("", None)
         if equals:
             pairs.append((name, text))
-        elif value is not None and last in INPUTS and belongs_to_value(word):
+        elif value is not None and last in INPUTS and not _is_name(word):
             pairs[-1] = last, f"{value} {word.rstrip(',;')}"
         else:
             pairs.append((name, None))
     return pairs
+
+
+def _is_name(word: str) -> bool:
+    """Whether a word stands for an input and has no value; else it belongs to the value before it,
+    and is refused with that where it is no part of one."""
+    if word in (*INPUTS, *KIND):
+        return True
+    return not belongs_to_value(word) and suggestion(word, loosely=False) is not None
 
 
 def _faults_of_names(

@@ -15,7 +15,7 @@ from mumacro.kernel.arrays import Array
 _NUMBER = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$"
 _THOUSANDS = r"^[+-]?[1-9][0-9]{0,2}(%s[0-9]{3})+(%s[0-9]*)?$"
 _FORTRAN = r"^([+-]?[0-9.]+)[dD]([+-]?[0-9]+)$"
-_ONE_NUMBER = "must be one number; ends of k are columns k_low and k_high, deviations std_k"
+_ENDS = "must be one number; the ends of an interval of k are columns k_low and k_high"
 
 
 def numbers_of(
@@ -39,8 +39,10 @@ def numbers_of(
         si[i] = values[i] = math.nan
         try:
             value = read_cell(name, column[i].as_py(), signs, scale)
-            if value.std is not None or value.low is not None:
-                raise ValueError(_ONE_NUMBER)
+            if value.low is not None:
+                raise ValueError(_ENDS)
+            if value.std is not None:
+                raise ValueError(f"must be one number; its deviation is a column std_{name}")
             si[i], values[i] = value.si, value.si * scale.over / scale.times
         except ValueError as error:
             faults[i] = str(error)

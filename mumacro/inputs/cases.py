@@ -36,7 +36,7 @@ from mumacro.inputs.kind import (
     code_of,
     kind_of,
 )
-from mumacro.inputs.names import suggestion, unknown_name
+from mumacro.inputs.names import suggestion, unit_in_name, unknown_name
 from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, in_unit, read
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
@@ -321,6 +321,8 @@ def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
 def unknown(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
     """The error for a name that is none of ``allowed``."""
     shown = [name for name in allowed if name not in DEVIATIONS]
+    if (own := unit_in_name(name, allowed)) is not None:
+        return InputError(name, value, own)
     meant = suggestion(name)
     advice = f"; did you mean {meant}?" if meant in shown else ""
     return InputError(name, value, f"one of {', '.join(shown)}{advice}")
@@ -398,9 +400,12 @@ def _of_arrow(value: Any) -> bool:
 
 
 def library_of(value: Any) -> str:
-    """The library whose labels or chunks a value has: pandas, xarray, dask; or nothing."""
+    """The library whose labels or chunks a value has: pandas, xarray, dask; or nothing, also for an
+    index or one value of pandas."""
     name = type(value).__module__.partition(".")[0]
-    return name if name in ("pandas", "xarray", "dask") else ""
+    if name == "pandas":
+        return name if hasattr(type(value), "iloc") else ""
+    return name if name in ("xarray", "dask") else ""
 
 
 def has_labels(values: Iterable[Any]) -> bool:
@@ -456,15 +461,26 @@ def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
         if conflicting := [name for name in ("k", *ENDS) if name in values]:
             raise InputError(conflicting[0], values[conflicting[0]], "left out beside k_range")
         pair = values.pop("k_range")
-        try:
-            values["k_low"], values["k_high"] = pair
-        except (TypeError, ValueError) as error:
-            raise InputError("k_range", pair, BOUND) from error
+        values["k_low"], values["k_high"] = _pair(pair)
     if missing := [name for name in ENDS if name not in values]:
         raise InputError(missing[0], None, "given [N/m] beside the other end of the interval")
     if "k" in values:
         raise InputError("k", values["k"], "left out beside an interval of it")
     return values
+
+
+def _pair(pair: Any) -> tuple[Any, Any]:
+    """Both ends of an interval, of a text such as 0.8..1.2 N/um or of a pair."""
+    if isinstance(pair, str):
+        typed = read("k_range", pair)
+        if typed.low is None:
+            raise InputError("k_range", pair, BOUND)
+        return typed.low, typed.high
+    try:
+        low, high = pair
+    except (TypeError, ValueError) as error:
+        raise InputError("k_range", pair, BOUND) from error
+    return low, high
 
 
 def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable
 
 from mumacro.inputs.fields import NAMES
+from mumacro.inputs.units import split_unit
 
 # Lower case, without spaces and punctuation.  Only names that hardly mean anything else, since a
 # file whose column has one of them while the input itself is missing is refused.
@@ -80,6 +81,19 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
     return None
 
 
+def unit_in_name(name: str, allowed: Iterable[str]) -> str | None:
+    """What to write in place of a name with a unit, which is the head of a column; None for another
+    name.
+
+    >>> unit_in_name("y0 [um]", ["y0"])
+    'named y0, with the unit in the value, as in "2 um"'
+    """
+    own, unit = split_unit(name[:80])
+    if unit is None or own not in allowed:
+        return None
+    return f'named {own}, with the unit in the value, as in "2 {unit}"'
+
+
 def unknown_name(name: str, allowed: Iterable[str]) -> str:
     """Why an unknown name is refused, with the most similar one of those allowed.
 
@@ -87,6 +101,8 @@ def unknown_name(name: str, allowed: Iterable[str]) -> str:
     'unknown field; did you mean omega? allowed: omega, f'
     """
     names = list(allowed)
+    if (own := unit_in_name(name, names)) is not None:
+        return f"must be {own}"
     nearest = suggestion(name[:80], loosely=False)
     if nearest not in names:
         nearest = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)

@@ -1,11 +1,13 @@
 """Numbers as people and instruments write them, read from text: decimal point or comma, thousands
 signs, Fortran's exponent, powers of ten."""
 
+import functools
 import re
+import unicodedata
 
-#: other signs for the same: minus and dashes of typography, blanks that do not break, µ
-_SIGNS = str.maketrans("−–﹣－⁺⁻   \t\n\r’", "---" + "-" + "+-" + "      '", "\u200b\ufeff")
-_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
+#: other signs for the same: minus and dashes of typography, a slash, apostrophes
+_SIGNS = str.maketrans("−–‐‑∕⁄’", "----//'")
+_SUPERSCRIPTS = dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-", strict=True))
 #: a number at the start of a text: digits with signs between them, an exponent
 NUMBER = re.compile(
     r"[+-]?(?:\d[\d.,']*|[.,]\d+)(?:(?: \d{3}(?!\d))+(?:[.,]\d+)?)?(?:[eEdD][+-]?\d+)?", re.ASCII
@@ -23,20 +25,37 @@ TOO_LARGE = "is beyond double range"
 def tidy(text: str) -> str:
     """A text with one sign for each meaning, and single blanks.
 
-    >>> tidy(" −1,5 × 10⁻⁶ ")
-    '-1,5 × 10^-6'
+    Signs of full width, such as ２ and ㎛, are those that they stand for; marks that are not seen
+    are left out.
+
+    >>> tidy(" −1,5 × 10⁻⁶ "), tidy("1.5*10**-6"), tidy("２．５ ㎛")
+    ('-1,5 × 10^-6', '1.5*10^-6', '2.5 μm')
     """
+    text = text.replace("**", "^")
     if text.isascii():
         return " ".join(text.split())
     raised, out = False, []
     for sign in text:
-        if sign in "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻":
+        if sign in _SUPERSCRIPTS:
             out.append("^" * (not raised))
             raised = True
         else:
             raised = False
-        out.append(sign)
-    return " ".join("".join(out).translate(_SUPERSCRIPTS).translate(_SIGNS).split())
+        out.append(_plain(sign))
+    return " ".join("".join(out).translate(_SIGNS).split())
+
+
+@functools.cache
+def _plain(sign: str) -> str:
+    """A sign as what it stands for, nothing for a mark that is not seen; a fraction such as ½ and
+    an index stay, which are no digits."""
+    if sign in _SUPERSCRIPTS:
+        return _SUPERSCRIPTS[sign]
+    if unicodedata.category(sign) == "Cf":
+        return ""
+    if unicodedata.decomposition(sign).startswith(("<fraction>", "<sub>")):
+        return sign
+    return unicodedata.normalize("NFKC", sign)
 
 
 def is_number(text: str) -> bool:

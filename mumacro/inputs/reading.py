@@ -8,6 +8,7 @@ of pint, astropy, unyt, xarray and uncertainties can do; none of these packages 
 
 import functools
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -17,12 +18,19 @@ from mumacro.errors import InputError
 from mumacro.inputs.fields import GAP, QUANTITY_OF, STIFFNESS, is_rigid
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.numbers import split_number, tidy
-from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, canonical, scale_in
-
-#: types of one real number
-NUMBERS: Final = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(code).type for code in "efdbhilqBHILQ"))
+from mumacro.inputs.units import (
+    QUANTITIES,
+    Scale,
+    bound_of_unit,
+    canonical,
+    is_level,
+    scale_in,
+    unit_in,
 )
+
+#: types of one real number; a truth value is none
+NUMBERS: Final = frozenset((float, int, *(np.dtype(code).type for code in "efdbhilqBHILQ")))
+_REAL = "fiu"  # kinds of arrays of real numbers
 A_NUMBER = "a real number or an array of them"
 LONGEST = 200  # characters of a value
 #: signs between a value and its deviation
@@ -30,10 +38,19 @@ _DEVIATIONS = ("±", "+/-", "+-")
 # may be written as the word rigid, as an interval
 _OR_RIGID = ("stiffness", "pressure")
 _INTERVALS = ("k", "k_range")
+_IN_RANGE = "within double range"
+_GAPS = ("NAType", "NaTType")  # of pandas, by the name of the type
 _ONE_NUMBER = "one number: k alone may be an interval; ask for both ends, one after the other"
 #: where an answer has no deviation of its own
 NO_DEVIATION = "without a deviation, which only an answer to given cases has"
 _NOT_BOTH = "an interval or a deviation, not both, and rigid alone"
+# a deviation in units of the last digits: 1.00(10) N/um
+_LAST_DIGITS = re.compile(
+    r"(?P<number>[+-]?\d{1,15}(?:[.,](?P<part>\d{1,15}))?)\((?P<std>\d{1,9})\)(?P<unit> ?\D{0,40})",
+    re.ASCII,
+)
+# above, a ratio before a deviation in per cent may be meant in per cent, too
+_SURE_RATIO = 1.5
 # of a unit that turns: without one of them 1/s is a frequency, with one of them it is none
 _ANGLES = ("rad", "deg", "°", "turn", "rev", "cycle", "rpm", "arc")
 
@@ -86,9 +103,8 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
         return Value(value)
     if of_type in NUMBERS:
         return Value(_double(name, value))
-    if of_type is np.ndarray and value.dtype.kind in "fiub":
-        array = value.astype(np.float64, copy=False)
-        return Value(array if array.ndim else float(array))
+    if of_type is np.ndarray and value.dtype.kind in _REAL:
+        return Value(_doubles(name, value))
     quantity = quantity or QUANTITY_OF.get(name, "ratio")
     if of_type is str:
         return _of_text(name, quantity, value)
@@ -123,7 +139,7 @@ def read_column(name: str, values: Any, quantity: str = "") -> tuple[Value, dict
     >>> column.si.tolist(), [*reasons]
     ([1e-06, 2e-06, nan, nan], [2, 3])
     """
-    if type(values) is np.ndarray and values.dtype.kind in "fiub":
+    if type(values) is np.ndarray and values.dtype.kind in _REAL:
         return read(name, values, quantity), {}
     whole, reasons = _read(name, values, quantity or QUANTITY_OF.get(name, "ratio"))
     missing = GAP if name == "k" else "is missing"
@@ -135,6 +151,8 @@ def read_column(name: str, values: Any, quantity: str = "") -> tuple[Value, dict
 
 def reason_of(bound: str) -> str:
     """The bound of an error as a sentence without its subject."""
+    if bound == STIFFNESS:  # of a gap, in the words of files and JSON
+        return GAP
     return bound if bound.startswith(("is ", "must ")) else f"must be {bound}"
 
 
@@ -189,7 +207,7 @@ def in_unit(name: str, column: Any, unit: str) -> Any:
     if scale is None:
         raise InputError(name, f"a column in {unit}", QUANTITIES[quantity].bound)
     kind = getattr(getattr(column, "dtype", None), "kind", "O")
-    if _library(column) in ("pandas", "xarray", "dask") and kind in "fiub":
+    if _library(column) in ("pandas", "xarray", "dask") and kind in _REAL:
         return scale.si(column)
     numbers: Any = np.asarray(read(name, column, quantity).si)
     numbers = scale.si(numbers)
@@ -214,11 +232,9 @@ def _read(name: str, value: Any, quantity: str) -> tuple[Value, Reasons]:
         return _of_quantity(name, value, unit, quantity)
     if (pair := _uncertain(value)) is not None:
         return Value(*pair), {}
-    if isinstance(value, np.ma.MaskedArray):
-        if value.dtype.kind in "fiub":
-            filled = np.ma.filled(value.astype(np.float64), math.nan)
-            return Value(filled if filled.ndim else float(filled)), {}
-        value = np.ma.filled(value.astype(object), None)
+    value = _without_mask(value)
+    if value is None or type(value).__name__ in _GAPS:
+        raise InputError(name, None, _gap(name))
     if isinstance(value, (list, tuple)):
         shape, entries = _entries(name, value)
         if NUMBERS.issuperset(map(type, entries)):
@@ -227,18 +243,21 @@ def _read(name: str, value: Any, quantity: str) -> tuple[Value, Reasons]:
             except OverflowError:
                 pass  # the entry beyond double range is found below
         return _of_entries(name, entries, shape, quantity)
-    if isinstance(value, (str, bytes, Mapping, set, frozenset)):
-        if isinstance(value, str):
-            return _of_text(name, quantity, str(value)), {}
+    if isinstance(value, str):
+        return _of_text(name, quantity, str(value)), {}
+    if isinstance(value, (bytes, bytearray, Mapping, set, frozenset)):
         raise InputError(name, value, A_NUMBER)
+    if _library(value) == "pandas" and hasattr(value, "columns"):
+        raise InputError(name, "a DataFrame", f"{A_NUMBER}: one column of it")
     try:
         array = np.asarray(value)
-        if array.dtype.kind in "fiub":
-            array = array.astype(np.float64, copy=False)
-            return Value(array if array.ndim else float(array)), {}
     except (TypeError, ValueError, OverflowError):
         raise InputError(name, value, A_NUMBER) from None
-    if array.dtype.kind not in "OUT" or (array.ndim == 0 and array.item() is value):
+    if array.dtype.kind in _REAL:
+        return Value(_doubles(name, array)), {}
+    if array.dtype.kind not in "OUT":
+        raise InputError(name, value, A_NUMBER)
+    if array.ndim == 0 and array.item() is value:
         return Value(_other_number(name, value)), {}
     entries = array.ravel().tolist()
     if not array.ndim:
@@ -247,14 +266,15 @@ def _read(name: str, value: Any, quantity: str) -> tuple[Value, Reasons]:
 
 
 def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any]]:
-    """Shape and entries of nested lists; InputError for lists of several lengths."""
-    if not any(isinstance(one, (list, tuple, np.ndarray)) for one in value):
+    """Shape and entries of nested lists; InputError for lists of several lengths.
+
+    An array that carries a unit is taken apart into entries that carry it.
+    """
+    if not any(map(_is_row, value)):
         return (len(value),), list(value)
     try:
         parts = [
-            (one.shape, one.ravel().tolist())
-            if isinstance(one, np.ndarray)
-            else _entries(name, one)
+            (one.shape, one.ravel().tolist()) if type(one) is np.ndarray else _entries(name, [*one])
             for one in value
         ]
     except (TypeError, RecursionError):
@@ -262,6 +282,14 @@ def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any
     if len({shape for shape, _ in parts}) > 1:
         raise InputError(name, value, f"{A_NUMBER}, its lists of one length")
     return (len(value), *parts[0][0]), [entry for _, entries in parts for entry in entries]
+
+
+def _is_row(value: Any) -> bool:
+    """Whether an entry of a list is a list or an array itself."""
+    if isinstance(value, (list, tuple)):
+        return True
+    dimensions = getattr(value, "ndim", 0)
+    return isinstance(dimensions, int) and dimensions > 0
 
 
 def _of_entries(
@@ -300,7 +328,7 @@ def _of_entry(name: str, entry: Any, quantity: str) -> Value:
     """One entry of an array; gaps, also those of pandas and of masks, are refused."""
     if type(entry) is float:
         return Value(entry)
-    if entry is None or entry is np.ma.masked or type(entry).__name__ in ("NAType", "NaTType"):
+    if entry is None or entry is np.ma.masked:
         raise InputError(name, None, _gap(name))
     one = read(name, entry, quantity)
     if np.ndim(one.si):
@@ -313,15 +341,46 @@ def _gap(name: str) -> str:
 
 
 def _double(name: str, value: Any) -> float:
+    """One number as a double; one beyond their range must not pass for a rigid contact."""
     try:
-        return float(value)
-    except OverflowError:  # a whole number; it must not pass for a rigid contact
-        raise InputError(name, value, "within double range") from None
+        number = float(value)
+    except OverflowError:
+        raise InputError(name, value, _IN_RANGE) from None
+    if math.isinf(number) and type(value) is not float and value != number:
+        raise InputError(name, value, _IN_RANGE)
+    return number
+
+
+def _doubles(name: str, array: Any) -> Any:
+    """An array of real numbers as doubles, or the one that it holds without a dimension."""
+    with np.errstate(over="ignore"):
+        doubles = array.astype(np.float64, copy=False)
+    if array.dtype.itemsize > doubles.dtype.itemsize:
+        beyond = np.flatnonzero(np.isinf(doubles) & np.isfinite(array))
+        if beyond.size:
+            index = int(beyond[0]) if array.ndim else None
+            raise InputError(name, array.flat[beyond[0]], _IN_RANGE, index)
+    return doubles if doubles.ndim else float(doubles)
+
+
+def _without_mask(value: Any) -> Any:
+    """A masked array of NumPy or astropy as a plain one, with NaN or None where it is masked."""
+    if isinstance(value, np.ma.MaskedArray):
+        plain, mask = value.data, np.ma.getmaskarray(value)
+    elif hasattr(value, "unmasked") and hasattr(value, "mask"):
+        plain, mask = np.asarray(value.unmasked), np.asarray(value.mask)
+    else:
+        return value
+    gap, dtype = (math.nan, np.float64) if plain.dtype.kind in _REAL else (None, object)
+    filled = np.array(plain, dtype)
+    filled[mask] = gap
+    return filled if filled.ndim else filled.item()
 
 
 def _other_number(name: str, value: Any) -> float:
-    """A number of another type, such as Decimal; complex numbers, times and bytes are none."""
-    if isinstance(value, (complex, np.complexfloating, np.generic, bytes)):
+    """A number of another type, such as Decimal; truth values, complex numbers and times are
+    none."""
+    if isinstance(value, (bool, complex, np.generic)):
         raise InputError(name, value, A_NUMBER)
     try:
         return _double(name, value)
@@ -340,7 +399,7 @@ def _own_unit(value: Any) -> Any:
     """The unit of a quantity of pint, astropy, unyt and others like them."""
     for attribute in ("units", "unit"):
         unit = getattr(value, attribute, None)
-        if unit is not None and not callable(unit):
+        if unit is not None and not callable(unit) and unit is not value:
             return unit
     return None
 
@@ -382,7 +441,7 @@ def _numbers(value: Any) -> Any:
     if library == "xarray":
         data = value.data
         return np.asarray(data) if _own_unit(data) is None else _numbers(data)
-    return _magnitude(value)
+    return _magnitude(value.quantity if library == "pint_pandas" else value)
 
 
 def _unit_text(unit: Any) -> str:
@@ -406,11 +465,11 @@ def _of_quantity(name: str, value: Any, unit: Any, quantity: str) -> tuple[Value
         scale, value = Scale(), converted
     numbers = _numbers(value)
     whole, reasons = _read_plain(name, numbers, quantity)
-    return whole.scaled(scale, canonical(text)), reasons
+    return whole.scaled(scale, unit_in(quantity, text)), reasons
 
 
 def _read_plain(name: str, numbers: Any, quantity: str) -> tuple[Value, Reasons]:
-    if type(numbers) in NUMBERS or (type(numbers) is np.ndarray and numbers.dtype.kind in "fiub"):
+    if type(numbers) in NUMBERS or (type(numbers) is np.ndarray and numbers.dtype.kind in _REAL):
         return read(name, numbers, quantity), {}
     return _read(name, numbers, quantity)
 
@@ -420,7 +479,7 @@ def _converted(value: Any, text: str, unit: str, quantity: str) -> Any:
 
     For a frequency libraries take a radian, and a turn, as a plain 1: a factor of 2 pi.
     """
-    if not hasattr(value, "to"):
+    if not hasattr(value, "to") or is_level(text):
         return None
     turns = any(word in text.lower() for word in _ANGLES)
     hertz = "hz" in text.lower() or "hertz" in text.lower()
@@ -506,7 +565,7 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
             raise
         raise InputError(name, raw, _of_no_number(quantity, str(error))) from None
     scale = _scale_or_refuse(name, quantity, raw, number, unit)
-    return Value(scale.si(number), text=raw, unit=canonical(unit) if unit else None)
+    return Value(scale.si(number), text=raw, unit=unit_in(quantity, unit) if unit else None)
 
 
 def _of_no_number(quantity: str, reason: str) -> str:
@@ -524,7 +583,7 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
     scale = scale_in(quantity, unit)
     if scale is not None:
         return scale
-    if quantity == "stiffness" and unit.startswith(("-", "to ")):
+    if unit.startswith(("-", "to ")):
         try:
             high, behind = split_number(unit.removeprefix("-").removeprefix("to ").strip())
         except ValueError:
@@ -532,7 +591,13 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
         else:
             if not behind or scale_in(quantity, behind):
                 ends = f"{number:.12g}..{high:.12g}{behind}"
-                raise InputError(name, raw, f"a number; write an interval as {ends}")
+                interval = name in _INTERVALS
+                bound = f"a number; write an interval as {ends}" if interval else _ONE_NUMBER
+                raise InputError(name, raw, bound)
+    if (last := _LAST_DIGITS.fullmatch(tidy(raw))) is not None:
+        deviation = f"{int(last['std']) / 10 ** len(last['part'] or ''):.12g}"
+        typed = f"{last['number'].replace(',', '.')} ± {deviation}{last['unit']}"
+        raise InputError(name, raw, f"a number; write its deviation as {typed}")
     raise InputError(name, raw, bound_of_unit(quantity, number, unit))
 
 
@@ -547,14 +612,17 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
     if deviation < 0.0 or not math.isfinite(deviation):
         raise InputError(name, raw, "a number and a deviation >= 0")
     relative = canonical(behind) == "%" and canonical(unit) != "%" and not together
+    if relative and not unit and quantity == "ratio" and abs(number) > _SURE_RATIO:
+        both = f"({number:.12g} ± {deviation:.12g}) %"
+        bound = f"clear: it may be {both}; write that, or the deviation without %"
+        raise InputError(name, raw, bound)
+    own_unit = unit_in(quantity, unit if relative else unit or behind) or None
     if relative:
         value = _scale_or_refuse(name, quantity, raw, number, unit).si(number)
-        return Value(value, abs(value) * deviation / 100.0, text=raw, unit=canonical(unit) or None)
+        return Value(value, abs(value) * deviation / 100.0, text=raw, unit=own_unit)
     scale = _scale_or_refuse(name, quantity, raw, number, unit or behind)
     own = _scale_or_refuse(name, quantity, raw, deviation, behind or unit)
-    return Value(
-        scale.si(number), own.si(deviation), text=raw, unit=canonical(unit or behind) or None
-    )
+    return Value(scale.si(number), own.si(deviation), text=raw, unit=own_unit)
 
 
 def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
@@ -571,4 +639,4 @@ def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
     if not 0.0 < ends[0] <= ends[1] < math.inf:
         raise InputError(name, raw, BOUND)
     middle = min(max(math.sqrt(ends[0]) * math.sqrt(ends[1]), ends[0]), ends[1])
-    return Value(middle, None, *ends, raw, canonical(behind or unit) or None)
+    return Value(middle, None, *ends, raw, unit_in(quantity, behind or unit) or None)

@@ -61,6 +61,7 @@ _FORCE = {
     "daN": Scale(1e1),
     "kN": Scale(1e3),
     "MN": Scale(1e6),
+    "GN": Scale(1e9),
     "gf": Scale(9.80665, 1e3),
     "kgf": Scale(9.80665),
     "lbf": Scale(4.4482216152605),
@@ -83,6 +84,8 @@ _FREQUENCY = {
     "1/s": Scale(),
     "1/min": Scale(over=60.0),
     "rpm": Scale(over=60.0),
+    "rev/s": Scale(),
+    "rev/min": Scale(over=60.0),
 }
 
 
@@ -125,6 +128,7 @@ QUANTITIES = {
             "rad/min": Scale(over=60.0),
             "deg/s": Scale(RAD_PER_CYCLE, 360.0),
             "rev/s": Scale(RAD_PER_CYCLE),
+            "rev/min": Scale(RAD_PER_CYCLE, 60.0),
         },
         "rad/s, krad/s, rpm, deg/s; a frequency in Hz is f",
     ),
@@ -238,6 +242,11 @@ _NAMED = {
     "revolutions": "rev",
     "turn": "rev",
     "turns": "rev",
+    "cycle": "rev",
+    "cycles": "rev",
+    "kmh": "km/h",
+    "kph": "km/h",
+    "ips": "in/s",
     "revolutions_per_minute": "rpm",
     "revolution_per_minute": "rpm",
 }
@@ -256,7 +265,7 @@ def canonical(unit: str) -> str:
     text = tidy(unit[:LONGEST]).translate(_MU).strip(" []()")
     if text.lower() == "dimensionless":
         return ""
-    text = text.replace("**", "^").replace(" per ", "/")
+    text = text.replace(" per ", "/")
     for times in "*·⋅.":
         text = text.replace(times, " ")
     powers: dict[str, int] = {}
@@ -345,7 +354,27 @@ def scale_in(quantity: str, unit: str) -> Scale | None:
     """The scale of a ``unit`` of a quantity; None for a unit that is not in the table."""
     units = QUANTITIES[quantity].units
     scale = units.get(unit)
-    return scale if scale is not None or len(unit) > LONGEST else units.get(canonical(unit))
+    if scale is not None or len(unit) > LONGEST:
+        return scale
+    return units.get(unit_in(quantity, unit))
+
+
+# an amplitude as vibrations are measured: from zero to the peak
+_PEAK = re.compile(r"(.*?\w) ?(?:0-?|zero[ -]to[ -])?(?:peak|pk|(?<=0)-?p)", re.IGNORECASE)
+
+
+def unit_in(quantity: str, unit: str) -> str:
+    """A unit of a quantity as the table writes it; that of a length may say that the value is an
+    amplitude.
+
+    >>> unit_in("length", "um 0-pk"), unit_in("length", "umpp"), unit_in("speed", "mm sec^-1")
+    ('um', 'umpp', 'mm/s')
+    """
+    if quantity == "length" and (match := _PEAK.fullmatch(unit.strip(" []()"))) is not None:
+        own = canonical(match[1])
+        if own in QUANTITIES[quantity].units:
+            return own
+    return canonical(unit)
 
 
 # --- what is meant by a unit that a quantity cannot have ------------------------------------------
@@ -360,9 +389,16 @@ _MASS = {
 }
 _GRAVITY = 9.80665  # m/s^2
 _ACCELERATION = {"g": _GRAVITY, "m/s2": 1.0, "mm/s2": 1e-3}
-_WHOLE = ("peak to peak", "peaktopeak", "pkpk", "p2p", "ptp", "pp")
+_WHOLE = ("peak to peak", "peaktopeak", "pkpk", "p2p", "ptp", "pp", "ss")
+_LEVELS = ("db", "decibel", "bel", "neper")
 _OTHER = {"angular frequency": "frequency", "frequency": "angular frequency"}
 _INPUT = {"frequency": "f", "angular frequency": "omega", "speed": "v0", "length": "y0"}
+
+
+def is_level(unit: str) -> bool:
+    """Whether a unit is one of levels, such as dB, whose reference is not said."""
+    words = re.split(r"[^a-z]+", unit[:LONGEST].lower())
+    return any(word.rstrip("s") in _LEVELS or word.startswith("db") for word in words)
 
 
 def bound_of_unit(quantity: str, number: float, unit: str) -> str:
@@ -390,7 +426,11 @@ def bound_of_unit(quantity: str, number: float, unit: str) -> str:
                 f"the amplitude, of a sine {math.sqrt(2.0):.6g} times its rms value: give "
                 f"{math.sqrt(2.0) * number:.12g}{mine}"
             )
+    if is_level(shown):
+        return "the value itself: the reference of a level is not said"
     key = canonical(shown)
+    if quantity == "stiffness" and key in QUANTITIES["pressure"].units:
+        return "a force over a length: mumacro stiffness computes it from a modulus and the bodies"
     if quantity == "force" and key in _MASS:
         newtons = number * _MASS[key] * _GRAVITY
         return (
@@ -403,6 +443,8 @@ def bound_of_unit(quantity: str, number: float, unit: str) -> str:
         return f"a length: of a velocity amplitude give {speed.si(number):.12g}/(2 pi f) metres"
     if quantity == "speed" and (turns := QUANTITIES["angular frequency"].units.get(key)):
         return f"a speed: give {turns.si(number):.12g} m/s times the radius in metres"
+    if shown in ("k", "M", "G") and (meant := shown + known.unit) in known.units:
+        return f"in {known.words}: did you mean {number:.12g}{meant}?"
     lower = key.lower()
     if alike := [symbol for symbol in known.units if symbol and symbol.lower() == lower]:
         meant = " or ".join(f"{number:.12g}{symbol}" for symbol in alike)

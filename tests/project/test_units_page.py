@@ -10,6 +10,9 @@ from tests.support.places import ROOT
 PAGE = ROOT / "docs" / "units.md"
 NAMED = ("mu0", "Fz", "k", "y0", "f", "v0", "Fz_amplitude")
 
+#: what has the units of a quantity that no input has
+_OTHERS = {"angle": "phases", "pressure": "moduli"}
+
 
 def _code(unit: str) -> str:
     return f"`{unit}`"
@@ -31,7 +34,7 @@ def lines() -> list[str]:
             units = f"{_listed(upper)} over {_listed(lower)}" + ", ".join(["", *map(_code, alone)])
         else:
             units = _listed(filter(None, quantity.units))
-        rows.append(f"| {name} | {inputs or 'phases, moduli'} | {units} |")
+        rows.append(f"| {name} | {inputs or _OTHERS[name]} | {units} |")
     return rows
 
 

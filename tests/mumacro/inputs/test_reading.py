@@ -1,8 +1,10 @@
 """One value of one input is understood or refused by its name, whatever its type."""
 
 import ast
+import datetime
 import decimal
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,12 @@ TYPED = {
     ("y0", "1.0D-3"): 1e-3,
     ("y0", "2×10⁻⁶ m"): 2e-6,
     ("y0", "10^-6"): 1e-6,
+    ("y0", "2*10**-6 m"): 2e-6,
+    ("y0", "２．５ ㎛"): 2.5e-6,
+    ("y0", "\u200e2\u2009\u2060µm\ufeff"): 2e-6,
+    ("y0", "2.5 um 0-p"): 2.5e-6,
+    ("y0", "2.5 umpk"): 2.5e-6,
+    ("y0", "2.5 um zero-to-peak"): 2.5e-6,
     ("y0", "1 mil"): 25.4e-6,
     ("y0", "1 ft"): 0.3048,
     ("Fz", "1.234,5 N"): 1234.5,
@@ -36,12 +44,17 @@ TYPED = {
     ("k", "1 newton / micrometer"): 1e6,
     ("k", "1 N mm^-1"): 1e3,
     ("k", "1 N·mm⁻¹"): 1e3,
+    ("k", "0.001 GN/m"): 1e6,
     ("k", "Rigid"): math.inf,
     ("v0", "10 mm/sec"): 0.01,
     ("v0", "10 mm s^-1"): 0.01,
     ("v0", "36 km/h"): 10.0,
+    ("v0", "36 kmh"): 10.0,
+    ("v0", "10 ips"): 0.254,
     ("omega", "60 rpm"): 2.0 * math.pi,
     ("f", "1200 rpm"): 20.0,
+    ("f", "1200 rev/min"): 20.0,
+    ("f", "20 cycles/s"): 20.0,
     ("f", "20 kHz"): 2e4,
     ("mu0", "30 %"): 0.3,
     ("phase", "90 deg"): 90.0,
@@ -62,6 +75,7 @@ DEVIATIONS = {
     ("k", "1 N/um +/- 100 N/mm"): (1e6, 1e5),
     ("k", "(1.00 +/- 0.10) newton / micrometer"): (1e6, 1e5),
     ("mu0", "30 % ± 2 %"): (0.3, 0.02),
+    ("mu0", "(30 ± 2) %"): (0.3, 0.02),
     ("mu0", "0.3 ± 10 %"): (0.3, 0.03),
 }
 
@@ -91,13 +105,32 @@ REFUSED = {
         "1..2",
         "5 g",
         "2 um rms",
+        "2 um peak to peak",
+        "2 µmss",
+        "½ um",
+        "2₀ um",
+        "٢ um",
+        "2 dB",
+        "2026-11-27",
+        "2um 3um",
+        "true",
     ],
-    "Fz": ["100 g", "10 N/m", "1,000"],
-    "k": ["rigid ± 1", "0.8..1.2 ± 0.1", "2..1", "1e999", "0.8-1.2N/um", "soft", "1 ± -0.1"],
+    "Fz": ["100 g", "10 N/m", "1,000", "10 dBm"],
+    "k": [
+        "rigid ± 1",
+        "0.8..1.2 ± 0.1",
+        "2..1",
+        "1e999",
+        "0.8-1.2N/um",
+        "soft",
+        "1 ± -0.1",
+        "210 GPa",
+        "1.00(10)",
+    ],
     "omega": ["20 kHz"],
     "f": ["20 rad/s", "20 khz", "20 mhz"],
-    "v0": ["1200 rpm", "10 m"],
-    "mu0": ["0_3", "0x1"],
+    "v0": ["1200 rpm", "10 m", "10 mm/s peak"],
+    "mu0": ["0_3", "0x1", "30 ± 2 %", "0.2-0.3", "-10 dB", "1/4"],
 }
 
 
@@ -109,6 +142,7 @@ def test_what_is_not_understood_is_refused_by_its_name(name: str, text: str) -> 
     assert refused.value.value == text
 
 
+_SAYS = ("give", "as", "mean", "be")  # before it
 #: what is typed -> what its refusal says to give, and the value of that
 ADVICE = {
     ("y0", "4umpp"): 2e-6,
@@ -116,7 +150,12 @@ ADVICE = {
     ("y0", "2 um rms"): math.sqrt(2.0) * 2e-6,
     ("Fz", "100 g"): 0.980665,
     ("Fz", "1 kg"): 9.80665,
+    ("y0", "5 µm ss"): 2.5e-6,
     ("f", "20 khz"): 2e4,
+    ("f", "20k"): 2e4,
+    ("k", "1.2M"): 1.2e6,
+    ("k", "1.00(10) N/um"): 1e6,
+    ("mu0", "30 ± 2 %"): 0.3,
     ("k", "1 n/m"): 1.0,
     ("k", "0.8-1.2N/um"): math.sqrt(0.8e6 * 1.2e6),
     ("x", "2um,90"): (1, 2e-6, 90.0),
@@ -130,8 +169,10 @@ def test_advice_leads_to_the_right_number(name: str, text: str) -> None:
         reader(name, text)
     words = refused.value.bound.replace("?", " ").split()
     given = next(
-        (words[i + 1] for i, word in enumerate(words) if word in ("give", "as", "mean")), ""
-    ).rstrip(",")
+        (" ".join(words[i + 1 :]) for i, x in enumerate(words) if x in _SAYS),
+        "",
+    )
+    given = re.split(", |;", given)[0]
     if name == "x":
         assert reader(name, given) == [ADVICE[name, text]]
     else:
@@ -178,7 +219,15 @@ def test_numbers_of_any_type_are_numbers(value: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [None, 1j, b"1", {}, {1}, [[1], [1, 2]], object(), [1j], np.datetime64("2026-01-01")]
+    "value",
+    [
+        *(None, 1j, b"1", {}, {1}, [[1], [1, 2]], object(), [1j], np.datetime64("2026-01-01")),
+        *(True, np.bool_(True), np.array([True]), [1.0, True], bytearray(b"1"), np.array([b"1"])),
+        *(datetime.date(2026, 11, 27), datetime.timedelta(1), np.timedelta64(1, "s")),
+        *(np.array([1], "m8[s]"), (x for x in (1.0,)), float, np.zeros(1, [("a", float)])),
+        *(10**400, [10**400], decimal.Decimal("1e400"), np.longdouble(1e300) * 1e300),
+        np.array([1.0, np.longdouble(1e300) * 1e300]),
+    ],
 )
 def test_what_is_no_number_is_refused_by_its_name(value: Any) -> None:
     with pytest.raises(InputError) as refused:
