@@ -137,6 +137,28 @@ def test_the_spreadsheets_addresses(
     assert live_server.ask("GET", f"{number_of}-1")[0] == 422
 
 
+def test_the_spreadsheets_query_with_a_key(repository: Path, surrogate: Surrogate) -> None:
+    from fastapi.testclient import TestClient
+
+    from service.app import create_app
+    from service.settings import Settings
+
+    text = (repository / "docs" / "how-to" / "spreadsheet.md").read_text("utf-8")
+    (query,) = re.findall(r"Query = \[(.+?)\],\s+Headers", text, re.DOTALL)
+    params = dict(re.findall(r'(\w+) = "([^"]+)"', query)) | {"y0": "2E-06"}
+    assert "y0 = Number.ToText" in query
+    (path,) = re.findall(r'RelativePath = "([^"]+)"', text)
+    (header,) = re.findall(r'Headers = \[#"([^"]+)" =', text)
+    settings = Settings(tables=(repository / "tables",), api_key="open-sesame")
+    with TestClient(create_app(settings)) as client:
+        assert client.get(f"/{path}", params=params).status_code == 401
+        answer = client.get(f"/{path}", params=params, headers={header: "open-sesame"})
+    head, first, *_ = csv.reader(io.StringIO(answer.text))
+    assert {"v0 [m/s]", "mu_macro [-]"} <= {*head}
+    expected = surrogate.evaluate(**{**CASE, "v0": float(first[0])}).mu_macro
+    assert float(first[1]) == close(expected, rel=1e-14)
+
+
 def test_octave(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
     need("octave-cli")
     text = run(repository, "octave-cli", "--norc", "examples/octave.m", live_server.url)
