@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Fit, Surrogate, fit, solve_for
-from mumacro.plotting import BLUE, GREY, INK, RED, finish
+from mumacro.plotting import BLUE, GREY, INK, RED, Panels, head, save
 
 Array = NDArray[np.float64]
 DATA = ROOT / "tests" / "data"
@@ -125,7 +125,7 @@ def forces() -> str:
         "rigid [N]",
         "shaken/rigid",
     )
-    _draw()
+    save(IMAGES / "measured.png", _draw, Panels(columns=3, size=(12.0, 4.2)), dpi=100)
     return markdown(header, rows, 0)
 
 
@@ -270,11 +270,9 @@ def oiled() -> str:
     )
 
 
-def _draw() -> None:
+def _draw(axes_of_all: Any) -> None:
     """docs/img/measured.png: all dry forces on logarithmic axes, the shaken ones alone, and the
     oiled contact."""
-    from matplotlib.figure import Figure
-
     p = points()
     v0 = np.geomspace(p.v0[0], p.v0[-1], 201)
     mu0 = np.interp(np.log(v0), np.log(p.v0), p.without / FZ)
@@ -284,8 +282,8 @@ def _draw() -> None:
     oil = points("oil")
     mu0_oil = np.interp(np.log(v0), np.log(oil.v0), oil.without / FZ)
     oiled = [force(c, fitted(c, surface="oil").values["k"], mu0_oil, v0) for c in CONTACTS]
-    figure = Figure(figsize=(12.0, 4.2), layout="constrained")
-    left, middle, right = figure.subplots(1, 3)
+    left, middle, right = axes_of_all
+    figure = left.figure
     for axes, curves in ((left, (spring, ball)), (middle, (spring, ball)), (right, oiled)):
         axes.plot(1e3 * v0, curves[0], color=BLUE, lw=2.0, label="one spring, $k$ fitted")
         axes.plot(1e3 * v0, curves[1], color=BLUE, lw=2.0, ls="--", label="ball, $k$ fitted")
@@ -305,9 +303,9 @@ def _draw() -> None:
     right.plot(1e3 * oil.v0, oil.without, "o", mfc="white", color=INK)
     right.plot(1e3 * oil.v0, oil.shaken, "o", color=INK)
     right.set(ylabel="friction [N]", ylim=(0.0, 4.0))
-    finish(left, "dry", legend=False)
-    finish(middle, "dry, shaken alone", legend=False)
-    finish(right, "oiled: not described", legend=False)
+    head(left, "dry", legend=False)
+    head(middle, "dry, shaken alone", legend=False)
+    head(right, "oiled: not described", legend=False)
     figure.suptitle(
         f"Steel on steel, shaken along: $f$ = 26 kHz, $x_0$ = 0.35 µm, $F_z$ = {FZ:.4g} N",
         fontsize="medium",
@@ -317,7 +315,6 @@ def _draw() -> None:
     figure.legend(
         list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False
     )
-    figure.savefig(IMAGES / "measured.png", dpi=100, metadata={"Software": None})
 
 
 SECTIONS = sections(forces, stiffness, trends, oiled)

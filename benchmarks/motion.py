@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate, motion
-from mumacro.plotting import BLUE, GREY, INK, RED, finish
+from mumacro.plotting import BLUE, GREY, INK, OF_CYCLE, RED, Panels, head, save
 
 Array = NDArray[np.float64]
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5}
@@ -243,14 +243,22 @@ def phase_sweep(v0: float) -> Array:
 
 def pictures(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
     """Writes the pictures of docs/how-to/motion.md, and prints the phase sweep at its ends."""
-    from matplotlib.figure import Figure
-
     case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
-    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
-    motion(**case, x=(2e-6, 90), y=4e-6).plot(figure.subplots(1, 2))
-    figure.savefig(IMAGES / "motion-ellipse.png", dpi=110)
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-    axes = figure.subplots()
+    cycle = motion(**case, x=(2e-6, 90), y=4e-6)
+    save(IMAGES / "motion-ellipse.png", cycle.plot, OF_CYCLE, dpi=110)
+    rows: list[list[str]] = []
+    save(
+        IMAGES / "motion-phase.png",
+        lambda axes: rows.extend(_draw_phases(axes)),
+        Panels(size=(6.4, 4.2)),
+        dpi=110,
+    )
+    header = ("v0 [m/s]", "least mu_macro/mu0", "at [degrees]", "most", "at [degrees]")
+    return markdown(header, rows)
+
+
+def _draw_phases(axes: Any) -> list[list[str]]:
+    """The phase sweeps, and their ends."""
     rows = []
     for v0, (color, dashes) in zip(SPEEDS, LOOKS, strict=True):
         ratio = phase_sweep(v0)
@@ -271,12 +279,8 @@ def pictures(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
         ylabel=r"$\mu_\mathrm{macro}/\mu_0$ [-]",
         xticks=np.arange(0, 361, 45),
     )
-    finish(
-        axes, r"$\mu_0$ = 0.3, $F_z$ = 10 ± 5 N, $k$ = 1 N/µm, $x_0$ = 4 µm, $f$ = 20 kHz; spring"
-    )
-    figure.savefig(IMAGES / "motion-phase.png", dpi=110)
-    header = ("v0 [m/s]", "least mu_macro/mu0", "at [degrees]", "most", "at [degrees]")
-    return markdown(header, rows)
+    head(axes, r"$\mu_0$ = 0.3, $F_z$ = 10 ± 5 N, $k$ = 1 N/µm, $x_0$ = 4 µm, $f$ = 20 kHz; spring")
+    return rows
 
 
 SECTIONS = sections(errors, beside_tables, times, pictures)

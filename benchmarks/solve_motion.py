@@ -17,7 +17,7 @@ import numpy as np
 
 import mumacro
 from mumacro.analysis.solve_motion import UNKNOWNS, Curve
-from mumacro.plotting import BLUE, RED, finish
+from mumacro.plotting import INK, Panels, head, save
 
 PROBLEMS, FINE = 1000, 2000
 POSSIBLE = [name for name in UNKNOWNS if name != "omega"]
@@ -90,27 +90,26 @@ def search(share: float = 1.0) -> str:
 
 def picture(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
     """Writes the picture of docs/how-to/conveyor.md: transport speed over the phase of the load."""
-    from matplotlib.figure import Figure
-
     speeds = np.full(PHASES.size, np.nan)
     for i, phase in enumerate(PHASES):
         roots = mumacro.solve_motion("v0", 0.0, **CONVEYOR, normal=(8.0, phase)).roots[0]
         if roots:
             speeds[i] = roots[-1].value
     best = int(np.nanargmax(speeds))
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-    axes = figure.subplots()
-    axes.plot(PHASES, 1e3 * speeds, color=BLUE, lw=2.0, label="transport speed")
-    axes.plot(PHASES[best], 1e3 * speeds[best], "o", color=RED, mec="white", label="fastest")
-    axes.set(
-        xlabel="phase of the load [degrees]",
-        ylabel="speed at which the mean force is 0 [mm/s]",
-        xticks=np.arange(0, 361, 45),
-        xlim=(0.0, 360.0),
-    )
-    axes.set_ylim(bottom=0.0)
-    finish(axes, r"$\mu_0$ = 0.3, $F_z$ = 10 ± 8 N, $k$ = 0.1 N/µm, $x_0$ = 0.1 mm, $f$ = 50 Hz")
-    figure.savefig(IMAGES / "conveyor.png", dpi=110)
+
+    def draw(axes: Any) -> None:
+        axes.plot(PHASES, 1e3 * speeds, label="transport speed")
+        axes.plot(PHASES[best], 1e3 * speeds[best], "o", color=INK, mec="white", label="fastest")
+        axes.set(
+            xlabel="phase of the load [degrees]",
+            ylabel="speed at which the mean force is 0 [mm/s]",
+            xticks=np.arange(0, 361, 45),
+            xlim=(0.0, 360.0),
+        )
+        axes.set_ylim(bottom=0.0)
+        head(axes, r"$\mu_0$ = 0.3, $F_z$ = 10 ± 8 N, $k$ = 0.1 N/µm, $x_0$ = 0.1 mm, $f$ = 50 Hz")
+
+    save(IMAGES / "conveyor.png", draw, Panels(size=(6.4, 4.2)), dpi=110)
     return f"fastest: {1e3 * speeds[best]:.2f} mm/s at {PHASES[best]:g} degrees"
 
 

@@ -7,17 +7,14 @@ python benchmarks/surface.py [OUT]      (default: docs/img/surface.png)
 import sys
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from mumacro import Surrogate
+from mumacro.plotting import Panels, save
 from tests.support.measuring import IMAGES
 
 
 def draw(surrogate: Surrogate, out: Path) -> None:
     """Write the picture, 900 x 600 pixels."""
-    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    surrogate.plot(figure.subplots())
-    figure.savefig(out, dpi=100, metadata={"Software": None})
+    save(out, surrogate.plot, Panels(size=(9.0, 6.0)), dpi=100)
 
 
 if __name__ == "__main__":

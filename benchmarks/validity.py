@@ -12,7 +12,7 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.analysis.settling import settling
-from mumacro.plotting import INK
+from mumacro.plotting import INK, Panels, save
 from mumacro.stiffness import Material, ball_on_flat, flat_punch
 
 STEEL = Material(E=210e9, nu=0.3)
@@ -51,14 +51,10 @@ CONTACTS = {
 def rigs() -> str:
     """The positions on the map of usual contacts at 20 kHz, with assumed, not published, numbers;
     and the picture."""
-    from matplotlib.figure import Figure
-
     s, rows = Surrogate.open(FINEST), []
-    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    axes = figure.subplots()
-    s.plot(axes)
-    for (name, (force, contact)), shape in zip(CONTACTS.items(), "osD^", strict=True):
-        places = []
+    marks: dict[str, list[tuple[float, float]]] = {}
+    for name, (force, contact) in CONTACTS.items():
+        places = marks.setdefault(name, [])
         for y0, v0 in ((0.1e-6, 0.01), (5e-6, 0.01), (5e-6, 0.5)):
             case: Any = {
                 "mu0": 0.3,
@@ -83,11 +79,15 @@ def rigs() -> str:
                 answer.regime,
             ]
             rows.append([name, *cells, *groups, f"{decay.periods:.2g}"])
-        axes.plot(*zip(*places, strict=True), shape, color=INK, mec="white", ms=9, label=name)
-    if (legend := axes.get_legend()) is not None:
-        legend.remove()
-    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    figure.savefig(IMAGES / "contacts.png", dpi=100, metadata={"Software": None})
+
+    def draw(axes: Any) -> None:
+        s.plot(axes)
+        axes.get_legend().remove()
+        for (name, places), shape in zip(marks.items(), "osD^", strict=True):
+            axes.plot(*zip(*places, strict=True), shape, color=INK, mec="white", ms=9, label=name)
+        axes.figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+
+    save(IMAGES / "contacts.png", draw, Panels(size=(9.0, 6.0)), dpi=100)
     header = (
         "contact",
         "k [N/m]",

@@ -307,11 +307,7 @@ def _draw(panel: Panel, axes: Any) -> None:
         if curve.z is None:
             axes.plot(curve.x, curve.y, curve.look, label=curve.label or None, ms=5, lw=1.4)
         else:
-            levels = [0.0, *plotting.LEVELS, 1.0]
-            axes.contourf(curve.x, curve.y, curve.z, levels, colors=plotting.band_colours())
-            lines = axes.contour(
-                curve.x, curve.y, curve.z, plotting.LEVELS, colors=plotting.INK, linewidths=0.6
-            )
+            _, lines = plotting.bands(axes, curve.x, curve.y, curve.z)
             axes.clabel(lines, fmt="%g", fontsize="small")
     for (x, y), text in panel.notes.items():
         axes.text(x, y, text, ha="center", va="bottom")

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Generic
 import numpy as np
 
 from mumacro import plotting
-from mumacro.errors import MumacroError
+from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.doubts import remarks as doubts
 from mumacro.inputs.fields import RAD_PER_CYCLE
-from mumacro.inputs.kind import Kind
+from mumacro.inputs.kind import AMPLITUDE, Kind
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 #: float for one case; for many an array of float64, or a labelled object in its place
@@ -224,22 +224,64 @@ class Answer(Generic[Number]):
 
     # --- other forms ------------------------------------------------------------------------------
 
-    def plot(self, axes: Any = None) -> Any:
-        """The cases over (v~, y~), see ``mumacro.plotting.plot_cases``; of arrays only where groups
-        or the gradient were requested; needs matplotlib."""
-        v, y, code = (
-            np.ravel(np.asarray(x)) for x in (self.v_tilde, self.y_tilde, self.regime_code)
-        )
-        regimes = {name: code == i for i, name in enumerate(REGIMES)}
-        return plotting.plot_cases(v, y, regimes, self._border(), axes)
+    def plot(self, ax: Any = None) -> Any:
+        """The cases on the map of mu~ of their contact and direction, by regime, with the border of
+        continuous sliding; needs matplotlib.
 
-    def _border(self) -> Any:
-        """v~crit(y~) of the kind of the cases; None where they are of several."""
-        cases = self._cases
-        kind = None if cases is None else self.cases.kind
-        if kind is None or self._surrogate is None:
-            return None
-        return lambda y_tilde: self._surrogate.v_tilde_crit(y_tilde, **kind.names)
+        A rigid contact, and whatever else lies beyond the map, stands at its edge with a word that
+        says why; an interval of k is a line through its middle.  ``ax`` are axes of matplotlib, or
+        new ones, and are returned; where the cases are of several contacts or directions, an array
+        with axes for each, in the order of :data:`mumacro.inputs.kind.KINDS`.
+        """
+        kinds = self._on_map()
+        if not kinds:
+            raise InputError("contact", None, "that of at least one case that has an answer")
+        panels = plotting.Panels(columns=len(kinds), size=(6.4 * len(kinds), 4.8))
+        axes = plotting.axes_for(ax, panels if len(kinds) > 1 else plotting.Panels())
+        if len(kinds) > 1 and np.size(axes) != len(kinds):
+            raise InputError("ax", np.size(axes), f"{len(kinds)} axes, one for each kind")
+        for one, (kind, marks) in zip(np.ravel(np.asarray(axes, object)), kinds, strict=True):
+            title = ", ".join(kind.names.values()) if self.cases.shape else self._title()
+            self._surrogate.draw_map(one, kind, title, marks=marks)
+        return axes
+
+    def _title(self) -> str:
+        """The answer to one case with the digits of a picture, and the case."""
+        cases, case = self.cases, dict[str, Any](self.cases.columns)
+        if cases.ends is not None:
+            case["k"] = [float(end[0]) for end in cases.ends]
+        low, high = (getattr(self, name, None) for name in BAND)
+        band = "" if low is None or high is None else f" ({low:.4g} to {high:.4g})"
+        words = plotting.in_words(case, cases.one_kind.names)
+        return rf"$\mu_\mathrm{{macro}}$ = {self.mu_macro:.4g}{band}; {words}"
+
+    def _on_map(self) -> list[tuple[Kind, plotting.Marks]]:
+        """The cases of each kind as marks of its map."""
+        cases = self.cases
+        groups = self._groups or self._surrogate.answer(cases, groups=True)._groups
+        size = max(cases.size, 1)
+        v, y = (np.ravel(np.asarray(x, np.float64)) for x in groups[:2])
+        regimes = np.ravel(np.asarray(self.regime, object))
+        ends = None
+        if cases.ends is not None:
+            k = np.broadcast_to(cases.columns["k"], size)
+            with np.errstate(all="ignore"):
+                low, high = (np.broadcast_to(np.ravel(end), size) / k for end in cases.ends)
+            ends = low, high
+        kinds = []
+        for where, part in cases.by_kind():
+            kind = part.one_kind
+            amplitude = AMPLITUDE if kind.normal else "y0"
+            marks = plotting.Marks(
+                v[where],
+                y[where],
+                _ray(part.columns, amplitude, v[where].size),
+                regimes[where],
+                _edge_words(part.columns, amplitude, v[where], y[where]),
+                None if ends is None else (ends[0][where], ends[1][where]),
+            )
+            kinds.append((kind, marks))
+        return kinds
 
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
@@ -291,6 +333,29 @@ class Answer(Generic[Number]):
 
 
 _NOTHING: dict[str, Any] = {}
+
+
+def _ray(columns: Mapping[str, Any], amplitude: str, size: int) -> Any:
+    """y0 omega / v0, (size,): y~/v~ of a rigid contact, too."""
+    with np.errstate(all="ignore"):
+        ratio = columns[amplitude] * np.asarray(columns["omega"]) / columns["v0"]
+    return np.broadcast_to(ratio, size)
+
+
+def _edge_words(columns: Mapping[str, Any], amplitude: str, v: Any, y: Any) -> Any:
+    """Why cases (n,) stand at the edge of the map; empty for those on it."""
+    with np.errstate(invalid="ignore"):
+        at_v, at_y = plotting.on_map(v, y, np.ones_like(v), amplitude == AMPLITUDE)
+        beyond = (at_v != v) | (at_y != y)
+    words = np.where(beyond, "beyond the map", "").astype(object)
+    for name, value, word in (
+        ("v0", 0.0, "$v_0$ = 0"),
+        ("omega", 0.0, "not shaken"),
+        (amplitude, 0.0, "not shaken"),
+        ("k", math.inf, "rigid"),
+    ):
+        words[beyond & np.broadcast_to(columns[name] == value, v.shape)] = word
+    return words
 
 
 class AnswerWithGradient(Answer[Number]):

@@ -51,10 +51,11 @@ Apply = Callable[[Callable[..., Any], Mapping[str, Any], Sequence[str]], list[An
 class LabelledAnswer(IntervalAnswer[Any]):
     """An answer whose attributes and outputs are Series, DataArrays or Dask arrays."""
 
-    __slots__ = ("_kinds", "_library")
+    __slots__ = ("_kinds", "_library", "_values")
 
     _kinds: dict[str, Any]  # contact and direction, where they were given
     _library: str
+    _values: dict[str, Any]  # all inputs
 
     def _apply(self, function: Callable[..., Any], inputs: Mapping[str, Any], name: str) -> Any:
         return _APPLY[self._library](lambda *arrays: [function(*arrays)], inputs, [name])[0]
@@ -64,6 +65,18 @@ class LabelledAnswer(IntervalAnswer[Any]):
         if self._library == "pandas" and table.dtype == object:
             return _categories(table, code, name)
         return self._apply(lambda codes: table[codes], {"source_code": code}, name)
+
+    def plot(self, ax: Any = None) -> Any:
+        """As in :class:`mumacro.Answer`."""
+        if self._cases is not None:
+            return super().plot(ax)
+        values = self._values
+        if self._library == "xarray":
+            labelled = {name: x for name, x in values.items() if library_of(x)}
+            arrays = importlib.import_module("xarray").broadcast(*labelled.values())
+            values = {**values, **dict(zip(labelled, arrays, strict=True))}
+        plain = {name: np.asarray(x) if np.ndim(x) else x for name, x in values.items()}
+        return self._surrogate.evaluate(plain).plot(ax)
 
     @property
     def regime_certain(self) -> Any:
@@ -114,7 +127,7 @@ def evaluate_labelled(
         surrogate, values, include, strict, library
     )
     answer._library, answer._surrogate = library, surrogate
-    answer._kinds = {name: values[name] for name in KIND if name in values}
+    answer._kinds, answer._values = {name: values[name] for name in KIND if name in values}, values
     if of_cases not in ("pandas", "xarray"):
         return answer
     columns = {path: answer[path] for path in answer.paths}

@@ -1,24 +1,28 @@
 """Pictures by matplotlib, which is loaded at the first of them.  They draw what they are given:
 arrays, names and marks.
 
-The methods ``plot`` of :class:`mumacro.Surrogate`, :class:`mumacro.Answer`, of a law and of
-:class:`mumacro.Fit` fill in the numbers.  Each draws on ``axes`` of matplotlib, or new ones, and
-returns them; MumacroError where it is not installed.  The colours, contours and ranges of the map
-are those of the page, too.
+The methods ``plot`` of :class:`mumacro.Surrogate`, :class:`mumacro.Answer`, of a law, of solutions,
+motions and :class:`mumacro.Fit` fill in the numbers.  Each draws on ``ax``, the axes of matplotlib
+that are given, or new ones, and returns them; MumacroError where it is not installed.  Sizes,
+lines, grids and the colours of curves are those of the user's style; the map has its own colours,
+which are those of the page, too, and each regime has one colour everywhere.
 """
 
 import importlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mumacro.errors import InputError, MumacroError, missing
-from mumacro.inputs.fields import unit_of
+from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE
-from mumacro.kernel.arrays import Array, Bools
+from mumacro.inputs.units import suited
+from mumacro.kernel.arrays import Array
 
 ENDINGS = (".png", ".svg", ".pdf")
 #: the map: v~ from deep in creep to fast sliding [-], and y~ [-]; that of a normal force is below
@@ -30,6 +34,8 @@ LABELLED = (0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99)
 #: of every map, evenly from mu~ = 0 to 1; darker is slipperier, also without colour
 COLOURS = ("#3f87b5", "#7fb9d3", "#c4e0e6", "#f2f2e2", "#fdf3d4")
 INK, BLUE, RED, GREY = "#16202c", "#0b5cad", "#a3242b", "#6b7683"
+#: of all borders, readable on light and on dark paper
+BORDER = "#c8323c"
 _SYMBOLS = {
     "mu0": r"$\mu_0$",
     "Fz": "$F_z$",
@@ -40,23 +46,54 @@ _SYMBOLS = {
     "v0": "$v_0$",
     AMPLITUDE: r"$\hat F_z$",
 }
-# unit and its size [SI] in which a title shows an input, the largest first
-_SHOWN = {
-    "Fz": {"kN": 1e3, "N": 1.0, "mN": 1e-3},
-    "k": {"N/µm": 1e6, "kN/m": 1e3, "N/m": 1.0},
-    "y0": {"mm": 1e-3, "µm": 1e-6, "nm": 1e-9},
-    "omega": {"kHz": 2e3 * math.pi, "Hz": 2.0 * math.pi},
-    "v0": {"m/s": 1.0, "mm/s": 1e-3, "µm/s": 1e-6},
-}
-_SHOWN[AMPLITUDE] = _SHOWN["Fz"]
 _LINES = {"border of reverse slip": "-.", "border of continuous sliding": "--"}
-_REGIMES = {"continuous": "continuous sliding", "stick_slip": "stick and slip"}
-_MARKS = "osD^vPX"  # of groups of cases: they differ without colour, too
+
+
+class Look(NamedTuple):
+    """How every picture shows a regime."""
+
+    words: str
+    colour: str
+    mark: str  #: regimes differ without colour, too
+
+
+#: regime -> its look in all pictures
+REGIMES = {
+    "continuous": Look("continuous sliding", "#c2410c", "o"),
+    "stick_slip": Look("stick and slip", "#1d63c4", "s"),
+    "partial_slip": Look("partial slip", "#00805a", "D"),
+    "reverse_slip": Look("reverse slip", "#a33a8f", "^"),
+    "static": Look("at rest", "#6b7683", "v"),
+}
+_MARKS = "osD^vPX"  # of sets of measured points
 _MOST_LABELS = 8  # of curves in a legend
+_MOST_RANGES = 20  # of intervals of k on a map
+_MANY = 1000  # cases on a map, drawn as small dots
 _TO_BORDER = 0.4  # weight of a label's distance to the border beside that to another line
 _SIDE = 0.05  # of the map, where no label stands
+_ARROWS = 16  # of the force along a path
 #: places where the map names the regime, in shares of its width and height
 AREAS = ((0.14, 0.735), (0.8, 0.12))
+
+
+class Panels(NamedTuple):
+    """How many axes a picture has, and its size [inches]; that of the user's style if left out."""
+
+    rows: int = 1
+    columns: int = 1
+    size: tuple[float, float] | None = None
+    heights: tuple[float, ...] | None = None  #: of the rows, which share their x
+
+    def on(self, figure: Any) -> Any:
+        """The axes of a figure, an array of them where there are several."""
+        return figure.subplots(
+            self.rows, self.columns, sharex=self.heights is not None, height_ratios=self.heights
+        )
+
+
+#: forces and path; curves and residuals
+OF_CYCLE = Panels(columns=2, size=(10.0, 5.0))
+OF_FIT = Panels(rows=2, size=(6.4, 5.6), heights=(3.0, 1.0))
 
 
 class Curve(NamedTuple):
@@ -66,35 +103,76 @@ class Curve(NamedTuple):
     x: Array  #: of the points (n,)
     mu: Array  #: measured mu_macro [-], (n,)
     bars: Array | None  #: standard deviations of ``mu`` [-], (n,), where known
+    residuals: Array  #: ``mu`` minus the fit [-], (n,)
     fine: Array  #: places of the curve (m,)
     model: Array  #: mu_macro of the fit there [-], (m,)
     off: Array  #: half the width of its band [-], (m,)
 
 
+class Marks(NamedTuple):
+    """Cases on a map."""
+
+    v: Array  #: v~ (n,); infinite where the contact is rigid
+    y: Array  #: y~ (n,), likewise
+    ray: Array  #: y0 omega / v0 (n,): y~/v~, also where both are infinite
+    regimes: NDArray[Any]  #: names (n,); empty for an illegal case
+    words: NDArray[Any]  #: (n,); why a case is at an edge, empty for one that is on the map
+    #: of intervals of k: the shares of the softest and the stiffest of the k that is marked, (n,)
+    ends: tuple[Array, Array] | None = None
+
+
 def _loaded(name: str) -> Any:
     try:
-        return importlib.import_module(f"matplotlib.{name}")
+        return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
     except ModuleNotFoundError as error:
         raise MumacroError(missing("plot", error)) from None
 
 
-def own(axes: Any) -> Any:
+def axes_for(ax: Any, panels: Panels = Panels()) -> Any:  # noqa: B008 - it cannot change
     """The axes of matplotlib that were given, or new ones."""
-    return _loaded("pyplot").subplots(layout="constrained")[1] if axes is None else axes
+    if ax is not None:
+        return ax
+    pyplot = _loaded("pyplot")
+    return panels.on(pyplot.figure(figsize=panels.size, layout="constrained"))
 
 
-def save(path: str | Path, draw: Callable[[Any], Any], panels: int = 1) -> None:
-    """Write a picture; ``draw`` gets its axes, of several panels an array of them.  InputError
-    where the name does not end in one of ``ENDINGS``."""
+def style() -> AbstractContextManager[None]:
+    """The style of this project's own pictures: those of the command and of the documents."""
+    matplotlib = _loaded("")
+    looks = {
+        "axes.prop_cycle": matplotlib.cycler(color=[BLUE, RED, "#00805a", "#a33a8f", GREY, INK]),
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "grid.color": "0.92",
+        "lines.linewidth": 2.0,
+    }
+    context: AbstractContextManager[None] = matplotlib.rc_context(looks)
+    return context
+
+
+def save(
+    path: str | Path,
+    draw: Callable[[Any], Any],
+    panels: Panels = Panels(),  # noqa: B008 - it cannot change
+    dpi: int = 150,
+) -> None:
+    """Write a picture in the style of this project; ``draw`` gets its axes, of several panels an
+    array of them.  InputError where the name does not end in one of ``ENDINGS``."""
     path = Path(path)
     if path.suffix not in ENDINGS:
         endings = f"one that ends in {', '.join(ENDINGS)}, or for the command in .csv"
         raise InputError("file name", str(path), endings)
-    figure = _loaded("figure").Figure(
-        figsize=(7.0 if panels == 1 else 5.0 * panels, 4.8), layout="constrained"
-    )
-    draw(figure.subplots(1, panels))
-    figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+    # the same picture is the same bytes
+    metadata = {".svg": {"Date": None}, ".png": {"Software": None}}.get(path.suffix)
+    with style():
+        figure = _loaded("figure").Figure(figsize=panels.size or (7.0, 4.8), layout="constrained")
+        draw(panels.on(figure))
+        figure.savefig(path, dpi=dpi, metadata=metadata)
+
+
+# --- words ----------------------------------------------------------------------------------------
 
 
 def in_words(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> str:
@@ -103,26 +181,108 @@ def in_words(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> 
     >>> in_words({"mu0": 0.3, "Fz": 10.0, "k": 1e6}, {"contact": "ball", "direction": "along"})
     '$\\\\mu_0$ = 0.3, $F_z$ = 10 N, $k$ = 1 N/µm; ball, along'
     """
-    inputs = ", ".join(_quantity(name, value) for name, value in case.items())
+    inputs = ", ".join(quantity_words(name, value) for name, value in case.items())
     return "; ".join(part for part in (inputs, ", ".join((kind or {}).values())) if part)
 
 
-def _quantity(name: str, value: Any) -> str:
+def quantity_words(name: str, value: Any) -> str:
+    """An input [SI], a number or (low, high), with its symbol and the unit that suits it."""
     ends = [value] if np.ndim(value) == 0 else [*value]
     if isinstance(value, str) or math.isinf(ends[-1]):
         return f"{_SYMBOLS[name]} rigid"
-    sizes = _SHOWN.get(name, {"": 1.0})
-    unit, size = next(
-        (one for one in sizes.items() if ends[-1] >= 0.1 * one[1]), [*sizes.items()][-1]
-    )
-    symbol = "$f$" if name == "omega" else _SYMBOLS[name]
-    numbers = " to ".join(f"{end / size:.4g}" for end in ends)
-    return f"{symbol} = {numbers} {unit}".rstrip()
+    if name == "omega":
+        name, ends = "f", [end / RAD_PER_CYCLE for end in ends]
+    return f"{_SYMBOLS[name]} = {_with_unit(QUANTITY_OF[name], *ends)}"
+
+
+def _with_unit(quantity: str, *values: float) -> str:
+    """Numbers [SI] in the unit that suits the last of them."""
+    unit, scale = suited(quantity, values[-1])
+    numbers = " to ".join(f"{scale.of_si(value):.4g}" for value in values)
+    shown = unit.replace("um", "µm").replace("uN", "µN").removeprefix("-")
+    return f"{numbers} {shown}".rstrip()
+
+
+def oscillation_words(symbol: str, quantity: str, terms: Iterable[tuple[int, float, float]]) -> str:
+    """An oscillation from harmonics, amplitudes [SI] and phases in degrees; empty without any.
+
+    >>> oscillation_words("$x$", "length", [(1, 2e-6, 90.0), (3, 4e-7, 0.0)])
+    '$x$: 2 µm at 90°, 3rd harmonic 0.4 µm'
+    """
+    parts = []
+    for harmonic, amplitude, degrees in terms:
+        ending = {1: "st", 2: "nd", 3: "rd"}.get(harmonic % 10 * (harmonic // 10 % 10 != 1), "th")
+        order = "" if harmonic == 1 else f"{harmonic}{ending} harmonic "
+        # whole turns say nothing
+        phase = math.remainder(degrees, 360.0)
+        at = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
+        parts.append(f"{order}{_with_unit(quantity, amplitude)}{at}")
+    return f"{symbol}: {', '.join(parts)}" if parts else ""
 
 
 def regime_words(name: str) -> str:
     """A regime as a picture names it."""
-    return _REGIMES.get(name, name.replace("_", " "))
+    return REGIMES[name].words
+
+
+def _axis(name: str) -> str:
+    return f"{_SYMBOLS[name]} [{unit_of(name)}]"
+
+
+def _points(text: str, size: Any) -> float:
+    """The width of a text in points."""
+    properties = _loaded("font_manager").FontProperties(size=size)
+    measure = _loaded("textpath").text_to_path.get_text_width_height_descent
+    return float(measure(text, properties, ismath="$" in text)[0])
+
+
+def _room(ax: Any, last: Any = None) -> float:
+    """How wide a text above the axes may be, up to the right of the ``last`` ones [points]."""
+    boxes = []
+    for one in (ax, last or ax):
+        spec = one.get_subplotspec()  # with the room of a colour bar
+        boxes.append(one.get_position() if spec is None else spec.get_position(one.figure))
+    return float(72.0 * ax.figure.get_figwidth() * (boxes[1].x1 - boxes[0].x0))
+
+
+def _wrapped(text: str, width: float, size: Any) -> str:
+    """A text in lines of at most ``width`` points, broken behind commas and semicolons."""
+    lines: list[str] = []
+    for line in text.split("\n"):
+        now = ""
+        for part in line.replace("; ", ";\0").replace(", ", ",\0").split("\0"):
+            longer = f"{now} {part}".lstrip()
+            if now and _points(longer, size) > width:
+                lines.append(now)
+                longer = part
+            now = longer
+        lines.append(now)
+    return "\n".join(lines)
+
+
+def head(ax: Any, title: str, legend: bool = True, last: Any = None) -> None:
+    """The title of axes in as many lines as it needs, and below it their legend, which so covers no
+    curve; up to the right of the ``last`` axes."""
+    size = "medium"
+    pad = 6.0
+    handles, labels = ax.get_legend_handles_labels()
+    if legend and labels:
+        em = _loaded("font_manager").FontProperties(size="small").get_size_in_points()
+        widest = max(_points(label, "small") for label in labels) + 5.0 * em
+        columns = min(3, len(labels), max(1, int(_room(ax) // widest)))
+        pad += 1.7 * em * -(-len(labels) // columns)
+        ax.legend(
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(-0.01, 1.0),
+            ncols=columns,
+            frameon=False,
+            fontsize="small",
+            borderpad=0.2,
+        )
+    if title:
+        ax.set_title(_wrapped(title, _room(ax, last), size), loc="left", fontsize=size, pad=pad)
 
 
 # --- curves of mu_macro ---------------------------------------------------------------------------
@@ -133,7 +293,7 @@ def plot_law(
     x: Array,
     mu_macro: Array,
     mu_static: Array,
-    axes: Any = None,
+    ax: Any = None,
     *,
     band: tuple[Array, Array] | None = None,
     borders: Iterable[tuple[float, str]] = (),
@@ -147,27 +307,27 @@ def plot_law(
     places on ``x`` with their names, such as "border of continuous sliding"; ``roots`` values of
     the input to mark, and ``target`` the mu_macro [-] that they give; ``title`` the other inputs.
     """
-    axes = own(axes)
-    axes.plot(x, mu_macro, color=BLUE, lw=2.0, label=r"$\mu_\mathrm{macro}$")
+    ax, ink = axes_for(ax), _ink()
+    ax.plot(x, mu_macro, color="C0", label=r"$\mu_\mathrm{macro}$")
     if band:
-        axes.fill_between(
-            x, *band, color=BLUE, alpha=0.2, lw=0.0, label="for every $k$ of the interval"
+        ax.fill_between(
+            x, *band, color="C0", alpha=0.2, lw=0.0, label="for every $k$ of the interval"
         )
-    axes.plot(x, mu_static, ":", color=GREY, label=r"static limit, $v_0 \to 0$")
+    ax.plot(x, mu_static, ":", color=ink, alpha=0.7, label=r"static limit, $v_0 \to 0$")
     labelled = set[str]()
     for value, name in borders:
         label = None if name in labelled else name
-        axes.axvline(value, ls=_LINES[name], lw=1.2, color=RED, label=label)
+        ax.axvline(value, ls=_LINES[name], lw=1.2, color=BORDER, label=label)
         labelled.add(name)
     if target is not None:
-        axes.axhline(target, lw=0.8, color=INK, label=f"target {target:.6g}")
-        axes.plot([*roots], [target] * len([*roots]), "o", color=INK, mec="white")
+        ax.axhline(target, lw=0.8, color=ink, label=f"target {target:.6g}")
+        ax.plot([*roots], [target] * len([*roots]), "o", color=ink, mec="white")
     if x[0] > 0.0 and x[-1] > 20.0 * x[0]:
-        axes.set_xscale("log")
-    axes.set(xlabel=_axis(along), ylabel=r"$\mu_\mathrm{macro}$ [-]", xlim=(x[0], x[-1]))
-    axes.set_ylim(bottom=0.0)
-    finish(axes, title)
-    return axes
+        ax.set_xscale("log")
+    ax.set(xlabel=_axis(along), ylabel=r"$\mu_\mathrm{macro}$ [-]", xlim=(x[0], x[-1]))
+    ax.set_ylim(bottom=0.0)
+    head(ax, title)
+    return ax
 
 
 def plot_roots(
@@ -178,75 +338,69 @@ def plot_roots(
     targets: Sequence[float],
     roots: Sequence[float],
     log: bool,
-    axes: Any = None,
+    ax: Any = None,
+    title: str = "",
 ) -> Any:
     """A mean force ``of`` a motion (n,) over values ``x`` (n,) of an input, whose axis is ``name``,
     with targets and roots."""
-    axes = own(axes)
+    ax, ink = axes_for(ax), _ink()
     symbol = {"mu_macro": r"\mathrm{macro}", "mu_lateral": r"\mathrm{lateral}"}[of]
-    axes.plot(x, mean, color=BLUE, lw=2.0, label=rf"$\mu_{symbol}$")
-    for target in targets:
-        axes.axhline(target, lw=0.8, color=GREY)
+    ax.plot(x, mean, color="C0", label=rf"$\mu_{symbol}$")
+    for i, target in enumerate(targets):
+        ax.axhline(target, lw=0.8, color=ink, alpha=0.7, label=None if i else "target")
     for i, root in enumerate(roots):
-        label = "target" if not i else None
-        axes.plot(root, np.interp(root, x, mean), "o", color=RED, mec="white", label=label)
+        label = None if i else "root"
+        ax.plot(root, np.interp(root, x, mean), "o", color=ink, mec="white", label=label)
     if log:
-        axes.set_xscale("log")
-    axes.set(xlabel=name, ylabel=rf"$\mu_{symbol}$ [-]", xlim=(x[0], x[-1]))
-    finish(axes, "")
-    return axes
+        ax.set_xscale("log")
+    ax.set(xlabel=name, ylabel=rf"$\mu_{symbol}$ [-]", xlim=(x[0], x[-1]))
+    head(ax, title)
+    return ax
 
 
-def plot_fit(along: str, curves: Sequence[Curve], title: str, axes: Any = None) -> Any:
-    """Measured points, the fit and its band over the input ``along``; more than 8 curves have no
-    legend."""
-    axes = own(axes)
-    colours = [BLUE] if len(curves) == 1 else [f"C{i}" for i in range(len(curves))]
-    for i, (one, mark, color) in enumerate(
-        zip(curves, _MARKS * len(curves), colours, strict=False)
-    ):
+def plot_fit(along: str, curves: Sequence[Curve], title: str, ax: Any = None) -> Any:
+    """Measured points, the fit and its band over the input ``along``, and below them the residuals;
+    more than 8 curves have no legend.
+
+    ``ax`` are two axes, or new ones, and an array of both is returned; on one alone there are no
+    residuals, and it is returned.
+    """
+    pair = axes_for(ax, OF_FIT)
+    upper, lower = pair if np.ndim(pair) else (pair, None)
+    paper = _loaded("").rcParams["axes.facecolor"]
+    for i, (one, mark) in enumerate(zip(curves, _MARKS * len(curves), strict=False)):
         points, band = (None, None) if i else ("measured", "95 % band of the fit")
-        looks = {"fmt": mark, "color": color, "mec": "white", "ms": 7.0}
-        axes.errorbar(one.x, one.mu, one.bars, label=points, **looks)
-        axes.plot(one.fine, one.model, color=color, label=one.label)
+        looks = {"fmt": mark, "color": f"C{i}", "mec": paper, "ms": 7.0}
+        upper.errorbar(one.x, one.mu, one.bars, label=points, **looks)
+        upper.plot(one.fine, one.model, color=f"C{i}", label=one.label)
         ends = one.model - one.off, one.model + one.off
-        axes.fill_between(one.fine, *ends, color=color, alpha=0.2, lw=0, label=band)
+        upper.fill_between(one.fine, *ends, color=f"C{i}", alpha=0.2, lw=0, label=band)
+        if lower is not None:
+            lower.errorbar(one.x, one.residuals, one.bars, **looks)
     x = np.concatenate([one.x for one in curves])
     low = x[x > 0.0].min(initial=math.inf)
     if low < x.max() / 10.0:
         if (x == 0.0).any():
-            axes.set_xscale("symlog", linthresh=low)
+            upper.set_xscale("symlog", linthresh=low)
         else:
-            axes.set_xscale("log")
-    axes.set(xlabel=_axis(along), ylabel=r"$\mu_\mathrm{macro}$ [-]")
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    finish(axes, title, legend=len(curves) <= _MOST_LABELS)
-    return axes
+            upper.set_xscale("log")
+        if lower is not None:
+            lower.set_xscale(upper.get_xscale(), **({"linthresh": low} if 0.0 in x else {}))
+    upper.set(ylabel=r"$\mu_\mathrm{macro}$ [-]")
+    upper.set_ylim(bottom=min(0.0, upper.get_ylim()[0]))
+    (upper if lower is None else lower).set_xlabel(_axis(along))
+    if lower is not None:
+        lower.axhline(0.0, lw=0.8, color=_ink())
+        lower.set_ylabel("residual [-]")
+        reach = 1.15 * max(map(abs, lower.get_ylim()))
+        lower.set_ylim(-reach, reach)
+    head(upper, title, legend=len(curves) <= _MOST_LABELS)
+    return pair if lower is None else np.array([upper, lower], object)
 
 
-def _axis(name: str) -> str:
-    return f"{_SYMBOLS[name]} [{unit_of(name)}]"
-
-
-def finish(axes: Any, title: str, legend: bool = True) -> None:
-    """What all curves share.  The legend stands above the axes: it covers no curve."""
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(visible=True, color="0.92")
-    axes.set_axisbelow(True)
-    heading = axes.set_title(title, loc="left", fontsize="medium")
-    if legend:
-        count = len(axes.get_legend_handles_labels()[0])
-        rows = -(-count // 3)
-        heading.set_position((0.0, 1.0))
-        axes.set_title(title, loc="left", fontsize="medium", pad=10.0 + 17.0 * rows)
-        axes.legend(
-            loc="lower left",
-            bbox_to_anchor=(-0.01, 1.0),
-            ncols=3,
-            frameon=False,
-            fontsize="small",
-            borderpad=0.2,
-        )
+def _ink() -> str:
+    """The colour of text in the user's style."""
+    return str(_loaded("").rcParams["text.color"])
 
 
 # --- the map of mu~ -------------------------------------------------------------------------------
@@ -320,50 +474,82 @@ def _distances(x: Array, y: Array, across: Array, line: Array) -> Array:
     return np.asarray(np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1))
 
 
+def bands(ax: Any, x: Array, y: Array, ratio: Array) -> tuple[Any, Any]:
+    """mu~ (m, n) over ``x`` (n,) and ``y`` (m,) in the colours of the map, with its contours:
+    areas and lines of matplotlib."""
+    levels = [0.0, *LEVELS, 1.0]
+    areas = ax.contourf(x, y, np.clip(ratio, 0.0, 1.0 - 1e-12), levels, colors=band_colours())
+    return areas, ax.contour(x, y, ratio, LEVELS, colors=INK, linewidths=0.6, alpha=0.75)
+
+
 def plot_map(
     ratio: Array,
     v_crit: Array,
-    axes: Any = None,
+    ax: Any = None,
     *,
     point: tuple[float, float] | None = None,
-    normal: bool = False,
+    marks: Marks | None = None,
+    direction: str = "across",
     areas: Sequence[str] = (),
     title: str = "",
 ) -> Any:
     """mu~ (m, n) over :func:`speeds` and :func:`amplitudes`, with the border of continuous sliding
-    ``v_crit`` (m,) and a ``point`` (v~, y~); ``normal``: y~ is that of the normal force; ``areas``
-    are the regimes at :data:`AREAS`."""
-    axes = own(axes)
+    ``v_crit`` (m,), and cases: a ``point`` (v~, y~), or ``marks``.
+
+    ``direction`` is that of the oscillation; ``areas`` are the regimes at :data:`AREAS`.
+    """
+    ax, normal = axes_for(ax), direction == "normal"
     v, y = speeds(ratio.shape[1]), amplitudes(len(ratio), normal)
-    levels = [0.0, *LEVELS, 1.0]
-    axes.contourf(v, y, np.clip(ratio, 0.0, 1.0 - 1e-12), levels, colors=band_colours())
-    lines = axes.contour(v, y, ratio, LEVELS, colors=INK, linewidths=0.6, alpha=0.75)
-    _plane(axes, v_crit, y, normal)
-    axes.set(xlim=V_RANGE, ylim=(y[0], y[-1]))
-    axes.figure.draw_without_rendering()  # labels are turned along the lines as they are then
+    coloured, lines = bands(ax, v, y, ratio)
+    halo = [_loaded("patheffects").withStroke(linewidth=2.5, foreground="white")]
+    ax.plot(
+        v_crit,
+        y,
+        "--",
+        color=BORDER,
+        lw=2.0,
+        label="border of continuous sliding",
+        path_effects=[_loaded("patheffects").withStroke(linewidth=3.5, foreground="white")],
+    )
+    ax.grid(visible=False)
+    ax.set(xscale="log", yscale="linear" if normal else "log", xlim=V_RANGE, ylim=(y[0], y[-1]))
+    speed = r"$\tilde v = v_0 k / (\mu_0 F_z \omega)$"
+    ax.set_xlabel(f"dimensionless speed {speed}\nfaster sliding $\\longrightarrow$")
+    ax.set_ylabel(f"{_AMPLITUDES[direction]}\nlarger amplitude $\\longrightarrow$")
+    bar = ax.figure.colorbar(coloured, ax=ax, ticks=[0.0, *LEVELS, 1.0], format="%g", pad=0.02)
+    bar.set_label(r"$\mu_\mathrm{macro} / \mu_0$ [-]")
+    bar.ax.tick_params(labelsize="small")
+    if marks is not None:
+        _mark(ax, marks, normal, halo)
+    elif point is not None and all(math.isfinite(x) and x > 0.0 for x in point):
+        ax.plot(*point, "o", color=INK, ms=10.0, mec="white", mew=2.0, zorder=5)
+    head(ax, title)
+    ax.figure.draw_without_rendering()  # labels are turned along the lines as they are then
     shown = np.interp(np.log(v), np.log(np.maximum(v_crit, 1e-300)), np.linspace(0.0, 1.0, len(y)))
     places = label_places(ratio, shown)
-    halo = [_loaded("patheffects").withStroke(linewidth=2.5, foreground="white")]
     manual = [place(u, w, normal) for _, u, w in places]
-    for text in axes.clabel(
+    for text in ax.clabel(
         lines, levels=LABELLED, manual=manual, fmt="%g", fontsize=9.0, inline_spacing=3, colors=INK
     ):
         text.set_path_effects(halo)
     for (u, w), name in zip(AREAS, areas, strict=False):
-        axes.annotate(
+        ax.annotate(
             regime_words(name),
             (u, w),
             xycoords="axes fraction",
             ha="center",
-            color=RED,
+            color=REGIMES[name].colour,
             fontsize=11.0,
             path_effects=halo,
         )
-    if point is not None and all(math.isfinite(x) and x > 0.0 for x in point):
-        axes.plot(*point, "o", color=INK, ms=10.0, mec="white", mew=2.0, zorder=5)
-    axes.set_title(title or r"$\mu_\mathrm{macro} / \mu_0$", loc="left", fontsize="medium")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize="small")
-    return axes
+    return ax
+
+
+_AMPLITUDES = {
+    "across": r"amplitude across $\tilde y = y_0 k / (\mu_0 F_z)$",
+    "along": r"amplitude along $\tilde y = y_0 k / (\mu_0 F_z)$",
+    "normal": r"amplitude of the load $\tilde y = \hat F_z / F_z$",
+}
 
 
 def place(u: float, w: float, normal: bool = False) -> tuple[float, float]:
@@ -372,35 +558,76 @@ def place(u: float, w: float, normal: bool = False) -> tuple[float, float]:
     return v, NORMAL_RANGE[1] * w if normal else Y_RANGE[0] * (Y_RANGE[1] / Y_RANGE[0]) ** w
 
 
-def plot_cases(
-    v: Array,
-    y: Array,
-    groups: Mapping[str, Bools],
-    border: Callable[[Array], Array] | None = None,
-    axes: Any = None,
-) -> Any:
-    """Cases (n,) over (v~, y~), one mark for each name of ``groups``, which says whether a case
-    belongs to it (n,); ``border`` gives v~crit(y~), NaN where the contact lifts off."""
-    axes = own(axes)
-    for (name, belongs), mark in zip(groups.items(), _MARKS, strict=False):
-        shown = belongs & (v > 0.0) & (y > 0.0) & np.isfinite(v) & np.isfinite(y)
-        if shown.any():
-            axes.plot(v[shown], y[shown], mark, ms=5.0, label=regime_words(name))
-    inside = y[(y > 0.0) & np.isfinite(y)]
-    ends = (0.5 * float(inside.min()), 2.0 * float(inside.max())) if inside.size else Y_RANGE
-    places = np.geomspace(*ends, 201)
-    _plane(axes, np.full(201, np.nan) if border is None else border(places), places)
-    finish(axes, "")
-    return axes
+def on_map(v: Array, y: Array, ray: Array, normal: bool = False) -> tuple[Array, Array]:
+    """Where cases are drawn: (v~, y~) on the map, or at its edge.
+
+    Far out mu~ depends on y~/v~ alone, so that what is beyond the map is where its ray, on which
+    this ratio is constant, leaves it; that is right for rigid contacts, too.
+
+    >>> on_map(*np.array([[0.1, np.inf], [0.5, np.inf], [5.0, 10.0]]))
+    (array([  0.1, 100. ]), array([5.e-01, 1.e+03]))
+    """
+    v, y = np.asarray(v, np.float64), np.asarray(y, np.float64)
+    if normal:
+        return np.clip(v, *V_RANGE), np.clip(y, *NORMAL_RANGE)
+    with np.errstate(all="ignore"):
+        rigid = np.isinf(v) & np.isinf(y)
+        ray = np.where(rigid, ray, y / v)
+        # the corner where the ray leaves the map
+        leaves = np.minimum(V_RANGE[1], Y_RANGE[1] / ray), np.minimum(Y_RANGE[1], ray * V_RANGE[1])
+        out = rigid | ((y > Y_RANGE[1]) & (v > 1.0)) | ((v > V_RANGE[1]) & (y > 1.0))
+        out &= np.isfinite(leaves[0]) & np.isfinite(leaves[1])
+        v, y = np.where(out, leaves[0], v), np.where(out, leaves[1], y)
+    return np.clip(v, *V_RANGE), np.clip(y, *Y_RANGE)
 
 
-def _plane(axes: Any, v_crit: Any, y: Any, normal: bool = False) -> None:
-    axes.plot(v_crit, y, "--", color=RED, lw=2.0, label="border of continuous sliding")
-    axes.set(xscale="log", yscale="linear" if normal else "log")
-    speed = r"$\tilde v = v_0 k / (\mu_0 F_z \omega)$"
-    size = r"$\tilde y = \hat F_z / F_z$" if normal else r"$\tilde y = y_0 k / (\mu_0 F_z)$"
-    axes.set_xlabel(f"dimensionless speed {speed}\nfaster sliding $\\longrightarrow$")
-    axes.set_ylabel(f"dimensionless amplitude {size}\nlarger amplitude $\\longrightarrow$")
+def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
+    """Cases by regime; those beyond the map at its edge, one of them with the word that says
+    why."""
+    v, y = on_map(marks.v, marks.y, marks.ray, normal)
+    regimes = np.asarray(marks.regimes, object)
+    count = v.size
+    looks: dict[str, Any] = {"ms": 10.0 if count == 1 else 7.0, "mec": "white", "mew": 1.5}
+    if count > _MANY:
+        looks = {"ms": 2.0, "mew": 0.0, "rasterized": True}
+    if marks.ends is not None and count <= _MOST_RANGES:
+        for i in range(count):
+            at = np.geomspace(marks.ends[0][i], marks.ends[1][i], 50)
+            path = on_map(at * marks.v[i], at * marks.y[i], np.full(50, marks.ray[i]), normal)
+            label = None if i else "the interval of $k$"
+            ax.plot(*path, color=INK, lw=4.0, alpha=0.45, solid_capstyle="round", label=label)
+    for name, look in REGIMES.items():
+        here = regimes == name
+        if here.any():
+            ax.plot(
+                v[here],
+                y[here],
+                look.mark,
+                color=look.colour,
+                label=look.words,
+                zorder=5,
+                clip_on=False,
+                **looks,
+            )
+    words = np.asarray(marks.words, object)
+    for word in dict.fromkeys(words[words != ""].tolist()):
+        at = np.flatnonzero(words == word)
+        number = f" ({at.size} cases)" if at.size > 1 else ""
+        across = np.log(v[at[0]] / V_RANGE[0]) / np.log(V_RANGE[1] / V_RANGE[0])
+        right = bool(across > 0.5)
+        _, middle = place(0.5, 0.5, normal)
+        above = bool(y[at[0]] > middle)
+        ax.annotate(
+            word + number,
+            (v[at[0]], y[at[0]]),
+            (-10.0 if right else 10.0, -12.0 if above else 12.0),
+            textcoords="offset points",
+            ha="right" if right else "left",
+            va="top" if above else "bottom",
+            color=INK,
+            path_effects=halo,
+            zorder=6,
+        )
 
 
 # --- a steady cycle -------------------------------------------------------------------------------
@@ -415,37 +642,48 @@ def plot_cycle(
     Fz: Array,
     mu0: float,
     title: str,
-    axes: Any = None,
+    ax: Any = None,
 ) -> Any:
     """Forces of one period over time, with the limit mu0 Fz, and the path of the upper point with
-    the force's direction at 16 moments; all (n,), in SI.  ``axes`` are two, or new ones."""
-    if axes is None:
-        _, axes = _loaded("pyplot").subplots(1, 2, figsize=(10.0, 4.5), layout="constrained")
-    forces, path = axes
+    the force at 16 moments; all (n,), in SI.  ``ax`` are two axes, or new ones; an array of both is
+    returned."""
+    forces, path = axes_for(ax, OF_CYCLE)
+    ink = _ink()
     share = (t - t[0]) / (t[-1] - t[0])
-    forces.plot(share, Fx, color=BLUE, label="$F_x$, along the drag")
-    forces.plot(share, Fy, color=RED, label="$F_y$, across")
-    forces.plot(share, mu0 * Fz, ":", color=GREY, label=r"$\pm\mu_0 F_z$")
-    forces.plot(share, -mu0 * Fz, ":", color=GREY)
+    forces.plot(share, Fx, color="C0", label="$F_x$, along the drag")
+    forces.plot(share, Fy, color="C1", label="$F_y$, across")
+    forces.plot(share, mu0 * Fz, ":", color=ink, alpha=0.7, label=r"$\pm\mu_0 F_z$")
+    forces.plot(share, -mu0 * Fz, ":", color=ink, alpha=0.7)
     mean = float(np.sum((Fx[1:] + Fx[:-1]) * np.diff(share)) / 2.0)
-    forces.axhline(mean, lw=0.8, color=BLUE, ls="--", label="mean of $F_x$")
-    forces.set(xlabel="share of the period [-]", ylabel="force [N]")
-    finish(forces, title)
-    micro = 1e6
-    path.plot(micro * x, micro * y, color=INK, label="upper point")
-    path.plot(micro * x[0], micro * y[0], "o", color=BLUE, label="start of the period")
-    places = np.linspace(0, t.size - 1, 17).astype(int)[:-1]
+    forces.axhline(mean, lw=0.8, color="C0", ls="--", label="mean of $F_x$")
+    forces.set(xlabel="share of the period [-]", ylabel="force [N]", xlim=(0.0, 1.0))
+    head(forces, title, last=path)
+    extent = max(np.ptp(x), np.ptp(y))
+    unit, scale = suited("length", float(extent))
+    x, y = x * scale.over / scale.times, y * scale.over / scale.times
+    path.plot(x, y, color=ink, label="upper point")
+    path.plot(x[0], y[0], "o", color="C0", label="start of the period")
+    at = np.linspace(0, t.size - 1, _ARROWS + 1).astype(int)[:-1]
+    # the longest arrow is a fifth of the path's extent
+    length = 0.2 * max(np.ptp(x), np.ptp(y)) / max(float(np.hypot(Fx, Fy).max()), 1e-300)
+    tips = np.stack([x[at] + length * Fx[at], y[at] + length * Fy[at]], axis=1)
     path.quiver(
-        micro * x[places],
-        micro * y[places],
-        Fx[places],
-        Fy[places],
+        x[at],
+        y[at],
+        length * Fx[at],
+        length * Fy[at],
         angles="xy",
+        scale_units="xy",
+        scale=1.0,
         width=0.004,
-        color=RED,
+        color="C1",
         label="force",
+        zorder=3,
     )
-    path.margins(0.15)
-    path.set(xlabel=r"$x$ [µm]", ylabel=r"$y$ [µm]", aspect="equal", adjustable="datalim")
-    finish(path, "")
-    return axes
+    path.update_datalim(tips)
+    path.margins(0.08)
+    shown = unit.replace("um", "µm")
+    path.set(xlabel=f"$x$ [{shown}]", ylabel=f"$y$ [{shown}]", aspect="equal", adjustable="datalim")
+    path.autoscale_view()
+    head(path, "")
+    return np.array([forces, path], object)

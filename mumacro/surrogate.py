@@ -134,25 +134,28 @@ class Surrogate:
 
     def plot(
         self,
-        axes: Any = None,
+        ax: Any = None,
         *,
         point: tuple[float, float] | None = None,
         contact: str = "spring",
         direction: str = "across",
     ) -> Any:
-        """The map of mu~ with a ``point`` (v~, y~), see ``mumacro.plotting.plot_map``; needs
-        matplotlib."""
+        """The map of mu~ with a ``point`` (v~, y~) on axes ``ax`` of matplotlib, or new ones, which
+        are returned; see ``mumacro.plotting.plot_map``."""
         kind = kind_of(contact, direction)
+        return self.draw_map(ax, kind, f"{contact}, {direction}", point=point)
+
+    def draw_map(self, ax: Any, kind: Kind, title: str, **cases: Any) -> Any:
+        """The map of a kind of contact with cases as ``mumacro.plotting.plot_map`` takes them."""
         ratio, border = self.map_of(kind, 281, 201)
-        title = rf"$\mu_\mathrm{{macro}} / \mu_0$: {contact}, {direction}"
         return plotting.plot_map(
             ratio,
             border,
-            axes,
-            point=point,
-            normal=kind.normal,
+            ax,
+            direction=kind.names["direction"],
             areas=self.regimes_on_map(kind),
             title=title,
+            **cases,
         )
 
     def map_of(self, kind: Kind, width: int, height: int) -> tuple[Array, Array]:

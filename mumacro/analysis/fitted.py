@@ -11,8 +11,8 @@ from mumacro import plotting
 from mumacro.analysis.measured_points import STD, UNKNOWNS, Measured
 from mumacro.errors import missing
 from mumacro.inputs.doubts import Remark
-from mumacro.inputs.fields import RIGID, unit_of
-from mumacro.kernel.arrays import Array
+from mumacro.inputs.fields import RIGID
+from mumacro.kernel.arrays import Array, Bools
 
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 _CURVE = 200  # points of the fitted law
@@ -164,47 +164,47 @@ class Fit:
         return quantile(None if has_std else self.residuals.size - len(self.values))
 
     def plot(self, ax: Any = None) -> Any:
-        """Points, fit and its 95 % band over the input that varies most; returns matplotlib's axes.
+        """Points, fit and its 95 % band over the input that varies most, mostly v0, and below them
+        what the points deviate from the fit.
 
         Each set of the other inputs has a curve; more than 8 of them have no legend.  Where each
-        point has a set of its own, such as its mu0, one line joins the fit at the points.
+        point has a set of its own, such as its mu0, one curve goes through all of them, with the
+        other inputs interpolated.  ``ax`` are two axes of matplotlib, or new ones, and an array of
+        both is returned; one alone gets no residuals, and is returned.
         """
         inputs = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(inputs, key=lambda name: (np.unique(inputs[name]).size, name == "v0"))
         x, names = inputs[along], [name for name in self._problem.columns if name != along]
         sets, member = np.unique([self.points[name] for name in names], axis=1, return_inverse=True)
+        fine = _fine(x)
         if sets.shape[1] == x.size > 1:
-            return self._plot_each(along, ax)
-        low = x[x > 0.0].min(initial=math.inf)
-        fine = np.geomspace(low, x.max(), 300) if low < math.inf else x
-        width = self._width()
+            others = {name: _interpolated(x, self.points[name], fine) for name in names}
+            every = np.ones(x.size, np.bool_)
+            curves = [self._curve("fit", along, every, fine, others)]
+            return plotting.plot_fit(along, curves, self._title(), ax)
         curves = []
         for i, row in enumerate(sets.T):
-            in_set = member.ravel() == i
-            set_labels = [
-                f"{name} = {x:.4g} {unit_of(name)}".removesuffix(" -")
+            differing = [
+                plotting.quantity_words(name, x)
                 for name, x, all_ in zip(names, row, sets, strict=True)
-                if np.ptp(all_) > 0.0
+                if all_.min() < all_.max()
             ]
-            x_curve = np.unique(np.concatenate([fine, x[in_set]]))
-            mu, deviation = self.predict(**{along: x_curve}, **dict(zip(names, row, strict=True)))
-            bars = self.points[STD][in_set] if STD in self.points else None
-            label, mu_measured = ", ".join(set_labels) or "fit", self.points["mu_macro"][in_set]
-            curves.append(
-                plotting.Curve(label, x[in_set], mu_measured, bars, x_curve, mu, width * deviation)
-            )
+            here, others = member.ravel() == i, dict(zip(names, row, strict=True))
+            label, places = ", ".join(differing) or "fit", np.union1d(fine, x[here])
+            curves.append(self._curve(label, along, here, places, others))
         return plotting.plot_fit(along, curves, self._title(), ax)
 
-    def _plot_each(self, along: str, ax: Any) -> Any:
-        """The same where each point has its own other inputs, such as mu0: one line."""
-        order = np.argsort(self.points[along])
-        x, mu_measured = self.points[along][order], self.points["mu_macro"][order]
-        mu, deviation = (column[order] for column in self.predict())
-        std = self.points.get(STD)
-        width = self._width()
-        bars, label = None if std is None else std[order], "fit, at the inputs of each point"
-        curve = plotting.Curve(label, x, mu_measured, bars, x, mu, width * deviation)
-        return plotting.plot_fit(along, [curve], self._title(), ax)
+    def _curve(
+        self, label: str, along: str, here: Bools, fine: Array, others: Mapping[str, Any]
+    ) -> plotting.Curve:
+        """Points ``here``, and the fit over the values ``fine`` of an input beside the others."""
+        mu, deviation = self.predict(**{along: fine}, **others)
+        bars = self.points[STD][here] if STD in self.points else None
+        x, measured, residuals = (
+            column[here] for column in (self.points[along], self.points["mu_macro"], self.residuals)
+        )
+        band = self._width() * deviation
+        return plotting.Curve(label, x, measured, bars, residuals, fine, mu, band)
 
     def _title(self) -> str:
         return f"{', '.join(self._value_texts())}; {self.contact}, {self.direction}"
@@ -230,6 +230,28 @@ class Fit:
             *(f"  {remark['row']}: {remark['text']}" for remark in self.remarks),
         ]
         return "\n".join(lines)
+
+
+def _fine(x: Array) -> Array:
+    """Values between the points, and these, so dense that a curve over them is smooth."""
+    low = x[x > 0.0].min(initial=math.inf)
+    if low == math.inf:
+        return np.unique(x)
+    return np.union1d(np.geomspace(low, x.max(), _CURVE), x)
+
+
+def _interpolated(x: Array, column: Array, fine: Array) -> Any:
+    """An input of the points at other values of ``x``, smooth and monotone between them."""
+    if column.min() == column.max() or np.unique(x).size < 2:
+        return float(column[0])
+    from scipy.interpolate import PchipInterpolator
+
+    places, member = np.unique(x, return_inverse=True)
+    means = np.bincount(member.ravel(), column) / np.bincount(member.ravel())
+    # even on the axis of the picture, which is logarithmic where that is wide
+    scale = places[places > 0.0].min()
+    curve = PchipInterpolator(np.arcsinh(places / scale), means)
+    return np.asarray(curve(np.arcsinh(fine / scale)))
 
 
 def _plain(part: Any, worded: bool, name: str = "") -> Any:

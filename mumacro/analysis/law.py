@@ -66,15 +66,16 @@ class Law:
         return {self.along: self.values, **k, **answer_columns, "mu_static": self.mu_static}
 
     def plot(
-        self, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None
+        self, ax: Any = None, *, roots: Iterable[float] = (), target: float | None = None
     ) -> Any:
-        """A picture, see ``mumacro.plotting.plot_law``; needs matplotlib."""
+        """mu_macro over the swept input with its static limit and borders, on axes ``ax`` of
+        matplotlib, or new ones, which are returned; see ``mumacro.plotting.plot_law``."""
         return plotting.plot_law(
             self.along,
             self.values,
             self.answer.mu_macro,
             self.mu_static,
-            axes,
+            ax,
             band=self.band,
             borders=[(crossing.value, crossing.name) for crossing in self.border],
             roots=roots,

@@ -144,13 +144,30 @@ class Motion:
         Fx, Fy = mu0 * Fz * forces.T
         return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load)
 
-    def plot(self, axes: Any = None, *, index: int | None = None) -> Any:
-        """Forces over a period and the path of the upper point, see
-        ``mumacro.plotting.plot_cycle``; needs matplotlib."""
+    def plot(self, ax: Any = None, *, index: int | None = None) -> Any:
+        """Forces over a period, and beside them the path of the upper point with the force at 16
+        moments; of many cases the one at ``index``, as in :meth:`cycle`.
+
+        ``ax`` are two axes of matplotlib, or new ones; an array of both is returned.
+        """
         i = self._place(index)
         case = {name: float(column[i]) for name, column in self.scenes.columns.items()}
         title = plotting.in_words(case, {"contact": self.scenes.contact})
-        return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, axes)
+        title = f"{title}\n{'; '.join(self._oscillations(i))}".rstrip()
+        return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, ax)
+
+    def _oscillations(self, i: int) -> list[str]:
+        """The amplitudes and phases of a case in words, a text for each part that oscillates."""
+        words = []
+        for symbol, part in zip(("$x$", "$y$", "$F_z$"), self.scenes.terms, strict=True):
+            quantity = "force" if symbol == "$F_z$" else "length"
+            terms = [
+                (term.harmonic, float(term.amplitude[i]), math.degrees(term.phase[i]))
+                for term in part
+                if term.amplitude[i] > 0.0
+            ]
+            words.append(plotting.oscillation_words(symbol, quantity, terms))
+        return [text for text in words if text]
 
     def _place(self, index: int | None) -> int:
         n = np.size(self.mu_macro)

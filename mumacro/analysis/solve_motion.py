@@ -106,13 +106,13 @@ class MotionSolution:
             )
         return text
 
-    def plot(self, axes: Any = None) -> Any:
-        """The mean force over the unknown with the targets and their roots; returns matplotlib's
-        axes."""
+    def plot(self, ax: Any = None) -> Any:
+        """The mean force over the unknown with the targets and their roots, on axes ``ax`` of
+        matplotlib, or new ones, which are returned."""
         x, mean = self.samples
         places = [root.value for roots in self.roots for root in roots]
         return plotting.plot_roots(
-            _axis(self.unknown), x, mean, self.of, self.targets, places, _log(x[0], x[-1]), axes
+            _axis(self.unknown), x, mean, self.of, self.targets, places, _log(x[0], x[-1]), ax
         )
 
     def __repr__(self) -> str:

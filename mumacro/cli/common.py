@@ -423,7 +423,12 @@ def model_lines(rows: Sequence[Row]) -> list[str]:
     return [in_columns([("assumes", f"{row['row']}: {row['text']}")]) for row in rows]
 
 
-def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:
+def write_result(
+    path: Path,
+    columns: Mapping[str, Any],
+    draw: Callable[[Any], Any],
+    panels: plotting.Panels = plotting.Panels(),  # noqa: B008 - it cannot change
+) -> str:
     """Write ``-o x.csv``, the columns under their heads with all digits, or a picture; a line that
     names the file."""
     if path.suffix == ".csv":
@@ -434,7 +439,7 @@ def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], A
                 zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
             )
     else:
-        plotting.save(path, draw)
+        plotting.save(path, draw, panels)
     return f"written: {path}"
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from mumacro import plotting
 from mumacro.analysis.fit import fit
 from mumacro.analysis.fitted import Fit
 from mumacro.analysis.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
@@ -89,7 +90,7 @@ def run(words: Sequence[str]) -> str:
         columns = dict(zip(heads, result.points.values(), strict=True))
         columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
         return (
-            common.write_result(chosen.out, columns, result.plot)
+            common.write_result(chosen.out, columns, result.plot, plotting.OF_FIT)
             + "\n"
             + _text(result, chosen.digits)
         )

@@ -21,11 +21,9 @@ def run(words: Sequence[str]) -> str:
     if chosen.out is None:
         raise UsageError("a map is written to a file: give -o map.png")
     kind, surrogate = common.kind_in(chosen), open_table(chosen.table)
-    one_k = "one k is needed: the map marks one point"
-    point = None
+    answer = None
     if chosen.words:
-        case = surrogate.evaluate(**{**read_case(chosen.words, kind, one_k=one_k), **kind.names})
-        point = (case.v_tilde, case.y_tilde)
+        answer = surrogate.evaluate(read_case(chosen.words, kind), **kind.names)
     grid = np.meshgrid(plotting.speeds(141), plotting.amplitudes(101, kind.normal))
     v, y = (x.ravel() for x in grid)
     ranges = ((v[0], v[-1]), (y[0], y[-1]))
@@ -37,8 +35,14 @@ def run(words: Sequence[str]) -> str:
     text = common.write_result(
         chosen.out,
         columns,
-        lambda axes: surrogate.plot(axes, point=point, **kind.names),
+        (lambda ax: surrogate.plot(ax, **kind.names)) if answer is None else answer.plot,
     )
-    if point and not all(low <= x <= high for x, (low, high) in zip(point, ranges, strict=True)):
-        text += f"\nthe case lies outside the map: v~ = {point[0]:.6g}, y~ = {point[1]:.6g}"
+    if answer is None:
+        return text
+    point = answer.v_tilde, answer.y_tilde
+    if not all(low <= x <= high for x, (low, high) in zip(point, ranges, strict=True)):
+        text += (
+            f"\nthe case lies outside the map, at its edge: v~ = {point[0]:.6g}, "
+            f"y~ = {point[1]:.6g}"
+        )
     return text

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mumacro import plotting
-from mumacro.analysis.motion import PARTS, Cycle, Motion
+from mumacro.analysis.motion import PARTS
 from mumacro.analysis.motion import motion as steady_cycle
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
@@ -85,14 +85,8 @@ def run(words: Sequence[str]) -> str:
         lines = f"{in_columns(rows)}\nnumerical error of both about {motion.error_estimate:.1e}"
     if chosen.out is None:
         return lines
-    _write(chosen.out, motion)
-    return lines if chosen.json else f"{lines}\nwritten: {chosen.out}"
-
-
-def _write(path: Path, motion: Motion) -> None:
-    if path.suffix != ".csv":
-        plotting.save(path, motion.plot, panels=2)
-        return
-    cycle: Cycle = motion.cycle()
-    columns = {f"{name} [{_SI[name]}]": column for name, column in cycle._asdict().items()}
-    common.write_result(path, columns, motion.plot)
+    columns = {}
+    if chosen.out.suffix == ".csv":
+        columns = {f"{name} [{_SI[name]}]": x for name, x in motion.cycle()._asdict().items()}
+    written = common.write_result(chosen.out, columns, motion.plot, plotting.OF_CYCLE)
+    return lines if chosen.json else f"{lines}\n{written}"

@@ -22,6 +22,10 @@ class Scale(NamedTuple):
         """``value`` in the SI unit."""
         return value * self.times / self.over
 
+    def of_si(self, value: float) -> float:
+        """``value``, which is in SI, in this unit."""
+        return value * self.over / self.times
+
 
 class Quantity(NamedTuple):
     """What a value measures."""
@@ -172,6 +176,32 @@ QUANTITIES = {
 }
 #: input -> unit -> scale
 UNITS_OF = {name: QUANTITIES[QUANTITY_OF[name]].units for name in SI}
+
+#: quantity -> units in which a value is shown, the largest first
+_SHOWN = {
+    "force": ("MN", "kN", "N", "mN", "uN", "nN"),
+    "stiffness": ("N/nm", "N/um", "kN/m", "N/m", "mN/m"),
+    "length": ("m", "mm", "um", "nm", "pm"),
+    "angular frequency": ("Mrad/s", "krad/s", "rad/s", "mrad/s"),
+    "frequency": ("GHz", "MHz", "kHz", "Hz", "mHz"),
+    "speed": ("m/s", "mm/s", "um/s", "nm/s"),
+}
+
+
+def suited(quantity: str, value: float) -> tuple[str, Scale]:
+    """The unit in which a value [SI] is a number that people like to read, and its scale: the
+    largest of the usual ones in which it is at least 0.1; the SI unit for 0.
+
+    >>> suited("length", 2.455e-6)[0], suited("stiffness", 13.07e6)[0], suited("ratio", 0.3)[0]
+    ('um', 'N/um', '-')
+    """
+    known, usual = QUANTITIES[quantity], _SHOWN.get(quantity, ())
+    size = abs(value)
+    if not usual or size == 0.0 or not math.isfinite(size):
+        return known.unit, Scale()
+    unit = next((one for one in usual if size >= 0.1 * known.units[one].si(1.0)), usual[-1])
+    return unit, known.units[unit]
+
 
 # --- a unit as people and programs write it -------------------------------------------------------
 

@@ -424,14 +424,15 @@ def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -
         {along: x, "mu_macro": friction(surrogate, **case), "std": 1e-3},
         **{name: value for name, value in case.items() if name != along},
     )
-    axes = estimate.plot()
-    assert axes.get_xlabel() == {"v0": "$v_0$ [m/s]", "y0": "$y_0$ [m]"}[along]
+    axes, below = estimate.plot()
+    assert below.get_xlabel() == {"v0": "$v_0$ [m/s]", "y0": "$y_0$ [m]"}[along]
     assert axes.get_ylabel() == r"$\mu_\mathrm{macro}$ [-]"
     points, curve = axes.lines[0], axes.lines[-1]
     assert np.array_equal(points.get_xdata(), x)
     assert np.interp(x, curve.get_xdata(), curve.get_ydata()) == close(points.get_ydata(), abs=1e-3)
     edges = axes.collections[-1].get_paths()[0].vertices[:, 1]
     assert edges.min() < curve.get_ydata().min() < curve.get_ydata().max() < edges.max()
+    assert below.lines[0].get_ydata() == close(estimate.residuals, rel=1e-15)
     matplotlib.pyplot.close("all")
 
 

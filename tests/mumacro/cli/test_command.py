@@ -239,7 +239,6 @@ def test_a_range_of_k_is_told_with_that_of_mu_macro_and_checked(capsys: Capture)
     assert "k is known" not in text
     for wrong in ("2..1", "0..1", "1..inf", "a..2"):
         assert "k must be" in output_of(capsys, 2, CASE.replace("1e6", wrong))
-    assert "one k is needed" in output_of(capsys, 2, "map", words, "-o", "x.csv")
 
 
 NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
@@ -600,56 +599,9 @@ def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path)
         CASE.replace("0.01", "0"),
         CASE.replace("1e6", "1e30"),
     ):
-        assert "the case lies outside the map: v~ = " in output_of(
+        assert "the case lies outside the map, at its edge: v~ = " in output_of(
             capsys, 0, "map", case, "-o", out
         )
-
-
-def test_objects_plot_themselves(surrogate: Surrogate) -> None:
-    figure = pytest.importorskip("matplotlib.figure").Figure()
-    from mumacro import law as friction_law
-
-    inputs = {name: value for name, value in VALUES.items() if name != "v0"}
-    law = friction_law(surrogate, start=1e-3, stop=1.0, points=20, **inputs)
-    axes = law.plot(figure.add_subplot())
-    np.testing.assert_array_equal(
-        axes.lines[0].get_xydata(), np.column_stack((law.values, law.answer.mu_macro))
-    )
-    assert [line.get_xdata()[0] for line in axes.lines[2:]] == [
-        crossing.value for crossing in law.border
-    ]
-    axes = surrogate.plot(figure.add_subplot(), point=(0.1, 0.5))
-    v, y = axes.lines[0].get_data()
-    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y))
-    assert axes.lines[1].get_xydata().tolist() == [[0.1, 0.5]]
-    many = surrogate.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
-    axes = many.plot(figure.add_subplot())
-    shown = {line.get_label(): len(line.get_xdata()) for line in axes.lines[:-1]}
-    # v~ = 0 has no place on a logarithmic axis
-    assert shown == {"continuous sliding": 2, "stick and slip": 1}
-
-
-@pytest.mark.parametrize(
-    "kind", [("spring", "across"), ("spring", "along"), ("ball", "across"), ("ball", "along")]
-)
-def test_a_picture_of_cases_has_the_border_of_their_contact(
-    surrogate: Surrogate, kind: Any
-) -> None:
-    figure = pytest.importorskip("matplotlib.figure").Figure()
-    names = dict(zip(("contact", "direction"), kind, strict=True))
-    many = surrogate.evaluate(**{**VALUES, "v0": np.array([1e-3, 1.0])}, **names, groups=True)
-    axes = many.plot(figure.add_subplot())
-    v, y = axes.lines[-1].get_data()
-    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
-    one = surrogate.evaluate(**VALUES, **names).plot(figure.add_subplot())
-    v, y = one.lines[-1].get_data()
-    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **names))
-
-
-def test_a_picture_needs_the_groups(surrogate: Surrogate) -> None:
-    figure = pytest.importorskip("matplotlib.figure").Figure()
-    with pytest.raises(AttributeError, match="groups=True"):
-        surrogate.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}).plot(figure.add_subplot())
 
 
 BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3")
