@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import chain
-from operator import itemgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -119,7 +118,7 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
         opening = b"[" if start else b""
         between = text[start : end.start()] + b"]" if end else text[start:]
         values = orjson.loads(opening + between)
-        if b"{" in between and _count(between, b":") != _members_in(values):
+        if b"{" in between and not _hold_all_members(values, _count(between, b":")):
             raise ValueError("a name is given twice, or a text has a colon")
         if not values and (start or end):
             raise ValueError("nothing beside a comma")
@@ -130,16 +129,16 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
         start = end.end() if end else len(text)
 
 
-def _members_in(rows: list[Any]) -> int:
-    """How many members the objects of a list have."""
-    return sum(len(row) for row in rows if isinstance(row, dict))
+def _hold_all_members(values: list[Any], colons: int) -> bool:
+    """Whether these are objects, with as many members as their text has colons."""
+    return {*map(type, values)} == {dict} and sum(map(len, values)) == colons
 
 
 def _numbers(values: list[Any]) -> Any:
     """An array if all values are finite numbers, else the list."""
     if {*map(type, values)} <= {float, int}:
         with suppress(OverflowError):
-            array = np.array(values, np.float64)
+            array = np.fromiter(values, np.float64, len(values))
             if np.isfinite(array).all():
                 return array
     return values
@@ -206,13 +205,13 @@ def _columns_of(slices: Iterable[list[Any]], words: Mapping[str, Any]) -> dict[s
             columns = {name: [] for name in _names_of_case(rows, words)}
         try:
             same = sum(map(len, rows)) == len(columns) * len(rows)
-            lists = [*zip(*map(itemgetter(*columns), rows), strict=True)]
+            lists = [[row[name] for row in rows] for name in columns]
         except (TypeError, LookupError):
             same = False
         if not same:
             raise ValueError("rows of other names")
         for parts, entries in zip(columns.values(), lists, strict=True):
-            values = _numbers([*entries])
+            values = _numbers(entries)
             if isinstance(values, list) and None in values:
                 raise ValueError("a null")
             parts.append(values)
@@ -339,4 +338,4 @@ def _row_of(answer: Answer[Any], index: int) -> bytes:
 def listed(path: str, column: Any) -> list[Any]:
     """A column as JSON lists it: NaN is written as null, and so is no text."""
     values: list[Any] = column.tolist()
-    return [value or None for value in values] if path in TEXTS else values
+    return [value or None for value in values] if path in TEXTS and "" in values else values
