@@ -55,7 +55,8 @@ def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]
     ('k', 'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 1 in N/m?')
     """
     if _usual(columns):
-        return []
+        rigid = columns["k"] == math.inf
+        return [_of_rigid(columns["mu0"] * columns["Fz"] / columns["y0"])] if rigid else []
     given = {name: np.asarray(column, np.float64) for name, column in columns.items()}
     shape = np.broadcast_shapes(*(column.shape for column in given.values()))
     six = dict.fromkeys(_USUAL, np.broadcast_to(math.nan, shape)) | {
@@ -78,11 +79,15 @@ def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]
                 cases = int(np.count_nonzero(new))
                 found[name] = {"row": UNITS, "field": name, "cases": cases, "text": text}
         rigid = np.asarray(np.isposinf(six["k"]) & _oscillates(six))
-        return [*found.values(), *([_of_rigid(six, rigid)] if rigid.any() else [])]
+        if not rigid.any():
+            return [*found.values()]
+        stiffest = float(np.fmax.reduce((six["mu0"] * six["Fz"] / six["y0"])[rigid]))
+        return [*found.values(), _of_rigid(stiffest, int(np.count_nonzero(rigid)))]
 
 
 def _usual(columns: Mapping[str, Any]) -> bool:
-    """Whether one case in plain numbers gives nothing to remark on, found in a microsecond."""
+    """Whether one case in plain numbers oscillates across or along within all usual ranges: looked
+    up in a microsecond."""
     mu0, load, k, y0, omega, v0 = map(columns.get, ("mu0", "Fz", "k", "y0", "omega", "v0"))
     if not (type(mu0) is type(load) is type(k) is type(y0) is type(omega) is type(v0) is float):
         return False
@@ -90,14 +95,19 @@ def _usual(columns: Mapping[str, Any]) -> bool:
     return bool(
         1e-3 <= mu0 <= 2.0
         and 1e-6 <= load <= 1e6
-        and 1.0 <= k <= 1e12
         and 0.0 < y0 <= 2e-2
         and y0 >= 1e-12
         and _USUAL["omega"][0] <= omega <= _USUAL["omega"][1]
         and 0.0 <= v0 <= 300.0
-        and force <= LONGEST * k
-        and y0 * k <= FURTHEST * force
-        and v0 * k <= FURTHEST * force * omega
+        and (
+            k == math.inf
+            or (
+                1.0 <= k <= 1e12
+                and force <= LONGEST * k
+                and y0 * k <= FURTHEST * force
+                and v0 * k <= FURTHEST * force * omega
+            )
+        )
     )
 
 
@@ -164,10 +174,10 @@ def _largest(case: Mapping[str, float], other: str) -> str:
     return max(excess, key=lambda name: excess[name])
 
 
-def _of_rigid(six: Mapping[str, Array], rigid: Bools) -> Remark:
-    """What a rigid contact assumes, with the stiffness that must be far exceeded for it."""
+def _of_rigid(stiffness: float, cases: int = 1) -> Remark:
+    """What a rigid contact assumes, with the stiffness that must be far exceeded for it [N/m]; of
+    many cases the largest."""
     text = "rigid: the contact does not stretch before it slips"
-    stiffest = float(np.fmax.reduce((six["mu0"] * six["Fz"] / six["y0"])[rigid]))
-    if math.isfinite(stiffest):
-        text += f"; holds for k far above mu0 Fz / y0 = {stiffest:.3g} N/m, a softer one differs"
-    return {"row": STIFFNESS, "field": "k", "cases": int(np.count_nonzero(rigid)), "text": text}
+    if math.isfinite(stiffness):
+        text += f"; holds for k far above mu0 Fz / y0 = {stiffness:.3g} N/m, a softer one differs"
+    return {"row": STIFFNESS, "field": "k", "cases": cases, "text": text}

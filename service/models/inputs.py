@@ -40,7 +40,7 @@ from .values import (
     Stiffness,
     StiffnessEnd,
     fault,
-    interval_of,
+    stiffness_inputs,
 )
 
 #: what a case may hold, in the order in which it is described
@@ -153,7 +153,7 @@ class OneCase(Strict):
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite."""
-        return _with_interval(_given(self))
+        return _given(self)
 
 
 class CaseInputs(OneCase):
@@ -181,24 +181,17 @@ class OtherInputs(Strict):
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite, and a null in k stays."""
-        inputs = _with_interval(_given(self))
+        inputs = _given(self)
         if self.k is None and "k" in self.model_fields_set:
             inputs["k"] = None
         return inputs
 
 
 def _given(model: BaseModel) -> dict[str, Any]:
-    """The inputs that are given, by name."""
+    """The inputs that are given, by name; k_range for an interval in k."""
     values = model.__dict__
-    return {name: values[name] for name in INPUTS if values.get(name) is not None}
-
-
-def _with_interval(inputs: dict[str, Any]) -> dict[str, Any]:
-    """The inputs, with k_range for an interval in k."""
-    if (ends := interval_of(inputs.get("k"))) is not None:
-        del inputs["k"]
-        inputs["k_range"] = ends
-    return inputs
+    inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
+    return inputs | stiffness_inputs(inputs.pop("k")) if type(inputs.get("k")) is str else inputs
 
 
 # --- columns --------------------------------------------------------------------------------------

@@ -121,8 +121,9 @@ Ratio = Annotated[
 ]
 
 
-def interval_of(k: Any) -> tuple[float, float] | None:
-    """Both ends of an interval of k in a text that was checked."""
-    if type(k) is str and (one := read("k", k)).low is not None:
-        return one.low, one.high
-    return None
+def stiffness_inputs(k: str) -> dict[str, Any]:
+    """The inputs that a checked text gives: k, infinite where rigid, or k_range."""
+    one = read("k", k)
+    if one.low is not None:
+        return {"k_range": (one.low, one.high)}
+    return {"k": math.inf if math.isinf(one.si) else k}
