@@ -171,39 +171,41 @@ def find_layout(start: Piece, wanted: Wanted, dialect: Dialect, encoding: str = 
     while cells and not cells[-1]:
         cells = cells[:-1]
     heads = [heading(cell, wanted.like) for cell in cells]
-    first, units = head.end, None
+    units = None
     if declared.units is not None:
         label_line = _split(lines[declared.units], head.sep)
         heads = _with_units(heads, ["", *label_line[1:]], wanted, number + declared.units) or heads
         units = number + declared.units
-    commented = lines[head.at].lstrip("\ufeff ").startswith(COMMENT)
-    at = next(
-        (
-            i
-            for i in range(head.end, len(lines))
-            if lines[i].strip(f" \t{head.sep}")
-            and (commented or not lines[i].lstrip().startswith(COMMENT))
-        ),
-        None,
-    )
-    if at is not None:
-        is_comment = lines[at].lstrip().startswith(COMMENT)
-        unit_cells = _split(_uncommented(lines[at]) if is_comment else lines[at], head.sep)
-        with_units = _with_units(heads, unit_cells, wanted, number + at, is_comment)
-        if with_units:
-            heads, first, units = with_units, at + 1, number + at
-    return Layout(
+    layout = Layout(
         head.sep,
         declared.decimal,
         number + head.at,
         units,
         heads,
-        number + first,
+        number + head.end,
         bool(heads) and split_unit(heads[0])[0] not in wanted.like,
         declared.labview,
         encoding,
         [number + i for i in range(head.at) if lines[i].strip()],
     )
+    return _with_row_of_units(layout, head, start, wanted)
+
+
+def _with_row_of_units(layout: Layout, head: _Head, start: Piece, wanted: Wanted) -> Layout:
+    """The layout with the units in the first row behind the head, where that is a row of units."""
+    lines = start.lines
+    in_comments = lines[head.at].lstrip("\ufeff ").startswith(COMMENT)
+    for i in range(head.end, len(lines)):
+        if not (is_row(lines[i], layout) or (in_comments and lines[i].strip(f" \t{layout.sep}"))):
+            continue
+        is_comment = lines[i].lstrip().startswith(COMMENT) and not is_row(lines[i], layout)
+        cells = _split(_uncommented(lines[i]) if is_comment else lines[i], layout.sep)
+        line = start.first + i
+        if cells == head.cells:  # the head again
+            return layout
+        heads = _with_units(layout.heads, cells, wanted, line, is_comment)
+        return layout._replace(heads=heads, first=line + 1, units=line) if heads else layout
+    return layout
 
 
 def _declared(lines: Sequence[str]) -> _Declared:
@@ -284,9 +286,9 @@ def _split(line: str, sep: str) -> list[str]:
 def _fits(head: _Head, lines: Sequence[str], labview: bool) -> bool:
     """Whether the row behind a head has as many cells."""
     width = len(head.cells)
-    for line in islice(lines, head.end, None):
-        if line.strip() and not line.lstrip().startswith(COMMENT):
-            cells = _split(line, head.sep)
+    for i in range(head.end, len(lines)):
+        if lines[i].strip() and not lines[i].lstrip().startswith(COMMENT):
+            cells = _split(_whole(lines, i)[0], head.sep)
             return len(cells) in (width, width - labview) or not any(cells[width:] or ["x"])
     return True
 

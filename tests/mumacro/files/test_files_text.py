@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.support.cases import CASE, Capture, opened
@@ -101,6 +101,8 @@ def test_text_of_every_ending_comes_in_and_goes_out(tmp_path: Path, ending: str,
     sep=st.sampled_from([",", ";", "\t"]),
     more=st.sampled_from(["", "# a comment\n", "\n", ";;;;;;\n", f"note,{HEAD}\n"]),
 )
+@example(notes=["#1"], piece=5, sep=",", more=f"note,{HEAD}\n")  # the head behind its only row
+@example(notes=["a\nb"], piece=5, sep=",", more=f"note,{HEAD}\n")
 def test_plain_and_quoted_rows_give_the_same_however_the_file_is_cut(
     tmp_path_factory: pytest.TempPathFactory, notes: list[str], piece: int, sep: str, more: str
 ) -> None:
