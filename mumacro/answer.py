@@ -179,15 +179,20 @@ class Answer(Generic[Number]):
         return certain if shape else bool(certain)
 
     @property
+    def _always(self) -> tuple[str, ...]:
+        """The paths of what is there without being asked for."""
+        return DEFAULT
+
+    @property
     def paths(self) -> list[str]:
         """The paths of all outputs, in the order of the JSON of one case."""
-        return [*DEFAULT, *(name for name in BAND if hasattr(self, name)), *self.outputs]
+        return [*self._always, *self.outputs]
 
     def __getitem__(self, path: str) -> Any:
         """An output by its path; KeyError with the remedy for one that was not asked for."""
         if path in self.outputs:
             return self.outputs[path]
-        if path in DEFAULT or (path in BAND and hasattr(self, path)):
+        if path in self._always:
             return getattr(self, path)
         within = {
             name.removeprefix(f"{path}."): x
@@ -293,7 +298,8 @@ class Answer(Generic[Number]):
         >>> [*Surrogate.open().evaluate(**case, include=("groups",)).to_dict()]
         ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
         """
-        members = nested({path: _listed(self[path]) for path in self.paths})
+        values = {path: getattr(self, path) for path in self._always} | {**self.outputs}
+        members = nested({path: _listed(value) for path, value in values.items()})
         if said := self.remarks:
             members["remarks"] = said
         return members
@@ -381,6 +387,10 @@ class IntervalAnswer(AnswerWithGradient[Number]):
     mu_macro_low: Number
     mu_macro_high: Number
 
+    @property
+    def _always(self) -> tuple[str, ...]:
+        return DEFAULT + BAND
+
 
 def add(remarks: list[Remark], remark: Remark) -> None:
     """Add a remark to others, or its cases to one of the same row and field."""
@@ -409,10 +419,10 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _listed(value: Any) -> Any:
     """A number or an array of them for JSON: None where one is not finite; None for no text."""
+    if type(value) is float:
+        return value if math.isfinite(value) else None
     if isinstance(value, str):
         return value or None
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
     array = np.asarray(value)
     if array.dtype.kind == "f":
         array = np.where(np.isfinite(array), array, None)  # type: ignore[call-overload]

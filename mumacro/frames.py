@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import BAND, GROUPS, Answer, IntervalAnswer
+from mumacro.answer import BAND, DEFAULT, GROUPS, Answer, IntervalAnswer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, codes_of, library_of
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.reading import without_unit
 from mumacro.outputs import MEMBERS, OUTPUTS
-from mumacro.outputs.evaluation import chosen
+from mumacro.outputs.evaluation import chosen, paths_of
 from mumacro.table.atlas import REGIMES
 
 #: what stands beside the outputs -> its unit and long name, as xarray and CF write them
@@ -56,6 +56,10 @@ class LabelledAnswer(IntervalAnswer[Any]):
     _kinds: dict[str, Any]  # contact and direction, where they were given
     _library: str
     _values: dict[str, Any]  # all inputs
+
+    @property
+    def _always(self) -> tuple[str, ...]:
+        return (*DEFAULT, *(name for name in BAND if hasattr(self, name)))
 
     def _apply(self, function: Callable[..., Any], inputs: Mapping[str, Any], name: str) -> Any:
         return _APPLY[self._library](lambda *arrays: [function(*arrays)], inputs, [name])[0]
@@ -201,7 +205,7 @@ def _of_chunks(
     outputs = tuple(OUTPUTS[x] for x in OUTPUTS if x in include or (x == "std" and deviations))
     direction = values.get("direction", "across")
     fields = kind_of(direction=direction).fields if isinstance(direction, str) else ALL_FIELDS
-    paths = [path for output in outputs for path in output.paths(fields)]
+    paths = paths_of(outputs, fields)
     gradient = any(output.name == "gradient" for output in outputs)
     band = BAND if {*ENDS} & values.keys() else ()
     names = [*_ALWAYS, *band]

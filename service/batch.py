@@ -95,8 +95,7 @@ class Batch:
     @property
     def cost(self) -> float:
         """The cost of all cases together, see :mod:`service.limits`."""
-        names = tuple(output.name for output in self.outputs)
-        return self.cases.size * cost(names, self.cases.kinds, self.cases.ends is not None)
+        return self.cases.size * cost(self.outputs, self.cases)
 
     def write(self) -> Iterator[bytes]:
         """The answer as JSON, piece by piece, in the form of the body."""

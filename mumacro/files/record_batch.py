@@ -28,7 +28,7 @@ from mumacro.inputs.text_tables import Wanted
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS
-from mumacro.outputs.evaluation import chosen, names_in
+from mumacro.outputs.evaluation import chosen, names_in, paths_of
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
@@ -178,8 +178,8 @@ def find_columns(
     deviations = any(column in heads for column in DEVIATIONS)
     wanted = {*names_in(include)} | ({"std"} if deviations else set())
     outputs = [output for name, output in OUTPUTS.items() if name in wanted]
-    paths = [path for output in outputs for path in output.paths(fields)]
-    added = [DEFAULT[0], *(BAND if ends == ENDS else ()), *DEFAULT[1:], *paths]
+    band = BAND if ends == ENDS else ()
+    added = [DEFAULT[0], *band, *DEFAULT[1:], *paths_of(outputs, fields)]
     faults += [
         f"the column {name!r} would be written twice; rename it" for name in added if name in names
     ]

@@ -70,17 +70,29 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
     return outputs
 
 
+def paths_of(outputs: Iterable[Output], fields: tuple[str, ...]) -> tuple[str, ...]:
+    """The paths of all values of outputs, for cases with these inputs, in order."""
+    return _paths(tuple(output.name for output in outputs), fields)
+
+
 @cache
-def cost(outputs: tuple[str, ...], kinds: tuple[Kind, ...], interval: bool) -> float:
-    """The time of a case, about, divided by the time of mu_macro of one spring across; of several
-    kinds that of the slowest."""
-    slowest = 1.0
-    for kind in kinds:
-        words = [*kind.names.values()]
-        both = _BALL_ALONG if words == ["ball", "along"] else 1.0
-        slowest = max(slowest, both * math.prod(_COSTS.get(word, 1.0) for word in words))
-    each = 1.0 + sum(OUTPUTS[name].cost for name in outputs)
-    return each * slowest * (_INTERVAL if interval else 1.0)
+def _paths(names: tuple[str, ...], fields: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(path for name in names for path in OUTPUTS[name].paths(fields))
+
+
+def cost(outputs: Iterable[Output], cases: Cases) -> float:
+    """The time of one of the cases with these outputs, about, in times of mu_macro alone for one
+    spring across; of several kinds that of the slowest."""
+    slowest = max(map(_cost_of, cases.kinds), default=1.0)
+    each = 1.0 + sum(output.cost for output in outputs)
+    return each * slowest * (_INTERVAL if cases.ends is not None else 1.0)
+
+
+@cache
+def _cost_of(kind: Kind) -> float:
+    words = [*kind.names.values()]
+    both = _BALL_ALONG if words == ["ball", "along"] else 1.0
+    return both * math.prod(_COSTS.get(word, 1.0) for word in words)
 
 
 def answer(
@@ -203,7 +215,6 @@ def _answer(
     if asked_for_slopes:
         for name in _SLOPES:
             setattr(answer, name, {field: shaped(f"{name} {field}") for field in cases.fields})
-    paths = [path for output in outputs for path in output.paths(cases.fields)]
-    answer.outputs = {path: shaped(path) for path in paths}
+    answer.outputs = {path: shaped(path) for path in paths_of(outputs, cases.fields)}
     answer.remarks_on_outputs = remarks
     return answer

@@ -126,4 +126,4 @@ def stiffness_inputs(k: str) -> dict[str, Any]:
     one = read("k", k)
     if one.low is not None:
         return {"k_range": (one.low, one.high)}
-    return {"k": math.inf if math.isinf(one.si) else k}
+    return {"k": math.inf if one.si == math.inf else k}

@@ -8,8 +8,8 @@ from starlette.responses import PlainTextResponse
 
 from mumacro import Surrogate
 from mumacro.errors import InputError
-from mumacro.inputs.k_range import ENDS
-from mumacro.outputs.evaluation import cost
+from mumacro.inputs.cases import Cases
+from mumacro.outputs.evaluation import chosen, cost
 from mumacro.validity import digits, k_effect, model_rows
 
 from ..models.answers import CaseAnswer
@@ -22,7 +22,6 @@ from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 router = router_of("answers", DirectRoute)
 #: members of a case of which nothing but the default is asked
 _PLAIN = frozenset(("mu0", "Fz", "k", "y0", "omega", "f", "v0", "tolerance", "value"))
-_INTERVAL = frozenset(("k_range", *ENDS))
 _LARGE = 100  # cost, see service/limits.py, from which one case is computed in a thread
 _CACHED: Any = {
     "model": CaseAnswer,
@@ -43,32 +42,27 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     if case.include and UNDERSTOOD in case.include:
         more = {UNDERSTOOD: understood(case.model_dump(warnings=False))}
     try:
-        if case.model_fields_set <= _PLAIN and _INTERVAL.isdisjoint(inputs):
+        if case.model_fields_set <= _PLAIN and "k_range" not in inputs:
             answer = table.surrogate.evaluate(**inputs)
-            members, source = answer.to_dict(), answer.source_code
         else:
-            work = partial(_answer_more, table.surrogate, case, inputs)
-            each = cost(case.outputs, (case.kind,), not _INTERVAL.isdisjoint(inputs))
-            large = case.model or each > _LARGE
-            members, source = await state.work.question(work) if large else work()
+            cases = Cases.of({**inputs, **case.kind.names, **case.deviations})
+            outputs = chosen(case.outputs, cases)
+            work = partial(table.surrogate.answer, cases, outputs)
+            large = cost(outputs, cases) > _LARGE
+            answer = await state.work.question(work) if large else work()
+        if case.model:
+            work = partial(_of_model, table.surrogate, inputs, case.kind.names)
+            more |= await state.work.question(work)
     except InputError as error:
         raise of_input(error, **more) from None
-    state.metrics.case(table, source)
-    return {**members, **more, **table.signature}
+    state.metrics.case(table, answer.source_code)
+    return {**answer.to_dict(), **more, **table.signature}
 
 
-def _answer_more(
-    surrogate: Surrogate, case: CaseRequest | CaseQuery, inputs: dict[str, Any]
-) -> tuple[dict[str, Any], int]:
-    """The members of the answer with all that is asked beside the default, and the code of its
-    source."""
-    words = case.kind.names
-    answer = surrogate.evaluate(**inputs, **words, **case.deviations, include=case.outputs)
-    members = answer.to_dict()
-    if case.model:  # rows of docs/validity.md, and the digits that k supports
-        members[MODEL] = model_rows(surrogate, inputs, **words)
-        members["digits"] = digits(k_effect(surrogate, inputs, **words))
-    return members, answer.source_code
+def _of_model(surrogate: Surrogate, inputs: Any, words: Any) -> dict[str, Any]:
+    """Rows of docs/validity.md on this case, and the digits that k supports."""
+    rows = model_rows(surrogate, inputs, **words)
+    return {MODEL: rows, "digits": digits(k_effect(surrogate, inputs, **words))}
 
 
 @router.get(
