@@ -22,7 +22,7 @@ from builder.tables.verify import QUANTILES, Neighbours, bound_over_error, distr
 from mumacro import Surrogate
 from mumacro.kernel.arrays import Array
 from mumacro.table.atlas import QUANTITY_NAMES
-from mumacro.table.netcdf import RATIOS, error_distribution
+from mumacro.table.blocks import RATIOS
 from tests.support import extended
 from tests.support.measuring import main, markdown, quantity
 
@@ -218,7 +218,7 @@ def driven(contact: str, direction: str, share: float) -> Iterator[list[str]]:
 def spring_across() -> Iterator[list[str]]:
     """What the tables state."""
     for tolerance in TOLERANCES:
-        for name, spread in error_distribution(Surrogate.open(tolerance).table).items():
+        for name, spread in Surrogate.open(tolerance).error_distribution.items():
             errors = [spread[f"{share:g}"] for share in QUANTILES]
             ratios = [spread[word] for word in RATIOS]
             stated = {"error_quantiles": errors, "bound_over_error": ratios}
@@ -232,7 +232,7 @@ def errors(share: float) -> str:
             rows += driven(contact, direction, share)
     order = [*dict.fromkeys((row[0], row[1]) for row in rows)]
     rows.sort(key=lambda row: order.index((row[0], row[1])))
-    points = int(Surrogate.open().attributes["verified_points"])  # type: ignore[call-overload]
+    points = int(Surrogate.open().table.contacts["spring"].attributes["verified_points"])
     across, slopes, single, balls = (f"{part(full, share):,}" for full in POINTS)
     points_drawn = (
         f"Points: spring across {points:,}; ball across {across}, of slopes {slopes}; spring along "

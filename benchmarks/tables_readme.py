@@ -41,7 +41,7 @@ BALL_HEADER = (
     "max rel error of the power",
     "max error of a logarithmic slope",
 )
-COMPANIONS = ("verified_max_stick_error", "verified_max_rel_power_error")
+COMPANIONS = ("stick_fraction", "power")
 BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
 
 
@@ -71,6 +71,17 @@ def rebuilt(table: Surrogate, workers: int) -> list[str]:
     return [quantity(seconds, 2), quantity(own, 2), "yes" if same else "no"]
 
 
+def errors_of(s: Surrogate, contact: str) -> list[str]:
+    """The largest verified errors of a contact: of mu~, absolute and relative, and of
+    ``COMPANIONS``."""
+    entry = s.table.contacts[contact]
+    errors = [
+        *(float(entry.attributes[f"verified_max_{norm}_error"]) for norm in ("abs", "rel")),
+        *(entry.error_distribution[name]["1"] for name in COMPANIONS),
+    ]
+    return [f"{error:.2e}" for error in errors]
+
+
 def cells_in(page: str, checksum: str) -> list[str]:
     """The measured columns of the row with that checksum, if there is one."""
     row = re.search(
@@ -88,22 +99,12 @@ def tables(build: bool, workers: int) -> str:
     rows, balls, builds = [], [], []
     for s in opened:
         counts = (int(str(s.attributes["n_solves"])), s.path.stat().st_size, s.memory)
-        errors = (
-            s.max_abs_error,
-            s.max_rel_error,
-            *(float(str(s.attributes[name])) for name in COMPANIONS),
-        )
-        numbers = (*(f"{count:,}" for count in counts), *(f"{error:.2e}" for error in errors))
+        numbers = (*(f"{count:,}" for count in counts), *errors_of(s, "spring"))
         rows.append([f"`{s.path.name}`", f"{s.tolerance:.0e}", *numbers])
-        ball = (
-            "max_abs_error",
-            "max_rel_error",
-            "max_stick_error",
-            "max_rel_power_error",
-            "max_slope_error",
-        )
-        ball_errors = (f"{float(str(s.attributes[f'ball_verified_{name}'])):.2e}" for name in ball)
-        balls.append([f"`{s.path.name}`", f"{s.ball_tolerance:.0e}", *ball_errors])
+        largest = s.table.contacts["ball"].error_distribution
+        slope = max(largest[f"slope_along_{name}"]["1"] for name in ("v", "y"))
+        tolerance = f"{s.table.contacts['ball'].tolerance:.0e}"
+        balls.append([f"`{s.path.name}`", tolerance, *errors_of(s, "ball"), f"{slope:.2e}"])
         cost = rebuilt(s, workers) if build else cells_in(old, s.checksum)
         builds.append([f"`{s.path.name}`", *cost, f"`{s.checksum}`"])
     builds_of_all = "\n".join(
@@ -119,7 +120,8 @@ def tables(build: bool, workers: int) -> str:
             f"Built anew on {workers} threads with the program that this page was written "
             f"with.\n{machine()}"
         )
-    points = {int(str(s.attributes["verified_points"])) for s in opened}
+    contacts = [contact for s in opened for contact in s.table.contacts.values()]
+    points = {int(contact.attributes["verified_points"]) for contact in contacts}
     verified = (
         f"Errors are the largest on {' or '.join(f'{n:,}' for n in sorted(points))} fresh "
         "solves, off the nodes."

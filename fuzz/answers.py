@@ -21,7 +21,8 @@ from builder.solver.ball import Springs
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
 from builder.tables.contacts import FINE, SolvedContact, ball, spring
-from builder.tables.verify import BALL_CASES, Neighbours, bound_over_error
+from builder.tables.draws import DRAWS
+from builder.tables.verify import Neighbours, bound_over_error
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
 from mumacro.inputs.kind import BALL, SPRING
@@ -254,22 +255,22 @@ def nearby(rng: np.random.Generator, v: Array, y: Array, size: float) -> tuple[A
 Ratios = dict[str, tuple[Array, Array]]  # by row: error over bound, bound over error
 
 
-def compared(table: Surrogate, of: SolvedContact, v: Array, y: Array, slopes: bool) -> Ratios:
+def compared(table: Surrogate, contact: SolvedContact, v: Array, y: Array, slopes: bool) -> Ratios:
     """A ball across at v~ and y~ of its middle spring against fresh quadratures, beyond what those
     may be wrong by."""
     ratios = {}
     if slopes:
-        true, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
-        rows = of.slopes(table, "mu_ratio", v, y)
+        true, noise = Neighbours(table, contact, v, y).slopes("mu_ratio")
+        rows = contact.slopes(table, "mu_ratio", v, y)
         parts = zip(extended.ROWS[3:], rows[1:3], rows[3:5], true, noise, strict=True)
     else:
-        solved = of.solve(v, y)
-        answers = [of.quantity(table, name, v, y)[:2] for name in QUANTITY_NAMES]
+        solved = contact.solve(v, y)
+        answers = [contact.quantity(table, name, v, y)[:2] for name in QUANTITY_NAMES]
         parts = zip(
             QUANTITY_NAMES,
             *zip(*answers, strict=True),
             [solved[name] for name in QUANTITY_NAMES],
-            [of.noise(name, v, y, solved, False) for name in QUANTITY_NAMES],
+            [contact.noise(name, v, y, solved, False) for name in QUANTITY_NAMES],
             strict=True,
         )
     for name, value, bound, truth, unsure in parts:
@@ -287,26 +288,27 @@ def across(share: float) -> list[list[str]]:
     springs = Springs(Surrogate.open(1e-12))
     for tolerance in (1e-7, 1e-10):
         table = Surrogate.open(tolerance)
-        of = ball(springs, tolerance, os.cpu_count() or 1)
+        contact = ball(springs, tolerance, os.cpu_count() or 1)
         for slopes, n in ((False, N // 5), (True, N // 100)):
             n = max(500, int(n * share))
-            drawn = [how(rng, math.ceil(part * n), table) for part, how in BALL_CASES.values()]
+            cases = DRAWS["ball"].cases.values()
+            drawn = [how(rng, math.ceil(part * n), table) for part, how in cases]
             v, y = (np.concatenate(x) for x in zip(*drawn, strict=True))
-            v, y = of.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
-            ratios = compared(table, of, v, y, slopes)
+            v, y = contact.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
+            ratios = compared(table, contact, v, y, slopes)
             medians = {name: np.nanmedian(over) for name, (_, over) in ratios.items()}
             worst = {name: beyond for name, (beyond, _) in ratios.items()}
             for size in (0.3, 0.03, 0.003):
                 best = np.unique(
                     [np.argsort(x)[-max(20, int(200 * share)) :] for x in worst.values()]
                 )
-                near_v, near_y = of.as_asked(
+                near_v, near_y = contact.as_asked(
                     *(
                         np.repeat(x[best], 4) * np.exp(size * rng.standard_normal(4 * best.size))
                         for x in (v, y)
                     )
                 )
-                near = compared(table, of, near_v, near_y, slopes)
+                near = compared(table, contact, near_v, near_y, slopes)
                 v, y = np.append(v, near_v), np.append(y, near_y)
                 worst = {name: np.append(x, near[name][0]) for name, x in worst.items()}
             for name, beyond in worst.items():
@@ -402,13 +404,13 @@ def seams(share: float) -> str:
     with Sweep(os.cpu_count() or 1) as sweep:
         for tolerance, kind in itertools.product((1e-4, 1e-7, 1e-10, 1e-12), (SPRING, BALL)):
             table = Surrogate.open(tolerance)
-            of = ball(springs, FINE, os.cpu_count() or 1) if kind == BALL else spring(sweep)
+            contact = ball(springs, FINE, os.cpu_count() or 1) if kind == BALL else spring(sweep)
             sources = {
-                "own values": (by_its_values(table, of), N // 50),
-                "fresh solves": (of, N // 2500),
+                "own values": (by_its_values(table, contact), N // 50),
+                "fresh solves": (contact, N // 2500),
             }
             if tolerance > FINE:
-                sources["finest table"] = (by_its_values(fine, of), N // 10)
+                sources["finest table"] = (by_its_values(fine, contact), N // 10)
             for source, (truth, n) in sources.items():
                 found: dict[str, list[tuple[Array, Array]]] = {}
                 for _, v, y in beside_every_seam(table, kind, max(40, int(n * share))):

@@ -245,18 +245,18 @@ def many_nodes(table: Table) -> None:
 
 
 def many_cells(table: Table) -> None:
-    for block in table.blocks:
+    for block in table.contacts["spring"].blocks:
         block.cells, block.cell_errors = (1000, 1000), {}
 
 
 def huge_numbers(table: Table) -> None:
-    for block in table.blocks:
+    for block in table.contacts["spring"].blocks:
         block.nodes["mu_ratio"][...] = 1.7e308
         block.nodes["power"][...] = -1.7e308
 
 
 def shuffled(table: Table) -> None:
-    for block in table.blocks:
+    for block in table.contacts["spring"].blocks:
         block.nodes["mu_ratio"] = (
             np.random.default_rng(1).normal(size=block.nodes["mu_ratio"].shape) * 1e100
         )
@@ -269,8 +269,8 @@ def deep(file: h5py.File) -> None:
 
 
 def links(file: h5py.File, link: Any) -> None:
-    del file["border/blocks/corner"]
-    file["border/blocks/corner"] = link
+    del file["border/spring/corner"]
+    file["border/spring/corner"] = link
 
 
 def attribute(name: str, value: Any, group: str = "/") -> Make:
@@ -290,11 +290,11 @@ HOSTILE: dict[str, Make] = {
         lambda file: file.__setitem__("border/again", file["border"])
     ),
     "a group that contains the root": edited(
-        lambda file: file.__setitem__("border/blocks/root", file["/"])
+        lambda file: file.__setitem__("border/spring/root", file["/"])
     ),
     "3,000 nested groups": edited(deep),
     "3,000 groups among the blocks": edited(
-        lambda file: [file.create_group(f"border/blocks/g{i}") for i in range(3000)]
+        lambda file: [file.create_group(f"border/spring/g{i}") for i in range(3000)]
     ),
     "2 GB of zeros in a chunk of 2 GB": variable(
         "mu_ratio", ZEROS, **{**TEN, "maxshape": (None,), "chunks": (2**28,)}
@@ -315,9 +315,9 @@ HOSTILE: dict[str, Make] = {
     ),
     "a grid of another shape": variable("mu_ratio", shape=(3, 3)),
     "a link to another file": edited(
-        lambda file: links(file, h5py.ExternalLink(SMALLEST, "/border/blocks/corner"))
+        lambda file: links(file, h5py.ExternalLink(SMALLEST, "/border/spring/corner"))
     ),
-    "a link to itself": edited(lambda file: links(file, h5py.SoftLink("/border/blocks/corner"))),
+    "a link to itself": edited(lambda file: links(file, h5py.SoftLink("/border/spring/corner"))),
     "a variable in place of a group": edited(lambda file: links(file, np.zeros(3))),
     "a type in place of a group": edited(lambda file: links(file, np.dtype("f8"))),
     "60 kB of text in an attribute": edited(
@@ -331,18 +331,23 @@ HOSTILE: dict[str, Make] = {
     "5,000 attributes": edited(
         lambda file: [file.attrs.__setitem__(f"a{i}", i) for i in range(5000)]
     ),
-    "a tolerance that is text": attribute("tolerance", "1e-4"),
-    "a tolerance of three numbers": attribute("tolerance", np.zeros(3)),
-    "a tolerance that is not finite": attribute("tolerance", np.nan),
+    "a tolerance that is text": attribute("tolerance", "1e-4", "border/spring"),
+    "a tolerance of three numbers": attribute("tolerance", np.zeros(3), "border/spring"),
+    "a tolerance that is not finite": attribute("tolerance", np.nan, "border/ball"),
+    "a tolerance of the root that is text": attribute("tolerance", "1e-4"),
     "a checksum of three numbers": attribute("content_sha256", np.zeros(3)),
-    "an error that is text": attribute("verified_max_abs_error", "small"),
+    "an error that is text": attribute("verified_max_abs_error", "small", "border/ball"),
+    "names of errors that are numbers": attribute(
+        "verified_quantities", np.zeros(2), "border/ball"
+    ),
+    "shares of errors that are text": attribute("verified_quantiles", "half", "border/spring"),
     "options that are not JSON": attribute("builder_options", "{"),
     "options nested too deeply": attribute("builder_options", "[" * 60_000),
     "a version of two numbers": attribute("format_version", np.array([3, 3])),
     "cells of a compound type": attribute(
-        "cells", np.zeros(1, [("a", "i4")]), "border/blocks/corner"
+        "cells", np.zeros(1, [("a", "i4")]), "border/spring/corner"
     ),
-    "errors that are complex": attribute("errors", np.zeros(9, complex), "border/blocks/corner"),
+    "errors that are complex": attribute("errors", np.zeros(9, complex), "border/spring/corner"),
     "text that is not UTF-8": attribute("title", np.bytes_(b"\xff\xfe")),
     "20,000 nodes, checksum right": signed(many_nodes),
     "12 million cells, checksum right": signed(many_cells),
@@ -353,7 +358,7 @@ HOSTILE: dict[str, Make] = {
         lambda table: setattr(table, "y_tilde", table.y_tilde * 1e300)
     ),
     "errors of 1e308, checksum right": signed(
-        lambda table: table.blocks[0].errors["mu_ratio"].fill(1e308)
+        lambda table: table.contacts["spring"].blocks[0].errors["mu_ratio"].fill(1e308)
     ),
 }
 #: a table with other numbers and a matching checksum is a different table; any answer is allowed

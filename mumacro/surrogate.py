@@ -37,8 +37,7 @@ from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
 from mumacro.table.bundled import bundled_table, bundled_tables
-from mumacro.table.netcdf import BALL as BALL_ATTRIBUTES
-from mumacro.table.netcdf import error_distribution, json_attributes, parse_table, read_image
+from mumacro.table.netcdf import json_attributes, parse_table, read_image
 
 _RATIO = SCALAR_KERNEL.ratio
 _FLOAT = np.dtype(np.float64)
@@ -71,10 +70,12 @@ class Surrogate:
         self.path = Path(path)
         self.table = table
         self.attributes = json_attributes(table)
-        self.tolerance = float(table.attributes["tolerance"])
+        #: of one spring, see :attr:`Table.contacts` for others
+        self.tolerance = table.contacts["spring"].tolerance
         self.checksum = str(table.attributes.get("content_sha256", ""))
-        self.max_abs_error = float(table.attributes.get("verified_max_abs_error", math.nan))
-        self.max_rel_error = float(table.attributes.get("verified_max_rel_error", math.nan))
+        stated = table.contacts["spring"].attributes
+        self.max_abs_error = float(stated.get("verified_max_abs_error", math.nan))
+        self.max_rel_error = float(stated.get("verified_max_rel_error", math.nan))
         #: the table as the kernel reads it
         self.tabulated = Tabulated(table, self.path, threads)
         self.border = self.tabulated.border
@@ -192,9 +193,10 @@ class Surrogate:
 
     @property
     def blocks(self) -> list[dict[str, object]]:
-        """JSON-able description of the blocks."""
+        """JSON-able description of the blocks of every contact."""
         return [
             {
+                "contact": contact.name,
                 "name": chart.name,
                 "regime": atlas.REGIMES[chart.regime],
                 "coordinates": [chart.a.name, chart.b.name],
@@ -206,30 +208,21 @@ class Surrogate:
                 "verified_max_rel_error": block.max_rel_error,
                 "errors": {name: block.errors[name].tolist() for name in self.table.quantities},
             }
-            for chart, block in zip(atlas.CHARTS, self.table.blocks, strict=True)
+            for contact in self.table.contacts.values()
+            for chart, block in zip(contact.charts, contact.blocks, strict=True)
         ]
 
     @property
     def error_distribution(self) -> dict[str, dict[str, float]]:
-        """Of the verified errors of every quantity: those that shares of the points do not exceed,
-        "0.5" to "1", and bound over error, ``least``, ``median`` and ``largest``; empty for a
-        table that does not state them.
+        """Of the verified errors of every quantity of one spring: those that shares of the points
+        do not exceed, "0.5" to "1", and bound over error, ``least``, ``median`` and ``largest``.
+        Of a ball: ``table.contacts["ball"].error_distribution``.
 
         >>> errors = Surrogate.open(1e-7).error_distribution["mu_ratio"]
         >>> errors["0.5"] < errors["0.95"] < errors["0.99"] < errors["1"] < 1e-7
         True
         """
-        return error_distribution(self.table)
-
-    @property
-    def ball_tolerance(self) -> float:
-        """The tolerance of mu~ of a ball that is shaken across [-]."""
-        return float(self.table.attributes[f"{BALL_ATTRIBUTES}tolerance"])
-
-    @property
-    def ball_error_distribution(self) -> dict[str, dict[str, float]]:
-        """The same of a ball that is shaken across, without the border."""
-        return error_distribution(self.table, BALL_ATTRIBUTES)
+        return self.table.contacts["spring"].error_distribution
 
     @property
     def memory(self) -> int:

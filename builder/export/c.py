@@ -6,7 +6,7 @@ other packages this module needs only what the library itself needs.
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import mumacro
@@ -14,9 +14,8 @@ from mumacro.contacts.quadrature import driven_rule
 from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas
-from mumacro.table.atlas import Chart
 from mumacro.table.atomic import write_whole
-from mumacro.table.blocks import Block, Table
+from mumacro.table.blocks import Table, TabulatedContact
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.version import __version__
 
@@ -127,39 +126,27 @@ def table_text(table: Table, linkage: str) -> str:
     border, pieces = border_cells(table.border)
     arrays: dict[str, Array] = {"border": border, "pieces": pieces, "outer": outer_cells()}
     arrays["rule_driven"] = driven_rule()
-    spring = _contact_text("", table, table.blocks, atlas.CHARTS, arrays)
-    ball = _contact_text("ball_", table, table.ball, atlas.BALL_CHARTS, arrays)
-    attributes = table.attributes
-    text = f'{float(attributes["tolerance"])!r}, "{attributes["content_sha256"]}", "{__version__}"'
-    definition = (
-        f"{linkage}const mumacro_export mumacro_table = {{\n    {spring},\n    {ball},\n"
-        f"    {text}}};\n\n"
-    )
+    contacts = [_contact_text(contact, table, arrays) for contact in table.contacts.values()]
+    checksum, tolerance = table.attributes["content_sha256"], table.contacts["spring"].tolerance
+    members = ",\n    ".join([*contacts, f'{tolerance!r}, "{checksum}", "{__version__}"'])
+    definition = f"{linkage}const mumacro_export mumacro_table = {{\n    {members}}};\n\n"
     return (
         "".join(_array(f"mumacro_table_{name}", array) for name, array in arrays.items())
         + definition
     )
 
 
-def _contact_text(
-    prefix: str,
-    table: Table,
-    blocks: Sequence[Block],
-    charts: Sequence[Chart],
-    arrays: dict[str, Array],
-) -> str:
-    """The initializer of one contact's ``mumacro_data``, whose arrays are added; no cells where the
-    table does not have it."""
-    arrays[f"{prefix}blocks"] = block_rows(blocks, charts)
-    shared = _names("", ("border", "pieces"))
-    own, outer = _names(prefix, ("blocks",)), _names("", ("outer",))
-    rows = [f"{len(arrays['border'])}, {shared}, {own}, {outer}"]
+def _contact_text(contact: TabulatedContact, table: Table, arrays: dict[str, Array]) -> str:
+    """The initializer of one contact's ``mumacro_data``, whose arrays are added."""
+    blocks = f"{contact.name}_blocks"
+    arrays[blocks] = block_rows(contact)
+    rows = [f"{len(arrays['border'])}, {_names('', ('border', 'pieces', blocks, 'outer'))}"]
     quantities = []
     for code, name in enumerate(atlas.QUANTITY_NAMES):
-        if name not in table.quantities or not blocks:
+        if name not in table.quantities:
             quantities.append("{0, 0, NULL, NULL, NULL}")
             continue
-        polynomials, errors, cell_errors = quantity_cells(blocks, code, charts)
+        polynomials, errors, cell_errors = quantity_cells(contact, code)
         # the stick fraction is zero in continuous sliding
         first = int(polynomials.any(axis=(1, 2)).argmax())
         parts = {
@@ -167,8 +154,9 @@ def _contact_text(
             "errors": errors,
             "cell_errors": cell_errors[first:],
         }
-        arrays |= {f"{prefix}{name}_{part}": array for part, array in parts.items()}
-        names = _names(f"{prefix}{name}_", parts)
+        prefix = f"{contact.name}_{name}_"
+        arrays |= {f"{prefix}{part}": array for part, array in parts.items()}
+        names = _names(prefix, parts)
         quantities.append(f"{{{first}, {len(polynomials) - first}, {names}}}")
     rows.append("{" + ",\n      ".join(quantities) + "}")
     rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")

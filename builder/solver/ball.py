@@ -72,7 +72,7 @@ class Springs:
             raise TableError(fine.path, reason)
         self.fine, self._data = fine, fine.tabulated.data()
         self._cells = [
-            np.ascontiguousarray(quantity_cells(fine.table.blocks, code)[0])
+            np.ascontiguousarray(quantity_cells(fine.table.contacts["spring"], code)[0])
             for code in range(len(atlas.QUANTITIES))
         ]
 
@@ -86,17 +86,17 @@ class Springs:
         at = np.flatnonzero(block == CORNER)
         a[at], b[at] = _corner(v[at], eta[at])
         out = {name: np.zeros(v.size) for name in NAMES}
-        rows = self._data.blocks
+        rows, charts = self._data.blocks, atlas.CHARTS["spring"]
         for index in np.unique(block):
             at = np.flatnonzero(block == index)
             vs, ys = v[at], y[at]
-            if index >= len(atlas.CHARTS):
+            if index >= len(charts):
                 for name in atlas.QUANTITY_NAMES:
                     out[name][at] = self.fine.quantity(name, vs, ys)[0]
                 out["deficit"][at] = _fast_deficit(vs, ys)
                 continue
             for code, quantity in enumerate(atlas.QUANTITIES):
-                if not atlas.CHARTS[index].holds(quantity):
+                if not charts[index].holds(quantity):
                     continue
                 base, factor = kernels[-1].forms(code, int(index), vs, ys, eta[at])
                 q = np.empty(at.size)

@@ -31,7 +31,7 @@ NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more
 
 
 def solve_nodes(
-    of: SolvedContact, index: int, shape: tuple[int, int], border: Border
+    contact: SolvedContact, index: int, shape: tuple[int, int], border: Border
 ) -> tuple[Array, Array, dict[str, Array], dict[str, Array]]:
     """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from
     fresh solves.
@@ -40,13 +40,13 @@ def solve_nodes(
     keep their digits, but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to
     0.
     """
-    chart, tabulated, cancelled = of.charts[index], {}, {}
+    chart, tabulated, cancelled = contact.charts[index], {}, {}
     a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
     v, y, eta = chart.point(a[:, None], b[None, :], border)
-    solved = of.solve(v, y, eta, continuous=chart.regime == CONTINUOUS)
+    solved = contact.solve(v, y, eta, continuous=chart.regime == CONTINUOUS)
     for code, quantity in enumerate(QUANTITIES):
         if chart.holds(quantity):
-            base, factor = kernels[-1].forms(code, index, v, y, eta, of.kind.contact)
+            base, factor = kernels[-1].forms(code, index, v, y, eta, contact.kind.contact)
             rest, complement = solved[quantity.name] - base, SOLVED[quantity.name].complement
             if complement:  # next to 1 it has the digits
                 rest = np.where(base == 1.0, -solved[complement], rest)
@@ -54,7 +54,7 @@ def solve_nodes(
             if chart.a.name in _LOGARITHMIC and quantity.name == "mu_ratio":
                 rest, exact = _small_rest(chart, v, y, solved), np.full(v.shape, True)
             tabulated[quantity.name] = rest / factor
-            noise = of.noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
+            noise = contact.noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
             cancelled[quantity.name] = np.where(exact, 0.0, noise / np.abs(factor))
     return a, b, tabulated, cancelled
 
@@ -116,11 +116,11 @@ def _position(axis: Axis, x: Array) -> Array:
 
 def _block_cells(chart: Chart, values: Array, axis: int, bound: float) -> int:
     """:func:`_fewest` along one axis of a block, on lines that cover the other."""
-    own, lines = (chart.a, chart.b)[axis], np.cos(np.linspace(0.0, np.pi, LINES))
+    along, lines = (chart.a, chart.b)[axis], np.cos(np.linspace(0.0, np.pi, LINES))
     c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
     across = c @ interpolation_matrix(values.shape[1 - axis], lines).T
     return _fewest(
-        own, lambda x: interpolation_matrix(len(c), _position(own, x)) @ across, bound, False
+        along, lambda x: interpolation_matrix(len(c), _position(along, x)) @ across, bound, False
     )
 
 
@@ -158,7 +158,7 @@ def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
 
 
 def build_block(
-    of: SolvedContact,
+    contact: SolvedContact,
     index: int,
     border: Border,
     tolerance: float,
@@ -166,14 +166,14 @@ def build_block(
 ) -> Block:
     """Solve nodes until the Chebyshev tail in both directions is below SHARE * tolerance, then cut
     the cells."""
-    chart = of.charts[index]
+    chart = contact.charts[index]
     bound = max(SHARE * tolerance, NODE_FLOOR)
     tail_block = chart.a.name == "inverse_y"
     na, nb = 3 if tail_block else 8, 8
     best, stuck = [math.inf, math.inf], [0, 0]
     while True:
         progress(f"{chart.name} {na} x {nb}")
-        a, b, tabulated, _ = solve_nodes(of, index, (na, nb), border)
+        a, b, tabulated, _ = solve_nodes(contact, index, (na, nb), border)
         values = tabulated["mu_ratio"]
         tails = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):

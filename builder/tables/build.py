@@ -12,9 +12,9 @@ import numpy as np
 
 from mumacro import MumacroError, Surrogate
 from mumacro.kernel.arrays import Array
-from mumacro.table.atlas import BALL_CHARTS, CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
-from mumacro.table.blocks import Block, Table
-from mumacro.table.netcdf import BALL, read_table, write_table
+from mumacro.table.atlas import CHARTS, QUANTITY_NAMES
+from mumacro.table.blocks import Block, Table, TabulatedContact
+from mumacro.table.netcdf import read_table, write_table
 from mumacro.table.polynomials import Border
 from mumacro.version import __version__
 
@@ -23,8 +23,8 @@ from ..solver.sweep import Sweep
 from .blocks import build_block, build_border
 from .contacts import FINE, SolvedContact, ball, spring
 from .measure import block_errors, border_errors
-from .quantities import ABS_TO_REL, SOLVED
-from .verify import QUANTILES, holds, uncovered, verify, verify_ball
+from .quantities import ABS_TO_REL
+from .verify import QUANTILES, holds, uncovered, verify
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
 SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
@@ -36,8 +36,6 @@ BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 SPRING_POINTS = 2000  # fresh solves that the springs of a ball are compared with
 ATTEMPTS = 4
-#: the least tolerance of a ball, whatever that of its table: beside the ridge the ring misses 1e-11
-BALL_TOLERANCE = 1e-10
 #: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to
 #: rounding
 STEPS = 256
@@ -92,14 +90,13 @@ def round_block(block: Block, tolerance: float) -> Block:
 # --- the table ------------------------------------------------------------------------------------
 
 
+Progress = Callable[[str, bool], None]
+
+
 def stages() -> int:
-    """The least number of calls of ``progress``, one for each finished stage."""
-    return 1 + len(CHARTS) + 3 + ball_stages()
-
-
-def ball_stages() -> int:
-    """The same of :func:`add_ball`."""
-    return 1 + len(BALL_CHARTS) + 2
+    """How many stages a build has, each of which calls ``progress`` when it is done."""
+    of_contacts = sum(len(charts) + len(("errors", "fresh solves")) for charts in CHARTS.values())
+    return len(("border", "plain grid")) + of_contacts
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
@@ -128,7 +125,7 @@ def build_table(
     out: Path,
     tolerance: float,
     sweep: Sweep,
-    progress: Callable[[str, bool], None] = lambda _text, _done: None,
+    progress: Progress = lambda _text, _done: None,
 ) -> Surrogate:
     """Build the table for ``tolerance`` (largest absolute error of mu~), verify it and write it to
     ``out``.
@@ -139,87 +136,100 @@ def build_table(
     Raises
     ------
     BuildError
-        When the verified error does not come below the tolerance.
+        When the verified error of a contact does not come below its tolerance.
     """
     border = Border(pieces := build_border(sweep, tolerance))
     largest = float(border_errors(border, sweep, np.random.default_rng(23), 600).max())
     for piece in pieces:
         piece.max_rel_error = SAFETY * largest
     progress("border", True)
-    targets, one = [tolerance] * len(CHARTS), spring(sweep)
-
-    def build(i: int) -> Block:
-        return round_block(
-            build_block(one, i, border, targets[i], lambda text: progress(text, False)),
-            targets[i],
-        )
-
-    blocks: list[Block] = []
-    for i, chart in enumerate(CHARTS):
-        blocks.append(build(i))
-        progress(chart.name, True)
-    grid = plain_grid(sweep, tolerance)
+    table = Table(pieces, {}, **plain_grid(sweep, tolerance))
     progress("plain grid", True)
-    table = Table(pieces, blocks, **grid)
-    table.attributes = {"tolerance": tolerance, "quantities": " ".join(QUANTITY_NAMES)}
-    _meet_tolerance(table, out, one, tolerance, targets, build)
-    progress("errors of the blocks", True)
-    return _finish(table, out, targets, sweep, progress)
+    table.attributes = {"quantities": " ".join(QUANTITY_NAMES)}
+    targets = {name: add_contact(table, out, name, tolerance, sweep, progress) for name in CHARTS}
+    table.attributes = {
+        "title": "Macroscopic friction coefficient under transverse oscillation",
+        "summary": "mu_macro/mu0 of a contact dragged at constant speed and shaken across, as a "
+        "function of the dimensionless speed and amplitude; plain grid for reading, border-fitted "
+        "Chebyshev blocks for evaluation",
+        "history": f"mumacro {__version__}: python -m builder build --tolerance {tolerance:g}",
+        "source": "full stick-slip model, steady cycle by root-finding on half a period",
+        "references": REFERENCE,
+        "license": "Apache-2.0",
+        "product_version": __version__,
+        "Conventions": "CF-1.11",
+        "quantities": " ".join(table.quantities),
+        "n_solves": np.int32(sweep.n_solves),
+        "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),
+    }
+    write_table(table, out)
+    return Surrogate.open(out)
 
 
-def add_ball(
-    table: Table,
-    out: Path,
-    sweep: Sweep,
-    progress: Callable[[str, bool], None] = lambda _text, _done: None,
-) -> Table:
-    """The table with a ball of its tolerance, but not below :data:`BALL_TOLERANCE`, verified; its
-    springs are the same.
+def add_contact(
+    table: Table, out: Path, name: str, tolerance: float, sweep: Sweep, progress: Progress
+) -> list[float]:
+    """Build the blocks of a contact into the table and verify them; the tolerances that they were
+    built for.
 
-    A ball is integrated over springs of the tolerance :data:`.contacts.FINE`, see
-    :func:`springs_for`.
+    The contacts are built in the order of ``atlas.CHARTS``: the springs that a ball is integrated
+    over may be those of the table.
 
     Raises
     ------
     BuildError
         When the verified error does not come below the tolerance.
     """
-    tolerance = max(float(table.attributes["tolerance"]), BALL_TOLERANCE)
-    of = ball(springs_for(table, sweep), tolerance, sweep.workers)
-    progress("springs of the ball", True)
-    border, targets = Border(table.border), [tolerance] * len(BALL_CHARTS)
+    contact = SOLVED_BY[name](table, tolerance, sweep)
+    tolerance = max(tolerance, contact.least_tolerance)
+    entry = TabulatedContact(name, [], {"tolerance": tolerance})
+    border, targets = Border(table.border), [tolerance] * len(entry.charts)
 
     def build(i: int) -> Block:
         return round_block(
-            build_block(of, i, border, targets[i], lambda text: progress(f"ball {text}", False)),
+            build_block(
+                contact, i, border, targets[i], lambda text: progress(f"{name} {text}", False)
+            ),
             targets[i],
         )
 
-    blocks: list[Block] = []
-    for i, chart in enumerate(BALL_CHARTS):
-        blocks.append(build(i))
-        progress(f"ball {chart.name}", True)
-    table = of.with_blocks(table, blocks)
-    _meet_tolerance(table, out, of, tolerance, targets, build)
-    progress("errors of the ball", True)
-    report = verify_ball(Surrogate(table, out), of, FINAL_POINTS)
-    progress("fresh balls", True)
+    for i, chart in enumerate(entry.charts):
+        entry.blocks.append(build(i))
+        progress(f"{name} {chart.name}", True)
+    table.contacts[name] = entry
+    for attempt in range(ATTEMPTS):
+        late = _state_errors(Surrogate(table, out), contact, attempt)
+        if not late or attempt == ATTEMPTS - 1:
+            break
+        for i in late:
+            targets[i] /= 3.0
+            entry.blocks[i] = build(i)
+    progress(f"{name}: errors", True)
+    report = verify(Surrogate(table, out), contact, FINAL_POINTS)
+    progress(f"{name}: fresh solves", True)
     if not holds(report, tolerance):
         raise _missed(report, tolerance)
-    stated = verified_attributes(report, table.quantities)
-    table.attributes = (
-        table.attributes
-        | {f"{BALL}tolerance": tolerance}
-        | {f"{BALL}{name}": x for name, x in stated.items()}
-    )
-    return table
+    entry.attributes |= verified_attributes(report)
+    return targets
 
 
-def springs_for(table: Table, sweep: Sweep) -> Springs:
+def _ball_for(table: Table, tolerance: float, sweep: Sweep) -> SolvedContact:
+    return ball(springs_for(table, sweep.workers), tolerance, sweep.workers)
+
+
+#: by contact: what solves it for a table, whose earlier contacts are built
+SOLVED_BY: dict[str, Callable[[Table, float, Sweep], SolvedContact]] = {
+    "spring": lambda _table, _tolerance, sweep: spring(sweep),
+    "ball": _ball_for,
+}
+
+
+def springs_for(table: Table, workers: int) -> Springs:
     """The springs that a ball is integrated over: those of ``table`` where its tolerance is
     :data:`.contacts.FINE`, else those of the bundled table of that tolerance.
 
-    They are compared with fresh solves first: the solver may have changed since they were built.
+    They are compared with fresh solves first, on ``workers`` threads: the solver may have changed
+    since they were built.
 
     Raises
     ------
@@ -231,11 +241,13 @@ def springs_for(table: Table, sweep: Sweep) -> Springs:
         f"first: python -m builder build --tolerance {FINE:g} --out tables/mumacro-{FINE:g}.nc"
     )
     try:
-        own = float(table.attributes["tolerance"]) <= FINE
-        fine = Surrogate(table, "this table") if own else Surrogate.open(FINE)
+        is_fine = table.contacts["spring"].tolerance <= FINE
+        fine = Surrogate(table, "this table") if is_fine else Surrogate.open(FINE)
     except MumacroError as error:
         raise BuildError(f"{error}; {remedy}") from error
-    if not holds(verify(fine, sweep, SPRING_POINTS), FINE):
+    with Sweep(workers) as sweep:  # its solves are not those of the build
+        report = verify(fine, spring(sweep), SPRING_POINTS)
+    if not holds(report, FINE):
         raise BuildError(f"{fine.path} is not what the solver gives now; {remedy}")
     return Springs(fine)
 
@@ -249,38 +261,18 @@ def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
     )
 
 
-def _meet_tolerance(
-    table: Table,
-    out: Path,
-    of: SolvedContact,
-    tolerance: float,
-    targets: list[float],
-    build: Callable[[int], Block],
-) -> None:
-    """State the errors of a contact's blocks; those that miss the tolerance are built again, for a
-    third of their target, at most :data:`ATTEMPTS` times in all."""
-    for attempt in range(ATTEMPTS):
-        late = _state_errors(table, out, of, attempt, tolerance)
-        if not late or attempt == ATTEMPTS - 1:
-            return
-        for i in late:
-            targets[i] /= 3.0
-            of.blocks(table)[i] = build(i)
-
-
-def _state_errors(
-    table: Table, out: Path, of: SolvedContact, seed: int, tolerance: float
-) -> list[int]:
-    """Measure the errors of the blocks and write them into the table; the blocks that miss its
-    tolerance."""
-    late = []
-    for i, measured in enumerate(block_errors(Surrogate(table, out), of, BLOCK_POINTS, seed)):
-        block = of.blocks(table)[i]
+def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> list[int]:
+    """Measure the errors of the blocks of a contact and write them into the table; the blocks that
+    miss its tolerance."""
+    late, entry = [], contact.of(surrogate)
+    tolerance = entry.tolerance
+    for i, measured in enumerate(block_errors(surrogate, contact, BLOCK_POINTS, seed)):
+        block = entry.blocks[i]
         for name, value in measured.values.items():
             slopes = np.zeros(2)
             if name in measured.cells:
                 errors = CELL_SAFETY * measured.cells[name]
-                if name not in of.sloped:
+                if name not in contact.sloped:
                     # they bound values: a rough quadrature can make the finer interpolant worse
                     # than the table, and some points of cells are in another block
                     errors[:, 0] = np.minimum(errors[:, 0], SAFETY * value)
@@ -293,27 +285,15 @@ def _state_errors(
     return late
 
 
-def _verified(quantity: Quantity, report: dict[str, Any]) -> tuple[str, float]:
-    """Name and value of the attribute that states the verified error of a quantity."""
-    if SOLVED[quantity.name].relative:
-        return f"verified_max_rel_{quantity.variable}_error", report["max_rel_error"]
-    return f"verified_max_{quantity.variable}_error", report["max_abs_error"]
-
-
-def verified_attributes(report: dict[str, Any], quantities: list[str]) -> dict[str, Any]:
-    """The attributes that state what a report of :func:`.verify.verify` found."""
+def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:
+    """The attributes of a contact that state what a report of :func:`.verify.verify` found."""
     spread = report["distribution"]
+    # few and flat: each attribute costs about a hundred bytes, and HDF5 keeps more than eight of a
+    # group in a structure of its own, of several kilobytes
     return {
         "verified_max_abs_error": report["max_abs_error"],
         "verified_max_rel_error": report["max_rel_error"],
-        **dict(
-            _verified(quantity, report[quantity.name])
-            for quantity in QUANTITIES[1:]
-            if quantity.name in quantities
-        ),
-        "verified_max_slope_error": report["slopes"]["mu_ratio"]["max_abs_error"],
         "verified_points": np.int32(report["points"]),
-        # few and flat: each attribute costs about a hundred bytes
         "verified_quantiles": np.array(QUANTILES),
         "verified_quantities": " ".join(spread),
         "verified_error_quantiles": np.concatenate(
@@ -325,47 +305,10 @@ def verified_attributes(report: dict[str, Any], quantities: list[str]) -> dict[s
     }
 
 
-def write_verified(path: Path, report: dict[str, Any]) -> None:
-    """Put what a report of :func:`.verify.verify` found into the attributes of a table file; no
-    other number of it changes."""
+def write_verified(path: Path, reports: dict[str, dict[str, Any]]) -> None:
+    """Put what reports of :func:`.verify.verify` found, by contact, into the attributes of a table
+    file; no other number of it changes."""
     table = read_table(path)
-    table.attributes |= verified_attributes(report, table.quantities)
-    stated = verified_attributes(report["ball"], table.quantities)
-    table.attributes |= {f"{BALL}{name}": x for name, x in stated.items()}
+    for name, report in reports.items():
+        table.contacts[name].attributes |= verified_attributes(report)
     write_table(table, path)
-
-
-def _finish(
-    table: Table,
-    out: Path,
-    targets: list[float],
-    sweep: Sweep,
-    progress: Callable[[str, bool], None],
-) -> Surrogate:
-    """Verify the table on fresh solves, write it to ``out`` with its provenance, and open it."""
-    tolerance = float(table.attributes["tolerance"])
-    surrogate = Surrogate(table, out)
-    report = verify(surrogate, sweep, FINAL_POINTS)
-    progress("fresh solves", True)
-    if not holds(report, tolerance):
-        raise _missed(report, tolerance)
-    table.attributes = {
-        "title": "Macroscopic friction coefficient under transverse oscillation",
-        "summary": "mu_macro/mu0 of a contact dragged at constant speed and shaken across, as a "
-        "function of the dimensionless speed and amplitude; plain grid for reading, border-fitted "
-        "Chebyshev blocks for evaluation",
-        "history": f"mumacro {__version__}: python -m builder build --tolerance {tolerance:g}",
-        "source": "full stick-slip model, steady cycle by root-finding on half a period",
-        "references": REFERENCE,
-        "license": "Apache-2.0",
-        "product_version": __version__,
-        "Conventions": "CF-1.11",
-        "tolerance": tolerance,
-        "quantities": " ".join(table.quantities),
-        **verified_attributes(report, table.quantities),
-        "n_solves": np.int32(sweep.n_solves),
-        "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),
-    }
-    table = add_ball(table, out, sweep, progress)
-    write_table(table, out)
-    return Surrogate.open(out)

@@ -1,30 +1,32 @@
 """A contact as the builder sees it: its charts, its solver, and what that may be wrong by.
 
-``v`` and ``y`` are those of the charts everywhere: v~ and y~ of one spring; of a ball v~/1.5 and
-y~/1.5, those of its middle spring.
+What differs from contact to contact is data of a :class:`SolvedContact`; whoever builds, measures
+or verifies asks for no name.  ``v`` and ``y`` are those of the charts everywhere: v~ and y~ of one
+spring; of a ball v~/1.5 and y~/1.5, those of its middle spring.
 """
 
-import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL, SPRING, Kind
-from mumacro.kernel import threads as shared_out
+from mumacro.inputs.kind import BALL, CONTACTS, SPRING, SPRINGS_OF, Kind
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import MIDDLE, Chart
-from mumacro.table.blocks import Block, Table
+from mumacro.table.atlas import Chart
+from mumacro.table.blocks import TabulatedContact
 
 from ..solver.ball import Ball, Springs, points_for
 from ..solver.sweep import Sweep
+from .draws import DRAWS, Draws
 from .quantities import Sliding, solver_noise
 
 #: tolerance of the springs that a ball is integrated over, whatever that of its table
 FINE = 1e-12
+#: the least tolerance of a ball: beside the ridge the ring misses 1e-11
+BALL_TOLERANCE = 1e-10
 #: what a quadrature over such springs may be wrong by: of mu~ and of the stick fraction, absolute
 #: and relative; of the power, relative
 BALL_NOISE = 4e-14
@@ -48,30 +50,44 @@ class SolvedContact(NamedTuple):
     """One contact; ``noise`` as :func:`.quantities.solver_noise`."""
 
     kind: Kind
-    charts: Sequence[Chart]
     solve: Solve
     noise: Noise
     #: the part of it that bounds allow for beside the errors that a table states
     allowed: Noise
     #: quantities whose slopes a table gives
     sloped: tuple[str, ...]
-    #: times those of the charts: v~ and y~ of the contact as a whole
-    scale: float
+    #: whether it is integrated over springs: the error of a quadrature is no rounding of the nodes,
+    #: and its mu~ has its digits in 1 - mu~ where it is next to 1
+    quadrature: bool
+    #: tables of a smaller tolerance have the contact with this one
+    least_tolerance: float
+    #: what solves v~crit, where verification of this contact covers the stored border, too
+    border: Sweep | None = None
 
-    def blocks(self, table: Table) -> list[Block]:
-        """Its blocks in a table."""
-        return table.ball if self.kind == BALL else table.blocks
+    @property
+    def name(self) -> str:
+        """The name of its entry in a table."""
+        return CONTACTS[self.kind.contact]
 
-    def with_blocks(self, table: Table, blocks: list[Block]) -> Table:
-        """The table with other blocks of this contact."""
-        if self.kind == BALL:
-            return dataclasses.replace(table, ball=blocks)
-        return dataclasses.replace(table, blocks=blocks)
+    @property
+    def charts(self) -> tuple[Chart, ...]:
+        """The geometry of its blocks."""
+        return atlas.CHARTS[self.name]
+
+    @property
+    def draws(self) -> Draws:
+        """Where it is tried."""
+        return draws_of(self.kind)
+
+    def of(self, surrogate: Surrogate) -> TabulatedContact:
+        """Its entry in a table."""
+        return surrogate.table.contacts[self.name]
 
     def as_asked(self, v: Array, y: Array) -> tuple[Array, Array]:
         """The groups that evaluation makes of those of the contact as a whole, to the last digit,
         which counts in the corner."""
-        return self.scale * v / self.scale, self.scale * y / self.scale
+        scale = scale_of(self.kind)
+        return scale * v / scale, scale * y / scale
 
     def places(self, surrogate: Surrogate, v: Array, y: Array) -> Codes:
         """The blocks of points (n,), their number where a closed form answers."""
@@ -80,26 +96,34 @@ class SolvedContact(NamedTuple):
 
     def quantity(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Any:
         """Value, bound and source of a table."""
-        return surrogate.quantity(name, self.scale * v, self.scale * y, **self.kind.names)
+        scale = scale_of(self.kind)
+        return surrogate.quantity(name, scale * v, scale * y, **self.kind.names)
 
     def slopes(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Array:
         """Value, slopes and their bounds, rows (5, n)."""
         return slopes_of(surrogate, self.kind, name, v, y)
 
 
+def scale_of(kind: Kind) -> float:
+    """v~ and y~ of a contact over those of its charts."""
+    return SPRINGS_OF[CONTACTS[kind.contact]].middle_load
+
+
+def draws_of(kind: Kind) -> Draws:
+    """Where a contact is tried."""
+    return DRAWS[CONTACTS[kind.contact]]
+
+
 def ratio_of(surrogate: Surrogate, kind: Kind, v: Array, y: Array) -> Array:
     """mu~ of a table at points of the charts' groups."""
-    if kind == SPRING:
-        return np.asarray(surrogate.mu_ratio(v, y))
-    return np.asarray(surrogate.quantity("mu_ratio", MIDDLE * v, MIDDLE * y, **kind.names)[0])
+    scale = scale_of(kind)
+    return np.asarray(surrogate.quantity("mu_ratio", scale * v, scale * y, **kind.names)[0])
 
 
 def slopes_of(surrogate: Surrogate, kind: Kind, name: str, v: Array, y: Array) -> Array:
     """Value, slopes and their bounds there, rows (5, n)."""
-    if kind == SPRING:
-        return np.array(surrogate.slopes(v, y, name, bounds=True))
-    code, data = atlas.QUANTITY_NAMES.index(name), surrogate.tabulated.data(name, kind)
-    return np.array(shared_out.slopes(code, data, MIDDLE * v, MIDDLE * y, None, kind.contact))
+    scale = scale_of(kind)
+    return np.array(surrogate.tabulated.slopes(name, scale * v, scale * y, kind))
 
 
 def spring(sweep: Sweep) -> SolvedContact:
@@ -111,7 +135,14 @@ def spring(sweep: Sweep) -> SolvedContact:
         return sweep.solve("continuous" if continuous else "full", v, y, eta)
 
     return SolvedContact(
-        SPRING, atlas.CHARTS, solve, solver_noise, solver_noise, atlas.QUANTITY_NAMES, 1.0
+        SPRING,
+        solve,
+        noise=solver_noise,
+        allowed=solver_noise,
+        sloped=atlas.QUANTITY_NAMES,
+        quadrature=False,
+        least_tolerance=FINE,
+        border=sweep,
     )
 
 
@@ -127,12 +158,12 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> SolvedC
 
     return SolvedContact(
         BALL,
-        atlas.BALL_CHARTS,
         solve,
-        _ball_noise,
-        _no_noise,
-        ("mu_ratio",),
-        MIDDLE,
+        noise=_ball_noise,
+        allowed=_no_noise,
+        sloped=("mu_ratio",),
+        quadrature=True,
+        least_tolerance=BALL_TOLERANCE,
     )
 
 

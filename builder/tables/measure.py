@@ -17,16 +17,12 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
-from mumacro.table import atlas
 from mumacro.table.atlas import (
     CONTINUOUS,
     QUANTITIES,
     QUANTITY_NAMES,
-    STEEPEST,
-    STEEPEST_Y,
     Axis,
     Chart,
 )
@@ -59,60 +55,6 @@ class BlockErrors(NamedTuple):
     cells: dict[str, Array]
 
 
-def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
-    """``n`` random numbers from ``low`` to ``high``, uniform in their logarithm, (n,)."""
-    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
-
-
-def fast_from(s: Surrogate, y: Array) -> Array:
-    """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
-    below = atlas.RHO_MAX * s.v_tilde_crit(y)
-    return np.asarray(np.where(y <= atlas.Y_TAIL, below, atlas.FAST_KAPPA * np.sqrt(y)))
-
-
-SEAMS = (atlas.Y_STICK_LO, atlas.Y_CONT, atlas.Y_MID, atlas.Y_HIGH, atlas.Y_TAIL)
-
-
-def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
-    """Points (v~, y~) beside the lines where two blocks or a block and a tail meet."""
-    y, v = log_uniform(rng, 1e-3, 1e6, n), log_uniform(rng, 1e-6, 1e4, n)
-    off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
-    which = rng.integers(0, 4, n)
-    y = np.where(which < 2, rng.choice(SEAMS, n) * off, y)
-    cut, fast = which == 2, which == 3
-    y[cut] = rng.uniform(atlas.Y_STICK_LO, atlas.Y_STICK_HI, int(cut.sum()))
-    v[cut] = s.v_tilde_crit(y[cut]) * atlas.SIGMA_CUT**2 * off[cut]
-    y[fast] = log_uniform(rng, atlas.Y_CONT, 1e6, int(fast.sum()))
-    v[fast] = fast_from(s, y[fast]) * off[fast]
-    return v, y
-
-
-BALL_SEAMS = (atlas.Y_STICK_LO, STEEPEST_Y, atlas.Y_MID, atlas.Y_HIGH, atlas.Y_TAIL)
-
-
-def near_ball_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
-    """The same of a ball: v~ and y~ of its middle spring."""
-    y, v = log_uniform(rng, 1e-3, 1e6, n), log_uniform(rng, 1e-6, 1e4, n)
-    off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
-    which = rng.integers(0, 8, n)
-    y = np.where(which < 2, rng.choice(BALL_SEAMS, n) * off, y)
-    cut, fast, ray, slow, border, ridge = (which == i for i in range(2, 8))
-    y[cut] = rng.uniform(atlas.Y_STICK_LO, STEEPEST_Y, int(cut.sum()))
-    v[cut] = s.v_tilde_crit(y[cut]) * atlas.SIGMA_CUT**2 * off[cut]
-    y[fast] = log_uniform(rng, STEEPEST_Y, 1e6, int(fast.sum()))
-    v[fast] = atlas.RHO_MAX * s.v_tilde_crit(y[fast]) * off[fast]
-    y[ray] = log_uniform(rng, 1e-6, STEEPEST_Y, int(ray.sum()))
-    v[ray] = STEEPEST * y[ray] * off[ray]
-    y[slow] = log_uniform(rng, 1e-3, STEEPEST_Y, int(slow.sum()))
-    v[slow] = atlas.SLOW * off[slow]
-    v[border] = s.v_tilde_crit(y[border]) * off[border]
-    # the ridge, where the steepest ray touches the border
-    other = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 0.2, n)
-    y[ridge] = STEEPEST_Y * other[ridge]
-    v[ridge] = atlas.SLOW * (1.0 + rng.uniform(-2.0, 2.0, n) * (other - 1.0))[ridge]
-    return v, y
-
-
 def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int) -> Array:
     """Relative errors of v~crit on ``n`` fresh solves, (n,)."""
     y = 10.0 ** rng.uniform(-4.0, 6.0, n)
@@ -120,13 +62,15 @@ def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int
     return np.asarray(np.abs(border(y) / exact - 1.0))
 
 
-def _stating(surrogate: Surrogate, of: SolvedContact, error: float, of_border: float) -> Surrogate:
+def _stating(
+    surrogate: Surrogate, contact: SolvedContact, error: float, of_border: float
+) -> Surrogate:
     """The same table with one error for all that it tabulates, and a share of the border's.
 
     With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the
     table's error.
     """
-    table, replace = surrogate.table, dataclasses.replace
+    table, entry, replace = surrogate.table, contact.of(surrogate), dataclasses.replace
     border = [
         replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border
     ]
@@ -137,55 +81,66 @@ def _stating(surrogate: Surrogate, of: SolvedContact, error: float, of_border: f
             errors=dict.fromkeys(table.quantities, one),
             cell_errors=dict.fromkeys(block.nodes, np.tile(one, (math.prod(block.cells), 1))),
         )
-        for block in of.blocks(table)
+        for block in entry.blocks
     ]
+    contacts = table.contacts | {entry.name: replace(entry, blocks=blocks)}
     return Surrogate(
-        of.with_blocks(replace(table, border=border), blocks), surrogate.path, surrogate.threads
+        replace(table, border=border, contacts=contacts), surrogate.path, surrogate.threads
     )
 
 
-def block_errors(surrogate: Surrogate, of: SolvedContact, n: int, seed: int) -> list[BlockErrors]:
+def block_errors(
+    surrogate: Surrogate, contact: SolvedContact, n: int, seed: int
+) -> list[BlockErrors]:
     """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
     neighbour."""
-    stating = tuple(_stating(surrogate, of, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
+    stating = tuple(
+        _stating(surrogate, contact, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0))
+    )
     errors_of_blocks = []
-    for index, block in enumerate(of.blocks(surrogate.table)):
+    for index, block in enumerate(contact.of(surrogate).blocks):
         errors = _value_errors(
-            surrogate, stating, of, index, np.random.default_rng([seed, index]), n
+            surrogate, stating, contact, index, np.random.default_rng([seed, index]), n
         )
-        _, _, *exact = solve_nodes(of, index, finer((block.a.size, block.b.size)), surrogate.border)
-        errors_of_blocks.append(BlockErrors(*errors, cell_errors(of, index, block, *exact)))
+        _, _, *exact = solve_nodes(
+            contact, index, finer((block.a.size, block.b.size)), surrogate.border
+        )
+        errors_of_blocks.append(BlockErrors(*errors, cell_errors(contact, index, block, *exact)))
     return errors_of_blocks
 
 
 def _value_errors(
     surrogate: Surrogate,
     stating: tuple[Surrogate, ...],
-    of: SolvedContact,
+    contact: SolvedContact,
     index: int,
     rng: np.random.Generator,
     n: int,
 ) -> tuple[dict[str, float], float, float]:
     """Of what is tabulated by quantity; absolute and relative of mu~."""
-    chart = of.charts[index]
+    chart = contact.charts[index]
     v, y, _ = chart.point(_crowded(rng, chart.a, n), _crowded(rng, chart.b, n), surrogate.border)
-    v_seam, y_seam = (near_ball_seams if of.kind == BALL else near_seams)(rng, 2 * n, surrogate)
-    v, y = of.as_asked(np.concatenate([v, v_seam]), np.concatenate([y, y_seam]))
-    here = of.places(surrogate, v, y) == index
+    v_seam, y_seam = contact.draws.near_seams(rng, 2 * n, surrogate)
+    v, y = contact.as_asked(np.concatenate([v, v_seam]), np.concatenate([y, y_seam]))
+    here = contact.places(surrogate, v, y) == index
     v, y = v[here], y[here]
-    mu = of.quantity(surrogate, "mu_ratio", v, y)[0]
-    solved = of.solve(v, y)
+    mu = contact.quantity(surrogate, "mu_ratio", v, y)[0]
+    solved = contact.solve(v, y)
     error = np.abs(mu - solved["mu_ratio"])
     errors = {}
-    for name in of.blocks(surrogate.table)[index].nodes:
-        value, *_ = of.quantity(surrogate, name, v, y)
+    for name in contact.of(surrogate).blocks[index].nodes:
+        value, *_ = contact.quantity(surrogate, name, v, y)
         truth, complement = solved[name], SOLVED[name].complement
-        if of.kind == BALL and complement:  # next to 1 it has the digits
+        if contact.quadrature and complement:
             truth = np.where(truth > 0.5, 1.0 - solved[complement], truth)
-        scale, beside, rounding = (of.quantity(table, name, v, y)[1] for table in stating)
+        scale, beside, rounding = (contact.quantity(table, name, v, y)[1] for table in stating)
         # what the bound allows anyway: half of rounding, and what the border's error does, of which
         # it states twice
-        noise = of.allowed(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
+        noise = (
+            contact.allowed(name, v, y, solved, chart.regime == CONTINUOUS)
+            + beside
+            - 0.5 * rounding
+        )
         errors[name] = float((np.maximum(np.abs(value - truth) - noise, 0.0) / scale).max())
     return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
 
@@ -254,8 +209,8 @@ def _difference(
         _Along(axis, n, m)
         for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
     )
-    own = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
-    tabulated = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
+    cells = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
+    tabulated = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, cells, b.powers, optimize=True)
     return tabulated - (a.follow @ exact @ b.follow.T).reshape(tabulated.shape), a, b
 
 
@@ -299,7 +254,11 @@ def _without_edge(off: Array, b: _Along, axis: Axis, cells: int) -> None:
 
 
 def cell_errors(
-    of: SolvedContact, index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]
+    contact: SolvedContact,
+    index: int,
+    block: Block,
+    exact: dict[str, Array],
+    noise: dict[str, Array],
 ) -> dict[str, Array]:
     """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and
     along b; of a quantity whose slopes a table does not give, 0 for the derivatives.
@@ -310,24 +269,24 @@ def cell_errors(
     errors: dict[str, Array] = {}
     for name in QUANTITY_NAMES:
         if name in block.nodes:
-            for coefficients in _truths(of, exact[name], noise[name]):
-                largest = _largest(of, index, block, name, coefficients)
+            for coefficients in _truths(contact, exact[name], noise[name]):
+                largest = _largest(contact, index, block, name, coefficients)
                 errors[name] = np.maximum(errors.get(name, 0.0), largest)
-            if name not in of.sloped:
+            if name not in contact.sloped:
                 errors[name][:, 1:] = 0.0
     return errors
 
 
-def _truths(of: SolvedContact, exact: Array, noise: Array) -> list[Array]:
-    """Chebyshev coefficients of the model: without what may be rounding; of a ball also all of
-    them, since its quadrature's error is no rounding of the nodes."""
+def _truths(contact: SolvedContact, exact: Array, noise: Array) -> list[Array]:
+    """Chebyshev coefficients of the model: without what may be rounding; of a quadrature also all
+    of them, since its error is no rounding of the nodes."""
     clean = _without_noise(exact, noise)
-    return [clean, chebyshev_coefficients(exact)] if of.kind == BALL else [clean]
+    return [clean, chebyshev_coefficients(exact)] if contact.quadrature else [clean]
 
 
-def _largest(of: SolvedContact, index: int, block: Block, name: str, exact: Array) -> Array:
+def _largest(contact: SolvedContact, index: int, block: Block, name: str, exact: Array) -> Array:
     """A quantity's largest errors over every cell, (cells, 3)."""
-    chart, quantity = of.charts[index], QUANTITIES[QUANTITY_NAMES.index(name)]
+    chart, quantity = contact.charts[index], QUANTITIES[QUANTITY_NAMES.index(name)]
     off, a, b = _difference(chart, block, block.nodes[name], exact)
     along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)
     along_b = np.einsum("jrq,ipjq->ipjr", b.to_derivative, off)

@@ -1,30 +1,26 @@
 """The table against fresh solves: error off the nodes, coverage of every bound, seams, monotony."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.inputs.kind import SPRING, Kind
 from mumacro.kernel.arrays import Array
-from mumacro.table import atlas
 from mumacro.table.atlas import (
     CONTINUOUS,
     QUANTITIES,
     QUANTITY_NAMES,
     REGIME_OF_SOURCE,
     SOURCES,
-    STEEPEST,
-    STEEPEST_Y,
 )
 
 from ..solver.sweep import Sweep
-from .contacts import SolvedContact, ratio_of, slopes_of, spring
-from .measure import BALL_SEAMS, SEAMS, border_errors, fast_from, near_ball_seams, near_seams
-from .measure import log_uniform as _log
+from .contacts import SolvedContact, draws_of, ratio_of, slopes_of
+from .draws import log_uniform
+from .measure import border_errors
 from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE
 
 # of v~crit: nearer, slopes of what is not smooth at the border are not compared
@@ -43,118 +39,12 @@ BORDER_POINTS = 2000  # fresh solves of v~crit
 QUANTILES = (0.5, 0.95, 0.99, 1.0)
 
 
-def _corner(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
-    radius, psi = _log(rng, 1e-6, 1.3, n), rng.uniform(0.0, 0.5 * math.pi, n)
-    phi, s0 = radius * np.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * np.cos(psi)
-    return phi * s0 * s0 / (2.0 * math.pi), 1.0 + 0.25 * s0 * s0 - 0.5 * phi * phi
-
-
-def _border(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
-    y = _log(rng, 1e-4, 1e6, n)
-    return s.v_tilde_crit(y) * (1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 0.1, n)), y
-
-
-def _tails(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
-    """Large amplitude at every speed, large speed at every amplitude, small amplitude."""
-    which = rng.integers(0, 3, n)
-    v, y = _log(rng, 1e-6, 1e8, n), _log(rng, 1e5, 1e12, n)
-    v = np.where(which == 1, _log(rng, 1e3, 1e8, n), v)
-    y = np.where(which == 1, _log(rng, 1e-3, 1e8, n), y)
-    return v, np.where(which == 2, _log(rng, 1e-9, 1e-3, n), y)
-
-
-_How = Callable[[np.random.Generator, int, Surrogate], tuple[Array, Array]]
-#: kind of case -> share of the points, how they are drawn
-CASES: dict[str, tuple[float, _How]] = {
-    "random": (0.30, lambda rng, n, _: (_log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n))),
-    "wide": (0.20, lambda rng, n, _: (_log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n))),
-    "border": (0.12, _border),
-    "corner": (0.12, lambda rng, n, _: _corner(rng, n)),
-    "seams": (0.10, near_seams),
-    "creep": (0.08, lambda rng, n, _: (_log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n))),
-    "tails": (0.08, lambda rng, n, _: _tails(rng, n)),
-}
-
-
-def _ring(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
-    """Between the steepest ray and the border, and beside both, below and above the ridge where
-    they meet."""
-    y = np.where(rng.random(n) < 0.5, _log(rng, 1e-6, STEEPEST_Y, n), _log(rng, 1.0, 1.7, n))
-    crit, top = s.v_tilde_crit(y), STEEPEST * y
-    within = crit * (top / crit) ** rng.random(n)
-    off = 1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 0.1, n)
-    which = rng.integers(0, 3, n)
-    return np.where(which == 0, within, np.where(which == 1, crit, top) * off), y
-
-
-#: the same of a ball: v~ and y~ of its middle spring
-BALL_CASES: dict[str, tuple[float, _How]] = {
-    **{name: (share, how) for name, (share, how) in CASES.items() if name != "seams"},
-    "random": (0.22, CASES["random"][1]),
-    "ring": (0.08, _ring),
-    "seams": (0.10, near_ball_seams),
-}
-
-
-def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
-    """``n`` points (v~, y~) of one kind of :data:`CASES`."""
-    return CASES[case][1](np.random.default_rng(seed), n, surrogate)
-
-
-#: factors to either side of a line
-SIDES = (1 - 1e-13, 1 + 1e-13)
-
-
-def _common_sides(
-    surrogate: Surrogate, rng: np.random.Generator, n: int, seams: Sequence[float], end: float
-) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of
-    the corner up to y = ``end``."""
-    low, high = SIDES
-    for seam in seams:
-        v = _log(rng, 1e-9, 1e5, n)
-        yield v, v, np.full(n, seam * low), np.full(n, seam * high)
-    y = _log(rng, 1e-3, 1e7, n)
-    yield (v := surrogate.v_tilde_crit(y)) * low, v * high, y, y
-    y = rng.uniform(atlas.Y_STICK_LO, end, n)
-    yield (v := surrogate.v_tilde_crit(y) * atlas.SIGMA_CUT**2) * low, v * high, y, y
-
-
-def _both_sides(
-    surrogate: Surrogate, n: int, seed: int
-) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Those of one spring, and of the edge of its closed form."""
-    rng, (low, high) = np.random.default_rng(seed), SIDES
-    yield from _common_sides(surrogate, rng, n, SEAMS, atlas.Y_STICK_HI)
-    y = _log(rng, atlas.Y_CONT, 1e8, n)
-    yield (v := fast_from(surrogate, y)) * low, v * high, y, y
-
-
-def _both_sides_of_ball(
-    surrogate: Surrogate, n: int, seed: int
-) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Those of a ball, and of its steepest ray."""
-    rng, (low, high) = np.random.default_rng(seed), SIDES
-    yield from _common_sides(surrogate, rng, n, BALL_SEAMS, STEEPEST_Y)
-    y = _log(rng, 1e-6, STEEPEST_Y, n)
-    yield (v := STEEPEST * y) * low, v * high, y, y
-    yield (v := np.full(n, atlas.SLOW)) * low, v * high, y, y
-    y = _log(rng, STEEPEST_Y, 1e8, n)
-    yield (v := atlas.RHO_MAX * surrogate.v_tilde_crit(y)) * low, v * high, y, y
-
-
-def _sides(
-    surrogate: Surrogate, n: int, seed: int, kind: Kind
-) -> Iterator[tuple[Array, Array, Array, Array]]:
-    return (_both_sides_of_ball if kind == BALL else _both_sides)(surrogate, n, seed)
-
-
 def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING) -> float:
     """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13
     apart."""
     sides = (
         (ratio_of(surrogate, kind, v1, y1), ratio_of(surrogate, kind, v2, y2))
-        for v1, v2, y1, y2 in _sides(surrogate, n, seed, kind)
+        for v1, v2, y1, y2 in draws_of(kind).sides(surrogate, n, seed)
     )
     return max(float((np.abs(one - two) / np.maximum(one, two)).max()) for one, two in sides)
 
@@ -166,7 +56,7 @@ def seam_slope_jumps(
     continuous, too."""
     sides = (
         [slopes_of(surrogate, kind, "mu_ratio", v, y)[1:3] for v, y in ((v1, y1), (v2, y2))]
-        for v1, v2, y1, y2 in _sides(surrogate, n, seed, kind)
+        for v1, v2, y1, y2 in draws_of(kind).sides(surrogate, n, seed)
     )
     return max(float(np.abs(one - two).max()) for one, two in sides)
 
@@ -177,7 +67,7 @@ def monotony(
     """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across
     all seams [-]."""
     rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
-    for fixed in _log(np.random.default_rng(seed), 1e-4, 1e6, lines):
+    for fixed in log_uniform(np.random.default_rng(seed), 1e-4, 1e6, lines):
         line = np.full(n, fixed)
         along_v, along_y = (
             ratio_of(surrogate, kind, v, y) for v, y in ((rise, line), (line, rise))
@@ -192,13 +82,10 @@ class Neighbours:
     A step is a share of the distance to what is not smooth: border and corner.
     """
 
-    def __init__(self, surrogate: Surrogate, of: SolvedContact, v: Array, y: Array) -> None:
+    def __init__(self, surrogate: Surrogate, contact: SolvedContact, v: Array, y: Array) -> None:
         self.v, self.y, self.crit, mu = v, y, surrogate.v_tilde_crit(y), surrogate.mu_ratio(v, y)
-        self.noise = of.noise
-        gap = np.abs(np.log(v / self.crit))
-        if of.kind == BALL:
-            ray = np.where(y < 1.1 * STEEPEST_Y, np.abs(np.log(v / (STEEPEST * y))), np.inf)
-            gap = np.minimum(gap, ray)
+        self.noise = contact.noise
+        gap = np.minimum(np.abs(np.log(v / self.crit)), contact.draws.off_steps(v, y))
         stiff = np.maximum(mu * mu, np.abs(1.0 - y * y))
         self.steps = (
             np.minimum(_STEP, gap / 32.0),
@@ -209,8 +96,8 @@ class Neighbours:
             for x, step in zip((v, y), self.steps, strict=True)
         )
         self.solved = (
-            of.solve(around_v, y[:, None]),
-            of.solve(v[:, None], around_y),
+            contact.solve(around_v, y[:, None]),
+            contact.solve(v[:, None], around_y),
         )
 
     def slopes(self, name: str) -> tuple[Array, Array]:
@@ -250,11 +137,16 @@ def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
 
 
 def _values(
-    surrogate: Surrogate, of: SolvedContact, name: str, v: Array, y: Array, solved: dict[str, Array]
+    surrogate: Surrogate,
+    contact: SolvedContact,
+    name: str,
+    v: Array,
+    y: Array,
+    solved: dict[str, Array],
 ) -> _Compared:
-    value, bound, source = of.quantity(surrogate, name, v, y)
+    value, bound, source = contact.quantity(surrogate, name, v, y)
     truth = solved[name]
-    noise = of.noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
+    noise = contact.noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
     error = np.abs(value - truth)
     missed, over = error > bound + noise, bound_over_error(bound, noise, error)
     if name != "mu_ratio":
@@ -263,11 +155,13 @@ def _values(
     return _Compared(error, error / scale, bound, over, missed, source)
 
 
-def _slopes(surrogate: Surrogate, of: SolvedContact, around: Neighbours, name: str) -> _Compared:
+def _slopes(
+    surrogate: Surrogate, contact: SolvedContact, around: Neighbours, name: str
+) -> _Compared:
     """The logarithmic slopes, both of each point."""
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
-    source = of.quantity(surrogate, "mu_ratio", v, y)[2]
-    _, along_v, along_y, *bounds = of.slopes(surrogate, name, v, y)
+    source = contact.quantity(surrogate, "mu_ratio", v, y)[2]
+    _, along_v, along_y, *bounds = contact.slopes(surrogate, name, v, y)
     difference, bound = np.abs(np.stack((along_v, along_y)) - truth), np.stack(bounds)
     off, over = np.maximum(difference - noise, 0.0), bound_over_error(bound, noise, difference)
     # at the border of one that is not smooth there, the last digits of v~crit decide
@@ -326,7 +220,7 @@ def _distributions(
         columns[name] = np.concatenate(error), np.concatenate(over)
     if border is not None:
         columns["border"] = border.relative, border.over
-    return {name: distribution(*both) for name, both in columns.items()}
+    return {name: distribution(error, over) for name, (error, over) in columns.items()}
 
 
 def _border_compared(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Compared:
@@ -370,8 +264,10 @@ def holds(report: dict[str, Any], tolerance: float) -> bool:
     return errors and not any(uncovered(report).values())
 
 
-def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
-    """Compare the springs of a table with ``points`` fresh solves drawn as in :data:`CASES`.
+def verify(
+    surrogate: Surrogate, contact: SolvedContact, points: int, seed: int = 2018
+) -> dict[str, Any]:
+    """Compare a contact of a table with ``points`` fresh solves, drawn as its draws say.
 
     Returns
     -------
@@ -380,41 +276,27 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         (values whose error exceeds their bound), and the same by kind of case in ``cases`` and by
         block or closed form in ``sources``; ``seam_jump``, ``seam_slope_jump``, ``monotony``.  By
         name the same of each other quantity, beyond the solver's own error, and in ``slopes`` of
-        the slopes of each along ln v~ and ln y~, absolute, of one point in twenty; in ``border`` of
-        v~crit, relative.  ``distribution``: errors at :data:`QUANTILES` and bounds over errors.
+        the slopes of each along ln v~ and ln y~, absolute, of one point in twenty; of a contact
+        that solves the border, in ``border`` of v~crit, relative.  ``distribution``: errors at
+        :data:`QUANTILES` and bounds over errors.
     """
-    border = _border_compared(surrogate, sweep, np.random.default_rng([seed, len(CASES)]))
-    return _verify(surrogate, spring(sweep), CASES, points, seed, border)
-
-
-def verify_ball(
-    surrogate: Surrogate, of: SolvedContact, points: int, seed: int = 2018
-) -> dict[str, Any]:
-    """The same of a ball with fresh quadratures, drawn as in :data:`BALL_CASES`; no border."""
-    return _verify(surrogate, of, BALL_CASES, points, seed, None)
-
-
-def _verify(
-    surrogate: Surrogate,
-    of: SolvedContact,
-    cases: dict[str, tuple[float, _How]],
-    points: int,
-    seed: int,
-    border: _Compared | None,
-) -> dict[str, Any]:
-    names = surrogate.table.quantities
-    sloped = [name for name in names if name in of.sloped]
+    names, cases = surrogate.table.quantities, contact.draws.cases
+    border = None
+    if contact.border is not None:
+        rng = np.random.default_rng([seed, len(cases)])
+        border = _border_compared(surrogate, contact.border, rng)
+    sloped = [name for name in names if name in contact.sloped]
     values: dict[str, list[_Compared]] = {name: [] for name in names}
     slopes: dict[str, list[_Compared]] = {name: [] for name in sloped}
-    for i, (share, how) in enumerate(cases.values()):
-        v, y = how(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
-        v, y = of.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
-        solved = of.solve(v, y)
-        around = Neighbours(surrogate, of, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
+    for i, (share, draw) in enumerate(cases.values()):
+        v, y = draw(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
+        v, y = contact.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
+        solved = contact.solve(v, y)
+        around = Neighbours(surrogate, contact, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
         for name in names:
-            values[name].append(_values(surrogate, of, name, v, y, solved))
+            values[name].append(_values(surrogate, contact, name, v, y, solved))
         for name in sloped:
-            slopes[name].append(_slopes(surrogate, of, around, name))
+            slopes[name].append(_slopes(surrogate, contact, around, name))
     return {
         **_report(values["mu_ratio"]),
         "cases": {
@@ -424,7 +306,7 @@ def _verify(
         "slopes": {name: _report(parts) for name, parts in slopes.items()},
         **({} if border is None else {"border": _summary(border)}),
         "distribution": _distributions(values, slopes["mu_ratio"], border),
-        "seam_jump": seam_jumps(surrogate, kind=of.kind),
-        "seam_slope_jump": seam_slope_jumps(surrogate, kind=of.kind),
-        "monotony": monotony(surrogate, kind=of.kind),
+        "seam_jump": seam_jumps(surrogate, kind=contact.kind),
+        "seam_slope_jump": seam_slope_jumps(surrogate, kind=contact.kind),
+        "monotony": monotony(surrogate, kind=contact.kind),
     }

@@ -27,7 +27,7 @@ def piece_rule(nodes: int) -> Array:
 
 
 def driven_rule() -> Array:
-    """The rule of oscillation along, (nodes, 5): as :func:`points`, and three null rules on the
+    """The rule of oscillation along, (nodes, 5): as :func:`piece_rule`, and three null rules on the
     same nodes.
 
     A null rule gives the coefficient of one Legendre polynomial in the integrand, of degree nodes -
@@ -40,7 +40,7 @@ def driven_rule() -> Array:
     return np.ascontiguousarray(np.concatenate([piece_rule(DRIVEN_NODES), nulls], axis=1))
 
 
-def put_driven(data: Data) -> None:
-    """Give the kernel its rule, once."""
+def prepare_driven(data: Data) -> None:
+    """Give the kernel the rule of oscillation along, once."""
     if not data.pointer.driven.nodes:
-        data.put_driven(driven_rule())
+        data.add_driven_rule(driven_rule())

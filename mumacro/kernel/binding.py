@@ -210,7 +210,9 @@ class Data:
         )
         self.pointer.border_cells = self.border.shape[0]
 
-    def put(self, quantity: int, polynomials: Array, errors: Array, cell_errors: Array) -> None:
+    def add_quantity(
+        self, quantity: int, polynomials: Array, errors: Array, cell_errors: Array
+    ) -> None:
         """Add the cells of a quantity, see :attr:`quantities`."""
         place = self.pointer.quantities[quantity]
         place.cells = polynomials.shape[0]
@@ -220,7 +222,7 @@ class Data:
             self._keep(place, "cell_errors", cell_errors),
         )
 
-    def put_driven(self, points: Array) -> None:
+    def add_driven_rule(self, points: Array) -> None:
         """Add the rule of a ball that is shaken along, see ``mumacro_driven_rule``."""
         self._keep(self.pointer.driven, "points", points)
         self.pointer.driven.nodes = points.shape[0]

@@ -100,7 +100,7 @@ typedef struct {
 
 /* A table as the export writes it: mumacro_table. */
 typedef struct {
-    mumacro_data data, ball; /* without cells where the table has no ball */
+    mumacro_data spring, ball;
     double tolerance;
     const char *checksum, *version;
 } mumacro_export;

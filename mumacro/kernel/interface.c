@@ -1,6 +1,6 @@
 /* The functions of mumacro.h, of the table mumacro_table. */
 
-static const mumacro_data *const MU_TABLE = &mumacro_table.data;
+static const mumacro_data *const MU_TABLE = &mumacro_table.spring;
 
 /* What a contact is read from: along and normal there are closed forms, which need a rule at
  * most. */

@@ -1,5 +1,5 @@
-/* mumacro.h: macroscopic friction of a contact that is oscillated
- * transversely to its sliding direction.
+/* mumacro.h: macroscopic friction of a contact that slides and is shaken
+ * across or along its way, or whose normal force oscillates.
  *
  *     #include "mumacro.h"
  *     mumacro_answer a;

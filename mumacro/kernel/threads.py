@@ -16,9 +16,9 @@ from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
 
 SLICE = 16_384  # points of a slice, whose arrays stay in the second-level cache
-FEW = 65_536  # points that one thread evaluates before a second one has started
+ONE_THREAD = 65_536  # points that one thread evaluates before a second one has started
 # the time of a ball that is shaken along, about, divided by that of a spring that is shaken across
-COST = 64
+ALONG_COST = 64
 # the time of a case with an interval of k, about, divided by that of a case with one k
 INTERVAL = 64
 _KERNEL = kernels[-1]
@@ -27,7 +27,7 @@ _KERNEL = kernels[-1]
 def _cost(kind: tuple[int, int]) -> int:
     """The time of a point of a kind, about, divided by that of a spring that is shaken across."""
     contact, direction = kind
-    return COST if direction else 1 + contact
+    return ALONG_COST if direction else 1 + contact
 
 
 @functools.cache
@@ -68,7 +68,7 @@ def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: 
         work(slice(0, n))
         return
     parts = [slice(low, min(low + length, n)) for low in range(0, n, length)]
-    workers = 1 if n < FEW // cost else threads or default_threads()
+    workers = 1 if n < ONE_THREAD // cost else threads or default_threads()
     if workers == 1:
         for part in parts:
             work(part)
@@ -100,8 +100,10 @@ def values(
     return value, bound, source
 
 
-def alone(quantity: int, data: Data, v: Array, y: Array, threads: int | None) -> Array:
-    """A quantity at (n,) points without its bound; NaN where illegal."""
+def values_without_bounds(
+    quantity: int, data: Data, v: Array, y: Array, threads: int | None
+) -> Array:
+    """A quantity of one spring at (n,) points; NaN where illegal."""
     value = np.empty(v.size)
     share_out(
         v.size,

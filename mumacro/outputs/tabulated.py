@@ -13,11 +13,11 @@ from typing import Any, Final, Self
 import numpy as np
 
 from mumacro import closed_forms
-from mumacro.contacts.quadrature import put_driven
+from mumacro.contacts.quadrature import prepare_driven
 from mumacro.errors import TableError
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import BALL, KINDS, SPRING, Kind
-from mumacro.kernel import threads as shared_out
+from mumacro.inputs.kind import CONTACTS, KINDS, SPRING, Kind
+from mumacro.kernel import threads as slices
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
 from mumacro.table import atlas
@@ -38,11 +38,11 @@ class Tabulated:
         self.threads = threads
         self.border = Border(table.border)
         _check_border(table.border, path)
-        self._spring = Data(*self.border.arrays, block_rows(table.blocks), outer_cells())
-        self._spring.put(atlas.MU, *quantity_cells(table.blocks, atlas.MU))
-        self._ball: Data | None = None
+        #: by code of the contact, each with the cells of mu~ at least; cut on first use
+        self._across: dict[int, Data] = {}
+        self._springs = self.data()
         #: of one spring, with the cells of mu~
-        self.pointer = self._spring.pointer
+        self.pointer = self._springs.pointer
 
     def on_one_thread(self) -> Self:
         """The same cells, whose calls start no thread."""
@@ -51,37 +51,41 @@ class Tabulated:
         return other
 
     def data(self, name: str = "mu_ratio", kind: Kind = SPRING) -> Data:
-        """What the kernel reads of a quantity of a kind; its cells are cut on first use."""
-        if kind == BALL:
-            return self._of_ball(CODES[name])
-        data, code = self._spring, CODES[name]
-        if code not in data.quantities:
-            data.put(code, *quantity_cells(self.table.blocks, code))
-        if kind.contact:  # shaken along: a quadrature over springs
-            put_driven(data)
+        """What the kernel reads of a quantity of a kind; its cells are cut on first use.
+
+        A table has cells of every contact that is shaken across; other directions are computed from
+        closed forms of one spring, of a ball by a quadrature over springs.
+        """
+        code = SPRING.contact if kind.direction else kind.contact
+        data = self._across.get(code)
+        if data is None:
+            data = self._across[code] = self._cells_of(code)
+        quantity = CODES[name]
+        if quantity not in data.quantities:
+            contact = self.table.contacts[CONTACTS[code]]
+            data.add_quantity(quantity, *quantity_cells(contact, quantity))
+        if kind.direction and kind.contact:
+            prepare_driven(data)
         return data
 
-    def _of_ball(self, code: int) -> Data:
-        """Of a ball that is shaken across, which has cells of its own."""
-        data = self._ball
-        if data is None:
-            rows = block_rows(self.table.ball, atlas.BALL_CHARTS)
-            data = self._ball = Data(*self.border.arrays, rows, outer_cells())
-        if code not in data.quantities:
-            data.put(code, *quantity_cells(self.table.ball, code, atlas.BALL_CHARTS))
+    def _cells_of(self, code: int) -> Data:
+        """A contact with the cells of mu~."""
+        contact = self.table.contacts[CONTACTS[code]]
+        data = Data(*self.border.arrays, block_rows(contact), outer_cells())
+        data.add_quantity(atlas.MU, *quantity_cells(contact, atlas.MU))
         return data
 
     # --- points (v~, y~) --------------------------------------------------------------------------
 
     def ratios(self, v: Array, y: Array) -> Array:
         """mu~ of one spring across at points (n,), without its bound."""
-        return shared_out.alone(atlas.MU, self._spring, v, y, self.threads)
+        return slices.values_without_bounds(atlas.MU, self._springs, v, y, self.threads)
 
     def values(
         self, name: str, v: Array, y: Array, kind: Kind = SPRING
     ) -> tuple[Array, Array, Codes]:
         """A quantity at points (n,), its bound, and the source codes."""
-        return shared_out.values(CODES[name], self.data(name, kind), v, y, self.threads, kind)
+        return slices.values(CODES[name], self.data(name, kind), v, y, self.threads, kind)
 
     def value(self, name: str, v: float, y: float, kind: Kind = SPRING) -> tuple[float, float, int]:
         """The same at one point."""
@@ -90,13 +94,13 @@ class Tabulated:
             return float(value[0]), float(bound[0]), int(source[0])
         return SCALAR_KERNEL.value(self.data(name, kind), CODES[name], v, y, kind.contact)
 
-    def slopes(self, name: str, v: Array, y: Array) -> SlopeRows:
-        """A quantity of one spring across at points (n,), with its slopes and their bounds."""
-        return shared_out.slopes(CODES[name], self.data(name), v, y, self.threads)
+    def slopes(self, name: str, v: Array, y: Array, kind: Kind = SPRING) -> SlopeRows:
+        """A quantity across at points (n,), with its slopes and their bounds."""
+        return slices.slopes(CODES[name], self.data(name, kind), v, y, self.threads, kind.contact)
 
     def crit(self, y: Array, kind: Kind = SPRING) -> Array:
         """v~crit at amplitudes (n,)."""
-        return _KERNEL.border(self._spring, y, kind)
+        return _KERNEL.border(self._springs, y, kind)
 
     def certain(self, v_tilde: Any, y_tilde: Any, kind: Kind | Codes = SPRING) -> Bools:
         """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~
@@ -119,14 +123,14 @@ class Tabulated:
 
     def one(self, six: Sequence[Any], gradient: bool = False, contact: int = 0) -> Any:
         """One case across in plain numbers: a ``mumacro_case``, see ``kernel/data.h``."""
-        pointer = self.data("mu_ratio", BALL).pointer if contact else self.pointer
-        return SCALAR_KERNEL.one(pointer, six, gradient, contact)
+        data = self._across.get(contact) or self.data(kind=Kind(contact, SPRING.direction))
+        return SCALAR_KERNEL.one(data.pointer, six, gradient, contact)
 
     def rows(self, cases: Cases, detail: Detail = "values") -> CaseRows:
         """Answers to cases of one kind, in their shape, (1,) for one case."""
         kind, shape = cases.one_kind, cases.shape or (1,)
         six = [*cases.columns.values()]
-        return shared_out.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
+        return slices.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
 
     def extremes(self, cases: Cases) -> ExtremeRows:
         """Extremes of mu_macro over intervals of k, (n,) each."""
@@ -134,7 +138,7 @@ class Tabulated:
             raise TypeError("the cases have one k each")
         low, high = cases.ends
         six, kind = [*{**cases.columns, "k": low}.values()], cases.one_kind
-        return shared_out.intervals(self.data(kind=kind), six, high, self.threads, kind)
+        return slices.intervals(self.data(kind=kind), six, high, self.threads, kind)
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:

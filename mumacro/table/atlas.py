@@ -1,7 +1,7 @@
 """The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of each.
 
-The list of blocks, of pieces of the border and of quantities is in ``kernel/atlas.c``,
-``kernel/ball_atlas.c`` and ``kernel/records.c``; this module reads it.  What a table file calls a
+The lists of blocks, of pieces of the border and of quantities are in ``kernel/atlas.c``,
+``kernel/ball_atlas.c`` and ``kernel/records.c``; this module reads them.  What a table file calls a
 coordinate is defined here, with both ways between a chart and (v~, y~).
 
 Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the
@@ -233,13 +233,14 @@ def _charts(listed: Any, count: int) -> tuple[Chart, ...]:
     )
 
 
-#: a block's place in this list is the source code of its values
-CHARTS = _charts(_ATLAS.chart, _ATLAS.charts)
-#: the blocks of a ball, of v~/1.5 and y~/1.5
-BALL_CHARTS = _charts(_ATLAS.ball_chart, _ATLAS.ball_charts)
-#: by code of the contact
-CHARTS_OF = (CHARTS, BALL_CHARTS)
-BLOCK_NAMES = tuple(chart.name for chart in CHARTS)
+#: the blocks of each contact that is shaken across, in the order of the kernel's codes of contacts;
+#: those of a ball are over v~/1.5 and y~/1.5
+CHARTS: dict[str, tuple[Chart, ...]] = {
+    "spring": _charts(_ATLAS.chart, _ATLAS.charts),
+    "ball": _charts(_ATLAS.ball_chart, _ATLAS.ball_charts),
+}
+#: a spring's; a block's place in this list is the source code of its values
+BLOCK_NAMES = tuple(chart.name for chart in CHARTS["spring"])
 #: v~crit in pieces: name, coordinate, what its nodes hold
 BORDER_PIECES = tuple(
     (_text(p.name), _axis(p.axis), _text(p.tabulated))

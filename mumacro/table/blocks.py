@@ -1,4 +1,4 @@
-"""The content of a table: the pieces of the border, the blocks, and a plain grid for people.
+"""The content of a table: the border's pieces, the blocks of each contact, and a plain grid.
 
 Nodes and errors as a table file stores them; ``netcdf.py`` reads and writes them,
 ``polynomials.py`` turns nodes into cells for evaluation.
@@ -49,21 +49,59 @@ class Block:
     max_rel_error: float = 0.0
 
 
+#: the statistics of bound over error in the attribute ``verified_bound_over_error``
+RATIOS = ("least", "median", "largest")
+
+
+@dataclass
+class TabulatedContact:
+    """One contact of a table: its blocks, and what the table states of them."""
+
+    name: str  #: as in ``atlas.CHARTS``
+    blocks: list[Block]  #: in the order of the charts
+    #: the tolerance of mu~ and what verification found, ``docs/table-format.md`` has the list
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def charts(self) -> tuple[atlas.Chart, ...]:
+        """The geometry of the blocks."""
+        return atlas.CHARTS[self.name]
+
+    @property
+    def tolerance(self) -> float:
+        """The largest absolute error of mu~ that the build allowed [-]."""
+        return float(self.attributes["tolerance"])
+
+    @property
+    def error_distribution(self) -> dict[str, dict[str, float]]:
+        """By quantity: the error that a share of the verified points does not exceed ("0.5" to
+        "1"), and the :data:`RATIOS` of bound over error."""
+        names = self.attributes["verified_quantities"].split()
+        heads = [f"{share:g}" for share in self.attributes["verified_quantiles"]]
+        errors, ratios = (
+            np.reshape(self.attributes[f"verified_{name}"], (len(names), -1)).tolist()
+            for name in ("error_quantiles", "bound_over_error")
+        )
+        return {
+            name: dict(zip(heads, error, strict=True)) | dict(zip(RATIOS, ratio, strict=True))
+            for name, error, ratio in zip(names, errors, ratios, strict=True)
+        }
+
+
 @dataclass
 class Table:
     """Everything that a table file holds."""
 
     border: list[BorderPiece]
-    blocks: list[Block]
+    #: by name, in the order of ``atlas.CHARTS``; without those that are not built yet
+    contacts: dict[str, TabulatedContact]
     v_tilde: Array
     y_tilde: Array
     mu_ratio: Array
     stick_fraction: Array
     error_estimate: Array
     v_tilde_crit: Array
-    attributes: dict[str, Any] = field(default_factory=dict)
-    #: the blocks of a ball in the order of ``atlas.BALL_CHARTS``; none before they are built
-    ball: list[Block] = field(default_factory=list)
+    attributes: dict[str, Any] = field(default_factory=dict)  #: of the root
 
     @property
     def quantities(self) -> list[str]:

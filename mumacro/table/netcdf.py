@@ -1,10 +1,9 @@
-"""The table file, format 5: netCDF-4 with CF-1.11 conventions; written atomically, checked on
+"""The table file, format 1: netCDF-4 with CF-1.11 conventions; written atomically, checked on
 reading.
 
 docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
-the blocks inside, those of a ball in ``border/ball``. The netCDF library writes, and is not
-thread-safe: a lock is held while it works.
-For reading see ``mumacro.table.hdf5``.
+the blocks of each contact inside, in a group with the contact's name.  The netCDF library writes,
+and is not thread-safe: a lock is held while it works.  For reading see ``mumacro.table.hdf5``.
 """
 
 import hashlib
@@ -20,10 +19,18 @@ from mumacro.errors import TableError
 from mumacro.kernel.arrays import Array
 from mumacro.table import atlas, hdf5
 from mumacro.table.atomic import write_whole
-from mumacro.table.blocks import BY_NAME, Block, BorderPiece, Table, names_in
+from mumacro.table.blocks import (
+    BY_NAME,
+    RATIOS,
+    Block,
+    BorderPiece,
+    Table,
+    TabulatedContact,
+    names_in,
+)
 from mumacro.table.polynomials import nodes
 
-FORMAT_VERSION = 5
+FORMAT_VERSION = 1
 # More is refused before memory is taken; of the largest table that the builder makes:
 MOST_BYTES = 16 * 2**20  # of a file: 425 kB
 MOST_NUMBERS = 200_000  # of a variable: 14,641
@@ -50,18 +57,10 @@ _PLAIN = {
         ("y_tilde",),
     ),
 }
-BALL = "ball_"  # before the names of attributes at the root that tell of a ball
-#: the statistics of bound over error in the attribute ``verified_bound_over_error``
-RATIOS = ("least", "median", "largest")
-#: of every contact; others may be missing
+#: what every contact states; the root repeats those of one spring, for people
 _STATED = ("tolerance", "verified_max_abs_error", "verified_max_rel_error")
 CELL_AXES = ("quantity", "cell", "derivative")
-FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
-
-
-def _contacts(table: Table) -> list[tuple[Sequence[atlas.Chart], list[Block]]]:
-    """The charts and blocks of every contact."""
-    return [(atlas.CHARTS, table.blocks), (atlas.BALL_CHARTS, table.ball)]
+LEAST_PACKED = 256  # numbers: as few are stored as they are, since a chunk's index takes 2 kB
 
 
 def _digest(table: Table) -> str:
@@ -69,7 +68,7 @@ def _digest(table: Table) -> str:
     tolerance."""
     h = hashlib.sha256()
 
-    def put(*parts: object) -> None:
+    def include(*parts: object) -> None:
         for part in parts:
             is_array = isinstance(part, np.ndarray)
             h.update(
@@ -78,15 +77,17 @@ def _digest(table: Table) -> str:
                 else repr(part).encode()
             )
 
-    put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
-    put(*(getattr(table, name) for name in _PLAIN))
+    include("mumacro", FORMAT_VERSION)
+    include(*(getattr(table, name) for name in _PLAIN))
     for geometry, piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
-        put(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
-    for charts, blocks in _contacts(table):
-        for chart, block in zip(charts, blocks, strict=True):
-            put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
-            put(*(block.errors[name] for name in table.quantities), block.a, block.b)
-            put(
+        include(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
+    for contact in table.contacts.values():
+        include(contact.name, contact.tolerance)
+        for chart, block in zip(contact.charts, contact.blocks, strict=True):
+            largest = float(block.max_abs_error), float(block.max_rel_error)
+            include(chart, tuple(block.cells), *largest)
+            include(*(block.errors[name] for name in table.quantities), block.a, block.b)
+            include(
                 *(
                     part[name]
                     for part in (block.nodes, block.cell_errors)
@@ -100,7 +101,7 @@ def _digest(table: Table) -> str:
 # --- writing --------------------------------------------------------------------------------------
 
 
-def _put(
+def _add_variable(
     group: Any,
     name: str,
     data: Array,
@@ -112,13 +113,13 @@ def _put(
     if not axes:
         group.createDimension(name, data.size)
     filters = {"compression": "zlib", "complevel": 9, "shuffle": True, "chunksizes": data.shape}
-    extra = filters if data.size > FEW else {"contiguous": True}
+    extra = filters if data.size > LEAST_PACKED else {"contiguous": True}
     variable = group.createVariable(name, "f8", axes or (name,), fill_value=False, **extra)
     variable.setncatts({"long_name": long_name, "units": "1", **attributes})
     variable[...] = data
 
 
-def _put_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> None:
+def _write_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> None:
     """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and
     a dimension too."""
 
@@ -136,7 +137,7 @@ def _put_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> N
         "errors of what is tabulated, and of its derivatives along both coordinates, in "
         "all cells of all blocks"
     )
-    _put(group, "cell_errors", errors, long_name, CELL_AXES)
+    _add_variable(group, "cell_errors", errors, long_name, CELL_AXES)
 
 
 def _geometry(chart: atlas.Chart) -> dict[str, Any]:
@@ -148,16 +149,16 @@ def _geometry(chart: atlas.Chart) -> dict[str, Any]:
     }
 
 
-def _fill(root: Any, table: Table) -> None:
+def _write(root: Any, table: Table) -> None:
     root.setncatts(table.attributes)
     for name, (long_name, axes) in _PLAIN.items():
         extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
-        _put(root, name, getattr(table, name), long_name, axes, **extra)
+        _add_variable(root, name, getattr(table, name), long_name, axes, **extra)
     border = root.createGroup("border")
     for (name, axis, tabulated), piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
         group = border.createGroup(name)
-        _put(group, axis.name, piece.nodes, atlas.COORDINATES[axis.name])
-        _put(group, "value", piece.values, tabulated, (axis.name,))
+        _add_variable(group, axis.name, piece.nodes, atlas.COORDINATES[axis.name])
+        _add_variable(group, "value", piece.values, tabulated, (axis.name,))
         group.setncatts(
             {
                 "cells": np.int32(piece.cells),
@@ -167,32 +168,26 @@ def _fill(root: Any, table: Table) -> None:
         )
     # inside the border, which they are fitted to: with a second group at the root the CF checker
     # looks for "time"
-    _fill_blocks(border.createGroup("blocks"), table, atlas.CHARTS, table.blocks)
-    if table.ball:
-        _fill_blocks(border.createGroup("ball"), table, atlas.BALL_CHARTS, table.ball)
+    for contact in table.contacts.values():
+        _write_contact(border.createGroup(contact.name), table, contact)
 
 
-def _fill_blocks(
-    group: Any,
-    table: Table,
-    charts: Sequence[atlas.Chart],
-    blocks: list[Block],
-) -> None:
-    """The blocks of a contact, with errors in every cell."""
-    if any(block.cell_errors for block in blocks):
-        _put_cell_errors(group, blocks, table.quantities)
-    for chart, block in zip(charts, blocks, strict=True):
+def _write_contact(group: Any, table: Table, contact: TabulatedContact) -> None:
+    """The blocks of a contact with the errors in every cell, and what is stated of them."""
+    group.setncatts(contact.attributes)
+    _write_cell_errors(group, contact.blocks, table.quantities)
+    for chart, block in zip(contact.charts, contact.blocks, strict=True):
         one = group.createGroup(chart.name)
         axes = (chart.a.name, chart.b.name)
-        _put(one, axes[0], block.a, atlas.COORDINATES[axes[0]])
-        _put(one, axes[1], block.b, atlas.COORDINATES[axes[1]])
+        _add_variable(one, axes[0], block.a, atlas.COORDINATES[axes[0]])
+        _add_variable(one, axes[1], block.b, atlas.COORDINATES[axes[1]])
         for quantity in table.quantities_of(chart):
             meaning = (
                 chart.quantity
                 if quantity.name == "mu_ratio"
                 else f"{quantity.meaning}, scaled for this block"
             )
-            _put(one, quantity.variable, block.nodes[quantity.name], meaning, axes)
+            _add_variable(one, quantity.variable, block.nodes[quantity.name], meaning, axes)
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
         one.setncatts(
             {
@@ -215,6 +210,8 @@ def write_table(table: Table, path: str | Path) -> str:
     import tempfile  # only writing needs it: reading a table starts sooner without
 
     path = Path(path)
+    stated = table.contacts["spring"].attributes
+    table.attributes |= {name: stated[name] for name in _STATED}
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
     try:
@@ -247,7 +244,7 @@ def _image(table: Table) -> bytes:
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         path = Path(folder) / "table.nc"
         with _netcdf_lock, netCDF4.Dataset(str(path), "w", format="NETCDF4") as root:
-            _fill(root, table)
+            _write(root, table)
         return path.read_bytes()
 
 
@@ -296,35 +293,31 @@ def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
         )
 
 
-def _check_distribution(root: hdf5.Group, attributes: dict[str, Any], of: str) -> None:
-    """Refuse a damaged distribution of errors; older tables have no distribution."""
-    if f"{of}verified_quantities" not in attributes:
-        return
-    shares = root.attribute(f"{of}verified_quantiles")
-    names = str(attributes[f"{of}verified_quantities"]).split()
+def _stated(group: hdf5.Group) -> dict[str, Any]:
+    """What a table states of a contact; what the program uses is checked."""
+    for name in _STATED:
+        if not group.numbers(name, 1)[0] > 0.0:
+            raise group.refuse(
+                f"attribute {name!r} of {group.path} must be > 0, got {group.attribute(name)}"
+            )
+    names, shares = (group.attribute(f"verified_{name}") for name in ("quantities", "quantiles"))
+    if not isinstance(names, str):
+        raise group.refuse(f"attribute 'verified_quantities' of {group.path} is no text")
+    group.numbers("verified_quantiles", np.size(shares))
     for name, count in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
-        if np.any(root.numbers(f"{of}verified_{name}", count * len(names)) < 0.0):
-            raise root.refuse(f"attribute '{of}verified_{name}' has a negative number")
+        if np.any(group.numbers(f"verified_{name}", count * len(names.split())) < 0.0):
+            raise group.refuse(f"attribute 'verified_{name}' of {group.path} has a negative number")
+    return group.attributes()
 
 
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
     """The attributes of the root; those that the program uses are checked."""
-    if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
-        raise root.refuse(
-            "not a mumacro table: format_version, tolerance or content_sha256 is missing"
-        )
+    if not all(map(root.has, ("format_version", "content_sha256"))):
+        raise root.refuse("not a mumacro table: format_version or content_sha256 is missing")
     version = root.attribute("format_version")
     if not np.array_equal(version, FORMAT_VERSION):
         raise root.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
     attributes = root.attributes()
-    for name in (
-        *(f"{of}{name}" for of in ("", BALL) for name in _STATED),
-        *(key for key in attributes if key.removeprefix(BALL).startswith("verified_max_")),
-    ):
-        if not root.numbers(name, 1)[0] > 0.0:
-            raise root.refuse(f"attribute {name!r} must be > 0, got {attributes[name]!r}")
-    for of in ("", BALL):
-        _check_distribution(root, attributes, of)
     if not isinstance(attributes["content_sha256"], str):
         raise root.refuse("attribute 'content_sha256' is no text")
     try:
@@ -370,6 +363,25 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
     return block
 
 
+def _contact(group: hdf5.Group, name: str, quantities: list[str]) -> TabulatedContact:
+    contact = TabulatedContact(name, [], _stated(group))
+    contact.blocks += (
+        _block(group.group(chart.name), chart, quantities) for chart in contact.charts
+    )
+    _add_cell_errors(group, contact.blocks, quantities)
+    return contact
+
+
+def _check_root(root: hdf5.Group, spring: TabulatedContact) -> None:
+    """Refuse a root that states other errors than the group of one spring."""
+    for name in _STATED:
+        if not np.array_equal(root.attribute(name), spring.attributes[name]):
+            raise root.refuse(
+                f"attribute {name!r} is {root.attribute(name)} at the root and "
+                f"{spring.attributes[name]} in /border/spring"
+            )
+
+
 def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str]) -> None:
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
     stored = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
@@ -382,23 +394,17 @@ def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str
 def _read(root: hdf5.Group) -> Table:
     attributes = _attributes(root)
     names = names_in(attributes)
-    below_border = root.group("border")
-    below_blocks = below_border.group("blocks")
-    border = [
-        _border_piece(below_border.group(name), axis) for name, axis, _ in atlas.BORDER_PIECES
-    ]
-    blocks = [_block(below_blocks.group(chart.name), chart, names) for chart in atlas.CHARTS]
-    _add_cell_errors(below_blocks, blocks, names)
-    below_ball = below_border.group("ball")
-    ball = [_block(below_ball.group(chart.name), chart, names) for chart in atlas.BALL_CHARTS]
-    _add_cell_errors(below_ball, ball, names)
+    below = root.group("border")
+    border = [_border_piece(below.group(name), axis) for name, axis, _ in atlas.BORDER_PIECES]
+    contacts = {name: _contact(below.group(name), name, names) for name in atlas.CHARTS}
+    _check_root(root, contacts["spring"])
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         shape = tuple(plain[axis].size for axis in axes) if axes else None
         plain[name] = root.array(name, MOST_NUMBERS, shape)
         if not axes and plain[name].ndim != 1:
             raise root.refuse(f"variable {name!r} in / is no axis")
-    return Table(border=border, blocks=blocks, attributes=attributes, ball=ball, **plain)
+    return Table(border=border, contacts=contacts, attributes=attributes, **plain)
 
 
 def read_table(path: str | Path) -> Table:
@@ -446,25 +452,6 @@ def read_image(path: str | Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise TableError(path, f"cannot be read: {error.strerror or error}") from error
-
-
-def error_distribution(table: Table, of: str = "") -> dict[str, dict[str, float]]:
-    """By quantity: the error that a share of the verified points does not exceed ("0.5" to "1"),
-    and the :data:`RATIOS` of bound over error; empty for a table that does not state them.
-
-    ``of``: :data:`BALL` for those of a ball.
-    """
-    attributes = table.attributes
-    names = str(attributes.get(f"{of}verified_quantities", "")).split()
-    if not names:
-        return {}
-    heads = [f"{share:g}" for share in attributes[f"{of}verified_quantiles"]]
-    errors = np.reshape(attributes[f"{of}verified_error_quantiles"], (len(names), -1)).tolist()
-    ratios = np.reshape(attributes[f"{of}verified_bound_over_error"], (len(names), -1)).tolist()
-    return {
-        name: dict(zip(heads, error, strict=True)) | dict(zip(RATIOS, ratio, strict=True))
-        for name, error, ratio in zip(names, errors, ratios, strict=True)
-    }
 
 
 def json_attributes(table: Table) -> dict[str, object]:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import BLOCK_ROW, PIECE_ROW, Data, kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import Axis, Chart
-from mumacro.table.blocks import Block, BorderPiece
+from mumacro.table.atlas import Axis
+from mumacro.table.blocks import BorderPiece, TabulatedContact
 
 WIDTH = 8  # coefficients of a cell along each coordinate: one vector
 
@@ -161,10 +161,10 @@ def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
     return np.concatenate(coefficients), _as_numbers(rows)
 
 
-def block_rows(blocks: Sequence[Block], charts: Sequence[Chart] = atlas.CHARTS) -> Array:
+def block_rows(contact: TabulatedContact) -> Array:
     """The geometry of the blocks for evaluation: a row for each source, and one for none."""
     rows, first = np.zeros(len(atlas.SOURCES) + 1, BLOCK_ROW), 0
-    for row, chart, block in zip(rows, charts, blocks, strict=False):
+    for row, chart, block in zip(rows, contact.charts, contact.blocks, strict=False):
         na, nb = block.cells
         row["first"], row["cells_b"] = first, nb
         row["offset_a"], row["step_a"] = _count(chart.a, na)
@@ -178,14 +178,12 @@ def _as_numbers(rows: NDArray[np.void]) -> Array:
     return rows.view(np.float64).reshape(len(rows), -1)
 
 
-def quantity_cells(
-    blocks: Sequence[Block], code: int, charts: Sequence[Chart] = atlas.CHARTS
-) -> tuple[Array, Array, Array]:
-    """A quantity for :meth:`mumacro.kernel.binding.Data.put`: polynomials, errors, errors in every
-    cell."""
+def quantity_cells(contact: TabulatedContact, code: int) -> tuple[Array, Array, Array]:
+    """A quantity for :meth:`mumacro.kernel.binding.Data.add_quantity`: polynomials, errors, errors
+    in every cell."""
     name, errors = atlas.QUANTITY_NAMES[code], np.zeros((len(atlas.SOURCES) + 1, 2))
     patches, in_cells = [], []
-    for error, chart, block in zip(errors, charts, blocks, strict=False):
+    for error, chart, block in zip(errors, contact.charts, contact.blocks, strict=False):
         cells = block.cells[0] * block.cells[1]
         nodes = block.nodes.get(name)
         patches.append(
@@ -223,7 +221,8 @@ class Border:
     def __init__(self, pieces: Sequence[BorderPiece]) -> None:
         self.arrays: tuple[Array, Array] = border_cells(pieces)
         self.max_rel_error = max(piece.max_rel_error for piece in pieces)
-        self._data = Data(*self.arrays, block_rows(()), outer_cells())
+        no_blocks = block_rows(TabulatedContact("spring", []))
+        self._data = Data(*self.arrays, no_blocks, outer_cells())
 
     def __call__(self, y: Array) -> Array:
         """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN below 0 and for

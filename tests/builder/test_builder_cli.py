@@ -69,7 +69,10 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
 
     verified = run_builder("verify", out, "--points", 300, "--seed", 5)
     assert verified.returncode == 0, verified.stderr
-    assert {"holds": True, "not_covered": 0}.items() <= json.loads(verified.stdout).items()
+    report = json.loads(verified.stdout)
+    assert report["holds"] is True
+    assert [*report["contacts"]] == ["spring", "ball"]
+    assert {part["not_covered"] for part in report["contacts"].values()} == {0}
 
 
 def test_verify_stores_what_it_finds_only_when_asked(
@@ -80,18 +83,21 @@ def test_verify_stores_what_it_finds_only_when_asked(
     words = ("verify", path, "--points", 300, "--seed", 5)
     assert here(*words).returncode == 0
     assert path.read_bytes() == image
-    report = json.loads(here(*words, "--write").stdout)
+    reports = json.loads(here(*words, "--write").stdout)["contacts"]
     after = Surrogate.open(path)
     assert after.checksum == before.checksum
-    assert after.attributes["verified_points"] == report["points"]
-    assert after.max_abs_error == report["max_abs_error"] < before.max_abs_error
-    for name, part in report["distribution"].items():
-        numbers = [*part["error_quantiles"], *part["bound_over_error"]]
-        assert [*after.error_distribution[name].values()] == numbers
-        assert numbers != [*before.error_distribution[name].values()]
+    assert after.max_abs_error == reports["spring"]["max_abs_error"] < before.max_abs_error
+    for contact, report in reports.items():
+        old, new = (table.table.contacts[contact] for table in (before, after))
+        assert new.attributes["verified_points"] == report["points"]
+        assert new.attributes["verified_max_abs_error"] == report["max_abs_error"]
+        for name, part in report["distribution"].items():
+            numbers = [*part["error_quantiles"], *part["bound_over_error"]]
+            assert [*new.error_distribution[name].values()] == numbers
+            assert numbers != [*old.error_distribution[name].values()]
     # a table that misses its bounds is left as it is
     table = read_table(path)
-    table.attributes["tolerance"] = 1e-9
+    table.contacts["spring"].attributes["tolerance"] = 1e-9
     write_table(table, path)
     image = path.read_bytes()
     refused(here(*words, "--write"), "misses its tolerance")
@@ -118,13 +124,14 @@ def test_verify_rejects_a_table_that_misses_its_tolerance(
     here: Run, tables_dir: Path, tmp_path: Path
 ) -> None:
     table = read_table(tables_dir / "mumacro-1e-4.nc")
-    table.attributes["tolerance"] = 1e-9  # it states a tolerance that it does not meet
+    # it states a tolerance that it does not meet
+    table.contacts["spring"].attributes["tolerance"] = 1e-9
     write_table(table, tmp_path / "boast.nc")
     done = here("verify", tmp_path / "boast.nc", "--points", 300)
     refused(done, "boast.nc", "misses its tolerance of 1e-09")
     report = json.loads(done.stdout)
     assert report["holds"] is False
-    assert report["max_abs_error"] > 1e-9
+    assert report["contacts"]["spring"]["max_abs_error"] > 1e-9
 
 
 def test_verify_refuses_a_damaged_table(here: Run, tables_dir: Path, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from builder.solver.sweep import Sweep
-from builder.tables.measure import SEAMS
+from builder.tables.draws import SEAMS
 from builder.tables.quantities import ABS_TO_REL, SOLVER_NOISE
 from mumacro import InputError, Surrogate
 from mumacro.closed_forms import outer

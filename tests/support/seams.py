@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from builder.tables.contacts import SolvedContact
 from builder.tables.verify import BESIDE_BORDER, Neighbours
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL, Kind
+from mumacro.inputs.kind import BALL, CONTACTS, Kind
 from mumacro.table.atlas import (
     BORDER_PIECES,
-    CHARTS_OF,
     MIDDLE,
     QUANTITY_NAMES,
     STEEPEST,
@@ -111,7 +110,9 @@ NODES = 0.5 - 0.5 * np.cos((np.arange(14) + 0.5) * np.pi / 14)  # of WAY
 DEGREE = 8
 
 
-def slopes_across_rays(of: SolvedContact, v: Array, y: Array, crit: Array) -> tuple[Array, Array]:
+def slopes_across_rays(
+    contact: SolvedContact, v: Array, y: Array, crit: Array
+) -> tuple[Array, Array]:
     """Slopes of mu~ along ln v~ and ln y~ in the ring of a ball, (2, n), and what they may be wrong
     by; infinitely wrong far from the steepest ray.
 
@@ -128,8 +129,10 @@ def slopes_across_rays(of: SolvedContact, v: Array, y: Array, crit: Array) -> tu
     lines = (ray * y[:, None], y[:, None]), (v[:, None], v[:, None] / ray)
     for row, (line_v, line_y) in enumerate(lines if here.size else ()):
         at_v, at_y = np.broadcast_arrays(line_v, line_y)
-        solved = of.solve(at_v, at_y)
-        each = of.noise("mu_ratio", at_v, at_y, solved, False).max(axis=1) + 4e-16  # of the sum
+        solved = contact.solve(at_v, at_y)
+        each = (
+            contact.noise("mu_ratio", at_v, at_y, solved, False).max(axis=1) + 4e-16
+        )  # of the sum
         level = solved["mu_ratio"][:, :1]  # which the weights cancel to their own digits only
         found = []
         for degree in (DEGREE, DEGREE - 1):
@@ -157,11 +160,11 @@ def beside_every_seam(
 
     Of a ball v~ and y~ are those of its middle spring, to the last digit as evaluation has them.
     """
-    blocks = table.table.ball if kind == BALL else table.table.blocks
-    for index, (chart, block) in enumerate(zip(CHARTS_OF[kind.contact], blocks, strict=True)):
+    entry = table.table.contacts[CONTACTS[kind.contact]]
+    for index, (chart, block) in enumerate(zip(entry.charts, entry.blocks, strict=True)):
         rng = np.random.default_rng([seed, kind.contact, index])
         yield chart.name, *_asked(kind, *beside_seams(rng, chart, block, table.border, n))
-    rng = np.random.default_rng([seed, kind.contact, len(blocks)])
+    rng = np.random.default_rng([seed, kind.contact, len(entry.blocks)])
     drawn = beside_border_seams(rng, table.table.border, table.border, n)
     yield "border", *_asked(kind, *drawn)
 
@@ -177,7 +180,7 @@ def with_slopes(table: Surrogate, quantity: Quantity, v: Array, y: Array) -> NDA
     return np.asarray(np.abs(v / table.v_tilde_crit(y) - 1.0) > BESIDE_BORDER)
 
 
-def by_its_values(table: Surrogate, of: SolvedContact) -> SolvedContact:
+def by_its_values(table: Surrogate, contact: SolvedContact) -> SolvedContact:
     """The contact as the values of a table have it, which may be wrong by their bounds."""
 
     def solve(
@@ -187,7 +190,7 @@ def by_its_values(table: Surrogate, of: SolvedContact) -> SolvedContact:
         v, y = np.broadcast_arrays(v, y)
         solved = {}
         for name in QUANTITY_NAMES:
-            value, bound, _ = of.quantity(table, name, v.ravel(), y.ravel())
+            value, bound, _ = contact.quantity(table, name, v.ravel(), y.ravel())
             solved[name], solved[f"bound of {name}"] = (
                 value.reshape(v.shape),
                 bound.reshape(v.shape),
@@ -200,7 +203,7 @@ def by_its_values(table: Surrogate, of: SolvedContact) -> SolvedContact:
         del v, y, sliding
         return solved[f"bound of {name}"]
 
-    return of._replace(solve=solve, noise=noise)
+    return contact._replace(solve=solve, noise=noise)
 
 
 def off_the_lines(table: Surrogate, v: Array, y: Array) -> NDArray[np.bool_]:
@@ -210,15 +213,15 @@ def off_the_lines(table: Surrogate, v: Array, y: Array) -> NDArray[np.bool_]:
 
 
 def true_slopes(
-    table: Surrogate, of: SolvedContact, names: Sequence[str], v: Array, y: Array
+    table: Surrogate, contact: SolvedContact, names: Sequence[str], v: Array, y: Array
 ) -> Iterator[tuple[str, Array, Array]]:
     """Name, slopes (2, n) and what they may be wrong by of some quantities, from solves around the
     points; beside the steepest ray of a ball by a polynomial in its root."""
-    around = Neighbours(table, of, v, y)
+    around = Neighbours(table, contact, v, y)
     for name in names:
         slopes, noise = around.slopes(name)
-        if of.kind == BALL:
-            across, unsure = slopes_across_rays(of, v, y, around.crit)
+        if contact.kind == BALL:
+            across, unsure = slopes_across_rays(contact, v, y, around.crit)
             better = unsure < noise
             slopes, noise = np.where(better, across, slopes), np.where(better, unsure, noise)
         yield name, slopes, noise

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from builder.export.c import header_text, write_c
-from builder.tables.verify import CASES, draw
+from builder.tables.draws import DRAWS
 from mumacro import Surrogate
 from mumacro.inputs.fields import BOUNDS, FIELDS
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS, kind_of
@@ -142,7 +142,9 @@ def neighbours(x: Any, most: int = 3) -> Any:
 
 def drawn(table: Surrogate, n: int, seed: int) -> Any:
     """``n`` points of every kind, shape (2, kinds n)."""
-    return np.concatenate([draw(case, n, table, seed) for case in CASES], axis=1)
+    return np.concatenate(
+        [DRAWS["spring"].draw(case, n, table, seed) for case in DRAWS["spring"].cases], axis=1
+    )
 
 
 def points(table: Surrogate, n: int, seed: int) -> Any:

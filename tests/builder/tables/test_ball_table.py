@@ -14,13 +14,14 @@ from builder.solver.ball import NAMES, Ball, Springs
 from builder.solver.sweep import Sweep
 from builder.tables.build import BuildError, springs_for
 from builder.tables.contacts import BALL_NOISE, SolvedContact, ball, ratio_of
+from builder.tables.draws import DRAWS
 from builder.tables.measure import block_errors
-from builder.tables.verify import BALL_CASES, Neighbours, seam_jumps
+from builder.tables.verify import Neighbours, seam_jumps
 from mumacro import InputError, Surrogate, closed_forms
 from mumacro.inputs.kind import BALL
 from mumacro.kernel.binding import kernels
 from mumacro.table import bundled
-from mumacro.table.atlas import BALL_CHARTS, MIDDLE, QUANTITY_NAMES, SLOW, STEEPEST, STEEPEST_Y
+from mumacro.table.atlas import CHARTS, MIDDLE, QUANTITY_NAMES, SLOW, STEEPEST, STEEPEST_Y
 from mumacro.table.netcdf import read_table, write_table
 from tests.support.cases import Array, opened
 from tests.support.comparing import close
@@ -35,7 +36,7 @@ def springs() -> Springs:
 
 
 @pytest.fixture(scope="module")
-def of(springs: Springs) -> SolvedContact:
+def contact(springs: Springs) -> SolvedContact:
     return ball(springs)
 
 
@@ -48,9 +49,11 @@ def wide(n: int, seed: int) -> tuple[Array, Array]:
 
 
 def test_the_springs_of_a_ball_are_those_of_the_finest_table(sweep: Sweep) -> None:
-    own = springs_for(opened(1e-12).table, sweep).fine.table
-    bundled = springs_for(opened(1e-4).table, sweep).fine.table
-    for one, other in zip(own.blocks, bundled.blocks, strict=True):
+    finest, coarse = (
+        springs_for(opened(tolerance).table, sweep.workers).fine.table.contacts["spring"].blocks
+        for tolerance in (1e-12, 1e-4)
+    )
+    for one, other in zip(finest, coarse, strict=True):
         for name in one.nodes:
             assert np.array_equal(one.nodes[name], other.nodes[name]), name
 
@@ -59,32 +62,33 @@ def test_springs_that_the_solver_does_not_give_are_refused(
     sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fine = opened(1e-12)
-    block = fine.table.blocks[0]
-    nodes = {name: x + 1e-9 for name, x in block.nodes.items()}
-    changed = [dataclasses.replace(block, nodes=nodes), *fine.table.blocks[1:]]
+    entry = fine.table.contacts["spring"]
+    nodes = {name: x + 1e-9 for name, x in entry.blocks[0].nodes.items()}
+    changed = [dataclasses.replace(entry.blocks[0], nodes=nodes), *entry.blocks[1:]]
     path = tmp_path / "mumacro-1e-12.nc"
-    table = dataclasses.replace(fine.table, blocks=changed)
+    contacts = fine.table.contacts | {"spring": dataclasses.replace(entry, blocks=changed)}
+    table = dataclasses.replace(fine.table, contacts=contacts)
     with pytest.raises(BuildError, match=r"this table is not what the solver gives now"):
-        springs_for(table, sweep)
+        springs_for(table, sweep.workers)
     write_table(table, path)
     monkeypatch.setattr(bundled, "bundled_tables", lambda: [path])
     coarse = opened(1e-4).table
     with pytest.raises(BuildError, match=r"not what the solver gives now; .* --tolerance 1e-12"):
-        springs_for(coarse, sweep)
+        springs_for(coarse, sweep.workers)
     for left in ([], [TABLES / "mumacro-1e-7.nc"]):
         monkeypatch.setattr(bundled, "bundled_tables", lambda left=left: left)
         with pytest.raises(BuildError, match=r"table.*; a ball .* first: .* --tolerance 1e-12"):
-            springs_for(coarse, sweep)
+            springs_for(coarse, sweep.workers)
 
 
 # --- the solver -----------------------------------------------------------------------------------
 
 
-def test_twice_the_points_give_the_same(springs: Springs, of: SolvedContact) -> None:
+def test_twice_the_points_give_the_same(springs: Springs, contact: SolvedContact) -> None:
     v, y = wide(60, 1)
     few, many = Ball(springs).solve(v, y), Ball(springs, 146).solve(v, y)
     for name in NAMES:
-        noise = BALL_NOISE if name == "deficit" else of.noise(name, v, y, many, False)
+        noise = BALL_NOISE if name == "deficit" else contact.noise(name, v, y, many, False)
         assert np.all(np.abs(few[name] - many[name]) <= noise), name
     # each of both has its own digits
     np.testing.assert_allclose(few["deficit"] + few["mu_ratio"], 1.0, rtol=0.0, atol=2e-12)
@@ -142,9 +146,9 @@ def test_next_to_the_ridge_the_last_crossing_is_an_edge(springs: Springs) -> Non
 # --- charts ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("index", range(len(BALL_CHARTS)))
+@pytest.mark.parametrize("index", range(len(CHARTS["ball"])))
 def test_file_and_evaluation_agree_on_coordinates(index: int) -> None:
-    table, chart = opened(1e-12), BALL_CHARTS[index]  # whose border is that of the charts
+    table, chart = opened(1e-12), CHARTS["ball"][index]  # whose border is that of the charts
     rng = np.random.default_rng(index)
     a, b = (
         axis.low + (axis.high - axis.low) * rng.uniform(0.02, 0.98, 2000)
@@ -194,32 +198,32 @@ CORNERS: dict[str, Any] = {
 @pytest.mark.parametrize("corner", CORNERS)
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10, 1e-12])
 def test_no_error_is_beyond_its_bound(
-    of: SolvedContact, tolerance: float, corner: str, name: str
+    contact: SolvedContact, tolerance: float, corner: str, name: str
 ) -> None:
     table = opened(tolerance)
-    v, y = of.as_asked(*CORNERS[corner](60))
-    solved = of.solve(v, y)
-    value, bound, _ = of.quantity(table, name, v, y)
-    noise = of.noise(name, v, y, solved, False)
+    v, y = contact.as_asked(*CORNERS[corner](60))
+    solved = contact.solve(v, y)
+    value, bound, _ = contact.quantity(table, name, v, y)
+    noise = contact.noise(name, v, y, solved, False)
     assert np.all(np.abs(value - solved[name]) <= bound + noise)
     if name == "mu_ratio":
-        assert np.abs(value - solved[name]).max() <= table.ball_tolerance
+        assert np.abs(value - solved[name]).max() <= contact.of(table).tolerance
 
 
 @pytest.mark.parametrize(
     "corner",
     ["ridge", "corner at creep", "steepest ray", "border at y~ 1.5", "creep below the ridge"],
 )
-def test_no_slope_is_beyond_its_bound(of: SolvedContact, corner: str) -> None:
+def test_no_slope_is_beyond_its_bound(contact: SolvedContact, corner: str) -> None:
     table = opened(COARSE)
-    v, y = of.as_asked(*CORNERS[corner](40))
-    truth, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
-    rows = of.slopes(table, "mu_ratio", v, y)
+    v, y = contact.as_asked(*CORNERS[corner](40))
+    truth, noise = Neighbours(table, contact, v, y).slopes("mu_ratio")
+    rows = contact.slopes(table, "mu_ratio", v, y)
     assert np.all(np.abs(rows[1:3] - truth) <= rows[3:5] + noise)
     # on the steepest ray itself slopes are those on either side of it
     v = STEEPEST * y * (1.0 + np.array([-1e-13, 0.0, 1e-13])[:, None])
     line = np.broadcast_to(y, v.shape)
-    along = of.slopes(table, "mu_ratio", v.ravel(), line.ravel())[1].reshape(v.shape)
+    along = contact.slopes(table, "mu_ratio", v.ravel(), line.ravel())[1].reshape(v.shape)
     if corner == "steepest ray":
         assert np.ptp(along, axis=0).max() <= 1e-4
 
@@ -241,13 +245,13 @@ def test_power_at_large_speeds_is_known_in_closed_form(tolerance: float) -> None
     assert np.all(bound <= tolerance * exact)
 
 
-def test_a_slope_where_the_border_has_a_knot_is_within_its_bound(of: SolvedContact) -> None:
+def test_a_slope_where_the_border_has_a_knot_is_within_its_bound(contact: SolvedContact) -> None:
     """The border's pieces meet at y~ = 1.5, within a block of the ball."""
     table = opened(COARSE)
     y = 1.5 + np.linspace(-0.05, 0.01, 121)
-    v, y = of.as_asked(np.full(y.size, 0.1742), y)
-    truth, noise = Neighbours(table, of, v, y).slopes("mu_ratio")
-    rows = of.slopes(table, "mu_ratio", v, y)
+    v, y = contact.as_asked(np.full(y.size, 0.1742), y)
+    truth, noise = Neighbours(table, contact, v, y).slopes("mu_ratio")
+    rows = contact.slopes(table, "mu_ratio", v, y)
     assert np.all(np.abs(rows[1:3] - truth) <= rows[3:5] + noise)
 
 
@@ -261,10 +265,13 @@ def test_seams_are_invisible() -> None:
 
 
 @pytest.mark.slow
-def test_the_errors_that_are_measured_are_those_that_the_table_states(of: SolvedContact) -> None:
+def test_the_errors_that_are_measured_are_those_that_the_table_states(
+    contact: SolvedContact,
+) -> None:
     table = opened(1e-4)
+    entry = contact.of(table)
     for chart, block, measured in zip(
-        BALL_CHARTS, table.table.ball, block_errors(table, of, 300, seed=4), strict=True
+        CHARTS["ball"], entry.blocks, block_errors(table, contact, 300, seed=4), strict=True
     ):
         assert measured.cells.keys() == block.nodes.keys()
         for name in block.nodes:
@@ -275,27 +282,25 @@ def test_the_errors_that_are_measured_are_those_that_the_table_states(of: Solved
             assert measured.values[name] <= block.errors[name][0], (chart.name, name)
             # where a stick fraction's own noise is larger than what the cells err by, none is left
             assert measured.values[name] > 0.0 or name == "stick_fraction", (chart.name, name)
-        assert measured.absolute <= table.ball_tolerance
+        assert measured.absolute <= entry.tolerance
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10, 1e-12])
 def test_half_of_the_bounds_are_below_150_errors(tolerance: float) -> None:
     """Of what verification met: one error a block was up to 440 times the error at most points."""
-    attributes = opened(tolerance).table.attributes
-    ratios = attributes["ball_verified_bound_over_error"].reshape(-1, 3)
-    names = attributes["ball_verified_quantities"].split()
-    assert names[:3] == ["mu_ratio", "power", "stick_fraction"]
-    for name, (least, median, _) in zip(names, ratios, strict=True):
-        assert least >= 1.0, name
-        assert median <= 150.0, name
+    stated = opened(tolerance).table.contacts["ball"].error_distribution
+    assert [*stated][:3] == ["mu_ratio", "power", "stick_fraction"]
+    for name, ratio in stated.items():
+        assert ratio["least"] >= 1.0, name
+        assert ratio["median"] <= 150.0, name
 
 
 @pytest.mark.parametrize("name", ["power", "stick_fraction"])
 def test_an_error_in_a_cell_widens_the_bounds_in_that_cell_alone(name: str) -> None:
     table = read_table(opened(1e-4).path)
-    v, y = BALL_CASES["ring"][1](np.random.default_rng(5), 400, opened(1e-4))
-    index = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
-    errors = table.ball[index].cell_errors[name]
+    v, y = DRAWS["ball"].cases["ring"][1](np.random.default_rng(5), 400, opened(1e-4))
+    index = [chart.name for chart in CHARTS["ball"]].index("partial_slip_ring")
+    errors = table.contacts["ball"].blocks[index].cell_errors[name]
     before = opened(1e-4).quantity(name, v, y, contact="ball")
     cell = int(errors[:, 0].argmax())
     errors[cell, 0] *= 3.0
@@ -307,15 +312,15 @@ def test_an_error_in_a_cell_widens_the_bounds_in_that_cell_alone(name: str) -> N
     np.testing.assert_array_equal(after[1][~wider], before[1][~wider])
 
 
-def test_an_error_of_a_block_is_found(of: SolvedContact) -> None:
+def test_an_error_of_a_block_is_found(contact: SolvedContact) -> None:
     table = read_table(opened(1e-4).path)
-    index = [chart.name for chart in BALL_CHARTS].index("partial_slip_ring")
-    table.ball[index].nodes["mu_ratio"][-3:] *= 1.01
+    index = [chart.name for chart in CHARTS["ball"]].index("partial_slip_ring")
+    table.contacts["ball"].blocks[index].nodes["mu_ratio"][-3:] *= 1.01
     wrong = Surrogate(table, "wrong.nc")
-    v, y = BALL_CASES["ring"][1](np.random.default_rng(1), 400, wrong)
-    v, y = of.as_asked(v, y)
-    value, bound, _ = of.quantity(wrong, "mu_ratio", v, y)
-    assert np.any(np.abs(value - of.solve(v, y)["mu_ratio"]) > bound)
+    v, y = DRAWS["ball"].cases["ring"][1](np.random.default_rng(1), 400, wrong)
+    v, y = contact.as_asked(v, y)
+    value, bound, _ = contact.quantity(wrong, "mu_ratio", v, y)
+    assert np.any(np.abs(value - contact.solve(v, y)["mu_ratio"]) > bound)
 
 
 # --- plain numbers --------------------------------------------------------------------------------

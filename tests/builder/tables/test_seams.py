@@ -54,12 +54,12 @@ def test_slopes_are_those_of_a_tables_own_values(
     tolerance: float, kind: Kind, springs: Springs, sweep: Sweep
 ) -> None:
     table = opened(tolerance)
-    of = by_its_values(table, ball(springs) if kind == BALL else spring(sweep))
+    contact = by_its_values(table, ball(springs) if kind == BALL else spring(sweep))
     for block, v, y in beside_every_seam(table, kind, 1000):
         here = off_the_lines(table, v, y)
         v, y = v[here], y[here]
-        for name, slopes, unsure in true_slopes(table, of, of.sloped, v, y):
-            rows = of.slopes(table, name, v, y)
+        for name, slopes, unsure in true_slopes(table, contact, contact.sloped, v, y):
+            rows = contact.slopes(table, name, v, y)
             off = np.abs(rows[1:3] - slopes) > rows[3:5] + unsure
             quantity = QUANTITIES[QUANTITY_NAMES.index(name)]
             assert not np.any(off & with_slopes(table, quantity, v, y)), (block, name)
@@ -91,14 +91,14 @@ HARD = (
 def test_slopes_of_a_ball_across_the_rays_are_those_of_fresh_quadratures(
     tolerance: float, springs: Springs
 ) -> None:
-    table, of = opened(tolerance), ball(springs)
+    table, contact = opened(tolerance), ball(springs)
     v, y = next((v, y) for name, v, y in beside_every_seam(table, BALL, 400) if name == RING)
     near = np.random.default_rng(1).permutation(np.flatnonzero(y > 1e-3))[:60]
     hard_v, hard_y = (np.array(x) / MIDDLE for x in zip(*HARD, strict=True))
-    v, y = of.as_asked(np.append(hard_v, v[near]), np.append(hard_y, y[near]))
-    truth, noise = slopes_across_rays(of, v, y, table.v_tilde_crit(y))
+    v, y = contact.as_asked(np.append(hard_v, v[near]), np.append(hard_y, y[near]))
+    truth, noise = slopes_across_rays(contact, v, y, table.v_tilde_crit(y))
     assert np.isfinite(noise[:, :2]).all()
-    rows = of.slopes(table, "mu_ratio", v, y)
+    rows = contact.slopes(table, "mu_ratio", v, y)
     assert np.all(np.abs(rows[1:3] - truth) <= rows[3:5] + noise)
     seen = np.abs(rows[1:3] - truth) > noise
     assert np.median((rows[3:5] / np.abs(rows[1:3] - truth))[seen]) <= 100.0

@@ -10,13 +10,12 @@ import pytest
 from builder.solver.sweep import Sweep
 from builder.tables.blocks import solve_nodes
 from builder.tables.contacts import spring
-from builder.tables.measure import SEAMS, block_errors, cell_errors, fast_from, finer
+from builder.tables.draws import DRAWS, SEAMS, fast_from
+from builder.tables.measure import block_errors, cell_errors, finer
 from builder.tables.quantities import SOLVED, solver_noise
 from builder.tables.verify import (
-    CASES,
     bound_over_error,
     distribution,
-    draw,
     monotony,
     seam_jumps,
     seam_slope_jumps,
@@ -31,6 +30,7 @@ from tests.support.cases import Array, opened, tables
 from tests.support.comparing import close
 from tests.support.places import TABLES
 
+SPRING_CHARTS = CHARTS["spring"]
 pytestmark = pytest.mark.slow
 
 TABLE = TABLES / "mumacro-1e-7.nc"
@@ -40,7 +40,7 @@ sound = tables(1e-7)
 def damaged(block: str, factor: Any, key: str = "mu_ratio") -> Surrogate:
     """The same table with one quantity of one block multiplied by ``factor``."""
     table = read_table(TABLE)
-    table.blocks[BLOCK_NAMES.index(block)].nodes[key] *= factor
+    table.contacts["spring"].blocks[BLOCK_NAMES.index(block)].nodes[key] *= factor
     return Surrogate(table, TABLE)
 
 
@@ -48,17 +48,18 @@ def test_cases_are_legal_and_repeatable_and_reach_every_block_and_the_fast_tail(
     sound: Surrogate,
 ) -> None:
     reached: set[str] = set()
-    for name in CASES:
-        v, y = draw(name, 3000, sound, seed=0)
+    draws = DRAWS["spring"]
+    for name in draws.cases:
+        v, y = draws.draw(name, 3000, sound, seed=0)
         assert v.shape == y.shape == (3000,)
         assert np.all((v > 0.0) & np.isfinite(v) & (y > 0.0) & np.isfinite(y))
-        assert np.array_equal((v, y), draw(name, 3000, sound, seed=0))
-        assert not np.array_equal(v, draw(name, 3000, sound, seed=2)[0])
+        assert np.array_equal((v, y), draws.draw(name, 3000, sound, seed=0))
+        assert not np.array_equal(v, draws.draw(name, 3000, sound, seed=2)[0])
         reached |= {SOURCES[code] for code in sound.quantity("mu_ratio", v, y)[2]}
     assert reached >= {*BLOCK_NAMES, "tail_fast"}
-    assert math.isclose(sum(share for share, _ in CASES.values()), 1.0)
+    assert math.isclose(sum(share for share, _ in draws.cases.values()), 1.0)
     with pytest.raises(KeyError):
-        draw("easy", 5, sound, seed=0)
+        draws.draw("easy", 5, sound, seed=0)
 
 
 def test_the_builder_knows_every_quantity_of_the_kernel(sweep: Sweep) -> None:
@@ -80,10 +81,10 @@ def test_the_builder_knows_every_quantity_of_the_kernel(sweep: Sweep) -> None:
 def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(
     sound: Surrogate, sweep: Sweep
 ) -> None:
-    report = verify(sound, sweep, 1000, seed=3)
+    report = verify(sound, spring(sweep), 1000, seed=3)
     assert report["points"] >= 1000
     assert 0.0 < report["max_abs_error"] <= sound.tolerance
-    assert set(report["cases"]) == set(CASES)
+    assert set(report["cases"]) == set(DRAWS["spring"].cases)
     for parts in (report["cases"], report["sources"]):
         for error in ("max_abs_error", "max_rel_error"):
             assert report[error] == max(part[error] for part in parts.values())
@@ -103,7 +104,7 @@ def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(
 
 
 def test_the_distribution_of_errors_is_that_of_its_points(sound: Surrogate, sweep: Sweep) -> None:
-    report = verify(sound, sweep, 1000, seed=3)
+    report = verify(sound, spring(sweep), 1000, seed=3)
     spread = report["distribution"]
     largest = {
         "mu_ratio": report["max_abs_error"],
@@ -137,7 +138,7 @@ def test_a_border_that_is_off_is_found(sweep: Sweep) -> None:
     table = read_table(TABLE)
     for piece in table.border:
         piece.values *= 1.0 + 1e-9
-    missed = uncovered(verify(Surrogate(table, TABLE), sweep, 200, seed=3))
+    missed = uncovered(verify(Surrogate(table, TABLE), spring(sweep), 200, seed=3))
     assert missed["border"] > 1000
 
 
@@ -156,7 +157,7 @@ def test_a_block_off_by_a_hundred_thousandth_is_found_and_named(
     sweep: Sweep, key: str, block: str
 ) -> None:
     wrong = damaged(block, 1.0 + 1e-5, key)
-    report = verify(wrong, sweep, 1000, seed=3)
+    report = verify(wrong, spring(sweep), 1000, seed=3)
     part = report.get(key, report)
     assert part["not_covered"] == uncovered(report)[key] > 0
     assert [name for name, source in part["sources"].items() if source["not_covered"]] == [block]
@@ -178,9 +179,12 @@ class Stepped:
         self, table: Surrogate, beyond: Callable[[Surrogate, Array, Array], Array]
     ) -> None:
         self.v_tilde_crit = table.v_tilde_crit
-        self.mu_ratio = lambda v, y: table.mu_ratio(v, y) * (1.0 + 1e-3 * beyond(table, v, y))
-        self.slopes = lambda v, y, *words, **names: [
-            part + 1e-3 * beyond(table, v, y) for part in table.slopes(v, y, *words, **names)
+        self.quantity = lambda name, v, y, **kind: [
+            table.quantity(name, v, y, **kind)[0] * (1.0 + 1e-3 * beyond(table, v, y))
+        ]
+        self.tabulated = self
+        self.slopes = lambda name, v, y, kind: [
+            part + 1e-3 * beyond(table, v, y) for part in table.tabulated.slopes(name, v, y, kind)
         ]
 
 
@@ -214,7 +218,9 @@ def test_the_errors_that_are_measured_are_those_that_the_table_states(
     sound: Surrogate, sweep: Sweep
 ) -> None:
     measured = block_errors(sound, spring(sweep), 200, seed=1)
-    for chart, block, errors in zip(CHARTS, sound.table.blocks, measured, strict=True):
+    for chart, block, errors in zip(
+        SPRING_CHARTS, sound.table.contacts["spring"].blocks, measured, strict=True
+    ):
         assert errors.values.keys() == errors.cells.keys() == block.nodes.keys()
         for name in block.nodes:
             assert 0.0 < errors.values[name] <= block.errors[name][0], chart.name
@@ -235,7 +241,7 @@ def test_errors_that_are_stated_do_not_hang_on_the_last_digits_of_the_solves(
     Other processors round otherwise: draws of that rounding stand for them.
     """
     table, index = opened(tolerance), BLOCK_NAMES.index("continuous_tail")
-    block = table.table.blocks[index]
+    block = table.table.contacts["spring"].blocks[index]
     _, _, exact, noise = solve_nodes(
         spring(sweep), index, finer((block.a.size, block.b.size)), table.border
     )
@@ -256,7 +262,7 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
     """Every second node off by half the stated error: values stay within their bound, slopes do
     not."""
     table, index = read_table(TABLE), BLOCK_NAMES.index(block)
-    part = table.blocks[index]
+    part = table.contacts["spring"].blocks[index]
     values = part.nodes["mu_ratio"]
     values += 0.25 * part.errors["mu_ratio"][0] * (-1.0) ** np.arange(values.shape[1])
     measured = block_errors(Surrogate(table, TABLE), spring(sweep), 200, seed=1)[index]
@@ -269,7 +275,7 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
 @pytest.mark.parametrize("block", ["corner", "continuous_mid_1"])
 def test_an_error_along_one_edge_of_a_block_counts_whole(sweep: Sweep, block: str) -> None:
     table, index = read_table(TABLE), BLOCK_NAMES.index(block)
-    table.blocks[index].nodes["mu_ratio"][:, -1] *= 1.0 + 1e-5
+    table.contacts["spring"].blocks[index].nodes["mu_ratio"][:, -1] *= 1.0 + 1e-5
     assert (
         block_errors(Surrogate(table, TABLE), spring(sweep), 200, seed=1)[index].values["mu_ratio"]
         > 5e-6

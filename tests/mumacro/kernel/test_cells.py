@@ -16,7 +16,8 @@ from tests.support.cases import Array
 from tests.support.comparing import close
 from tests.support.made_cells import Cells
 
-AXES = sorted({axis for chart in CHARTS for axis in (chart.a, chart.b)}, key=repr)
+SPRING_CHARTS = CHARTS["spring"]
+AXES = sorted({axis for chart in SPRING_CHARTS for axis in (chart.a, chart.b)}, key=repr)
 ANGLE = Axis("angle", 0.0, 1.0)
 
 
@@ -58,19 +59,19 @@ def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
     v, y = table.points(index, rng.random(200), rng.uniform(0.5, 0.99, 200))
     block, a, b = kernel.places(table.data, v, y)
     assert np.all(block == index)
-    (low_a, high_a), (low_b, high_b) = CHARTS[index].a.span, CHARTS[index].b.span
+    (low_a, high_a), (low_b, high_b) = SPRING_CHARTS[index].a.span, SPRING_CHARTS[index].b.span
     u, w = 2.0 * (a - low_a) / (high_a - low_a) - 1.0, 2.0 * (b - low_b) / (high_b - low_b) - 1.0
     for size in (1.0, 1e-3):
         cell = size * rng.random((WIDTH, WIDTH))
         cell[-1, -1] += 10.0  # below zero a power is cut off
-        coef = np.zeros((len(CHARTS), WIDTH, WIDTH))
+        coef = np.zeros((len(SPRING_CHARTS), WIDTH, WIDTH))
         coef[index] = cell
         result = table.values(coef, v, y, kernel)
         expected = np.polynomial.polynomial.polyval2d(w, u, cell[::-1, ::-1])
         assert result == close(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize("index", range(len(CHARTS)), ids=BLOCK_NAMES)
+@pytest.mark.parametrize("index", range(len(SPRING_CHARTS)), ids=BLOCK_NAMES)
 @pytest.mark.parametrize("cells", [(1, 1), (2, 7), (7, 2), (40, 1)])
 def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(
     index: int, cells: tuple[int, int]
@@ -78,9 +79,9 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(
     """A table whose cells hold their own numbers: none is skipped, neighbours follow one
     another."""
     table = Cells(cells)
-    chart, n = CHARTS[index], cells[0] * cells[1]
-    number = np.zeros((n * len(CHARTS), WIDTH, WIDTH))
-    number[:, -1, -1] = np.tile(np.arange(n), len(CHARTS))
+    chart, n = SPRING_CHARTS[index], cells[0] * cells[1]
+    number = np.zeros((n * len(SPRING_CHARTS), WIDTH, WIDTH))
+    number[:, -1, -1] = np.tile(np.arange(n), len(SPRING_CHARTS))
     for axis, other in ((0, 0.37), (1, 0.73)):
         along = np.linspace(1e-6, 1.0 - 1e-6, 997)
         v, y = table.points(index, *((along, other) if axis == 0 else (other, along)))
@@ -127,7 +128,7 @@ def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
     assert ANGLE.to_file(half) == close(2.0 / math.pi * np.arctan2(2.0 * phi, s0), rel=1e-14)
 
 
-@pytest.mark.parametrize("chart", CHARTS, ids=BLOCK_NAMES)
+@pytest.mark.parametrize("chart", SPRING_CHARTS, ids=BLOCK_NAMES)
 @pytest.mark.parametrize("cells", [(4, 12), (7, 20)])
 def test_cells_of_a_block_follow_a_smooth_function(chart: Chart, cells: tuple[int, int]) -> None:
     """Along s they have an edge at the knot; those below the lowest s of a block are never

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builder.tables.verify import CASES, draw
+from builder.tables.draws import DRAWS
 from mumacro import Surrogate
 from mumacro.table.atlas import QUANTITY_NAMES
 from tests.support.cases import opened
@@ -130,8 +130,8 @@ def test_a_table_that_is_built_there_differs_within_what_both_state(
     )
     here, there = opened(1e-4), Surrogate.open(out)
     assert there.tolerance == here.tolerance
-    for case in CASES:
-        v, y = draw(case, 2000, here, seed=5)
+    for case in DRAWS["spring"].cases:
+        v, y = DRAWS["spring"].draw(case, 2000, here, seed=5)
         for name in QUANTITY_NAMES:
             (one, of_one, _), (two, of_two, _) = (
                 table.quantity(name, v, y) for table in (here, there)

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from builder.solver.sweep import Sweep
-from builder.tables.measure import fast_from
+from builder.tables.draws import DRAWS, fast_from
 from builder.tables.quantities import solver_noise
-from builder.tables.verify import CASES, draw
 from mumacro import Surrogate, solve_for
 from mumacro.analysis.settling import settling
 from mumacro.table.atlas import (
@@ -29,7 +28,7 @@ from tests.support.comparing import close
 from tests.support.hard_points import NAMES as BALL_NAMES
 from tests.support.hard_points import hard_points, rows_of
 
-KINDS = list(CASES)
+KINDS = list(DRAWS["spring"].cases)
 Ask = Callable[[Surrogate, Array, Array], Any]  # values and bounds
 table = tables(1e-7)
 
@@ -45,7 +44,7 @@ def shares(ask: Ask, coarse: Any, n: int, kinds: Sequence[str] = KINDS) -> tuple
     """
     ours, worst, medians = (opened(coarse) if isinstance(coarse, float) else coarse), 0.0, [1.0]
     for kind in kinds:
-        v, y = draw(kind, n, ours, seed=8)
+        v, y = DRAWS["spring"].draw(kind, n, ours, seed=8)
         (value, bound), (truth, fine_bound) = (
             np.array(ask(s, v, y)) for s in (ours, opened(1e-12))
         )
@@ -154,7 +153,7 @@ def test_the_worst_error_of_every_block_is_about_half_its_bound(
     large ones."""
     worst: dict[str, float] = {}
     for kind in KINDS:
-        v, y = draw(kind, 4000, table, seed=77)
+        v, y = DRAWS["spring"].draw(kind, 4000, table, seed=77)
         value, bound, source = table.quantity(name, v, y)
         solved = sweep.solve("full", v, y)
         sliding = REGIME_OF_SOURCE[source] == CONTINUOUS
@@ -386,7 +385,7 @@ def test_an_enclosure_holds_the_true_root_and_may_not_be_halved(
     seams included."""
     ours, fine, worst = opened(coarse), opened(1e-12), 0.0
     for kind in KINDS:
-        v, y = draw(kind, 20_000, ours, seed=5)
+        v, y = DRAWS["spring"].draw(kind, 20_000, ours, seed=5)
         (mu, bound, _), (truth, fine_bound, _) = (
             s.quantity("mu_ratio", v, y) for s in (ours, fine)
         )

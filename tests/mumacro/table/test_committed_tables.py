@@ -15,7 +15,8 @@ import xarray as xr
 from builder.solver.steady import solve
 from builder.solver.sweep import Sweep
 from builder.tables.build import STEPS, build_table, to_step
-from builder.tables.measure import SEAMS
+from builder.tables.contacts import spring
+from builder.tables.draws import SEAMS
 from builder.tables.quantities import ABS_TO_REL, STICK_NOISE, solver_noise
 from builder.tables.verify import holds, monotony, seam_jumps, seam_slope_jumps, verify
 from mumacro import Surrogate, TableError
@@ -67,7 +68,7 @@ def test_fresh_solves_lie_within_tolerance_and_bounds(table: Surrogate, sweep: S
 
     tests/builder/tables/test_verify.py tries the verifier itself.
     """
-    report = verify(table, sweep, 40_000, seed=77)
+    report = verify(table, spring(sweep), 40_000, seed=77)
     assert holds(report, table.tolerance)
     # the stated errors are those at other points: of slopes ten lie beyond 99 %, and the median is
     # where closed forms answer
@@ -142,7 +143,7 @@ def test_known_answers_are_the_models_and_a_wrong_table_does_not_meet_them() -> 
     for path in PATHS:
         Surrogate.open(path).self_check()
     wrong = read_table(PATHS[1])
-    for block in wrong.blocks:
+    for block in wrong.contacts["spring"].blocks:
         block.nodes["mu_ratio"] *= 1.001
     with pytest.raises(TableError, match="known answer"):
         Surrogate(wrong, PATHS[1]).self_check()
@@ -185,17 +186,21 @@ def test_every_committed_file_is_tested() -> None:
 
 
 def test_the_stated_shares_of_errors_end_at_the_largest(table: Surrogate) -> None:
-    attributes: Any = table.attributes
-    largest = {name: part["1"] for name, part in table.error_distribution.items()}
-    assert largest["mu_ratio"] == attributes["verified_max_abs_error"] <= table.tolerance
-    assert largest["power"] == attributes["verified_max_rel_power_error"]
-    assert largest["stick_fraction"] == attributes["verified_max_stick_error"]
-    slopes = largest["slope_along_v"], largest["slope_along_y"]
-    assert max(slopes) == attributes["verified_max_slope_error"]
-    assert largest["border"] <= table.border.max_rel_error
-    for part in table.error_distribution.values():
-        assert part["0.5"] <= part["0.95"] <= part["0.99"] <= part["1"]
-        assert 1.0 <= part["least"] < part["median"] < part["largest"]
+    for contact in table.table.contacts.values():
+        stated = contact.error_distribution
+        largest = stated["mu_ratio"]["1"]
+        assert largest == contact.attributes["verified_max_abs_error"] <= contact.tolerance
+        for part in stated.values():
+            assert part["0.5"] <= part["0.95"] <= part["0.99"] <= part["1"]
+            assert 1.0 <= part["least"] < part["median"] < part["largest"]
+    assert table.error_distribution["border"]["1"] <= table.border.max_rel_error
+
+
+def test_the_root_states_what_holds_for_one_spring(table: Surrogate) -> None:
+    stated, root = table.table.contacts["spring"].attributes, table.attributes
+    for name in ("tolerance", "verified_max_abs_error", "verified_max_rel_error"):
+        assert root[name] == stated[name]
+    assert table.table.contacts["ball"].tolerance == max(table.tolerance, 1e-10)
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
@@ -213,9 +218,10 @@ def test_files_are_small(path: Path) -> None:
 
 def test_nodes_are_rounded_to_what_their_block_was_built_for(table: Surrogate) -> None:
     targets = json.loads(table.table.attributes["builder_options"])["block_targets"]
-    for block, target in zip(table.table.blocks, targets, strict=True):
-        for nodes in block.nodes.values():
-            assert np.array_equal(nodes, to_step(nodes, target))
+    for contact in table.table.contacts.values():
+        for block, target in zip(contact.blocks, targets[contact.name], strict=True):
+            for nodes in block.nodes.values():
+                assert np.array_equal(nodes, to_step(nodes, target))
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
@@ -249,7 +255,13 @@ def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: 
 @pytest.mark.slow
 def test_the_smallest_table_is_what_the_builder_makes(tmp_path: Path, sweep: Sweep) -> None:
     again = build_table(tmp_path / "again.nc", 1e-4, sweep)
-    for old, new in zip(read_table(PATHS[0]).blocks, again.table.blocks, strict=True):
+    contacts = read_table(PATHS[0]).contacts
+    pairs = [
+        pair
+        for name, contact in contacts.items()
+        for pair in zip(contact.blocks, again.table.contacts[name].blocks, strict=True)
+    ]
+    for old, new in pairs:
         assert old.cells == new.cells
         # the last digits depend on the processor's instructions
         for name in old.nodes:

@@ -242,7 +242,7 @@ static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int6
         for (int i = 0; i < 6; ++i) columns[i][i == single ? 0 : j] = number(i);
     ask_cases(kernel, data, n, columns, single);
     if (single < 0) ask_elements(kernel, n, columns);
-    if (single < 0 && data == &mumacro_table.data)
+    if (single < 0 && data == &mumacro_table.spring)
         for (int64_t j = 0; j < n; ++j) {
             double x[6];
             for (int i = 0; i < 6; ++i) x[i] = columns[i][j];
@@ -309,12 +309,12 @@ int main(int count, char **words) {
     check_misuse();
     for (int i = 0; asked < random; ++i) {
         const int64_t n = lengths[i % 8];
-        ask_all(kernel, i % 4 == 1 ? &mumacro_table.ball : &mumacro_table.data, n, ordinary,
+        ask_all(kernel, i % 4 == 1 ? &mumacro_table.ball : &mumacro_table.spring, n, ordinary,
                 i % 7 - 1);
         asked += (long)n;
     }
     while (combinations < hostile) {
-        ask_all(kernel, &mumacro_table.data, LONGEST, combined, -1);
+        ask_all(kernel, &mumacro_table.spring, LONGEST, combined, -1);
         combinations += LONGEST;
     }
     for (long i = 0; i < tables; ++i) ask_nonsense(kernel);
