@@ -13,7 +13,7 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.inputs.kind import Kind
-from mumacro.kernel import threads as shared_out
+from mumacro.kernel import threads as slices
 
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
 KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
@@ -29,7 +29,7 @@ def costs() -> str:
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
             data = s.tabulated.data("mu_ratio", Kind(*kind))
-            ask = functools.partial(shared_out.values, 0, data, v, amplitude, threads=1, kind=kind)
+            ask = functools.partial(slices.values, 0, data, v, amplitude, threads=1, kind=kind)
             each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
             spring = spring or each
             rows.append((name, f"{tolerance:g}", f"{1e9 * each:.0f}", f"{each / spring:.1f}"))

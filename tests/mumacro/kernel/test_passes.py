@@ -8,7 +8,7 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.inputs.kind import Kind
-from mumacro.kernel import threads as shared_out
+from mumacro.kernel import threads as slices
 from mumacro.kernel.binding import CaseRows, Kernel, kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import (
@@ -38,8 +38,8 @@ def one_by_one(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> 
         one = slice(i, i + 1)
         rows.append(
             (
-                *shared_out.values(code, data, v[one], y[one], 1),
-                *shared_out.slopes(code, data, v[one], y[one], 1),
+                *slices.values(code, data, v[one], y[one], 1),
+                *slices.slopes(code, data, v[one], y[one], 1),
             )
         )
     return [np.concatenate(part) for part in zip(*rows, strict=True)]
