@@ -23,9 +23,6 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas
 from mumacro.table.atlas import MIDDLE, STEEPEST, STEEPEST_Y
-from mumacro.table.polynomials import quantity_cells
-
-from .compiled import solver_kernel
 
 CORNER = atlas.BLOCK_NAMES.index("corner")
 #: what a ball is solved for: every tabulated quantity, and 1 - mu~ with its own digits
@@ -70,11 +67,9 @@ class Springs:
         if lacking:
             reason = f"has no {', '.join(lacking)}: build this table anew, before any coarser one"
             raise TableError(fine.path, reason)
-        self.fine, self._data = fine, fine.tabulated.data()
-        self._cells = [
-            np.ascontiguousarray(quantity_cells(fine.table.contacts["spring"], code)[0])
-            for code in range(len(atlas.QUANTITIES))
-        ]
+        self.fine = fine
+        for name in atlas.QUANTITY_NAMES:
+            self._data = fine.tabulated.data(name)  # one for all, which has the cells then
 
     def crit(self, y: Array) -> Array:
         """v~crit of one spring."""
@@ -86,7 +81,7 @@ class Springs:
         at = np.flatnonzero(block == CORNER)
         a[at], b[at] = _corner(v[at], eta[at])
         out = {name: np.zeros(v.size) for name in NAMES}
-        rows, charts = self._data.blocks, atlas.CHARTS["spring"]
+        charts = atlas.CHARTS["spring"]
         for index in np.unique(block):
             at = np.flatnonzero(block == index)
             vs, ys = v[at], y[at]
@@ -99,8 +94,7 @@ class Springs:
                 if not charts[index].holds(quantity):
                     continue
                 base, factor = kernels[-1].forms(code, int(index), vs, ys, eta[at])
-                q = np.empty(at.size)
-                _cell_values(self._cells[code], rows[index], a[at], b[at], q)
+                q = kernels[-1].tabulated(self._data, code, int(index), a[at], b[at])
                 out[quantity.name][at] = base + factor * q
                 if code == atlas.MU:
                     plain = 1.0 - base - factor * q
@@ -114,25 +108,6 @@ def _corner(v: Array, eta: Array) -> tuple[Array, Array]:
     s0 = np.sqrt(2.0 * math.pi * v / phi)
     radius = np.sqrt(0.5 * s0 * s0 + 2.0 * phi * phi)
     return radius, 2.0 * phi / (math.sqrt(2.0) * radius + s0)
-
-
-@solver_kernel
-def _cell_values(cells: Array, row: Array, a: Array, b: Array, out: Array) -> None:
-    """The polynomials of a block with the geometry ``row`` at (a, b), (n,)."""
-    first, cells_b = int(row[0]), int(row[1])
-    last = cells.shape[0] - 1
-    for n in range(a.size):
-        x, z = row[3] * a[n] + row[2], row[5] * b[n] + row[4]
-        i, j = max(int(x), 0), max(int(z), 0)
-        u, w = 2.0 * (x - i) - 1.0, 2.0 * (z - j) - 1.0
-        cell = cells[min(first + i * cells_b + j, last)]
-        total = 0.0
-        for k in range(8):
-            line = 0.0
-            for m in range(8):
-                line = line * u + cell[k, m]
-            total = total * w + line
-        out[n] = total
 
 
 def _fast_deficit(v: Array, y: Array) -> Array:

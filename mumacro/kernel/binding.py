@@ -423,6 +423,12 @@ class Kernel:
 
     # --- for the builder --------------------------------------------------------------------------
 
+    def tabulated(self, data: Data, quantity: int, block: int, a: Array, b: Array) -> Array:
+        """What ``block`` tabulates at its coordinates (n,) as :meth:`places` gives them."""
+        q = np.empty(a.size)
+        self._functions.tabulated(data.pointer, quantity, block, a.size, *map(_numbers, (a, b, q)))
+        return q
+
     def forms(
         self, quantity: int, block: int, v: Array, y: Array, eta: Array, contact: int = 0
     ) -> tuple[Array, Array]:

@@ -78,6 +78,16 @@ static void mu_places_of(const mumacro_data *data, int contact, int64_t n, const
     }
 }
 
+static void mu_tabulated(const mumacro_data *data, int quantity, int block, int64_t n,
+                         const double *a, const double *b, double *q) {
+    const mumacro_cells *cells = &data->quantities[quantity];
+    const double *row = mu_block_of(data, block);
+    for (int64_t i = 0; i < n; ++i) {
+        const mu_spot spot = mu_find(row, cells->first, cells->cells, a[i], b[i]);
+        q[i] = mu_cell_value(cells->polynomials + 64 * spot.cell, spot.u, spot.w);
+    }
+}
+
 static void mu_border_scales(int piece, int64_t n, const double *y, double *of_nodes,
                              double *of_cells) {
     for (int64_t i = 0; i < n; ++i) {
@@ -158,6 +168,7 @@ const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     mu_one,
     mu_borders_as,
     mu_places_of,
+    mu_tabulated,
     mu_forms,
     mu_border_scales,
     mu_cell_shares,

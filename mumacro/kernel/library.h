@@ -61,8 +61,10 @@ typedef struct {
      * the block is the number of blocks */
     void (*places)(const mumacro_data *data, int contact, int64_t n, const double *v,
                    const double *y, int8_t *block, double *a, double *b);
-    /* for the builder: base and factor with value = base + factor q;
-     * eta = y~ - 1 counts in the corner only */
+    /* for the builder: what a block tabulates, q, at its coordinates as evaluation counts them */
+    void (*tabulated)(const mumacro_data *data, int quantity, int block, int64_t n, const double *a,
+                      const double *b, double *q);
+    /* base and factor with value = base + factor q; eta = y~ - 1 counts in the corner only */
     void (*forms)(int contact, int quantity, int block, int64_t n, const double *v, const double *y,
                   const double *eta, double *base, double *factor);
     /* what node values of a piece of the border, and what its cells,

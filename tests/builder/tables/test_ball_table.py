@@ -344,7 +344,6 @@ def test_plain_numbers_answer_as_arrays_do() -> None:
         assert (alone.source_code, alone.regime) == (many.source_code[i], many.regime[i])
         assert alone.gradient == {name: x[i] for name, x in many.gradient.items()}
         assert alone.regime_certain == many.regime_certain[i]
-        assert alone._border()(2.0) == table.v_tilde_crit(2.0, contact="ball")
 
 
 @pytest.mark.parametrize(("name", "value"), [("mu0", -0.3), ("v0", math.nan), ("k", 0.0)])
