@@ -6,6 +6,7 @@ body, or a large computation, is at hand.  Computing and reading happen in threa
 """
 
 import asyncio
+import math
 from collections.abc import Iterator
 from typing import Annotated, Any
 
@@ -41,6 +42,8 @@ class _Answer(Response):
         self._work: Work = self._state.work
         settings = self._state.settings
         self._limit, self._most = settings.max_body_bytes, settings.max_batch
+        # HTTP/1.0 knows no answer in pieces
+        self._piece = math.inf if request.scope["http_version"] == "1.0" else _PIECE
         self._placed = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -80,7 +83,7 @@ class _Answer(Response):
             threads = self._work.questions.threads
             batch = await asyncio.wrap_future(threads.submit(self._batch, text))
         cost += batch.cost
-        pieces = _gathered(batch.write())
+        pieces = _gathered(batch.write(), self._piece)
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [(b"content-type", JSON), (b"x-table", batch.table.id.encode("latin-1"))]
         if following is None:
@@ -108,13 +111,13 @@ def _by_one(text: bytearray) -> float:
     return _ROW * text.count(b"{") + _WORD * (text.count(b'"') / 2 + text.count(b"null"))
 
 
-def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
-    """The same bytes in larger pieces."""
+def _gathered(pieces: Iterator[bytes], least: float) -> Iterator[bytes]:
+    """The same bytes in pieces of at least so many."""
     gathered, size = list[bytes](), 0
     for piece in pieces:
         gathered.append(piece)
         size += len(piece)
-        if size >= _PIECE:
+        if size >= least:
             yield b"".join(gathered)
             gathered, size = [], 0
     if size:

@@ -264,6 +264,18 @@ def test_a_body_is_read_in_any_pieces_after_100_continue(
     assert received.strip() == live_server.ask("POST", BATCH, body)[2]
 
 
+def test_an_answer_over_http_1_0_is_one_piece(live_server: Any, raw: Any) -> None:
+    body = columns(20_000)
+    raw.sendall(posted(BATCH, body).replace(b" HTTP/1.1\r\n", b" HTTP/1.0\r\n"))
+    response = http.client.HTTPResponse(raw, method="POST")
+    response.begin()
+    assert response.status == 200
+    assert response.getheader("Transfer-Encoding") is None
+    whole = live_server.ask("POST", BATCH, body)[2]
+    assert int(response.getheader("Content-Length", "0")) == len(whole)
+    assert response.read() == whole
+
+
 @pytest.mark.slow
 def test_short_requests_are_answered_while_a_large_batch_is(
     serving: Any, surrogate: Surrogate

@@ -276,3 +276,14 @@ def test_a_rigid_contact_is_told_what_it_assumes() -> None:
     [remark] = remarks({**CASE, "k": math.inf})
     assert (remark["row"], remark["field"]) == ("k is known", "k")
     assert "1.5e+06 N/m" in remark["text"]
+
+
+@pytest.mark.parametrize("k", [math.inf, 0.5, 1e6, 2e12])
+@pytest.mark.parametrize("y0", [0.0, 1e-13, 2e-6, 0.1])
+@pytest.mark.parametrize("omega", [0.0, 1e-5, 1.3e5, 1e10])
+@pytest.mark.parametrize("v0", [0.0, 0.01, 400.0])
+def test_one_case_has_the_remarks_of_a_column_of_one(
+    k: float, y0: float, omega: float, v0: float
+) -> None:
+    case = {**CASE, "k": k, "y0": y0, "omega": omega, "v0": v0}
+    assert remarks(case) == remarks({**case, "k": np.array([k])})
