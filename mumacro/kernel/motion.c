@@ -4,10 +4,14 @@
  * mean limit mu0 Fz for forces, l0 = mu0 Fz / k for lengths, the angle tau = omega t for time. */
 
 enum {
-    MU_MARKS = 256, /* parts of a period whose sums are kept, at most: 16 for each harmonic */
+    /* parts of a period of a harmonic, whose sums are kept: each turns it by 2 pi/16 = 0.393, below
+     * MU_DAMPED */
     MU_MARKS_OF_A_HARMONIC = 16,
-    MU_MOTION_ORDERS = 12, /* harmonics that are summed by the rule of sin and cos of a sum */
-    MU_MOMENTS = 4         /* computed at once */
+    MU_MARKS = 256, /* at most: those of the harmonic 16; of higher ones a part has several steps */
+    /* harmonics that are summed by the rule of sin and cos of a sum, which adds a rounding with
+     * each order */
+    MU_MOTION_ORDERS = 12,
+    MU_MOMENTS = 4 /* computed at once: a vector of them */
 };
 
 /* A motion of one spring: harmonics of x, y and the normal force one after another, whose terms are
@@ -29,7 +33,9 @@ typedef struct {
     double tau, x, y, wx, wy, limit, slope;
 } mu_moment;
 
-/* sin x and cos x of |x| < 1e5, off by at most 1.2e-16. */
+/* sin x and cos x of |x| < 1e5, off by at most 1.2e-16: by the series of Taylor, whose coefficients
+ * are 1/17! to -1/3! and 1/16! to -1/2!, of what is left of whole quarter turns (Cody and Waite).
+ */
 static inline void mu_sine_cosine(double x, double *sine, double *cosine) {
     static const double odd[8] = {2.8114572543455206e-15, -7.647163731819816e-13,
                                   1.6059043836821613e-10, -2.505210838544172e-08,
@@ -118,14 +124,18 @@ static mu_moment mu_moment_at(const mu_shaken *m, double tau) {
     return out;
 }
 
-/* sin(half) / half of half <= 0.2, to 1e-17. */
+/* A harmonic turns by no more than this from one end of a step to the other. */
+#define MU_DAMPED 0.4
+
+/* sin(half) / half of half <= MU_DAMPED / 2, to 1e-17: the series of Taylor, whose factors are
+ * those of 3!, 5!/3! and so on. */
 static double mu_damping(double half) {
     const double z = half * half;
     return 1.0 -
            z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0))));
 }
 
-/* The mean way over a time that no harmonic turns by more than 0.4. */
+/* The mean way over a time in which no harmonic turns by more than MU_DAMPED. */
 static void mu_mean_way(const mu_shaken *m, double tau, double length, double *way) {
     const double *order = m->orders, *term = m->terms, middle = tau + 0.5 * length;
     double sine, cosine;

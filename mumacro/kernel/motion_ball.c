@@ -1,22 +1,33 @@
 /* A ball is many independent springs (see element.c), and its steady cycle their sum: an adaptive
  * rule of quadrature over them.  At the end the functions of library.h, for springs and balls.
  *
- * The thresholds that are not derived were tried over the balls of `errors` in
- * benchmarks/motion.py, beside tolerances a hundred times finer. */
+ * A threshold that says *tried* is not derived.  It was tried over the balls of `errors` in
+ * benchmarks/motion.py, beside tolerances a hundred times finer (ranges: motion_slip.c). */
 
 enum {
-    MU_MOTION_KNOWN = 256, /* cycles that are kept to start others from */
-    MU_MOTION_PANELS = 48, /* a ball with more is given up */
-    MU_MOTION_SCAN = 10    /* springs at which the kind of their cycles is looked at first */
+    MU_MOTION_KNOWN = 256, /* cycles that are kept to start others from (tried) */
+    MU_MOTION_PANELS = 48, /* a ball with more is given up (tried) */
+    MU_MOTION_SCAN = 10, /* springs at which the kind of their cycles is looked at first (tried) */
+    MU_KRONROD_POINTS = 15,
+    /* coefficients by which roughness is judged: those of the last of the rule's polynomials */
+    MU_ROUGH_TERMS = 4,
+    /* points at either end of the rule: a kink between two of them is seen by few (tried) */
+    MU_POINTS_AT_END = 4
 };
-#define MU_MIDDLE_SHARE \
-    1.5 /* of the mean limit, that of the middle spring under Hertz's pressure */
-#define MU_MOTION_COARSE 30.0 /* of the tolerance, where only the kind of a cycle is looked for */
-#define MU_KINK_WIDTH 0.4     /* roots of the tolerance: an error of its power 3/2 is below it */
-#define MU_KINK_AT_END 0.02   /* of a panel: a kink so near to its end is left to later divisions */
-/* of the roughness: without and with a kink where few points of the rule see it */
+/* of the mean limit, that of the middle spring under Hertz's pressure */
+#define MU_MIDDLE_SHARE 1.5
+/* of the tolerance, where only the kind of a cycle is looked for (tried) */
+#define MU_MOTION_COARSE 30.0
+/* roots of the tolerance: springs change by the power 3/2 of the distance to a kink, so that the
+ * sum errs by the power 5/2 of what the kink is off, a tenth of the tolerance's power 5/4 */
+#define MU_KINK_WIDTH 0.4
+/* of a panel: a kink so near to its end is left to later divisions (tried) */
+#define MU_KINK_AT_END 0.02
+/* of the roughness: without and with a kink where few points of the rule see it (tried) */
 #define MU_ROUGH 1.5
 #define MU_ROUGH_AT_KINK 4.0
+/* of the tolerance: that of the springs; the rest is that of their sum */
+#define MU_OF_SPRINGS 0.5
 
 /* The rule of Kronrod with 15 points: places and weights from the middle outwards. */
 static const double MU_KRONROD[8][2] = {
@@ -52,6 +63,7 @@ typedef struct {
  * lie between the points. */
 static double mu_roughness(double values[15][2], double *start, double *end) {
     double x[15], weight[15], last[15] = {0.0}, p[15], size = 0.0, square = 0.0;
+    /* the first of the polynomials is constant, of the norm 1 on [-1, 1] */
     double at_end = 0.7071067811865476, before = 0.0, sign = 1.0;
     for (int i = 0; i < 15; ++i) {
         x[i] = mu_kronrod(i, &weight[i]);
@@ -68,7 +80,7 @@ static double mu_roughness(double values[15][2], double *start, double *end) {
             start[j] += sign * at_end * c[j];
             end[j] += at_end * c[j];
         }
-        if (degree > 10) square += c[0] * c[0] + c[1] * c[1];
+        if (degree >= MU_KRONROD_POINTS - MU_ROUGH_TERMS) square += c[0] * c[0] + c[1] * c[1];
         for (int i = 0; i < 15; ++i) {
             next[i] = x[i] * p[i] - size * last[i];
             sum += weight[i] * next[i] * next[i];
@@ -250,7 +262,8 @@ static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_l
     }
     (void)mu_roughness(values, out.start, out.end);
     for (int i = 1; i < 15; ++i)
-        kinks += (low == 0.0 || i < 4 || i > 11) && out.sticks[i] != out.sticks[i - 1];
+        kinks += (low == 0.0 || i < MU_POINTS_AT_END || i > MU_KRONROD_POINTS - MU_POINTS_AT_END) &&
+                 out.sticks[i] != out.sticks[i - 1];
     /* few of the points see springs at the rim, or close to an end, that behave otherwise than the
      * rest */
     out.error = (kinks ? MU_ROUGH_AT_KINK : MU_ROUGH) * mu_roughness(sums, ends, ends);
@@ -323,7 +336,7 @@ static double mu_division(mu_ball *ball, const mu_panel *panel, double tolerance
 static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *grid,
                                 mu_grid *steps) {
     mu_panel panels[MU_MOTION_PANELS];
-    const double half = 0.5 * tolerance;
+    const double half = MU_OF_SPRINGS * tolerance;
     double error = 0.0;
     mu_ball ball;
     mu_steady out;

@@ -8,64 +8,99 @@
  * The cycle is found with finer and finer steps.  The estimate of the error sums the differences of
  * the last two over all marks, which cannot cancel.
  *
- * The thresholds that are not derived were tried over the motions of `errors` in
- * benchmarks/motion.py, where the column *given up* shows what they miss. */
+ * A threshold that says *tried* is not derived.  It was tried over the motions of `errors` in
+ * benchmarks/motion.py (ranges: motion_slip.c), where the columns *above 1* and *given up* show
+ * what it misses: an error beyond its estimate, and an estimate beyond the tolerance. */
 
 enum {
-    MU_MOTION_PERIODS = 100,      /* of a search for a cycle; 2 to 5 are usual */
-    MU_MOTION_REST_PERIODS = 500, /* of the way from rest */
-    MU_MOTION_LEVELS = 6,         /* of halved steps: 2^-6 of a step is 1e-9 of its error */
-    MU_MOTION_SLIDING_PERIODS = 12
+    MU_MOTION_PERIODS = 100,        /* of a search for a cycle; 2 to 5 are usual (tried) */
+    MU_MOTION_REST_PERIODS = 500,   /* of the way from rest (tried) */
+    MU_MOTION_LEVELS = 6,           /* of halved steps: 2^-6 of a step is 1e-9 of its error */
+    MU_MOTION_SLIDING_PERIODS = 12, /* of a search at rest for a cycle that slips (tried) */
+    MU_MOTION_RETRIES = 3           /* with finer steps, where none are found (tried) */
 };
 /* Lengths of a step.  The estimate embedded in a step is of order 4, the error of a cycle of order
- * 6: a step may err by the power 2/3 of the tolerance.  Halves of it err by 2^-4. */
-#define MU_STEP_OF_TOLERANCE 0.1
-#define MU_STEP_LARGEST 1e-3 /* of what is raised to 2/3 */
+ * 6: a step may err by the power 2/3 of the tolerance.  Halves of it err by 2^-4 = 0.0625. */
+#define MU_STEP_OF_TOLERANCE 0.1 /* what is raised to 2/3 (tried) */
+#define MU_STEP_LARGEST 1e-3     /* of what is raised: a step follows an angle to 1 % then */
 #define MU_STEP_HALVED 0.06
 /* The rule of step control: the fourth root of tolerance over error, a little less, within bounds
  * (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.8). */
-#define MU_STEP_SAFETY 0.85
-#define MU_STEP_SHORTEST 0.2 /* of the step before */
-#define MU_STEP_LONGEST 2.0
-#define MU_STEP_REPEATED 0.9   /* at most, of a step that erred too much */
-#define MU_STEP_FAILED 0.25    /* of a step without stages */
-#define MU_STEP_OF_ERROR_0 4.0 /* of a step without an error; then the longest counts */
+#define MU_STEP_SAFETY 0.85  /* a little less: theirs is 0.9 or less */
+#define MU_STEP_SHORTEST 0.2 /* of the step before: theirs */
+#define MU_STEP_LONGEST 2.0  /* theirs is 8: events would be passed (tried) */
+/* at most, of a step that erred too much: shorter, or it would repeat */
+#define MU_STEP_REPEATED 0.9
+#define MU_STEP_FAILED 0.25    /* of a step without stages (tried) */
+#define MU_STEP_OF_ERROR_0 4.0 /* of a step without an error: any number above the longest */
+/* of the fourth root of the tolerance, the first step: the order of its estimate (tried) */
 #define MU_STEP_FIRST 0.1
-#define MU_STEP_NONE 1e-15       /* below, rounding of tau: the march fails */
-#define MU_ON_LIMIT 1e-12        /* of the limit: a force that begins so near to it begins on it */
-#define MU_MOTION_BRIEF 1e-3     /* of tau; a shorter stick or slip makes no other kind of cycle */
-#define MU_MOTION_SHORT 1e-10    /* of tau; a shorter stick or step is rounding */
-#define MU_MOTION_UNKNOWN 2.0    /* of the limit: no two forces are further from each other */
-#define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least: sticks too short to be found */
+#define MU_STEP_LAST 0.5   /* of the rest: a longer step that does not reach its end takes half */
+#define MU_STEP_NONE 1e-15 /* below, rounding of tau: the march fails */
+/* of the limit: the way of the force in a part of a stick, so that it passes the limit and comes
+ * back once at most (tried) */
+#define MU_STICK_WAY 0.5
+/* of the limit: a force that begins so near to it begins on it (tried) */
+#define MU_ON_LIMIT 1e-12
+/* of tau; a shorter stick or slip makes no other kind of cycle (tried) */
+#define MU_MOTION_BRIEF 1e-3
+#define MU_MOTION_SHORT 1e-10 /* of tau; a shorter stick or step is rounding (tried) */
+#define MU_MOTION_UNKNOWN 2.0 /* of the limit: no two forces are further from each other */
+/* What the estimate has beside the differences of two levels.  A part of the tolerance, within
+ * bounds, for sticks too short to be found (tried): */
+#define MU_MOTION_ROUNDING_OF_TOLERANCE 0.05
+#define MU_MOTION_ROUNDING 2e-10 /* of the mean force, at least */
 #define MU_MOTION_MOST_ROUNDING 5e-9
-#define MU_MOTION_NO_PATH 1e-13   /* a path of slip that is rounding */
-#define MU_MOTION_OF_ROUNDING 1e4 /* a way to the cycle, in moves of a period that are rounding */
-#define MU_MOTION_OF_DISTANCE 3.0 /* an error, in distances to the cycle */
-#define MU_MOTION_STAYS 1e-16     /* 1 less the share of a disturbance that is left, at least */
-/* The way from rest. */
+#define MU_MOTION_OF_DISTANCE 3.0 /* in distances to the cycle (tried) */
+/* times the differences of the last two levels; larger at rest, where the errors of the whole way
+ * stay, and for slow drags (tried) */
+#define MU_MOTION_OF_DIFFERENCE 2.0
+#define MU_MOTION_OF_DIFFERENCE_AT_REST 6.0
+/* Of the tolerance, the distance to the cycle at which a search ends: with MU_MOTION_OF_DISTANCE it
+ * leaves the most of the estimate to the differences.  At rest less, and never more than of 1e-5,
+ * as the errors of the whole way stay (tried). */
+#define MU_MOTION_GOAL 0.1
+#define MU_MOTION_GOAL_AT_REST 0.01
+#define MU_MOTION_GOAL_LARGEST 1e-5
+/* of the estimate before: at rest, finer steps help below it (tried) */
+#define MU_MOTION_HELPS 0.5
+#define MU_MOTION_NO_PATH 1e-13 /* a path of slip that is rounding: some hundred of a force */
+/* a way to the cycle, in moves of a period that are rounding (tried) */
+#define MU_MOTION_OF_ROUNDING 1e4
+/* 1 less the share of a disturbance that is left, at least: rounding */
+#define MU_MOTION_STAYS 1e-16
+/* The way from rest.  A leap that is taken back is halved, the next ones grow again (tried). */
 #define MU_MOTION_LEAP 0.9 /* of what is left of the way to a cycle, at most */
 #define MU_MOTION_LEAST_LEAP 0.1
+#define MU_MOTION_LEAP_CUT 0.5
 #define MU_MOTION_LEAP_GROWTH 1.5
+/* moves of a period: those that have shown that it can be trusted */
+#define MU_MOTION_LEAP_WORTH 2.0
+/* of what a later period moves: by so much a leap changes the end */
+#define MU_MOTION_AFTER_LEAP 0.5
 #define MU_MOTION_LEAST_MOVE 1e-12 /* of a period before a leap: 100 roundings */
 /* of a way of the force, by which Newton's step after it may be off: it shortens by a third of the
  * way where the force moves by the cube of what is left */
 #define MU_MOTION_OFF 0.85
-#define MU_MOTION_SLIDES 1e3 /* goals: a cycle with a longer path slips */
+#define MU_MOTION_SLIDES 1e3 /* goals: a cycle with a longer path slips (tried) */
 /* The search for a cycle beside a drag.  A step too long is cut to a tenth at least, cut once more
  * to a hundredth of that, and so on; the steps after it grow by 4 at most.  Where no cycle is
  * found, those of faster drags lead to it, from 1e-3 l0 per radian by tenths.  Found by search:
  * 1 of 11,000 random springs with drags from 1e-9 to 1e-3 is left short of the tolerance, see `slow
  * drag` in benchmarks/motion.py. */
-#define MU_MOTION_SLOW \
-    1e-6 /* l0 per radian; below, a slip that larger steps miss moves the cycle */
+/* l0 per radian; below, a slip that larger steps miss moves the cycle */
+#define MU_MOTION_SLOW 1e-6
 #define MU_MOTION_OF_SLOW 1e-6         /* the tolerance there at most */
 #define MU_MOTION_ROUNDING_OF_SLOW 0.1 /* of that tolerance: 3 of 6,000 springs need 0.05 */
+/* of the move before: a step after which the force moves back further */
+#define MU_MOTION_BACK 0.5
 #define MU_MOTION_CUT 0.1
 #define MU_MOTION_LONGEST_CUT 0.7
 #define MU_MOTION_LEAST_SHARE 1e-9
 #define MU_MOTION_GROWTH 4.0
 #define MU_MOTION_FASTER 1e-3
 #define MU_MOTION_SLOWER 0.1
+#define MU_MOTION_NEAR 2.0 /* drags: a cycle of this one leads to that of the drag itself */
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 
 /* Times at which steps end at the latest, up to 2 pi, and room for more of them. */
@@ -155,9 +190,9 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     const double size = mu_length(march->f[0], march->f[1]), ex = march->f[0] / size;
     const double ey = march->f[1] / size;
     const double rest = end - start.tau;
-    const double length = march->step >= rest        ? rest
-                          : march->step > 0.5 * rest ? 0.5 * rest
-                                                     : march->step;
+    const double length = march->step >= rest                 ? rest
+                          : march->step > MU_STEP_LAST * rest ? MU_STEP_LAST * rest
+                                                              : march->step;
     double factor, nx, ny, time;
     mu_bracket fall;
     mu_slip slip;
@@ -212,7 +247,8 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
 static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *fresh, int *ends,
                           mu_drawing *drawing) {
     mu_stick stick = {m, march->at, {march->f[0], march->f[1]}, end - march->at.tau};
-    const double speed = mu_length(stick.start.wx, stick.start.wy), way = 0.5 * stick.start.limit;
+    const double speed = mu_length(stick.start.wx, stick.start.wy),
+                 way = MU_STICK_WAY * stick.start.limit;
     const double slowest = speed + sqrt(speed * speed + 2.0 * m->acceleration * way);
     double share, time, at_last[2];
     mu_moment last;
@@ -382,7 +418,8 @@ static int mu_cut_step(mu_newton *step, const mu_residual *r) {
     const double *way = step->at.step, *moved = step->at.moved;
     const double now = way[0] * r->moved[0] + way[1] * r->moved[1];
     const double before = way[0] * moved[0] + way[1] * moved[1];
-    if (!(now < 0.0 && r->size > 0.5 * step->at.size && step->share > MU_MOTION_LEAST_SHARE))
+    if (!(now < 0.0 && r->size > MU_MOTION_BACK * step->at.size &&
+          step->share > MU_MOTION_LEAST_SHARE))
         return 0;
     step->share *= mu_max(step->least, mu_min(before / (before - now), MU_MOTION_LONGEST_CUT));
     step->least *= MU_MOTION_CUT;
@@ -443,7 +480,7 @@ static mu_steady mu_find_dragged(const mu_shaken *m, const mu_grid *grid, mu_gri
     if (out.distance <= goal || out.failed || faster.drag <= m->drag) return out;
     f[0] = start[0];
     f[1] = start[1];
-    for (; faster.drag > 2.0 * m->drag; faster.drag *= MU_MOTION_SLOWER)
+    for (; faster.drag > MU_MOTION_NEAR * m->drag; faster.drag *= MU_MOTION_SLOWER)
         (void)mu_find_cycle(&faster, grid, steps, tolerance, goal, MU_MOTION_PERIODS, 0.0, f);
     return mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_PERIODS, 0.0, f);
 }
@@ -509,7 +546,7 @@ static int mu_is_alike(const mu_leaps *leaps, const mu_march *march, const mu_re
 static void mu_take_back(mu_leaps *leaps, double *f) {
     f[0] = leaps->back[0];
     f[1] = leaps->back[1];
-    leaps->share = mu_max(0.5 * leaps->share, MU_MOTION_LEAST_LEAP);
+    leaps->share = mu_max(MU_MOTION_LEAP_CUT * leaps->share, MU_MOTION_LEAST_LEAP);
     leaps->wait *= 2;
     leaps->leapt = leaps->waited = leaps->phases = 0;
 }
@@ -528,7 +565,8 @@ static int mu_is_leap_due(mu_leaps *leaps, const mu_march *march, const mu_resid
     leaps->back[0] = march->f[0];
     leaps->back[1] = march->f[1];
     return leaps->allowed && leaps->waited >= leaps->wait && leaps->phases > 1 &&
-           leaps->moved > MU_MOTION_LEAST_MOVE && leaps->length > 2.0 * leaps->moved;
+           leaps->moved > MU_MOTION_LEAST_MOVE &&
+           leaps->length > MU_MOTION_LEAP_WORTH * leaps->moved;
 }
 
 /* Along the circle of the forces on which the last slip ends. */
@@ -591,7 +629,7 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
         }
         if (leaps.leapt) mu_trust_leaps(&leaps);
         distance = mu_distance_at_rest(&march, &r);
-        if (leaps.ever) distance += 0.5 * (distance == 0.0 ? leaps.moved : r.size);
+        if (leaps.ever) distance += MU_MOTION_AFTER_LEAP * (distance == 0.0 ? leaps.moved : r.size);
         if (distance <= goal || march.mean[MU_MEAN_PATH] < MU_MOTION_NO_PATH ||
             period >= MU_MOTION_REST_PERIODS || march.failed)
             return mu_end_of_way(&march, distance, &longest);
@@ -657,8 +695,13 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
     double of_step = mu_cube_root_near(mu_min(MU_STEP_OF_TOLERANCE * followed, MU_STEP_LARGEST));
     const double rounding =
         slow ? MU_MOTION_ROUNDING_OF_SLOW * followed
-             : mu_max(MU_MOTION_ROUNDING, mu_min(0.05 * tolerance, MU_MOTION_MOST_ROUNDING));
-    const double goal = m->drag > 0.0 ? 0.1 * followed : 0.01 * mu_min(tolerance, 1e-5);
+             : mu_max(MU_MOTION_ROUNDING,
+                      mu_min(MU_MOTION_ROUNDING_OF_TOLERANCE * tolerance, MU_MOTION_MOST_ROUNDING));
+    const double goal = m->drag > 0.0
+                            ? MU_MOTION_GOAL * followed
+                            : MU_MOTION_GOAL_AT_REST * mu_min(tolerance, MU_MOTION_GOAL_LARGEST);
+    const double of_difference =
+        m->drag > 0.0 && !slow ? MU_MOTION_OF_DIFFERENCE : MU_MOTION_OF_DIFFERENCE_AT_REST;
     int near = f[0] != 0.0 || f[1] != 0.0;
     mu_steady last, out;
     of_step *= of_step;
@@ -669,7 +712,9 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         mu_keep_below(limit, f);
         out = mu_cycle_near(m, grid, steps, of_step, goal, near, f);
         /* steps too large to be followed */
-        for (int i = 0; level == 0 && i < 3 && out.distance >= MU_MOTION_UNKNOWN * limit; ++i) {
+        for (int i = 0;
+             level == 0 && i < MU_MOTION_RETRIES && out.distance >= MU_MOTION_UNKNOWN * limit;
+             ++i) {
             near = 0;
             f[0] = m->drag > 0.0 ? limit : 0.0;
             f[1] = 0.0;
@@ -679,13 +724,12 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         out.level = level;
         out.error = MU_MOTION_UNKNOWN * limit;
         if (level > 0)
-            out.error =
-                (m->drag > 0.0 && !slow ? 2.0 : 6.0) * mu_difference(&out, &last, m->marks) +
-                MU_MOTION_OF_DISTANCE * out.distance + rounding;
+            out.error = of_difference * mu_difference(&out, &last, m->marks) +
+                        MU_MOTION_OF_DISTANCE * out.distance + rounding;
         /* finer steps bring no cycle nearer, and of a contact at rest not always the same */
         if (out.error <= tolerance || level == levels) return out;
-        if (level > 0 && (out.distance > tolerance ||
-                          (m->drag == 0.0 && level > 1 && out.error > 0.5 * last.error)))
+        if (level > 0 && (out.distance > tolerance || (m->drag == 0.0 && level > 1 &&
+                                                       out.error > MU_MOTION_HELPS * last.error)))
             return out;
         if (out.slips_before) { /* the steps of the last period are too few */
             mu_march march;

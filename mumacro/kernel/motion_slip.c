@@ -8,26 +8,32 @@
  * a quadratic equation for u = tan((th - th0)/2), which the method of Radau of order 5 integrates.
  * Stick ends where |f| reaches L, slip where its speed falls through 0.
  *
- * The thresholds that are not derived were tried over the motions of `errors` in
+ * A threshold that says *tried* is not derived.  It was tried over the motions of `errors` in
  * benchmarks/motion.py: amplitudes to 1e2 l0, drags from 1e-9 to 1e3 l0 per radian, tolerances from
- * 1e-9 to 1e-4. */
+ * 1e-9 to 1e-4.  What it decides is only time, or a step that is taken again: the estimate of the
+ * error does not rest on it. */
 
 #define MU_SQRT6 2.449489742783178
-#define MU_RADAU_NEWTON 1e-6  /* a step of Newton's method leaves its square, which is rounding */
-#define MU_RADAU_ITERATIONS 9 /* of Newton's method: more are none, as the step is too long */
-#define MU_RADAU_FURTHEST                                                                          \
-    9.0                        /* sum of the u of the stages, beyond which Newton's method is lost \
-                                */
-#define MU_RADAU_LARGEST 0.5   /* u of a stage: 53 degrees, where the cubic through them holds */
-#define MU_EVENT_ITERATIONS 60 /* halving a step as often leaves 1e-18 of it */
-#define MU_EVENT_WIDTH 1e-15   /* of a step: rounding of its end */
-#define MU_EVENT_SPEED 1e-13   /* of the fastest slip of a step: rounding of the slip speed */
-#define MU_EVENT_EXCESS 1e-15  /* of the limit squared: rounding of |f|^2 - L^2 */
-#define MU_EVENT_LOW 0.3     /* of the fastest: a speed whose least is higher does not fall to 0 */
-#define MU_EVENT_PARABOLAS 3 /* steps to that least */
-#define MU_EVENT_TOPS 12     /* steps of regula falsi to the largest excess of a stick */
-#define MU_EVENT_NO_STICK 1e-12 /* of a step: a stick that is outside after it does not begin */
+#define MU_RADAU_NEWTON 1e-6 /* a step of Newton's method leaves its square, which is rounding */
+/* of Newton's method; with more the step is too long, and is taken again (tried) */
+#define MU_RADAU_ITERATIONS 9
+/* sum of the u of the stages: beyond, Newton's method is lost (tried) */
+#define MU_RADAU_FURTHEST 9.0
+/* u of a stage: 53 degrees, to which the cubic through them follows the angle (tried) */
+#define MU_RADAU_LARGEST 0.5
+#define MU_EVENT_ITERATIONS 60 /* halving a step as often leaves 2^-60 = 1e-18 of it */
+#define MU_EVENT_WIDTH 1e-15   /* of a step: a few roundings of its end */
+/* of the fastest slip of a step: roundings of the slip speed, a sum of velocities */
+#define MU_EVENT_SPEED 1e-13
+#define MU_EVENT_EXCESS 1e-15 /* of the limit squared: a few roundings of |f|^2 - L^2 */
+/* of the fastest: a speed whose cubic has a higher least does not fall to 0 (tried) */
+#define MU_EVENT_LOW 0.3
+#define MU_EVENT_PARABOLAS 3 /* steps to that least (tried) */
+#define MU_EVENT_TOPS 12     /* steps of regula falsi to the largest excess of a stick (tried) */
+/* of a step: a stick that is outside the limit after it is rounding, and does not begin (tried) */
+#define MU_EVENT_NO_STICK 1e-12
 
+/* The method of Radau IIA of order 5: places of the stages, and their weights. */
 static const double MU_RADAU_AT[3] = {(4.0 - MU_SQRT6) / 10.0, (4.0 + MU_SQRT6) / 10.0, 1.0};
 static const double MU_RADAU[3][3] = {
     {(88.0 - 7.0 * MU_SQRT6) / 360.0, (296.0 - 169.0 * MU_SQRT6) / 1800.0,
