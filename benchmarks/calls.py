@@ -161,7 +161,50 @@ def far_end(points: int, quick: bool) -> str:  # noqa: ARG001
     return markdown(["place", "ns a point", "medians"], rows)
 
 
+def outputs(points: int, quick: bool) -> str:
+    """Every output of ``include`` beside the calls that it is made of, for one thread: the time of
+    the answer with the output over that of its parts."""
+    s = mumacro.open(1e-10, threads=1)
+    rng = np.random.default_rng(0)
+    n = 10_000 if quick else min(points, 200_000)
+    v, y = 10.0 ** rng.uniform(-3.0, 3.0, (2, n))
+    unit = CASE["mu0"] * CASE["Fz"] / CASE["k"]
+    many = {**CASE, "v0": unit * CASE["omega"] * v, "y0": unit * y}
+    spreads = {"k": 1e5, "v0": 1e-4}
+
+    def crit() -> None:
+        s.evaluate({**many, "v0": unit * CASE["omega"] * s.v_tilde_crit(y)})
+
+    plain = partial(s.evaluate, many)
+    at_rest = partial(s.evaluate, {**many, "v0": 0.0})
+    with_groups = partial(s.evaluate, many, groups=True)
+    gradient = partial(s.evaluate, many, gradient=True)
+    parts = {
+        "groups": [with_groups],
+        "limits": [with_groups, at_rest, crit],
+        "gradient": [gradient],
+        "std": [gradient, lambda: [np.hypot(v, y) for _ in range(10)]],
+        "stick_fraction": [with_groups, partial(s.quantity, "stick_fraction", v, y)],
+        "power": [with_groups, partial(s.quantity, "power", v, y)],
+        "settling": [
+            with_groups,
+            partial(s.quantity, "mu_ratio", v, y),
+            partial(s.quantity, "power", v, y),
+        ],
+    }
+    work = {f"{name} {i}": part for name, some in parts.items() for i, part in enumerate(some)}
+    for name in parts:
+        options = {"std": spreads} if name == "std" else {"include": (name,)}
+        work[name] = partial(s.evaluate, many, **options)
+    best = best_of(2 if quick else 9, {"plain": plain, **work})
+    rows = []
+    for name, some in parts.items():
+        together = sum(best[f"{name} {i}"] for i in range(len(some)))
+        ratios = best[name] / best["plain"], best[name] / together
+        rows.append([name, quantity(1e9 * best[name] / n), *(f"{ratio:.2f}" for ratio in ratios)])
+    return markdown(["answer with", "ns a case", "times mu_macro alone", "times its parts"], rows)
+
+
 if __name__ == "__main__":
-    main(
-        __doc__, {"calls": calls, "small": small, "far_end": far_end}, points=1_000_000, quick=False
-    )
+    sections = {"calls": calls, "small": small, "far_end": far_end, "outputs": outputs}
+    main(__doc__, sections, points=1_000_000, quick=False)

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import BAND, DEFAULT, GROUPS, Answer, IntervalAnswer
+from mumacro.answer import BAND, DEFAULT, GROUPS, Answer, IntervalAnswer, add
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, codes_of, library_of
+from mumacro.inputs.doubts import Remark
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.reading import without_unit
@@ -140,7 +141,12 @@ def evaluate_labelled(
         if remarks := answer.remarks:
             frame.attrs["remarks"] = remarks
         return frame
-    return importlib.import_module("xarray").Dataset(columns)
+    dataset = importlib.import_module("xarray").Dataset(columns)
+    if remarks := answer.remarks:  # as text, which netCDF can hold
+        dataset.attrs["remarks"] = "\n".join(
+            f"{remark['field']} ({remark['cases']} cases): {remark['text']}" for remark in remarks
+        )
+    return dataset
 
 
 def _of_pandas(
@@ -211,10 +217,14 @@ def _of_chunks(
     names = [*_ALWAYS, *band]
     names += [*(GROUPS if outputs else ()), *(_SLOPES_OF_K if gradient else ()), *paths]
 
+    remarks: list[Remark] = []
+
     def chunk(*columns: Any) -> list[Any]:
         inputs = {**fixed, **dict(zip(arguments, columns, strict=True))}
         cases = Cases.of(inputs, strict=strict)
         answer = surrogate.answer(cases, chosen(include, cases))
+        for remark in answer.remarks:
+            add(remarks, remark)
         if (cases.std and not deviations) or (cases.ends is not None and not band):
             bound = "numbers: give deviations and intervals as arrays, std={...}, k_low and k_high"
             raise InputError("inputs", "texts", bound)
@@ -226,6 +236,8 @@ def _of_chunks(
 
     results = dict(zip(names, _APPLY[library](chunk, arguments, names), strict=True))
     answer = LabelledAnswer(*(results[name] for name in names[:4]))
+    if library == "xarray" and results["mu_macro"].chunks is None:  # else they are not known yet
+        answer.remarks_on_outputs = remarks
     for name in band:
         setattr(answer, name, results[name])
     if outputs:

@@ -59,12 +59,11 @@ class Evaluated:
 
     def _over_interval(self) -> None:
         """The extremes of mu_macro, and the largest bound that was met there."""
-        extremes = self.tabulated.extremes(self.cases)
-        low, high, bound = map(self._take, extremes)
+        low, high, bound = self.tabulated.extremes(self.cases)
         # of an interval of one point, rigid contact among them, there may be none
-        self.mu_macro_low = np.fmin(self.mu_macro, low)
-        self.mu_macro_high = np.fmax(self.mu_macro, high)
-        self.error_bound = np.fmax(self.error_bound, bound)
+        self.mu_macro_low = self._take(np.fmin(self.mu_macro, low))
+        self.mu_macro_high = self._take(np.fmax(self.mu_macro, high))
+        self.error_bound = self._take(np.fmax(self.error_bound, bound))
 
     @cached_property
     def moving(self) -> Any:

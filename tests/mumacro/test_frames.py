@@ -4,6 +4,7 @@ compute()."""
 import math
 import os
 import signal
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -284,6 +285,7 @@ def test_a_dask_dataset_stays_lazy(table: Surrogate) -> None:
         assert answer.mu_macro.chunks is not None
         assert answer.source.chunks is not None
     whole = table.evaluate(data.compute())
+    assert whole.attrs.pop("remarks").startswith("k (60 cases): k = -1 N/m")
     with dask.config.set(scheduler="threads"):
         xr.testing.assert_identical(answer.compute(), whole)
 
@@ -332,6 +334,20 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bits(table: Surrogate) -> 
 
 
 # --- names and units; other tables ----------------------------------------------------------------
+
+
+def test_remarks_come_with_xarray_and_are_written_by_netcdf(
+    table: Surrogate, tmp_path: Path
+) -> None:
+    speeds = xr.DataArray([0.01, 400.0, 500.0], dims="t")
+    amplitudes = xr.DataArray([2e-6, 3e-6], dims="y")
+    [remark] = table.evaluate(**{**CASE, "v0": speeds, "y0": amplitudes}).remarks
+    assert (remark["row"], remark["field"], remark["cases"]) == ("units", "v0", 4)
+    data = table.evaluate(xr.Dataset({**CASE, "v0": speeds}))
+    assert data.attrs["remarks"].startswith("v0 (2 cases): v0 = 400 m/s")
+    data.drop_vars(["regime", "source"]).to_netcdf(tmp_path / "answer.nc")
+    assert "remarks" not in table.evaluate(xr.Dataset({**CASE, "v0": speeds[:1]})).attrs
+    assert table.evaluate(**{**CASE, "v0": speeds.chunk({"t": 1})}).remarks == []
 
 
 def test_results_of_xarray_have_names_and_units_of_their_own(table: Surrogate) -> None:

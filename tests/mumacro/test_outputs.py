@@ -10,6 +10,7 @@ import pytest
 
 from mumacro import InputError, Surrogate, law, settling, solve_for
 from mumacro.analysis.motion import motion
+from mumacro.answer import TEXTS
 from mumacro.contacts.element import Element
 from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.kind import KINDS, Kind
@@ -59,11 +60,23 @@ def test_one_case_has_the_outputs_that_it_has_among_many(table: Surrogate, kind:
         one = table.evaluate(case, **kind.names, include=include, std={"mu0": 0.01, "v0": 1e-3})
         assert one.paths == many.paths
         for path in one.paths:
+            assert type(one[path]) is (str if path in TEXTS else float), path
             assert same(one[path], many[path][i]) or one[path] == close(
                 many[path][i], rel=1e-12, abs=1e-300
             ), (path, i)
         listed = many.to_dict()
         assert one.to_dict()["mu_macro"] == listed["mu_macro"][i]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: " ".join(kind.names.values()))
+def test_one_interval_is_answered_in_plain_numbers(table: Surrogate, kind: Kind) -> None:
+    _, _, case = as_kind(CASE, (kind.names["contact"], kind.names["direction"]))
+    k = case.pop("k")
+    include = [name for name in names_for(kind) if "k_range" not in OUTPUTS[name].lacks]
+    answer = table.evaluate(case, **kind.names, k_range=(0.8 * k, 1.2 * k), include=include)
+    assert "mu_macro_low" in answer.paths
+    for path in answer.paths:
+        assert type(answer[path]) is (str if path in TEXTS else float), path
 
 
 def test_cases_of_several_kinds_are_answered_in_their_places(table: Surrogate) -> None:
