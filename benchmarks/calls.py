@@ -7,8 +7,10 @@ import statistics
 import subprocess
 import sys
 import timeit
+from collections.abc import Callable
 from functools import partial
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from scipy.special import ellipk
@@ -179,7 +181,7 @@ def outputs(points: int, quick: bool) -> str:
     at_rest = partial(s.evaluate, {**many, "v0": 0.0})
     with_groups = partial(s.evaluate, many, groups=True)
     gradient = partial(s.evaluate, many, gradient=True)
-    parts = {
+    parts: dict[str, list[Callable[[], object]]] = {
         "groups": [with_groups],
         "limits": [with_groups, at_rest, crit],
         "gradient": [gradient],
@@ -194,7 +196,7 @@ def outputs(points: int, quick: bool) -> str:
     }
     work = {f"{name} {i}": part for name, some in parts.items() for i, part in enumerate(some)}
     for name in parts:
-        options = {"std": spreads} if name == "std" else {"include": (name,)}
+        options: Any = {"std": spreads} if name == "std" else {"include": (name,)}
         work[name] = partial(s.evaluate, many, **options)
     best = best_of(2 if quick else 9, {"plain": plain, **work})
     rows = []
