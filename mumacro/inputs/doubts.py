@@ -179,5 +179,8 @@ def _of_rigid(stiffness: float, cases: int = 1) -> Remark:
     many cases the largest."""
     text = "rigid: the contact does not stretch before it slips"
     if math.isfinite(stiffness):
-        text += f"; holds for k far above mu0 Fz / y0 = {stiffness:.3g} N/m, a softer one differs"
+        text += (
+            f"; this holds for k far above mu0 Fz / y0 = {stiffness:.3g} N/m, a softer contact has "
+            "another friction"
+        )
     return {"row": STIFFNESS, "field": "k", "cases": cases, "text": text}

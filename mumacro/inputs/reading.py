@@ -43,7 +43,7 @@ _GAPS = ("NAType", "NaTType")  # of pandas, by the name of the type
 _ONE_NUMBER = "one number: k alone may be an interval; ask for both ends, one after the other"
 #: where an answer has no deviation of its own
 NO_DEVIATION = "without a deviation, which only an answer to given cases has"
-_NOT_BOTH = "an interval or a deviation, not both, and rigid alone"
+_NOT_BOTH = "an interval or a deviation, not both; rigid has neither"
 # a deviation in units of the last digits: 1.00(10) N/um
 _LAST_DIGITS = re.compile(
     r"(?P<number>[+-]?\d{1,15}(?:[.,](?P<part>\d{1,15}))?)\((?P<std>\d{1,9})\)(?P<unit> ?\D{0,40})",

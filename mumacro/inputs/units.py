@@ -457,7 +457,7 @@ def bound_of_unit(quantity: str, number: float, unit: str) -> str:
                 f"{math.sqrt(2.0) * number:.12g}{mine}"
             )
     if is_level(shown):
-        return "the value itself: the reference of a level is not said"
+        return "the value itself: the reference of a level in dB is not known"
     key = canonical(shown)
     if quantity == "stiffness" and key in QUANTITIES["pressure"].units:
         return "a force over a length: mumacro stiffness computes it from a modulus and the bodies"

@@ -30,7 +30,7 @@ POWER = Output(
     {
         "power.oscillation": Member(
             "W",
-            "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; none where it is rigid",
+            "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; no value where rigid",
         ),
         "power.saved": Member("W", "Power that the drive saves: (mu0 - mu_macro) Fz v0"),
         "power_bound.oscillation": Member("W", "Bound of the absolute error of oscillation"),

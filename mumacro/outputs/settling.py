@@ -94,7 +94,7 @@ SETTLING = Output(
         "settling.periods_any": Member("-", "For a disturbance of any size: twice as many"),
         "settling.time": Member("s", "periods as a time; also without oscillation"),
         "settling.slip_path": Member(
-            "-", "Path of the foot in a period over l0; none for a rigid contact"
+            "-", "Path of the foot in a period over l0; no value for a rigid contact"
         ),
         "settling_bound.periods": Member("-", "Bound of the absolute error of periods"),
     },

@@ -20,7 +20,7 @@ STICK_FRACTION = Output(
     {
         "stick_fraction": Member("-", "Share of the period during which the contact sticks"),
         "stick_fraction_bound": Member(
-            "-", "Bound of its absolute error, larger at the border; none where it is not known"
+            "-", "Bound of its absolute error, larger at the border; no value where it is not known"
         ),
     },
     cost=4,
