@@ -236,7 +236,7 @@ class Answer(Generic[Number]):
         A rigid contact, and whatever else lies beyond the map, stands at its edge with a word that
         says why; an interval of k is a line through its middle.  ``ax`` are axes of matplotlib, or
         new ones, and are returned; where the cases are of several contacts or directions, an array
-        with axes for each, in the order of :data:`mumacro.inputs.kind.KINDS`.
+        with axes for each, in the order of ``mumacro.inputs.kind.KINDS``.
         """
         kinds = self._on_map()
         if not kinds:

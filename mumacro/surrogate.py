@@ -70,7 +70,7 @@ class Surrogate:
         self.path = Path(path)
         self.table = table
         self.attributes = json_attributes(table)
-        #: of one spring, see :attr:`Table.contacts` for others
+        #: of one spring, see ``Table.contacts`` for others
         self.tolerance = table.contacts["spring"].tolerance
         self.checksum = str(table.attributes.get("content_sha256", ""))
         stated = table.contacts["spring"].attributes
