@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, Generic
 import numpy as np
 
 from mumacro import plotting
-from mumacro.errors import InputError, MumacroError
+from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.doubts import remarks as doubts
 from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import AMPLITUDE, Kind
+from mumacro.shown import cell, frame_of, html_of, html_of_rows, listed, text_of, text_of_rows
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 #: float for one case; for many an array of float64, or a labelled object in its place
@@ -299,7 +300,7 @@ class Answer(Generic[Number]):
         ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
         """
         values = {path: getattr(self, path) for path in self._always} | {**self.outputs}
-        members = nested({path: _listed(value) for path, value in values.items()})
+        members = nested({path: listed(value) for path, value in values.items()})
         if said := self.remarks:
             members["remarks"] = said
         return members
@@ -314,28 +315,45 @@ class Answer(Generic[Number]):
         >>> answer.to_frame()["regime"].tolist()
         ['static', 'stick_slip']
         """
-        try:
-            import pandas
-        except ModuleNotFoundError:
-            raise MumacroError("pandas is not installed: pip install pandas") from None
-        columns = {path: self[path] for path in self.paths}
-        return pandas.DataFrame(
-            {
-                path: x if hasattr(x, "index") and hasattr(x, "dtype") else np.ravel(x)
-                for path, x in columns.items()
-            }
-        )
+        return frame_of({path: self[path] for path in self.paths})
+
+    def _kind_words(self) -> str:
+        if self._cases is None:
+            return ""
+        kinds = ["; ".join(", ".join(kind.names.values()) for kind in self.cases.kinds)]
+        return f": {kinds[0]}" if kinds[0] else ""
+
+    def _heading(self) -> str:
+        shape = self._shape
+        cases = f"{math.prod(shape)} cases of shape {shape}" if shape else "one case"
+        return f"<{type(self).__name__} to {cases}{self._kind_words()}>"
+
+    def _columns(self) -> dict[str, Any]:
+        """What is shown, by path."""
+        return {path: self[path] for path in self.paths}
+
+    @property
+    def _shape(self) -> tuple[int, ...]:
+        mu: Any = self.mu_macro
+        return np.shape(mu)
+
+    def _is_one(self) -> bool:
+        return self._cases is not None and not self._shape
 
     def __repr__(self) -> str:
-        names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
-        names += [name for name in BAND if hasattr(self, name)]
-        names += GROUPS if self._groups is not None else ()
-        names += ["gradient", "gradient_bound"] if self.gradient is not None else []
-        values = [f"{name}={getattr(self, name)!r}" for name in names]
-        shown = {"groups", "gradient", "gradient_bound"}
-        more = {path: x for path, x in self.outputs.items() if path.partition(".")[0] not in shown}
-        values += [f"outputs={more!r}"] if more else []
-        return f"{type(self).__name__}({', '.join(values)})"
+        if self._is_one():
+            pairs = [(path, cell(x)) for path, x in self._columns().items()]
+            return text_of_rows(self._heading(), pairs)
+        return text_of(self._heading(), self._columns())
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: of one case what the command prints."""
+        if not self._is_one():
+            return html_of(self._heading(), self._columns())
+        from mumacro import words  # above this floor; the one place where a result needs it
+
+        rows, notes, error = words.of_one_case(self)
+        return html_of_rows("", rows, [*map(" ".join, notes), error])
 
 
 _NOTHING: dict[str, Any] = {}
@@ -415,18 +433,3 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
         else:
             tree[name] = value
     return tree
-
-
-def _listed(value: Any) -> Any:
-    """A number or an array of them for JSON: None where one is not finite; None for no text."""
-    if type(value) is float:
-        return value if math.isfinite(value) else None
-    if isinstance(value, str):
-        return value or None
-    array = np.asarray(value)
-    if array.dtype.kind == "f":
-        array = np.where(np.isfinite(array), array, None)  # type: ignore[call-overload]
-    elif array.dtype.kind in "OU":
-        texts = [x if isinstance(x, str) and x else None for x in array.ravel().tolist()]
-        array = np.array(texts, object).reshape(array.shape)
-    return array.tolist()

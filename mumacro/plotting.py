@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro.errors import InputError, MumacroError, missing
-from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.units import suited
 from mumacro.kernel.arrays import Array
@@ -192,31 +192,32 @@ def quantity_words(name: str, value: Any) -> str:
         return f"{_SYMBOLS[name]} rigid"
     if name == "omega":
         name, ends = "f", [end / RAD_PER_CYCLE for end in ends]
-    return f"{_SYMBOLS[name]} = {_with_unit(QUANTITY_OF[name], *ends)}"
+    return f"{_SYMBOLS[name]} = {_with_unit(unit_of(name), *ends)}"
 
 
-def _with_unit(quantity: str, *values: float) -> str:
-    """Numbers [SI] in the unit that suits the last of them."""
-    unit, scale = suited(quantity, values[-1])
+def _with_unit(si: str, *values: float) -> str:
+    """Numbers in an SI unit, in the one that suits the last of them."""
+    unit, scale = suited(si, values[-1])
     numbers = " to ".join(f"{scale.of_si(value):.4g}" for value in values)
     shown = unit.replace("um", "µm").replace("uN", "µN").removeprefix("-")
     return f"{numbers} {shown}".rstrip()
 
 
-def oscillation_words(symbol: str, quantity: str, terms: Iterable[tuple[int, float, float]]) -> str:
-    """An oscillation from harmonics, amplitudes [SI] and phases in degrees; empty without any.
+def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, float]]) -> str:
+    """An oscillation from harmonics, amplitudes in an SI unit, phases in degrees; empty for none.
 
-    >>> oscillation_words("$x$", "length", [(1, 2e-6, 90.0), (3, 4e-7, 0.0)])
+    >>> oscillation_words("$x$", "m", [(1, 2e-6, 90.0), (3, 4e-7, 0.0)])
     '$x$: 2 µm at 90°, 3rd harmonic 0.4 µm'
     """
     parts = []
     for harmonic, amplitude, degrees in terms:
-        ending = {1: "st", 2: "nd", 3: "rd"}.get(harmonic % 10 * (harmonic // 10 % 10 != 1), "th")
+        last = 0 if harmonic // 10 % 10 == 1 else harmonic % 10
+        ending = {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
         order = "" if harmonic == 1 else f"{harmonic}{ending} harmonic "
         # whole turns say nothing
         phase = math.remainder(degrees, 360.0)
         at = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
-        parts.append(f"{order}{_with_unit(quantity, amplitude)}{at}")
+        parts.append(f"{order}{_with_unit(unit, amplitude)}{at}")
     return f"{symbol}: {', '.join(parts)}" if parts else ""
 
 
@@ -659,7 +660,7 @@ def plot_cycle(
     forces.set(xlabel="share of the period [-]", ylabel="force [N]", xlim=(0.0, 1.0))
     head(forces, title, last=path)
     extent = max(np.ptp(x), np.ptp(y))
-    unit, scale = suited("length", float(extent))
+    unit, scale = suited("m", float(extent))
     x, y = x * scale.over / scale.times, y * scale.over / scale.times
     path.plot(x, y, color=ink, label="upper point")
     path.plot(x[0], y[0], "o", color="C0", label="start of the period")

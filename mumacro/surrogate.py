@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, Unpack, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mumacro import plotting
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer
@@ -27,7 +27,7 @@ from mumacro.inputs.cases import (
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
 from mumacro.inputs.reading import NUMBERS, read
-from mumacro.inputs.signature import AnyCases, ManyCases, OneCase, OneInterval
+from mumacro.inputs.signature import AnyCases, ManyCases, Numbers, OneCase, OneInterval
 from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.threads import default_threads
 from mumacro.outputs import evaluation
@@ -288,7 +288,7 @@ class Surrogate:
         return _reshape(values, shape)
 
     def v_tilde_crit(
-        self, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across"
+        self, y_tilde: Numbers, *, contact: str = "spring", direction: str = "across"
     ) -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-]
         >= 0.
@@ -311,7 +311,7 @@ class Surrogate:
             raise InputError("y_tilde", float(y[0]), ">= 0 and < 1" if kind.normal else ">= 0")
         return _reshape(crit, shape)
 
-    def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
+    def power(self, v_tilde: Numbers, y_tilde: Numbers, **kind: str) -> Any:
         """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
         :meth:`quantity` without bound.
 
@@ -319,13 +319,13 @@ class Surrogate:
         """
         return self.quantity("power", v_tilde, y_tilde, **kind)[0]
 
-    def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
+    def stick_fraction(self, v_tilde: Numbers, y_tilde: Numbers, **kind: str) -> Any:
         """Share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity` without
         bound."""
         return self.quantity("stick_fraction", v_tilde, y_tilde, **kind)[0]
 
     def slopes(
-        self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
+        self, v_tilde: Numbers, y_tilde: Numbers, of: str = "mu_ratio", *, bounds: bool = False
     ) -> tuple[Any, ...]:
         """The quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~ d/d y~
         [-].
@@ -349,8 +349,8 @@ class Surrogate:
     def quantity(
         self,
         name: str,
-        v_tilde: ArrayLike,
-        y_tilde: ArrayLike,
+        v_tilde: Numbers,
+        y_tilde: Numbers,
         *,
         contact: str = "spring",
         direction: str = "across",

@@ -13,6 +13,7 @@ from mumacro.errors import missing
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array, Bools
+from mumacro.shown import frame_of, html_of, html_of_rows, listed, text_of
 
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 _CURVE = 200  # points of the fitted law
@@ -24,8 +25,26 @@ class Prediction(NamedTuple):
     mu_macro: Any  #: [-]
     std: Any  #: its standard deviation, from the covariance of the fit [-]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Both by name: arrays as lists."""
+        result: dict[str, Any] = listed(self._asdict())
+        return result
 
-@dataclass(frozen=True)
+    def to_frame(self) -> Any:
+        """Both as a DataFrame of pandas, one row a case."""
+        return frame_of(self._asdict())
+
+    def __repr__(self) -> str:
+        if shape := np.shape(self.mu_macro):
+            return text_of(f"<Prediction of cases of shape {shape}>", self._asdict())
+        return f"Prediction(mu_macro={self.mu_macro!r}, std={self.std!r})"
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        return html_of("<Prediction>", self._asdict())
+
+
+@dataclass(frozen=True, repr=False)
 class Fit:
     """k and mu0 of a contact, fitted to measured points.
 
@@ -216,20 +235,34 @@ class Fit:
             for name, x in self.values.items()
         ]
 
-    def __repr__(self) -> str:
-        has_std = STD in self.points
+    def _heading(self) -> str:
         scatter = (
             f"reduced chi2 {self.reduced_chi2:.3g}"
-            if has_std
+            if STD in self.points
             else f"scatter {math.sqrt(self.reduced_chi2):.2g}"
         )
         summary = f"{self.residuals.size} points, {scatter}, {self.contact}"
-        lines = [
-            f"<Fit {', '.join(self._value_texts())}; {summary}>",
-            *(f"  warning: {text}" for text in self.warnings),
-            *(f"  {remark['row']}: {remark['text']}" for remark in self.remarks),
+        return f"<Fit {', '.join(self._value_texts())}; {summary}>"
+
+    def _notes(self) -> list[str]:
+        remarks = (f"{remark['row']}: {remark['text']}" for remark in self.remarks)
+        return [*(f"warning: {text}" for text in self.warnings), *remarks]
+
+    def __repr__(self) -> str:
+        return text_of(self._heading(), {}, self._notes())
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: the values with their deviations and intervals, and warnings."""
+        rows = [
+            (name, f"{x:.4g}", f"± {self.std[name]:.2g}", "95 %: {:.4g} to {:.4g}".format(*ends))
+            for (name, x), ends in zip(self.values.items(), self.interval.values(), strict=True)
         ]
-        return "\n".join(lines)
+        return html_of_rows(self._heading(), rows, self._notes())
+
+    def to_frame(self) -> Any:
+        """The points as a DataFrame of pandas, with mu_macro of the fit and the residuals."""
+        fitted = self.points["mu_macro"] - self.residuals
+        return frame_of({**self.points, "fitted": fitted, "residual": self.residuals})
 
 
 def _fine(x: Array) -> Array:

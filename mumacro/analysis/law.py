@@ -14,17 +14,18 @@ from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, without_interval
-from mumacro.inputs.fields import NAMES, POSITIVE, QUANTITY_OF, field_of
+from mumacro.inputs.fields import NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
+from mumacro.shown import frame_of, html_of, listed, text_of
 from mumacro.surrogate import Surrogate
 
 SCALES = ("log", "linear")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Law:
     """A sweep of one input."""
 
@@ -64,6 +65,35 @@ class Law:
         answer_columns = {name: getattr(self.answer, name) for name in names}
         k = {} if self.stiffening is None else {"k": self.inputs["k"]}
         return {self.along: self.values, **k, **answer_columns, "mu_static": self.mu_static}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON of a law over HTTP, without table and api_version: lists in place
+        of arrays, None where a number is not finite."""
+        columns = {name: x for name, x in self.columns.items() if name != self.along}
+        border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in self.border]
+        members = {"along": self.along, "unit": unit_of(self.along), "values": self.values}
+        result: dict[str, Any] = listed({**members, **columns, "border": border})
+        return result
+
+    def to_frame(self) -> Any:
+        """The law as a DataFrame of pandas, one row a value of the swept input."""
+        return frame_of(self.columns)
+
+    def _heading(self) -> str:
+        unit, kind = unit_of(self.along), ", ".join(self.kind.names.values())
+        low, high = self.values[0], self.values[-1]
+        return f"<Law over {self.along} from {low:.6g} to {high:.6g} {unit}: {kind}>"
+
+    def _notes(self) -> list[str]:
+        unit = unit_of(self.along)
+        return [f"{mark.name} at {self.along} = {mark.value:.6g} {unit}" for mark in self.border]
+
+    def __repr__(self) -> str:
+        return text_of(self._heading(), self.columns, self._notes())
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks, with the borders."""
+        return html_of(self._heading(), self.columns, self._notes())
 
     def plot(
         self, ax: Any = None, *, roots: Iterable[float] = (), target: float | None = None

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mumacro import plotting
 from mumacro.errors import InputError
@@ -21,9 +20,11 @@ from mumacro.inputs.cases import ABSENT, columns_of, real
 from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.oscillation import read_oscillation
+from mumacro.inputs.signature import Numbers, Oscillation
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
+from mumacro.shown import cell, frame_of, html_of, html_of_rows, listed, text_of
 
 TOLERANCES = 1e-9, 1e-2
 # of ways per radian, in units of mu0 Fz / k; below the last, rounding decides which way the drag
@@ -64,6 +65,35 @@ class Cycle(NamedTuple):
     Fx: Array  #: the force on it along [N], mu_macro Fz in the mean
     Fy: Array  #: and across [N]
     Fz: Array  #: normal force [N]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The columns as lists."""
+        result: dict[str, Any] = listed(self._asdict())
+        return result
+
+    def to_frame(self) -> Any:
+        """The columns as a DataFrame of pandas."""
+        return frame_of(self._asdict())
+
+    def __repr__(self) -> str:
+        return text_of(f"<Cycle of {self.t.size} times>", self._asdict())
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        return html_of(f"<Cycle of {self.t.size} times>", self._asdict())
+
+
+#: what a motion has: unit and meaning
+NUMBERS = {
+    "mu_macro": ("-", "mean force along / Fz"),
+    "mu_lateral": ("-", "mean force across / Fz"),
+    "stick_fraction": ("-", "share of the period"),
+    "slip_path": ("m", "of the foot per period"),
+    "power": ("W", "of the shaker"),
+    "power_drive": ("W", "of the drive, mu_macro Fz v0"),
+    "periods": ("-", "until a disturbance has fallen to 1 %"),
+    "error_estimate": ("-", "of mu_macro and mu_lateral"),
+}
 
 
 @dataclass(frozen=True)
@@ -160,13 +190,13 @@ class Motion:
         """The amplitudes and phases of a case in words, a text for each part that oscillates."""
         words = []
         for symbol, part in zip(("$x$", "$y$", "$F_z$"), self.scenes.terms, strict=True):
-            quantity = "force" if symbol == "$F_z$" else "length"
+            unit = "N" if symbol == "$F_z$" else "m"
             terms = [
                 (term.harmonic, float(term.amplitude[i]), math.degrees(term.phase[i]))
                 for term in part
                 if term.amplitude[i] > 0.0
             ]
-            words.append(plotting.oscillation_words(symbol, quantity, terms))
+            words.append(plotting.oscillation_words(symbol, unit, terms))
         return [text for text in words if text]
 
     def _place(self, index: int | None) -> int:
@@ -178,15 +208,44 @@ class Motion:
             raise InputError("index", index, f"a whole number from 0 to {n - 1}: one of the cases")
         return int(index)
 
-    def __repr__(self) -> str:
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The numbers by name, each in the shape of the cases."""
+        return {name: getattr(self, name) for name in NUMBERS}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON of a motion over HTTP, without cycle and api_version; arrays as
+        lists, None where a number is not finite."""
+        result: dict[str, Any] = listed({**self.columns, "contact": self.scenes.contact})
+        return result
+
+    def to_frame(self) -> Any:
+        """The numbers as a DataFrame of pandas, one row a case; ``cycle().to_frame()`` is the cycle
+        of one case."""
+        return frame_of(self.columns)
+
+    def _heading(self) -> str:
         shape = np.shape(self.mu_macro)
-        if shape:
-            of = f"{self.scenes.contact}, {math.prod(shape)} cases of shape {shape}"
-            return f"<Motion of a {of}>"
+        cases = f", {math.prod(shape)} cases of shape {shape}" if shape else ""
+        return f"<Motion of a {self.scenes.contact}{cases}>"
+
+    def __repr__(self) -> str:
+        if np.shape(self.mu_macro):
+            return text_of(self._heading(), self.columns)
         return (
             f"<Motion of a {self.scenes.contact}: mu_macro {self.mu_macro:.6g}, mu_lateral "
             f"{self.mu_lateral:.6g}, error_estimate {self.error_estimate:.1e}>"
         )
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: of one case a number a row with unit and meaning."""
+        if np.shape(self.mu_macro):
+            return html_of(self._heading(), self.columns)
+        rows = [
+            (name, cell(getattr(self, name)), f"[{unit}]", meaning)
+            for name, (unit, meaning) in NUMBERS.items()
+        ]
+        return html_of_rows(self._heading(), rows)
 
 
 def motion(
@@ -195,11 +254,11 @@ def motion(
     Fz: Any = ABSENT,
     k: Any = ABSENT,
     v0: Any = ABSENT,
-    omega: ArrayLike | None = None,
-    f: ArrayLike | None = None,
-    x: Any = 0.0,
-    y: Any = 0.0,
-    normal: Any = 0.0,
+    omega: Numbers | None = None,
+    f: Numbers | None = None,
+    x: Oscillation = 0.0,
+    y: Oscillation = 0.0,
+    normal: Oscillation = 0.0,
     contact: str = "spring",
     tolerance: float = 1e-6,
     threads: int | None = None,

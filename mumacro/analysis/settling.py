@@ -1,8 +1,10 @@
 """How many periods until a disturbed contact is steady again; the physics is in
 :mod:`mumacro.outputs.settling`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
+
+import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ABSENT, Cases, named
@@ -10,10 +12,11 @@ from mumacro.inputs.kind import kind_of
 from mumacro.inputs.reading import NO_DEVIATION
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.settling import REMAINING, decay
+from mumacro.shown import frame_of, html_of, listed, text_of
 from mumacro.surrogate import Surrogate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Settling:
     """How fast a disturbance decays; floats for scalar inputs, arrays of the broadcast shape
     otherwise."""
@@ -28,6 +31,29 @@ class Settling:
     #: exp(-slip_path) is the multiplier of a small disturbance per period
     slip_path: Any
     error_bound: Any  #: bound of the error of ``periods`` that comes from the table [-]
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The numbers by name, each in the shape of the cases."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The numbers by name: arrays as lists, None where one is not finite."""
+        result: dict[str, Any] = listed(self.columns)
+        return result
+
+    def to_frame(self) -> Any:
+        """The numbers as a DataFrame of pandas, one row a case."""
+        return frame_of(self.columns)
+
+    def __repr__(self) -> str:
+        if shape := np.shape(self.periods):
+            return text_of(f"<Settling of cases of shape {shape}>", self.columns)
+        return f"<Settling: {self.periods:.6g} periods, {self.time:.6g} s>"
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        return html_of("<Settling>", self.columns)
 
 
 def settling(

@@ -35,21 +35,24 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from mumacro.analysis import solutions as tables
 from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
 from mumacro.analysis.rootfinding import TINY, Branch, branches_between, last_double, samples
 from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
-from mumacro.inputs.fields import POSITIVE, QUANTITY_OF, field_of
+from mumacro.inputs.fields import POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.reading import read_one
+from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools, Places
+from mumacro.shown import frame_of, html_of, listed, text_of
 from mumacro.surrogate import Surrogate
 
 HUGE = 1.7976931348623157e308
+_NO_LIMIT = 1e300  # of the unknown: what is beyond it is all that a double holds
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.
 # At r = 10, three percent above its onset, the fold is a sixth of a decade wide; the steep descent
@@ -92,7 +95,7 @@ class Reach:
         return above and (target < self.mu_max or (self.max_included and target == self.mu_max))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Solution:
     """All roots of every target."""
 
@@ -109,11 +112,81 @@ class Solution:
     #: how k grows with Fz, where that is solved for; None where k is constant
     stiffening: Stiffening | None = None
 
+    @property
+    def value(self) -> float:
+        """The one root of the one target [SI]; InputError where there are none or several."""
+        return tables.one_value(self.roots, self.reason)
+
+    @property
+    def unit(self) -> str:
+        """The SI unit of the unknown."""
+        return unit_of(self.unknown)
+
+    def reason(self, index: int = 0) -> str:
+        """Why a target has no root; empty where it has one."""
+        if self.roots[index]:
+            return ""
+        reach, unknown = self.reach, self.unknown
+        where = f"any {unknown}"  # all that a double holds
+        if reach.high < _NO_LIMIT:
+            where = f"{unknown} from {reach.low:.6g} to {reach.high:.6g} {self.unit}"
+        if self.constant:
+            return f"{unknown} has no influence here: mu_macro is {reach.mu_min:.6g} for {where}"
+        return (
+            f"mu_macro = {self.targets[index]:.6g} is out of reach: {where} gives "
+            f"{reach.mu_min:.4g} to {reach.mu_max:.4g}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON of an inverse problem over HTTP, without table and api_version;
+        ``ends`` are the same for the softest and the stiffest contact of an interval of k."""
+        reach = self.reach
+        reachable = {"min": reach.mu_min, "max": reach.mu_max}
+        reachable |= {"min_included": reach.min_included, "max_included": reach.max_included}
+        members = {
+            "unknown": self.unknown,
+            "unit": self.unit,
+            "results": tables.results_of(self.targets, self.roots, self.reason),
+            "range": [reach.low, None if reach.high > _NO_LIMIT else reach.high],
+            "reachable": reachable,
+            **({"ends": [end.to_dict() for end in self.ends]} if self.ends else {}),
+        }
+        result: dict[str, Any] = listed(members)
+        return result
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The roots as a table: target, value, low, high, mu_macro, regime; one row a root."""
+        return tables.columns_of(Root, self.targets, self.roots)
+
+    def to_frame(self) -> Any:
+        """The roots as a DataFrame of pandas, one row a root."""
+        return frame_of(self.columns)
+
+    def _heading(self) -> str:
+        return f"<Solution for {self.unknown} [{self.unit}]: {tables.counts(self.roots)}>"
+
+    def _notes(self) -> list[str]:
+        ends = zip(("softest", "stiffest"), self.ends or (), strict=False)
+        at_ends = [
+            f"for the {word} contact: {root.value:.6g} {self.unit}"
+            for word, end in ends
+            for root in end.roots[0]
+        ]
+        return [*at_ends, *filter(None, map(self.reason, range(len(self.targets))))]
+
+    def __repr__(self) -> str:
+        return text_of(self._heading(), self.columns, self._notes()[:4])
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        return html_of(self._heading(), self.columns, self._notes()[:4])
+
 
 def solve_for(
     surrogate: Surrogate,
     unknown: str,
-    target: ArrayLike,
+    target: Numbers,
     *,
     within: tuple[Any, Any] | None = None,
     contact: str = "spring",

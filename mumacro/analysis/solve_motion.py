@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mumacro import plotting
+from mumacro.analysis import solutions as tables
 from mumacro.analysis.motion import PARTS, motion
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
@@ -23,7 +23,9 @@ from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.reading import read, read_one
+from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools
+from mumacro.shown import frame_of, html_of, listed, text_of
 
 #: inputs of a motion that may be unknown
 INPUTS = ("v0", "k", "Fz", "f", "omega", "mu0")
@@ -78,11 +80,9 @@ class MotionSolution:
 
     @property
     def value(self) -> float:
-        """The one root of the one target; InputError where there are none or several."""
-        every = [root for roots in self.roots for root in roots]
-        if len(every) != 1:
-            raise InputError("value", len(every), "used where there is one root: see .roots")
-        return every[0].value
+        """The one root of the one target [SI], a phase in degrees; InputError where there are none
+        or several."""
+        return tables.one_value(self.roots, self.reason)
 
     @property
     def unit(self) -> str:
@@ -115,12 +115,54 @@ class MotionSolution:
             _axis(self.unknown), x, mean, self.of, self.targets, places, _log(x[0], x[-1]), ax
         )
 
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON of an inverse problem of a motion over HTTP, without
+        api_version."""
+        reach, other = self.reach, self.other_way
+        members: dict[str, Any] = {
+            "unknown": self.unknown,
+            "unit": self.unit,
+            "of": self.of,
+            "results": tables.results_of(self.targets, self.roots, self.reason),
+            "range": [reach.low, reach.high],
+            "reachable": {
+                "min": reach.least,
+                "max": reach.most,
+                "min_included": True,
+                "max_included": True,
+            },
+        }
+        if other is not None:
+            members["other_way"] = tables.results_of(other.targets, other.roots, other.reason)
+        result: dict[str, Any] = listed(members)
+        return result
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The roots as a table: target, value, low, high, mean, error_estimate; one row a root."""
+        return tables.columns_of(MotionRoot, self.targets, self.roots)
+
+    def to_frame(self) -> Any:
+        """The roots as a DataFrame of pandas, one row a root."""
+        return frame_of(self.columns)
+
+    def _heading(self) -> str:
+        unit, counts = self.unit, tables.counts(self.roots)
+        return f"<MotionSolution for {self.unknown} [{unit}], {self.of}: {counts}>"
+
+    def _notes(self) -> list[str]:
+        return [*filter(None, map(self.reason, range(len(self.targets))))][:4]
+
     def __repr__(self) -> str:
         every = [root for roots in self.roots for root in roots]
-        shown = ", ".join(f"{root.value:.6g}" for root in every[:8])
-        more = ", ..." if len(every) > 8 else ""
-        found = f"{shown}{more} {self.unit}".rstrip() if every else f"no root: {self.reason()}"
-        return f"<MotionSolution {self.unknown}: {found}>"
+        if len(every) == len(self.targets) == 1:
+            value = f"{every[0].value:.6g} {self.unit}".rstrip(" -")
+            return f"<MotionSolution {self.unknown}: {value}>"
+        return text_of(self._heading(), self.columns if every else {}, self._notes())
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        return html_of(self._heading(), self.columns, self._notes())
 
 
 def unit_of_unknown(unknown: str) -> str:
@@ -137,7 +179,7 @@ def unit_of_unknown(unknown: str) -> str:
 
 def solve_motion(
     unknown: str,
-    target: ArrayLike = 0.0,
+    target: Numbers = 0.0,
     of: str = "mu_macro",
     within: tuple[Any, Any] | None = None,
     **case: Any,

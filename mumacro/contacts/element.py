@@ -19,11 +19,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import check, real
 from mumacro.inputs.kind import kind_of
+from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 
@@ -75,9 +75,9 @@ class Element:
 
     def __init__(
         self,
-        mu0: ArrayLike,
-        Fz: ArrayLike,
-        k: ArrayLike,
+        mu0: Numbers,
+        Fz: Numbers,
+        k: Numbers,
         contact: str = "spring",
         springs: int | None = None,
     ) -> None:
@@ -103,7 +103,7 @@ class Element:
         self._limit = self._limits(Fz_)
         self._forces = np.zeros((self._k.size, springs, 2))
 
-    def step(self, dx: ArrayLike, dy: ArrayLike, Fz: ArrayLike | None = None) -> tuple[Any, Any]:
+    def step(self, dx: Numbers, dy: Numbers, Fz: Numbers | None = None) -> tuple[Any, Any]:
         """Move the upper point, and return the force that must be applied there to hold it.
 
         Parameters
@@ -156,7 +156,7 @@ class Element:
         return self._forces.reshape(*self.shape, self.springs, 2).copy()
 
     @state.setter
-    def state(self, forces: ArrayLike) -> None:
+    def state(self, forces: Numbers) -> None:
         array, shape = real("state", forces), (*self.shape, self.springs, 2)
         if array.shape != shape:
             raise InputError("state", array.shape, f"of the shape {shape}")
@@ -170,10 +170,10 @@ class Element:
 
     def __repr__(self) -> str:
         springs = f", {self.springs} springs" if self.contact == "ball" else ""
-        return (
-            f"<Element {self.contact}{springs}, {self._k.size} contacts of shape {self.shape}, "
-            f"force {self.force}>"
-        )
+        if self.shape:
+            contacts = f"{self._k.size} contacts of shape {self.shape}"
+            return f"<Element {self.contact}{springs}, {contacts}>"
+        return f"<Element {self.contact}{springs}, force {self.force}>"
 
     def _limits(self, Fz: Array) -> Array:
         """mu0 Fz [N] of every contact."""
@@ -188,7 +188,7 @@ class Element:
             )
         return limit
 
-    def _like(self, value: ArrayLike, name: str) -> Array:
+    def _like(self, value: Numbers, name: str) -> Array:
         """``value`` for every contact, (n,) and contiguous; finite."""
         if type(value) is float and math.isfinite(value):
             return np.full(self._k.size, value)

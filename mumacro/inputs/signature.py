@@ -1,11 +1,25 @@
-"""What ``evaluate`` takes, for type checkers: one case, one case with an interval of k, many."""
+"""What functions take, for type checkers and in their signatures: numbers, an oscillation; one case
+of ``evaluate``, one case with an interval of k, many."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, Required, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, Required, TypedDict
 
 from numpy.typing import ArrayLike
 
 from mumacro.inputs.kind import ContactName, DirectionName
+
+if TYPE_CHECKING:
+    Numbers = ArrayLike
+    Oscillation = Any
+else:  # a signature shows the name, in place of a union of twenty lines
+
+    class Numbers:
+        """A number in SI, a text with a unit such as "2um", a quantity, or an array of these."""
+
+    class Oscillation:
+        """An amplitude, a text such as "2um@90deg", (amplitude, phase in degrees), or a list of
+        (harmonic, amplitude, phase): see :func:`mumacro.motion`."""
+
 
 _Value = float | str  # a text is read as a person types it
 

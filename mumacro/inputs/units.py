@@ -177,30 +177,41 @@ QUANTITIES = {
 #: input -> unit -> scale
 UNITS_OF = {name: QUANTITIES[QUANTITY_OF[name]].units for name in SI}
 
-#: quantity -> units in which a value is shown, the largest first
-_SHOWN = {
-    "force": ("MN", "kN", "N", "mN", "uN", "nN"),
-    "stiffness": ("N/nm", "N/um", "kN/m", "N/m", "mN/m"),
-    "length": ("m", "mm", "um", "nm", "pm"),
-    "angular frequency": ("Mrad/s", "krad/s", "rad/s", "mrad/s"),
-    "frequency": ("GHz", "MHz", "kHz", "Hz", "mHz"),
-    "speed": ("m/s", "mm/s", "um/s", "nm/s"),
+#: SI unit -> units in which a value is shown, the largest first
+_SHOWN: dict[str, dict[str, Scale]] = {
+    QUANTITIES[quantity].unit: {unit: QUANTITIES[quantity].units[unit] for unit in units}
+    for quantity, units in {
+        "force": ("MN", "kN", "N", "mN", "uN", "nN"),
+        "stiffness": ("N/nm", "N/um", "kN/m", "N/m", "mN/m"),
+        "length": ("m", "mm", "um", "nm", "pm"),
+        "angular frequency": ("Mrad/s", "krad/s", "rad/s", "mrad/s"),
+        "frequency": ("GHz", "MHz", "kHz", "Hz", "mHz"),
+        "speed": ("m/s", "mm/s", "um/s", "nm/s"),
+    }.items()
+} | {
+    "s": {"s": Scale(), "ms": Scale(over=1e3), "us": Scale(over=1e6), "ns": Scale(over=1e9)},
+    "W": {
+        "kW": Scale(1e3),
+        "W": Scale(),
+        "mW": Scale(over=1e3),
+        "uW": Scale(over=1e6),
+        "nW": Scale(over=1e9),
+    },
 }
 
 
-def suited(quantity: str, value: float) -> tuple[str, Scale]:
-    """The unit in which a value [SI] is a number that people like to read, and its scale: the
-    largest of the usual ones in which it is at least 0.1; the SI unit for 0.
+def suited(unit: str, value: float) -> tuple[str, Scale]:
+    """The unit in which a value in an SI ``unit`` is a number that people like to read, and its
+    scale: the largest of the usual ones in which it is at least 0.1; the SI unit for 0.
 
-    >>> suited("length", 2.455e-6)[0], suited("stiffness", 13.07e6)[0], suited("ratio", 0.3)[0]
+    >>> suited("m", 2.455e-6)[0], suited("N/m", 13.07e6)[0], suited("-", 0.3)[0]
     ('um', 'N/um', '-')
     """
-    known, usual = QUANTITIES[quantity], _SHOWN.get(quantity, ())
-    size = abs(value)
+    usual, size = _SHOWN.get(unit, {}), abs(value)
     if not usual or size == 0.0 or not math.isfinite(size):
-        return known.unit, Scale()
-    unit = next((one for one in usual if size >= 0.1 * known.units[one].si(1.0)), usual[-1])
-    return unit, known.units[unit]
+        return unit, Scale()
+    of_units = [*usual.items()]
+    return next((one for one in of_units if size >= 0.1 * one[1].si(1.0)), of_units[-1])
 
 
 # --- a unit as people and programs write it -------------------------------------------------------

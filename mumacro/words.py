@@ -1,0 +1,127 @@
+"""The answer to one case in words: what the command prints, and a notebook shows."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mumacro.answer import Answer
+from mumacro.inputs.doubts import UNITS
+from mumacro.inputs.fields import LIKE, PER_UNIT
+from mumacro.inputs.kind import Kind
+from mumacro.inputs.units import suited
+from mumacro.outputs import MEMBERS
+from mumacro.shown import known
+from mumacro.validity import digits, k_effect, model_rows
+
+REGIMES = {
+    "continuous": "slips all the time",
+    "stick_slip": "sticks during a part of each period",
+    "static": "at rest",
+    "partial_slip": "a part of the contact area slips all the time, the rest sticks during a part "
+    "of each period",
+    "reverse_slip": "slips forwards and backwards in each period",
+}
+_SHOWN = ("std", "std_share", "gradient")  # in rows of their own
+_ROW_OF_K = ("k is known", True)  # the answer for an interval says that already
+
+Rows = list[tuple[str, ...]]
+
+
+def of_one_case(answer: Answer[Any], shown: int | None = None) -> tuple[Rows, Rows, str]:
+    """Rows of name, value, unit and meaning; what the answer assumes, and remarks, each with the
+    word for which of them it is; and its numerical error.
+
+    Numbers have the digits that are known, and the unit that suits them; with ``shown`` that many
+    digits, in SI.
+    """
+    surrogate, cases = answer._surrogate, answer.cases
+    kind, case = cases.one_kind, cases.columns
+    ends = cases.ends and tuple(float(end[0]) for end in cases.ends)
+    asked = {**case} if ends is None else {**_without_k(case), "k_range": ends}
+    effect = k_effect(surrogate, asked, *kind.names.values()) if shown is None else 0.0
+    rows = _rows_of(answer, kind, shown, digits(effect))
+    notes: Rows = [
+        ("assumes", f"{row['row']}: {in_words(row['text'], case)}")
+        for row in model_rows(surrogate, asked, **kind.names)
+        # a doubtful unit is a remark
+        if (row["row"], ends is not None) != _ROW_OF_K and row["row"] != UNITS
+    ]
+    notes += [("remark", f"{one['field']}: {one['text']}") for one in answer.remarks]
+    return rows, notes, f"numerical error  {answer.error_bound:.2g}"
+
+
+def _without_k(case: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: x for name, x in case.items() if name != "k"}
+
+
+def in_words(text: str, case: Mapping[str, Any]) -> str:
+    """The advice of a model line with what is typed in place of Python's keyword."""
+    unit, scale = suited("N/m", case["k"])
+    k = scale.of_si(case["k"])
+    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}")
+
+
+def with_unit(
+    value: float, unit: str, count: int, shown: int | None = None, error: float = 0.0
+) -> tuple[str, str]:
+    """A number in an SI unit with ``count`` digits, and the unit that suits it; with ``shown`` that
+    many digits, in SI.
+
+    >>> with_unit(2.4547623e-6, "m", 4), with_unit(2.4547623e-6, "m", 4, 8)
+    (('2.455', 'um'), ('2.4547623e-06', 'm'))
+    """
+    if shown is not None:
+        return f"{value:.{shown}g}", unit
+    name, scale = suited(unit, value)
+    return known(scale.of_si(value), count, scale.of_si(error)), name
+
+
+def _rows_of(answer: Any, kind: Kind, shown: int | None, count: int) -> Rows:
+    """An answer as rows of name, value, unit, meaning."""
+    surrogate, cases = answer._surrogate, answer.cases
+    std = answer["std"] if "std" in answer.paths else 0.0
+
+    def number(value: float, error: float = 0.0, deviation: float = 0.0) -> str:
+        if shown is not None:
+            return f"{value:#.{shown}g}"
+        return known(value, count, error, deviation)
+
+    error, mu0 = answer.error_bound, cases.columns["mu0"]
+    groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
+    ratio = number(answer.mu_ratio, error / mu0, std / mu0)
+    rows: Rows = [
+        ("mu_macro", number(answer.mu_macro, error, std), "[-]", ""),
+        ("mu_ratio", ratio, "[-]", "mu_macro / mu0"),
+        ("regime", answer.regime, "", REGIMES[answer.regime]),
+        ("v_tilde", number(answer.v_tilde), "[-]", "v0 k / (mu0 Fz omega)"),
+        ("y_tilde", number(answer.y_tilde), "[-]", groups),
+        ("source", answer.source, "", f"of {surrogate.id}, tolerance {surrogate.tolerance:g}"),
+    ]
+    if cases.ends is not None:
+        low, high = (" ".join(with_unit(float(end[0]), "N/m", 6, shown)) for end in cases.ends)
+        middle = " ".join(with_unit(cases.columns["k"], "N/m", 6, shown))
+        rows[:1] = [
+            (*rows[0][:3], f"at k = {middle}, the geometric middle"),
+            (
+                "from",
+                number(answer.mu_macro_low, error),
+                "[-]",
+                f"the least for k from {low} to {high}",
+            ),
+            ("to", number(answer.mu_macro_high, error), "[-]", "the most"),
+        ]
+    if "std" in answer.paths:
+        shares = {name: answer[f"std_share.{name}"] for name in kind.fields}
+        parts = ", ".join(f"{name} {100.0 * x:.3g} %" for name, x in shares.items() if x > 0.0)
+        rows.insert(1, ("+-", f"{std:.2g}", "[-]", f"standard deviation; {parts}"))
+    for name, slope in (answer.gradient or {}).items():
+        unit = PER_UNIT[LIKE.get(name, name)]
+        error = answer.gradient_bound[name]
+        rows.append((f"slope {name}", number(slope, error), f"[{unit}]", f"d mu_macro / d {name}"))
+    for path, value in answer.outputs.items():
+        if path.partition(".")[0] in _SHOWN or "_bound" in path:
+            continue
+        name, dot, member = path.partition(".")
+        error = answer.outputs.get(f"{name}_bound{dot}{member}", 0.0)
+        text, unit = with_unit(value, MEMBERS[path].unit, count, shown, error)
+        rows.append((path, text, f"[{unit}]", MEMBERS[path].meaning))
+    return rows
