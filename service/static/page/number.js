@@ -2,7 +2,17 @@
 // assumes.
 import { $ } from "./ask.js";
 import { html, nothing, render } from "../lib/lit-html.js";
-import { about, digitsWithin, friction, inWords, prose, show, withDeviation } from "./words.js";
+import {
+  about,
+  around,
+  digitsWithin,
+  friction,
+  inWords,
+  numberOf,
+  prose,
+  show,
+  withDeviation,
+} from "./words.js";
 
 /** Rows of remarks that have a place of their own beside the number. */
 const BESIDE = ["units", "k is known", "first order"];
@@ -11,7 +21,7 @@ const SHOWN = 3; // lines of assumptions; all of them are one click away
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
 
 /** The number and its deviation as texts. */
-function numberOf(answer, all) {
+function resultOf(answer, all) {
   const {
     mu_macro: mu,
     std,
@@ -45,7 +55,14 @@ function spread(answer, rows) {
     return words.length ? `The variance comes from ${words.join(", ")}.` : "";
   }
   const known = rows.find(({ row }) => row === "k is known");
-  return known ? `${prose(known.text)}.` : "";
+  return known ? `${sentence(known.text, inputs)}.` : "";
+}
+
+/** A remark in the page's signs; an interval of k is shown for this one. */
+function sentence(text, inputs) {
+  const k = numberOf(inputs?.k);
+  const example = k === undefined ? "" : `, such as ${around(k)}`;
+  return prose(text.replace("give k_range", `give k as an interval${example}`));
 }
 
 export function numberPanel(store) {
@@ -67,7 +84,7 @@ export function numberPanel(store) {
     const remarks = answer.remarks ?? [];
     const said = new Set(remarks.map(({ row }) => row));
     const rows = [...remarks, ...(answer.model ?? []).filter(({ row }) => !said.has(row))];
-    const { value, std } = numberOf(answer, store.state.digits === "all");
+    const { value, std } = resultOf(answer, store.state.digits === "all");
     const doubt = rows.find(({ row }) => row === "units");
     const warning = doubt ?? rows.find(({ row }) => row === "first order");
     render(
@@ -82,11 +99,12 @@ export function numberPanel(store) {
       ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}`
       : "";
     const lines = rows.filter(({ row }) => !BESIDE.includes(row));
+    const words = (text) => sentence(text, answer.inputs);
     const line = ({ row, text }) =>
-      html`<li title=${prose(text)}><b>${row}:</b> ${prose(text)}</li>`;
+      html`<li title=${words(text)}><b>${row}:</b> ${words(text)}</li>`;
     render(lines.slice(0, SHOWN).map(line), $("rows"));
     render(
-      rows.map(({ row, text }) => html`<p><b>${row}.</b> ${prose(text)}</p>`),
+      rows.map(({ row, text }) => html`<p><b>${row}.</b> ${words(text)}</p>`),
       $("all-rows"),
     );
   };

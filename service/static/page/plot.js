@@ -136,14 +136,19 @@ export class Plot {
     return where.append("path").attr("class", className).attr("d", shape(points));
   }
 
+  /** A text at a place; a centred one is kept within the frame. */
   text(words, x, y, className, anchor = "middle") {
-    return this.over
+    const text = this.over
       .append("text")
       .attr("class", className)
       .attr("text-anchor", anchor)
       .attr("x", x)
       .attr("y", y)
       .text(words);
+    if (anchor !== "middle") return text;
+    const half = text.node().getComputedTextLength() / 2 + 3;
+    const { box } = this;
+    return text.attr("x", Math.min(Math.max(x, box.x + half), box.x + box.width - half));
   }
 
   /** The user's point; where it is outside, an arrow on the frame that points to it. */

@@ -80,6 +80,13 @@ export function withDeviation(value, std) {
 export const digitsWithin = (value, bound) =>
   value && bound ? Math.max(Math.min(Math.floor(Math.log10(Math.abs(value) / bound)), 15), 1) : 15;
 
+/** An interval of ten per cent about a stiffness [N/m], as a person types it: "0.9..1.1 N/µm". */
+export function around(k) {
+  const high = inUnit("k", 1.1 * k, unitFor("k", k), 3);
+  const low = inUnit("k", 0.9 * k, unitFor("k", k), 3);
+  return `${low.split(" ")[0]}..${high}`;
+}
+
 /** A sentence of the service in the page's signs. */
 export const prose = (text) =>
   text
@@ -88,7 +95,6 @@ export const prose = (text) =>
     .replace(/\b([yvl])0\b/g, "$1₀")
     .replace(/\b([yv])~/g, "$1\u0303")
     .replaceAll(" um ", " µm ")
-    .replace("give k_range", "give k as an interval, such as 0.9..1.1 N/µm")
     .replace(/(\d) (?=%|µm|N\b|mm\b)/g, "$1\u00a0");
 
 /** A regime as a person names it. */
