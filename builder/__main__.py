@@ -61,18 +61,18 @@ def _place(out: Path, folder: bool = False) -> None:
         raise UsageError(f"--out {out} is a folder")
 
 
-def _build(chosen: Namespace) -> str:
+def _build(options: Namespace) -> str:
     from .solver.sweep import Sweep
     from .tables.build import MAX_TOLERANCE, MIN_TOLERANCE, build_table, stages
 
-    out, tolerance = chosen.out, chosen.tolerance
+    out, tolerance = options.out, options.tolerance
     _writer()
     if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
         raise UsageError(
             f"--tolerance must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}"
         )
     _place(out)
-    with Sweep(chosen.workers) as sweep:
+    with Sweep(options.workers) as sweep:
         surrogate = build_table(out, tolerance, sweep, _Bar(stages()))
     return as_json(
         {
@@ -87,34 +87,34 @@ def _build(chosen: Namespace) -> str:
     )
 
 
-def _solve(chosen: Namespace) -> int:
+def _solve(options: Namespace) -> int:
     from .solver.steady import solve
 
     try:
-        steady = solve(chosen.v, chosen.y)
+        steady = solve(options.v, options.y)
     except InputError as error:
         option = {"v_tilde": "--v", "y_tilde": "--y"}[error.field]
         raise UsageError(f"{option} must be {error.bound}, got {error.value!r}") from None
-    print(as_json({"v_tilde": chosen.v, "y_tilde": chosen.y, **asdict(steady)}))
+    print(as_json({"v_tilde": options.v, "y_tilde": options.y, **asdict(steady)}))
     return 0 if steady.ok else 1
 
 
-def _verify(chosen: Namespace) -> int:
+def _verify(options: Namespace) -> int:
     from .solver.sweep import Sweep
     from .tables.build import SOLVED_BY, write_verified
     from .tables.verify import holds, verify
 
-    if chosen.write:
+    if options.write:
         _writer()
-    surrogate = Surrogate.open(chosen.table)
+    surrogate = Surrogate.open(options.table)
     table = surrogate.table
-    with Sweep(chosen.workers) as sweep:
+    with Sweep(options.workers) as sweep:
         reports = {
             name: verify(
                 surrogate,
                 SOLVED_BY[name](table, contact.tolerance, sweep),
-                chosen.points,
-                chosen.seed,
+                options.points,
+                options.seed,
             )
             for name, contact in table.contacts.items()
         }
@@ -122,21 +122,21 @@ def _verify(chosen: Namespace) -> int:
     print(as_json({"tolerance": surrogate.tolerance, "holds": whole, "contacts": reports}))
     if not whole:
         raise ImpossibleError(
-            f"{chosen.table} misses its tolerance of {surrogate.tolerance:g} or a bound"
+            f"{options.table} misses its tolerance of {surrogate.tolerance:g} or a bound"
         )
-    if chosen.write:
-        write_verified(chosen.table, reports)
+    if options.write:
+        write_verified(options.table, reports)
     return 0
 
 
-def _export(chosen: Namespace) -> str:
-    which, kind, out = chosen.path or chosen.table, chosen.format, chosen.out
+def _export(options: Namespace) -> str:
+    which, kind, out = options.path or options.table, options.format, options.out
     if kind == "c":  # which needs no further package
         from .export.c import DEFAULT_TOLERANCE, write_c
 
         surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
-        written = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
-        return _report(chosen, {"table": str(surrogate.path), "format": kind, "out": written})
+        paths = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
+        return _report(options, {"table": str(surrogate.path), "format": kind, "out": paths})
     from .export.c import ExportError
     from .export.grid import FORMATS, check_format, export_table
 
@@ -149,25 +149,25 @@ def _export(chosen: Namespace) -> str:
     if out.is_dir():
         raise UsageError(f"--out {out} is a folder")
     shape = export_table(path, kind, out).mu_ratio.shape
-    return _report(chosen, {"table": str(path), "format": kind, "out": str(out), "shape": shape})
+    return _report(options, {"table": str(path), "format": kind, "out": str(out), "shape": shape})
 
 
-def _report(chosen: Namespace, about: dict[str, Any]) -> str:
+def _report(options: Namespace, about: dict[str, Any]) -> str:
     """What was written, as JSON or in columns, as ``mumacro table``."""
-    if chosen.json:
+    if options.json:
         return as_json(about)
     texts = {name: x if isinstance(x, str) else " ".join(map(str, x)) for name, x in about.items()}
     return in_columns(list(texts.items()))
 
 
-def _figures(chosen: Namespace) -> str:
+def _figures(options: Namespace) -> str:
     from .figures import draw_figures
 
-    _place(chosen.out, folder=True)
-    surrogate = Surrogate.open(chosen.table)
-    chosen.out.mkdir(exist_ok=True)
-    written = draw_figures(surrogate, chosen.out)
-    return as_json({"table": str(surrogate.path), "figures": list(map(str, written))})
+    _place(options.out, folder=True)
+    surrogate = Surrogate.open(options.table)
+    options.out.mkdir(exist_ok=True)
+    paths = draw_figures(surrogate, options.out)
+    return as_json({"table": str(surrogate.path), "figures": list(map(str, paths))})
 
 
 def _whole(low: int, high: float = math.inf) -> Callable[[str], int]:
@@ -253,11 +253,11 @@ def _parser(prog: str) -> OneLineParser:
 def main(arguments: Sequence[str] | None = None, prog: str = "python -m builder") -> int:
     """Run the command; return the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    chosen = _parser(prog).parse_args(words or ["--help"])
+    options = _parser(prog).parse_args(words or ["--help"])
     try:
-        return run(chosen.title, chosen.run, chosen)
+        return run(options.title, options.run, options)
     except ModuleNotFoundError as error:
-        print(f"{chosen.title}: {missing('builder', error)}", file=sys.stderr)
+        print(f"{options.title}: {missing('builder', error)}", file=sys.stderr)
         return 1
 
 

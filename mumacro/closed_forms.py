@@ -183,9 +183,9 @@ def master_curve_limit(x: ArrayLike) -> Any:
         )
     stick = 2.0 * (np.pi - d)
     # integrals of 1 + cos t over stick and slip, every term positive
-    pulled = stick * (2.0 * np.sin(0.5 * b) ** 2 + 0.5 * x * stick)
-    followed = 2.0 * _minus_sine(d) + 4.0 * np.sin(d) * np.sin(0.5 * (d - b)) ** 2
-    return (pulled + followed) / (2.0 * np.pi)
+    pull = stick * (2.0 * np.sin(0.5 * b) ** 2 + 0.5 * x * stick)
+    arc = 2.0 * _minus_sine(d) + 4.0 * np.sin(d) * np.sin(0.5 * (d - b)) ** 2
+    return (pull + arc) / (2.0 * np.pi)
 
 
 def _minus_sine(d: Any) -> Any:
@@ -207,10 +207,10 @@ def border_23(y: ArrayLike) -> Any:
     method. Off by -1.2 % (y~ = 0.5), +0.7 % (1), +12 % (2).
     """
     y = _float(y)
-    bounded = np.minimum(y, 1e50)
-    square = bounded * bounded
+    size = np.minimum(y, 1e50)
+    square = size * size
     # above the root, from where Newton's method falls towards it
-    d = np.minimum(square, 2.0 * bounded)
+    d = np.minimum(square, 2.0 * size)
     for _ in range(8):  # the slowest, y~ = 2, takes 7
         f = d * ((d + 4.0) * d + 4.0 - 4.0 * square) - 4.0 * square
         d = d - f / ((3.0 * d + 8.0) * d + 4.0 * (1.0 - square))

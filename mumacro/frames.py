@@ -234,11 +234,11 @@ def _of_chunks(
         if (cases.std and not deviations) or (cases.ends is not None and not band):
             bound = "numbers: give deviations and intervals as arrays, std={...}, k_low and k_high"
             raise InputError("inputs", "texts", bound)
-        found = dict(answer.outputs)
+        values = dict(answer.outputs)
         for name, path in _SLOPES_OF_K.items():
             slopes = getattr(answer, path.removesuffix(".k"))
-            found[name] = None if slopes is None else slopes["k"]
-        return [found[name] if name in found else getattr(answer, name) for name in names]
+            values[name] = None if slopes is None else slopes["k"]
+        return [values[name] if name in values else getattr(answer, name) for name in names]
 
     results = dict(zip(names, _APPLY[library](chunk, arguments, names), strict=True))
     answer = LabelledAnswer(*(results[name] for name in names[:4]))

@@ -73,9 +73,9 @@ class Surrogate:
         #: of one spring, see ``Table.contacts`` for others
         self.tolerance = table.contacts["spring"].tolerance
         self.checksum = str(table.attributes.get("content_sha256", ""))
-        stated = table.contacts["spring"].attributes
-        self.max_abs_error = float(stated.get("verified_max_abs_error", math.nan))
-        self.max_rel_error = float(stated.get("verified_max_rel_error", math.nan))
+        attributes = table.contacts["spring"].attributes
+        self.max_abs_error = float(attributes.get("verified_max_abs_error", math.nan))
+        self.max_rel_error = float(attributes.get("verified_max_rel_error", math.nan))
         #: the table as the kernel reads it
         self.tabulated = Tabulated(table, self.path, threads)
         self.border = self.tabulated.border

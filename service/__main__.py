@@ -59,20 +59,20 @@ def main(arguments: Sequence[str] | None = None, prog: str = "python -m service"
     for name in _OPTIONS:
         description = Settings.model_fields[name].description
         parser.add_argument(f"--{name.replace('_', '-')}", metavar=name.upper(), help=description)
-    chosen = vars(parser.parse_args(arguments))
+    options = vars(parser.parse_args(arguments))
     # After the options: the value of a misspelt one would be refused in place of its name.
-    if chosen["command"] not in _COMMANDS:
-        parser.error(f"{chosen['command']!r} is neither {' nor '.join(_COMMANDS)}")
+    if options["command"] not in _COMMANDS:
+        parser.error(f"{options['command']!r} is neither {' nor '.join(_COMMANDS)}")
     # In the environment, so that worker processes get the same settings.
     os.environ |= {
-        PREFIX + name.upper(): chosen[name] for name in _OPTIONS if chosen[name] is not None
+        PREFIX + name.upper(): options[name] for name in _OPTIONS if options[name] is not None
     }
     try:
         settings = load_settings()
     except SettingsError as error:
         print(error, file=sys.stderr)
         return 2
-    return _serve(settings) if chosen["command"] == "serve" else _check(settings)
+    return _serve(settings) if options["command"] == "serve" else _check(settings)
 
 
 def _address(settings: Settings) -> str:
@@ -131,16 +131,16 @@ def _allow_files(connections: int) -> str | None:
         import resource
     except ModuleNotFoundError:  # Windows has no such limit
         return None
-    needed = connections + _OTHER_FILES
+    files = connections + _OTHER_FILES
     soft, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft in (resource.RLIM_INFINITY, -1) or soft >= needed:
+    if soft in (resource.RLIM_INFINITY, -1) or soft >= files:
         return None
-    allowed = needed if most in (resource.RLIM_INFINITY, -1) else min(most, needed)
+    allowed = files if most in (resource.RLIM_INFINITY, -1) else min(most, files)
     resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, most))
-    if allowed == needed:
+    if allowed == files:
         return None
     return (
-        f"{PREFIX}MAX_CONNECTIONS={connections} needs {needed} open files, and the system allows "
+        f"{PREFIX}MAX_CONNECTIONS={connections} needs {files} open files, and the system allows "
         f"{allowed}: raise its limit (ulimit -n), or lower the setting"
     )
 

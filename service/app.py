@@ -22,14 +22,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
 from .guide_pages import GuidePages
-from .limits import Room, Work
+from .limits import ConnectionLimit, Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.options import Case, CaseColumns, CaseRequest
 from .observe import Observe, Observer
 from .problems import HANDLERS, Failures
 from .routers import batch, case, contact, health, motion, page, questions, table
-from .security import HEALTH_PATHS, SCHEMES, Heads, Keys
+from .security import HEALTH_PATHS, SCHEMES, ClearHead, Keys
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 
@@ -142,8 +142,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(HeadAsGet)
     if keys:
         app.add_middleware(Keys, keys=keys, open_paths=opened)
-    app.add_middleware(Heads)
-    app.add_middleware(Room)
+    app.add_middleware(ClearHead)
+    app.add_middleware(ConnectionLimit)
     app.add_middleware(Failures)
     app.add_middleware(
         Observe, observer=state.observer, trusted_proxies=list(settings.trusted_proxies)
@@ -174,7 +174,7 @@ def _described(app: FastAPI, closed: bool) -> dict[str, Any]:
     """FastAPI's description, with what it cannot know."""
     if app.openapi_schema:
         return app.openapi_schema
-    described = get_openapi(
+    document = get_openapi(
         title=app.title,
         version=app.version,
         description=app.description,
@@ -183,11 +183,11 @@ def _described(app: FastAPI, closed: bool) -> dict[str, Any]:
         servers=app.servers,
     )
     models = models_json_schema(_MORE, ref_template=REF_TEMPLATE)[1]["$defs"]
-    described["components"]["schemas"] |= models
+    document["components"]["schemas"] |= models
     if closed:
-        described |= {"security": [{name: []} for name in SCHEMES]}
-        described["components"]["securitySchemes"] = SCHEMES
+        document |= {"security": [{name: []} for name in SCHEMES]}
+        document["components"]["securitySchemes"] = SCHEMES
     # pydantic names a generic model by its parameter
-    text = re.sub(r"_list_Union_float__NoneType___", "Columns", orjson.dumps(described).decode())
+    text = re.sub(r"_list_Union_float__NoneType___", "Columns", orjson.dumps(document).decode())
     app.openapi_schema = orjson.loads(text.replace("_Union_float__NoneType__", ""))
     return app.openapi_schema

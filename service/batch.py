@@ -28,12 +28,12 @@ from .reading import dump, of_members
 from .tables import LoadedTable, Tables
 
 
-def both(members: Mapping[str, Any], options: BatchOptions) -> dict[str, Any]:
+def body_and_query(members: Mapping[str, Any], options: BatchOptions) -> dict[str, Any]:
     """What body and query say, each name once."""
     query = options.members
-    if twice := [name for name in query if members.get(name) is not None]:
+    if repeats := [name for name in query if members.get(name) is not None]:
         reason = "is given in the query and in the body"
-        refuse([FieldFault.of(name, reason, members[name]) for name in twice])
+        refuse([FieldFault.of(name, reason, members[name]) for name in repeats])
     return {**members, **query}
 
 
@@ -66,7 +66,7 @@ class Batch:
             raise too_large(max_batch)
         std = {name: x for name, x in body.members.items() if name.startswith("std_")}
         members = {name: x for name, x in body.members.items() if name not in std}
-        model = of_members(CaseColumns, both(members, options))
+        model = of_members(CaseColumns, body_and_query(members, options))
         if model.model:
             raise InputError("include", MODEL, f"without {MODEL}, which is for one case")
         values, reasons = model.columns | std, dict(body.reasons)
@@ -80,8 +80,8 @@ class Batch:
         lengths = {name: len(x) for name, x in values.items() if isinstance(x, np.ndarray)}
         if len({*lengths.values()}) > 1:
             size = next(iter(lengths.values()))
-            shown = ", ".join(f"{name}: {length}" for name, length in lengths.items())
-            reason = f"lists must have one length; given {shown}"
+            text = ", ".join(f"{name}: {length}" for name, length in lengths.items())
+            reason = f"lists must have one length; given {text}"
             wrong = [name for name, length in lengths.items() if length != size]
             refuse([FieldFault.of(name, reason) for name in wrong])
         if not lengths and "v0" in values:  # else it is refused below

@@ -48,8 +48,8 @@ def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
     media_type = headers.get(b"content-type", JSON).lower()
     media, _, parameters = media_type.decode("latin-1").partition(";")
     if media.strip().encode() != JSON or not _is_utf8(parameters):
-        shown = media_type[:80].decode("latin-1")
-        detail = f"send {JSON.decode()}, not {shown}{remedy and f'; {remedy}'}"
+        text = media_type[:80].decode("latin-1")
+        detail = f"send {JSON.decode()}, not {text}{remedy and f'; {remedy}'}"
         raise RequestError(
             ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": JSON.decode()}
         )
@@ -66,9 +66,9 @@ def _is_utf8(parameters: str) -> bool:
     >>> _is_utf8('version=1; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
     (True, False)
     """
-    named = (parameter.partition("=") for parameter in parameters.split(";"))
+    pairs = (parameter.partition("=") for parameter in parameters.split(";"))
     return all(
-        value.strip(' \t"') in _CHARSETS for name, _, value in named if name.strip() == "charset"
+        value.strip(' \t"') in _CHARSETS for name, _, value in pairs if name.strip() == "charset"
     )
 
 
@@ -181,7 +181,7 @@ async def within(limit: int, late: ProblemKind = ProblemKind.TOOK_TOO_LONG) -> A
         raise RequestError(late, f"this may take up to {limit} s") from None
 
 
-class Room:
+class ConnectionLimit:
     """Middleware: while more connections are open than the settings allow, only the probes are
     answered."""
 

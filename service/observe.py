@@ -44,7 +44,7 @@ def for_people(line: Mapping[str, Any]) -> bytes:
     """A line of the log as a person at a terminal reads it; control characters are escaped, so that
     a client cannot forge a line or move the cursor."""
     rest = {name: x for name, x in line.items() if name not in ("time", "level", "logger")}
-    raised = str(rest.pop("exception", "")).splitlines()
+    traceback = str(rest.pop("exception", "")).splitlines()
     if "duration_ms" in rest:
         words = [rest["method"], rest["path"], rest["status"], f"{rest['duration_ms']} ms"]
     else:
@@ -52,7 +52,7 @@ def for_people(line: Mapping[str, Any]) -> bytes:
         words += [f"{name}={x}" for name, x in rest.items() if isinstance(x, (str, int, float))]
     level = "" if line["level"] in ("info", "debug") else f"{line['level']}: "
     text = f"{line['time']:%H:%M:%S}  {level}{' '.join(map(str, words))}"
-    lines = [one.translate(_ESCAPED) for one in (text, *raised)]
+    lines = [one.translate(_ESCAPED) for one in (text, *traceback)]
     return ("\n".join(lines) + "\n").encode("utf-8", "backslashreplace")
 
 
@@ -166,10 +166,10 @@ class Observer:
     def name(self, scope: Scope) -> None:
         """Give a request its id: the one that it has brought, or a new one."""
         if "request_id" not in scope:
-            offered = dict(scope["headers"]).get(b"x-request-id", b"")
+            proposal = dict(scope["headers"]).get(b"x-request-id", b"")
             scope["request_id"] = (
-                offered.decode()
-                if _ID.fullmatch(offered)
+                proposal.decode()
+                if _ID.fullmatch(proposal)
                 else f"{self._stem}{next(self._numbers):016x}"
             )
 

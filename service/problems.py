@@ -140,8 +140,8 @@ def faults_of(
             value = _NO_VALUE
         names = [str(step) for step in path if isinstance(step, str)]
         name = names[-1] if names else "body"
-        own = _WITHIN.get(names[0], INPUTS) if len(names) > 1 else allowed
-        reason = _reason(error, name, own)
+        choices = _WITHIN.get(names[0], INPUTS) if len(names) > 1 else allowed
+        reason = _reason(error, name, choices)
         faults.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(faults.values())
 
@@ -195,7 +195,7 @@ _LEAST = {"greater_than": (">", "gt"), "greater_than_equal": (">=", "ge")}
 _LARGE = 1e308
 
 
-def names_of(model: type[BaseModel]) -> tuple[str, ...]:
+def choicesof(model: type[BaseModel]) -> tuple[str, ...]:
     """What a model may be given: inputs first, options after them."""
     fields = model.model_fields
     inputs = [name for name in (*INPUTS, *LIKE, "k_range") if name in fields]
@@ -209,7 +209,7 @@ def invalid(
     parameter: bool | None = None,
 ) -> "RequestError":
     """The error that reports what a model refuses in the members of a body or query."""
-    faults = faults_of(error.errors(include_url=False), names_of(model), parameter)
+    faults = faults_of(error.errors(include_url=False), choicesof(model), parameter)
     if "mu0" in model.model_fields and model.model_fields["mu0"].is_required():
         paths = {fault.path for fault in faults}
         faults += [fault for fault in _absent_in(members) if fault.path not in paths]
@@ -298,7 +298,7 @@ def _of_fastapi(error: RequestValidationError, scope: Scope) -> RequestError:
     dependant = scope["route"].dependant
     declared = (dependant.body_params or dependant.query_params)[0].field_info.annotation
     errors = [{**fault, "loc": fault["loc"][1:]} for fault in error.errors()]
-    return refused(faults_of(errors, names_of(declared)), **_understood(error.body))
+    return refused(faults_of(errors, choicesof(declared)), **_understood(error.body))
 
 
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:

@@ -40,8 +40,8 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     members = dict(pairs)
     if len(members) < len(pairs):
         times = Counter(name for name, _ in pairs)
-        twice = [name for name in members if times[name] > 1]
-        refuse([FieldFault.of(name, "is given more than once") for name in twice])
+        repeats = [name for name in members if times[name] > 1]
+        refuse([FieldFault.of(name, "is given more than once") for name in repeats])
     return members
 
 
@@ -139,16 +139,16 @@ async def small_body(request: Request, most: int = SMALL_BODY) -> bytes:
 def members_of(query: bytes) -> dict[str, Any]:
     """The parameters of a query as a body has them: numbers as numbers, others as texts."""
     members: dict[str, Any] = {}
-    twice: dict[str, None] = {}
+    repeats: dict[str, None] = {}
     for name, value in _pairs(query):
         if name in _LISTS:
             members.setdefault(name, []).extend(part.strip() for part in value.split(","))
         elif name in members:
-            twice[name] = None
+            repeats[name] = None
         else:
             members[name] = _number(value)
-    if twice:
-        refuse([FieldFault((name,), "is given more than once", parameter=True) for name in twice])
+    if repeats:
+        refuse([FieldFault((name,), "is given more than once", parameter=True) for name in repeats])
     return members
 
 

@@ -44,16 +44,16 @@ class Keys:
         await self._app(scope, receive, send)
 
     def _holder(self, headers: Mapping[bytes, bytes]) -> str:
-        offered = headers.get(b"x-api-key")
-        if offered is None:
+        candidate = headers.get(b"x-api-key")
+        if candidate is None:
             scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
-            offered = credentials if scheme.lower() == b"bearer" else b""
-        offered = offered.strip()
+            candidate = credentials if scheme.lower() == b"bearer" else b""
+        candidate = candidate.strip()
         # compares all keys: the time does not depend on the key sent
         names = [
             name
             for key, name in self._keys.items()
-            if secrets.compare_digest(offered, key.encode("ascii"))
+            if secrets.compare_digest(candidate, key.encode("ascii"))
         ]
         if not names:
             detail = "send the API key as X-API-Key or as Authorization: Bearer"
@@ -62,7 +62,7 @@ class Keys:
         return names[0]
 
 
-class Heads:
+class ClearHead:
     """Refuses a head that says two things."""
 
     def __init__(self, app: ASGIApp) -> None:

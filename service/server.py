@@ -121,8 +121,8 @@ class Connection(HttpToolsProtocol):
         if self._busy and self.cycle.response_started:
             self.abort()
         elif not self.transport.is_closing():
-            refused = self._refused(error.kind.status)
-            answer, marks = problem_of(error, refused), self._observer.marks(refused)
+            problem = self._refused(error.kind.status)
+            answer, marks = problem_of(error, problem), self._observer.marks(problem)
             fields = b"".join(b"%b: %b\r\n" % field for field in (*answer.raw_headers, *marks))
             start = b"HTTP/1.1 %d %b" % (error.kind.status, error.kind.title.encode())
             self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, bytes(answer.body)))

@@ -21,15 +21,15 @@ def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Each input that can be read: its text, its value in SI, the unit that was typed or the SI
     unit; the deviation and the ends of an interval where it has them.  An input that is refused is
     left out."""
-    found: dict[str, dict[str, Any]] = {}
+    inputs: dict[str, dict[str, Any]] = {}
     for name, field in INPUTS.items():
         try:
             one = _of(name, members.get(name))
             if one is not None:
-                found[name] = {**one, "unit": one["unit"] or field.unit}
+                inputs[name] = {**one, "unit": one["unit"] or field.unit}
             deviation = _of(name, _deviation(members, name))
-            if name in found and deviation is not None:
-                found[name]["std"] = deviation["value"]
+            if name in inputs and deviation is not None:
+                inputs[name]["std"] = deviation["value"]
         except InputError:
             continue
     ends = members.get("k_range")
@@ -37,12 +37,12 @@ def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         try:
             low, high = (_of("k", end) for end in ends)
         except InputError:
-            return found
+            return inputs
         if low and high and all(isinstance(end["value"], float) for end in (low, high)):
             middle = math.sqrt(low["value"]) * math.sqrt(high["value"])
-            found["k"] = {"text": None, "value": middle, "unit": low["unit"] or "N/m"}
-            found["k"] |= {"low": low["value"], "high": high["value"]}
-    return found
+            inputs["k"] = {"text": None, "value": middle, "unit": low["unit"] or "N/m"}
+            inputs["k"] |= {"low": low["value"], "high": high["value"]}
+    return inputs
 
 
 def _deviation(members: Mapping[str, Any], name: str) -> Any:

@@ -63,9 +63,9 @@ class Springs:
     """
 
     def __init__(self, fine: Surrogate) -> None:
-        lacking = [name for name in atlas.QUANTITY_NAMES if name not in fine.table.quantities]
-        if lacking:
-            reason = f"has no {', '.join(lacking)}: build this table anew, before any coarser one"
+        absent = [name for name in atlas.QUANTITY_NAMES if name not in fine.table.quantities]
+        if absent:
+            reason = f"has no {', '.join(absent)}: build this table anew, before any coarser one"
             raise TableError(fine.path, reason)
         self.fine = fine
         for name in atlas.QUANTITY_NAMES:
@@ -197,8 +197,8 @@ class Ball:
         edges, out = self._edges(v, y), np.zeros((len(NAMES), v.size))
         # xi and 1 - xi of the edges, each with its own digits; eta = y - 1 has those of s = y
         at_corner = edges == y[:, None]
-        lacking = np.where(at_corner, -eta[:, None], 1.0 - edges)
-        xi_of = np.sqrt(lacking)
+        complement = np.where(at_corner, -eta[:, None], 1.0 - edges)
+        xi_of = np.sqrt(complement)
         rest_of = edges / (1.0 + xi_of)
         for piece in range(edges.shape[1] - 1):
             at = np.flatnonzero(edges[:, piece] > edges[:, piece + 1])

@@ -45,8 +45,8 @@ def _store() -> Path | None:
     numba's own store does not see a change in a function that another one calls, so each digest of
     the sources has a folder: in ``NUMBA_CACHE_DIR``, else in the user's folder for caches.
     """
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        caches = Path(chosen)
+    if setting := os.environ.get("NUMBA_CACHE_DIR"):
+        caches = Path(setting)
     elif sys.platform == "win32":
         caches = Path(os.environ.get("LOCALAPPDATA") or Path.home()) / "mumacro"
     else:

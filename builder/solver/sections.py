@@ -18,7 +18,7 @@ import numpy as np
 
 from mumacro.closed_forms import BORDER_CONSTANT
 
-from . import slip as model
+from . import slip as slip_phase
 from .compiled import solver_kernel
 from .slip import OK, rechart, slip
 from .stick import stick_end
@@ -69,13 +69,13 @@ def _angle_section(
     """Return map's residual th_end - th0 [rad] and status, for slip that stops at th0 = base + x0;
     in chart 1 x0 = -x.
 
-    ``w`` and ``out`` as in :func:`.model.slip`; ``orbit`` (6,) receives the stick phase.
+    ``w`` and ``out`` as in :func:`.slip.slip`; ``orbit`` (6,) receives the stick phase.
     """
     cth, sth, _ = _direction(x0, chart)
     s0 = math.asin(min(v * cth / (y * sth), 1.0))
     d, s1 = stick_end(v, y, eta, x0, chart, s0)
     if d < 0.0:
-        return -1.0, model.NO_SLIP
+        return -1.0, slip_phase.NO_SLIP
     _keep(orbit, d, s0, s1, x0, chart)
     # sigma1 counted from the nearer turn: after a short stick that is the one which slip came from
     turn = -1 if d < 0.5 * math.pi else 0
@@ -87,14 +87,25 @@ def _angle_section(
         # 2 B = delta1 - delta0 from sin delta1 - sin delta0 = v d, free of cancellation
         b = math.asin(min(1.0, 0.5 * v * d / math.cos(0.5 * (x0 + d1))))
         status = slip(
-            v, y, near, turn, -(x0 + 2.0 * b), model.SIDE, 0.5 * math.pi, model.TO_STICK, w, out
+            v,
+            y,
+            near,
+            turn,
+            -(x0 + 2.0 * b),
+            slip_phase.SIDE,
+            0.5 * math.pi,
+            slip_phase.TO_STICK,
+            w,
+            out,
         )
-        return out[model.TURNED] - 2.0 * b, status
+        return out[slip_phase.TURNED] - 2.0 * b, status
     th1 = math.atan2(uy, ux)
-    status = slip(v, y, near, turn, th1, model.FRONT, 0.5 * math.pi, model.TO_STICK, w, out)
+    status = slip(
+        v, y, near, turn, th1, slip_phase.FRONT, 0.5 * math.pi, slip_phase.TO_STICK, w, out
+    )
     if status != OK:
         return 0.0, status
-    x_end = rechart(out[model.ANGLE], int(out[model.CHART]), chart)
+    x_end = rechart(out[slip_phase.ANGLE], int(out[slip_phase.CHART]), chart)
     return (x_end + x0 if chart == 1 else x_end - x0), status
 
 
@@ -134,14 +145,16 @@ def _time_section(
             th0 = a_ang - b
             ratio = v * math.tan(th0) / y
         if not th0 > 0.0:  # NaN where slip cannot start there
-            return -1.0, model.NO_SLIP
+            return -1.0, slip_phase.NO_SLIP
         old, s0 = s0, math.asin(min(1.0, ratio))
         if abs(s0 - old) <= 1e-16 * abs(s0):
             break
     _keep(orbit, math.pi - s0 + s1, s0, s1, th0, chart)
     start = a_ang - b if chart == 0 else -(a_ang + b)
-    status = slip(v, y, s1, model.HERE, start, chart, 0.5 * math.pi, model.TO_STICK, w, out)
-    return 2.0 * b - out[model.TURNED], status
+    status = slip(
+        v, y, s1, slip_phase.HERE, start, chart, 0.5 * math.pi, slip_phase.TO_STICK, w, out
+    )
+    return 2.0 * b - out[slip_phase.TURNED], status
 
 
 @solver_kernel
@@ -224,7 +237,7 @@ def stick_slip(
     z_old, f_old, spread, before = z, math.inf, math.inf, math.inf
     for it in range(200):
         f, status = section(kind, v, y, eta, z, chart, w, out, orbit)
-        if status in (model.NO_SLIP, model.NO_STICK):
+        if status in (slip_phase.NO_SLIP, slip_phase.NO_STICK):
             # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border
             # slip misses lam = 0 when th0 is too large, since the half-period map turns the order
             # of orbits round there

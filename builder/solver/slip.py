@@ -159,7 +159,7 @@ def slip(
             if math.isnan(x_end):
                 return DIVERGED
             out[MIN_SPEED] = min(out[MIN_SPEED], least)
-            turned, x = x_end - x, x_end
+            angle, x = x_end - x, x_end
         else:
             last = h >= remaining
             h = remaining if last else h
@@ -170,9 +170,9 @@ def slip(
                 stop = -1.0
             h = stop if stop >= 0.0 else h
             _add_integrals(y, chart, h, v < SMALL_V and y < SMALL_Y, w, out)
-            turned = series.increment(w[series.X], h)
-            x += turned
-        out[TURNED] += turned
+            angle = series.increment(w[series.X], h)
+            x += angle
+        out[TURNED] += angle
         steps += 1
         if stop < 0.0 and last and to_stick:
             return NO_STICK

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from mumacro.errors import InputError
 from mumacro.table.atlas import REGIMES
 
-from . import slip as model
+from . import slip as slip_phase
 from .compiled import solver_kernel
 from .sections import (
     COS_0,
@@ -42,11 +42,11 @@ _LOST = (
 )
 ADVICE = {
     OK: "solved",
-    model.NO_SLIP: "the stick phase never reaches the friction limit: " + _LOST,
-    model.NO_STICK: "slip does not end within a period although the continuous orbit is not "
+    slip_phase.NO_SLIP: "the stick phase never reaches the friction limit: " + _LOST,
+    slip_phase.NO_STICK: "slip does not end within a period although the continuous orbit is not "
     "admissible: " + _LOST,
-    model.TOO_MANY_STEPS: "more than 10,000 Taylor steps in one half period: " + _LOST,
-    model.DIVERGED: "the stiff step did not converge: " + _LOST,
+    slip_phase.TOO_MANY_STEPS: "more than 10,000 Taylor steps in one half period: " + _LOST,
+    slip_phase.DIVERGED: "the stiff step did not converge: " + _LOST,
     NOT_CONVERGED: "the section's root was not found to rounding: " + _LOST,
 }
 
@@ -84,26 +84,28 @@ def error_estimate(mu: float, deficit: float) -> float:
 @solver_kernel
 def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
     """Continuous orbit over sigma in [-pi/2, pi/2], eq. (11); ``w`` and ``out`` as in
-    :func:`.model.slip`; a status."""
+    :func:`.slip.slip`; a status."""
     th, half, done = math.atan(v * y / (1.0 + v * v)), 0.5 * math.pi, False
     for _ in range(60):
         chart = 1 if th > 0.75 else 0
         x = th - chart * half
-        status = slip(v, y, -half, model.HERE, x, chart, half, model.ALL_THE_WAY, w, out)
+        status = slip(v, y, -half, slip_phase.HERE, x, chart, half, slip_phase.ALL_THE_WAY, w, out)
         if status != OK:
             return status
-        x_end, chart_end = out[model.ANGLE], int(out[model.CHART])
+        x_end, chart_end = out[slip_phase.ANGLE], int(out[slip_phase.CHART])
         # residual th_end + th_start, formed in the mirrored chart so that small angles keep their
         # digits
         res = rechart(x_end, chart_end, -chart) + x
         if done:
             return OK
-        step = res / (1.0 + math.exp(-out[model.PATH]))
+        step = res / (1.0 + math.exp(-out[slip_phase.PATH]))
         th -= step
         scale = min(max(abs(th), y / math.sqrt(1.0 + v * v)), 1.0)
-        if abs(step) < 1e-8 * scale or (out[model.PATH] > model.FORGOTTEN and abs(step) < 0.05):
+        if abs(step) < 1e-8 * scale or (
+            out[slip_phase.PATH] > slip_phase.FORGOTTEN and abs(step) < 0.05
+        ):
             done = True
-        if out[model.PATH] > model.FORGOTTEN:
+        if out[slip_phase.PATH] > slip_phase.FORGOTTEN:
             # the initial state decays within half a period: one more pass starts on the orbit
             th = -(x_end + chart_end * half)
     return NOT_CONVERGED
@@ -120,13 +122,13 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
         status = continuous(z, y, w, out)
         if status != OK:
             return math.nan, math.nan, status
-        f = out[model.MIN_SPEED]
+        f = out[slip_phase.MIN_SPEED]
         lo, hi = (lo, z) if f > 0.0 else (z, hi)
         if f == 0.0 or (f_old < math.inf and abs(z - z_old) <= 1e-9 * z):
             if f not in (0.0, f_old):  # both at rounding level: z is the root
                 z -= f * (z - z_old) / (f - f_old)
-            mu = out[model.SUM_UX] / math.pi
-            return z, (1.0 - out[model.SUM_DEFICIT] / math.pi if mu > 0.5 else mu), OK
+            mu = out[slip_phase.SUM_UX] / math.pi
+            return z, (1.0 - out[slip_phase.SUM_DEFICIT] / math.pi if mu > 0.5 else mu), OK
         new = (
             z - f * (z - z_old) / (f - f_old)
             if f_old < math.inf
@@ -135,7 +137,7 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
         if not (lo < new < hi):
             new = 0.5 * (lo + hi)
         z_old, f_old, z = z, f, new
-    return z, out[model.SUM_UX] / math.pi, NOT_CONVERGED
+    return z, out[slip_phase.SUM_UX] / math.pi, NOT_CONVERGED
 
 
 @solver_kernel
@@ -144,24 +146,24 @@ def _finish(v: float, y: float, regime: int, out: np.ndarray, res: np.ndarray) -
     a small power."""
     res[REGIME], res[SLIP_SPEED], res[MIN_SLIP_SPEED] = (
         regime,
-        out[model.PATH] * MEAN,
-        out[model.MIN_SPEED],
+        out[slip_phase.PATH] * MEAN,
+        out[slip_phase.MIN_SPEED],
     )
     if res[DEFICIT] < 0.5:
         res[MU_RATIO] = 1.0 - res[DEFICIT]
     else:
         res[DEFICIT] = 1.0 - res[MU_RATIO]
-    if v < model.SMALL_V and y < model.SMALL_Y:
+    if v < slip_phase.SMALL_V and y < slip_phase.SMALL_Y:
         # <lam> - v~ mu~ with nothing subtracted: <lam u_x> = v~ is the foot's mean velocity along
         # the drive
-        res[POWER] = out[model.EXCESS] / math.pi + v * res[DEFICIT]
+        res[POWER] = out[slip_phase.EXCESS] / math.pi + v * res[DEFICIT]
 
 
 @solver_kernel
 def sliding(v: float, y: float, out: np.ndarray, res: np.ndarray) -> None:
     """Results (7,) of continuous sliding from what :func:`continuous` left in ``out``, eq. (15)."""
-    res[MU_RATIO], res[DEFICIT] = out[model.SUM_UX] * MEAN, out[model.SUM_DEFICIT] * MEAN
-    res[STICK_FRACTION], res[POWER] = 0.0, out[model.WORK] * MEAN
+    res[MU_RATIO], res[DEFICIT] = out[slip_phase.SUM_UX] * MEAN, out[slip_phase.SUM_DEFICIT] * MEAN
+    res[STICK_FRACTION], res[POWER] = 0.0, out[slip_phase.WORK] * MEAN
     _finish(v, y, CONTINUOUS, out, res)
 
 
@@ -173,17 +175,17 @@ def _sticking(v: float, y: float, out: np.ndarray, orbit: np.ndarray, res: np.nd
     # Next to the border lam grazes zero and the end of slip is known to 1e-16/sqrt(1 - v~/v~crit)
     # only; the state there is known far better, so the surplus is taken out and stick and slip
     # together last exactly half a period.
-    surplus = out[model.SIGMA] - orbit[SIGMA_0]
-    out[model.SUM_UX] -= surplus * cth
-    out[model.SUM_DEFICIT] -= surplus * deficit
-    out[model.WORK] += surplus * y * math.sin(orbit[SIGMA_0]) * orbit[SIN_0]
-    res[MU_RATIO] = (d * (cth + 0.5 * v * d) + out[model.SUM_UX]) * MEAN
-    res[DEFICIT] = (d * (deficit - 0.5 * v * d) + out[model.SUM_DEFICIT]) * MEAN
+    surplus = out[slip_phase.SIGMA] - orbit[SIGMA_0]
+    out[slip_phase.SUM_UX] -= surplus * cth
+    out[slip_phase.SUM_DEFICIT] -= surplus * deficit
+    out[slip_phase.WORK] += surplus * y * math.sin(orbit[SIGMA_0]) * orbit[SIN_0]
+    res[MU_RATIO] = (d * (cth + 0.5 * v * d) + out[slip_phase.SUM_UX]) * MEAN
+    res[DEFICIT] = (d * (deficit - 0.5 * v * d) + out[slip_phase.SUM_DEFICIT]) * MEAN
     # during stick the spring takes up and returns the same energy, so the shaker's work is minus
     # the drive's
     res[STICK_FRACTION], res[POWER] = (
         d * MEAN,
-        (out[model.WORK] - v * d * (cth + 0.5 * v * d)) * MEAN,
+        (out[slip_phase.WORK] - v * d * (cth + 0.5 * v * d)) * MEAN,
     )
     _finish(v, y, STICK_SLIP, out, res)
 
@@ -206,8 +208,8 @@ def solve_raw(
         status = continuous(v, y, w, out)
         if status != OK:
             return status
-        least = out[model.MIN_SPEED]
-        hint = out[model.FALL]
+        least = out[slip_phase.MIN_SPEED]
+        hint = out[slip_phase.FALL]
     if not least >= 0.0:
         status = stick_slip(v, y, eta, hint, w, out, orbit)
         if status == OK:

@@ -93,14 +93,14 @@ class Sweep:
         steady.check_range(v, y, eta)
         points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
         chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
-        done = self._pool.map(lambda chunk: solve_chunk(kind, chunk), chunks)
-        out = np.concatenate([np.empty((0, len(COLUMNS))), *done])
+        results = self._pool.map(lambda chunk: solve_chunk(kind, chunk), chunks)
+        out = np.concatenate([np.empty((0, len(COLUMNS))), *results])
         self.n_solves += points.shape[0]
-        failed = np.flatnonzero(out[:, _STATUS] != OK)
-        if failed.size:
-            (v_bad, y_bad, _), status = points[failed[0]].tolist(), int(out[failed[0], _STATUS])
+        failures = np.flatnonzero(out[:, _STATUS] != OK)
+        if failures.size:
+            (v_bad, y_bad, _), status = points[failures[0]].tolist(), int(out[failures[0], _STATUS])
             text = (
-                f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, "
+                f"{failures.size} of {points.shape[0]} points failed, first v~={v_bad!r}, "
                 f"y~={y_bad!r}: "
             )
             raise SolveError(text + steady.ADVICE[status])

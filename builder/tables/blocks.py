@@ -40,33 +40,33 @@ def solve_nodes(
     keep their digits, but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to
     0.
     """
-    chart, tabulated, cancelled = contact.charts[index], {}, {}
+    chart, numbers, roundings = contact.charts[index], {}, {}
     a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
     v, y, eta = chart.point(a[:, None], b[None, :], border)
-    solved = contact.solve(v, y, eta, continuous=chart.regime == CONTINUOUS)
+    solution = contact.solve(v, y, eta, continuous=chart.regime == CONTINUOUS)
     for code, quantity in enumerate(QUANTITIES):
         if chart.holds(quantity):
             base, factor = kernels[-1].forms(code, index, v, y, eta, contact.kind.contact)
-            rest, complement = solved[quantity.name] - base, SOLVED[quantity.name].complement
+            rest, complement = solution[quantity.name] - base, SOLVED[quantity.name].complement
             if complement:  # next to 1 it has the digits
-                rest = np.where(base == 1.0, -solved[complement], rest)
+                rest = np.where(base == 1.0, -solution[complement], rest)
             exact = (base == 0.0) | (base == 1.0)
             if chart.a.name in _LOGARITHMIC and quantity.name == "mu_ratio":
-                rest, exact = _small_rest(chart, v, y, solved), np.full(v.shape, True)
-            tabulated[quantity.name] = rest / factor
-            noise = contact.noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
-            cancelled[quantity.name] = np.where(exact, 0.0, noise / np.abs(factor))
-    return a, b, tabulated, cancelled
+                rest, exact = _small_rest(chart, v, y, solution), np.full(v.shape, True)
+            numbers[quantity.name] = rest / factor
+            noise = contact.noise(quantity.name, v, y, solution, chart.regime == CONTINUOUS)
+            roundings[quantity.name] = np.where(exact, 0.0, noise / np.abs(factor))
+    return a, b, numbers, roundings
 
 
 #: coordinates of blocks whose base is 1 and a logarithm
 _LOGARITHMIC = ("y_root", "v_root", "ray_root")
 
 
-def _small_rest(chart: Chart, v: Array, y: Array, solved: dict[str, Array]) -> Array:
+def _small_rest(chart: Chart, v: Array, y: Array, solution: dict[str, Array]) -> Array:
     """mu~ less a base of 1 and a logarithm, by 1 - mu~, whose digits are left where y~ is small."""
     level = 0.375 * np.log(y) if chart.a.name == "y_root" else 0.1875 * np.log(v)
-    return np.asarray(-solved["deficit"] - y * y * level)
+    return np.asarray(-solution["deficit"] - y * y * level)
 
 
 def _next(n: int) -> int:
@@ -170,19 +170,19 @@ def build_block(
     bound = max(SHARE * tolerance, NODE_FLOOR)
     tail_block = chart.a.name == "inverse_y"
     na, nb = 3 if tail_block else 8, 8
-    best, stuck = [math.inf, math.inf], [0, 0]
+    best, stalls = [math.inf, math.inf], [0, 0]
     while True:
         progress(f"{chart.name} {na} x {nb}")
-        a, b, tabulated, _ = solve_nodes(contact, index, (na, nb), border)
-        values = tabulated["mu_ratio"]
+        a, b, numbers, _ = solve_nodes(contact, index, (na, nb), border)
+        values = numbers["mu_ratio"]
         tails = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):
             # twice no better by a third: what is left is the solver's rounding, to which more nodes
             # only add
-            stuck[axis] = 0 if tails[axis] < 0.67 * best[axis] else stuck[axis] + 1
+            stalls[axis] = 0 if tails[axis] < 0.67 * best[axis] else stalls[axis] + 1
             best[axis] = min(best[axis], tails[axis])
         grow = [
-            tails[axis] > bound and (na, nb)[axis] < MAX_NODES and stuck[axis] < 3
+            tails[axis] > bound and (na, nb)[axis] < MAX_NODES and stalls[axis] < 3
             for axis in (0, 1)
         ]
         if tail_block:
@@ -194,4 +194,4 @@ def build_block(
     if tail_block:
         follow[0] = bound
     cells = (_block_cells(chart, values, 0, follow[0]), _block_cells(chart, values, 1, follow[1]))
-    return Block(a, b, cells, tabulated)
+    return Block(a, b, cells, numbers)

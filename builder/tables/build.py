@@ -70,8 +70,8 @@ def to_bits(values: Array, digits: int, up: bool = False) -> Array:
     """``values`` with ``digits`` binary digits each, to the nearest or, with ``up``, away from
     zero."""
     mantissa, exponent = np.frexp(values)
-    scaled = np.ldexp(mantissa, digits)
-    whole = np.copysign(np.ceil(np.abs(scaled)), scaled) if up else np.round(scaled)
+    multiple = np.ldexp(mantissa, digits)
+    whole = np.copysign(np.ceil(np.abs(multiple)), multiple) if up else np.round(multiple)
     return np.asarray(np.ldexp(whole, exponent - digits))
 
 
@@ -107,10 +107,14 @@ def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
     """
     n = 31 if tolerance > 1e-5 else (61 if tolerance > 1e-9 else 121)
     v, y = np.geomspace(1e-3, 1e3, n), np.geomspace(1e-3, 1e3, n)
-    solved = sweep.solve("full", v[:, None], y[None, :])
+    solution = sweep.solve("full", v[:, None], y[None, :])
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
-    mu, stick = (to_bits(solved[name], bits(tolerance)) for name in ("mu_ratio", "stick_fraction"))
-    error = to_bits(solved["error_estimate"] + np.abs(mu - solved["mu_ratio"]), ERROR_BITS, up=True)
+    mu, stick = (
+        to_bits(solution[name], bits(tolerance)) for name in ("mu_ratio", "stick_fraction")
+    )
+    error = to_bits(
+        solution["error_estimate"] + np.abs(mu - solution["mu_ratio"]), ERROR_BITS, up=True
+    )
     return {
         "v_tilde": v,
         "y_tilde": y,
@@ -253,11 +257,11 @@ def springs_for(table: Table, workers: int) -> Springs:
 
 
 def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
-    missed = {what: count for what, count in uncovered(report).items() if count}
+    misses = {what: count for what, count in uncovered(report).items() if count}
     return BuildError(
         f"verified error {report['max_abs_error']:.2e} absolute, {report['max_rel_error']:.2e} "
         f"relative against a tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; "
-        f"outside their bound: {missed or 'none'}; no table was written"
+        f"outside their bound: {misses or 'none'}; no table was written"
     )
 
 
@@ -266,12 +270,12 @@ def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> li
     miss its tolerance."""
     late, entry = [], contact.of(surrogate)
     tolerance = entry.tolerance
-    for i, measured in enumerate(block_errors(surrogate, contact, BLOCK_POINTS, seed)):
+    for i, largest in enumerate(block_errors(surrogate, contact, BLOCK_POINTS, seed)):
         block = entry.blocks[i]
-        for name, value in measured.values.items():
+        for name, value in largest.values.items():
             slopes = np.zeros(2)
-            if name in measured.cells:
-                errors = CELL_SAFETY * measured.cells[name]
+            if name in largest.cells:
+                errors = CELL_SAFETY * largest.cells[name]
                 if name not in contact.sloped:
                     # they bound values: a rough quadrature can make the finer interpolant worse
                     # than the table, and some points of cells are in another block
@@ -279,8 +283,8 @@ def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> li
                 errors = to_bits(errors, ERROR_BITS, up=True)
                 block.cell_errors[name], slopes = errors, errors.max(axis=0)[1:]
             block.errors[name] = np.array([SAFETY * value, *slopes])
-        block.max_abs_error, block.max_rel_error = measured.absolute, measured.relative
-        if measured.absolute > 0.8 * tolerance or measured.relative > 0.8 * ABS_TO_REL * tolerance:
+        block.max_abs_error, block.max_rel_error = largest.absolute, largest.relative
+        if largest.absolute > 0.8 * tolerance or largest.relative > 0.8 * ABS_TO_REL * tolerance:
             late.append(i)
     return late
 

@@ -167,16 +167,18 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> SolvedC
     )
 
 
-def _ball_noise(name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding) -> Array:
+def _ball_noise(
+    name: str, v: Array, y: Array, solution: dict[str, Array], sliding: Sliding
+) -> Array:
     del v, y, sliding
-    value = solved[name]
+    value = solution[name]
     if name == "mu_ratio":
         return BALL_NOISE * np.minimum(1.0, 4.0 * value)
     # next to the border a spring's own stick fraction has half of its digits
     return 8.0 * BALL_NOISE * value if name == "power" else np.full(value.shape, 25.0 * BALL_NOISE)
 
 
-def _no_noise(name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding) -> Array:
+def _no_noise(name: str, v: Array, y: Array, solution: dict[str, Array], sliding: Sliding) -> Array:
     """A quadrature's own error is a part of the errors that a table of a ball states."""
-    del y, solved, sliding, name
+    del y, solution, sliding, name
     return np.zeros_like(v)

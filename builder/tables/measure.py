@@ -125,24 +125,24 @@ def _value_errors(
     here = contact.places(surrogate, v, y) == index
     v, y = v[here], y[here]
     mu = contact.quantity(surrogate, "mu_ratio", v, y)[0]
-    solved = contact.solve(v, y)
-    error = np.abs(mu - solved["mu_ratio"])
+    solution = contact.solve(v, y)
+    error = np.abs(mu - solution["mu_ratio"])
     errors = {}
     for name in contact.of(surrogate).blocks[index].nodes:
         value, *_ = contact.quantity(surrogate, name, v, y)
-        truth, complement = solved[name], SOLVED[name].complement
+        truth, complement = solution[name], SOLVED[name].complement
         if contact.quadrature and complement:
-            truth = np.where(truth > 0.5, 1.0 - solved[complement], truth)
+            truth = np.where(truth > 0.5, 1.0 - solution[complement], truth)
         scale, beside, rounding = (contact.quantity(table, name, v, y)[1] for table in stating)
         # what the bound allows anyway: half of rounding, and what the border's error does, of which
         # it states twice
         noise = (
-            contact.allowed(name, v, y, solved, chart.regime == CONTINUOUS)
+            contact.allowed(name, v, y, solution, chart.regime == CONTINUOUS)
             + beside
             - 0.5 * rounding
         )
         errors[name] = float((np.maximum(np.abs(value - truth) - noise, 0.0) / scale).max())
-    return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
+    return errors, float(error.max()), float((error / solution["mu_ratio"]).max())
 
 
 def _crowded(rng: np.random.Generator, axis: Axis, n: int) -> Array:
@@ -210,8 +210,8 @@ def _difference(
         for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
     )
     cells = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
-    tabulated = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, cells, b.powers, optimize=True)
-    return tabulated - (a.follow @ exact @ b.follow.T).reshape(tabulated.shape), a, b
+    interpolant = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, cells, b.powers, optimize=True)
+    return interpolant - (a.follow @ exact @ b.follow.T).reshape(interpolant.shape), a, b
 
 
 #: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to

@@ -41,10 +41,10 @@ def _power_noise(v: Array, y: Array, power: Array, sliding: Sliding) -> Array:
     In stick-slip what the drive puts in during stick, v~, is taken out; in continuous sliding the
     angle swings by y~, and only v~ of that is out of phase.
     """
-    lost = np.where(
+    loss = np.where(
         sliding, np.where(y < 1.0, 1e-15 * y * y, 0.0), np.where(y < 2.0, 4e-15 * v, 0.0)
     )
-    noise: Array = SOLVER_NOISE * power + np.where(v < 1.0, lost, 0.0)
+    noise: Array = SOLVER_NOISE * power + np.where(v < 1.0, loss, 0.0)
     return noise
 
 
@@ -60,7 +60,7 @@ SOLVED = {
 
 
 def solver_noise(
-    name: str, v: Array, y: Array, solved: dict[str, Array], sliding: Sliding
+    name: str, v: Array, y: Array, solution: dict[str, Array], sliding: Sliding
 ) -> Array:
     """What fresh solves of a quantity may be wrong by, absolute."""
-    return SOLVED[name].noise(v, y, solved[name], sliding)
+    return SOLVED[name].noise(v, y, solution[name], sliding)

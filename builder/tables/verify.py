@@ -67,8 +67,8 @@ def monotony(
     """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across
     all seams [-]."""
     rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
-    for fixed in log_uniform(np.random.default_rng(seed), 1e-4, 1e6, lines):
-        line = np.full(n, fixed)
+    for level in log_uniform(np.random.default_rng(seed), 1e-4, 1e6, lines):
+        line = np.full(n, level)
         along_v, along_y = (
             ratio_of(surrogate, kind, v, y) for v, y in ((rise, line), (line, rise))
         )
@@ -105,11 +105,11 @@ class Neighbours:
         by."""
         slope, noise = np.empty((2, self.v.size)), np.empty((2, self.v.size))
         sliding = (self.v > self.crit)[:, None]
-        for row, (step, solved) in enumerate(zip(self.steps, self.solved, strict=True)):
-            slope[row] = solved[name] @ _SIXTH_ORDER / step
+        for row, (step, solution) in enumerate(zip(self.steps, self.solved, strict=True)):
+            slope[row] = solution[name] @ _SIXTH_ORDER / step
             # what the fourth order leaves out; the sixth leaves out up to a seventh of it
-            left_out = np.abs(slope[row] - solved[name] @ _FOURTH_ORDER / step)
-            each = self.noise(name, self.v[:, None], self.y[:, None], solved, sliding).max(axis=1)
+            left_out = np.abs(slope[row] - solution[name] @ _FOURTH_ORDER / step)
+            each = self.noise(name, self.v[:, None], self.y[:, None], solution, sliding).max(axis=1)
             noise[row] = (2.0 * each + 4e-16 * np.abs(slope[row])) / step + 0.2 * left_out
         return slope, noise
 
@@ -142,17 +142,17 @@ def _values(
     name: str,
     v: Array,
     y: Array,
-    solved: dict[str, Array],
+    solution: dict[str, Array],
 ) -> _Compared:
     value, bound, source = contact.quantity(surrogate, name, v, y)
-    truth = solved[name]
-    noise = contact.noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
+    truth = solution[name]
+    noise = contact.noise(name, v, y, solution, REGIME_OF_SOURCE[source] == CONTINUOUS)
     error = np.abs(value - truth)
-    missed, over = error > bound + noise, bound_over_error(bound, noise, error)
+    misses, over = error > bound + noise, bound_over_error(bound, noise, error)
     if name != "mu_ratio":
         error = np.maximum(error - noise, 0.0)
     scale = np.where(truth == 0.0, 1.0, truth)
-    return _Compared(error, error / scale, bound, over, missed, source)
+    return _Compared(error, error / scale, bound, over, misses, source)
 
 
 def _slopes(
@@ -172,13 +172,13 @@ def _slopes(
     return _Compared(off, off, bound, over, off > bound, np.tile(source[keep], 2))
 
 
-def _summary(compared: _Compared, at: Any = slice(None)) -> dict[str, Any]:
+def _summary(comparison: _Compared, at: Any = slice(None)) -> dict[str, Any]:
     return {
-        "points": int(compared.error[at].size),
-        "max_abs_error": float(compared.error[at].max()),
-        "max_rel_error": float(compared.relative[at].max()),
-        "max_bound": float(compared.bound[at].max()),
-        "not_covered": int(np.count_nonzero(compared.missed[at])),
+        "points": int(comparison.error[at].size),
+        "max_abs_error": float(comparison.error[at].max()),
+        "max_rel_error": float(comparison.relative[at].max()),
+        "max_bound": float(comparison.bound[at].max()),
+        "not_covered": int(np.count_nonzero(comparison.missed[at])),
     }
 
 
@@ -195,11 +195,11 @@ def _report(parts: list[_Compared]) -> dict[str, Any]:
 def distribution(error: Array, over: Array) -> dict[str, list[float]]:
     """Errors at :data:`QUANTILES`; least, median and largest bound over error, 0 where no error is
     beyond the solver's own."""
-    defined = over[~np.isnan(over)]
+    ratios = over[~np.isnan(over)]
     return {
         "error_quantiles": np.quantile(error, QUANTILES).tolist(),
-        "bound_over_error": np.quantile(defined, (0.0, 0.5, 1.0)).tolist()
-        if defined.size
+        "bound_over_error": np.quantile(ratios, (0.0, 0.5, 1.0)).tolist()
+        if ratios.size
         else [0.0, 0.0, 0.0],
     }
 
@@ -244,14 +244,14 @@ def _border_compared(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generato
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
     """Of the report of :func:`verify`: how many values and slopes of each quantity, and
     speeds of the border, miss their bound."""
-    missed = {
+    misses = {
         name: report.get(name, report)["not_covered"]
         for name in report["distribution"]
         if name in QUANTITY_NAMES
     }
     if "border" in report:
-        missed["border"] = report["border"]["not_covered"]
-    return missed | {
+        misses["border"] = report["border"]["not_covered"]
+    return misses | {
         f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()
     }
 
@@ -291,10 +291,10 @@ def verify(
     for i, (share, draw) in enumerate(cases.values()):
         v, y = draw(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
         v, y = contact.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
-        solved = contact.solve(v, y)
+        solution = contact.solve(v, y)
         around = Neighbours(surrogate, contact, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
         for name in names:
-            values[name].append(_values(surrogate, contact, name, v, y, solved))
+            values[name].append(_values(surrogate, contact, name, v, y, solution))
         for name in sloped:
             slopes[name].append(_slopes(surrogate, contact, around, name))
     return {

@@ -282,9 +282,9 @@ class _Problem(Measured):
         low = dict.fromkeys(self.unknowns, math.inf)
         high = dict.fromkeys(self.unknowns, 0.0)
         if inside[finite].any():
-            found = profile.ends([goal for name in self.unknowns for goal in self._goals(name)])
+            ends = profile.ends([goal for name in self.unknowns for goal in self._goals(name)])
             for i, name in enumerate(self.unknowns):
-                low[name], high[name] = max(-found[2 * i], 0.0), found[2 * i + 1]
+                low[name], high[name] = max(-ends[2 * i], 0.0), ends[2 * i + 1]
         along = self.unknowns[0]
         if inside[0]:
             low[along] = 0.0

@@ -174,8 +174,8 @@ class Fit:
             "curve": self.curve(),
         }
         # an infinite deviation of k is no rigid contact
-        worded = ("values", "interval", "solutions", "points")
-        return {name: _plain(part, name in worded) for name, part in members.items()}
+        parts = ("values", "interval", "solutions", "points")
+        return {name: _plain(part, name in parts) for name, part in members.items()}
 
     def _width(self) -> float:
         """Half width of a 95 % interval in standard deviations."""
@@ -287,17 +287,17 @@ def _interpolated(x: Array, column: Array, fine: Array) -> Any:
     return np.asarray(curve(np.arcsinh(fine / scale)))
 
 
-def _plain(part: Any, worded: bool, name: str = "") -> Any:
+def _plain(part: Any, as_word: bool, name: str = "") -> Any:
     """Numbers, texts, lists and dicts for JSON; where ``worded`` an infinite k is the word
     rigid."""
     if isinstance(part, Mapping):
-        return {key: _plain(entry, worded, key) for key, entry in part.items()}
+        return {key: _plain(entry, as_word, key) for key, entry in part.items()}
     if isinstance(part, np.ndarray):
         part = part.tolist()
     if isinstance(part, (list, tuple)):
-        return [_plain(entry, worded, name) for entry in part]
+        return [_plain(entry, as_word, name) for entry in part]
     if isinstance(part, float) and not math.isfinite(part):
-        return RIGID if worded and name == "k" and part == math.inf else None
+        return RIGID if as_word and name == "k" and part == math.inf else None
     return part
 
 

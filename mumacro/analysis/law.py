@@ -222,13 +222,13 @@ def law(
         raise InputError("along", along, f"one of {', '.join(NAMES)}, {AMPLITUDE}")
     if values is None:
         ends_given = (_end(along, "start", start), _end(along, "stop", stop))
-        shown = sweep_values(along, *ends_given, points, scale)
+        axis = sweep_values(along, *ends_given, points, scale)
     elif start is None and stop is None:
-        shown = _ascending(along, values)
+        axis = _ascending(along, values)
     else:
         raise InputError("values", "an array", "left out beside start and stop")
     name, per = field_of(along)
-    kind, x = kind_of(contact, direction), per * shown
+    kind, x = kind_of(contact, direction), per * axis
     middle_case, ends = without_interval(case, name)
     middle_case, stiffening = stiffening_of(middle_case, name, kind, stiffness_exponent)
     fixed = fixed_inputs(middle_case, along, kind)
@@ -239,7 +239,7 @@ def law(
     )
     if refine:
         x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
-        shown = x / per
+        axis = x / per
     answer = curve.answer(x, groups=True, strict=True)
     if ends:
         interval = {**{name: value for name, value in fixed.items() if name != "k"}, **ends}
@@ -249,4 +249,4 @@ def law(
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
     k_range = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
     marks = tuple(replace(crossing, value=crossing.value / per) for crossing in border)
-    return Law(along, shown, answer, mu_static, marks, fixed, kind, curve.stiffening, k_range)
+    return Law(along, axis, answer, mu_static, marks, fixed, kind, curve.stiffening, k_range)

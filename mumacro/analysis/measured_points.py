@@ -14,7 +14,7 @@ from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import NO_DEVIATION, read
-from mumacro.inputs.text_tables import Dialect, Table, Wanted, read_table
+from mumacro.inputs.text_tables import ColumnNames, Dialect, Table, read_table
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
@@ -31,7 +31,7 @@ _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their product
 #: columns of a table of points, and the input whose units each has
 COLUMNS = {name: LIKE.get(name, name) for name in (*NAMES, AMPLITUDE)}
 COLUMNS |= {"mu_macro": "mu0", STD: "mu0"}
-_WANTED = Wanted(COLUMNS, (("v0",), ("mu_macro",)))
+_COLUMN_NAMES = ColumnNames(COLUMNS, (("v0",), ("mu_macro",)))
 
 
 def read_points(
@@ -46,7 +46,7 @@ def read_points(
     >>> read_points(b"v0 [mm/s],mu_macro\\n10,0.2\\n").columns
     {'v0': array([0.01]), 'mu_macro': array([0.2])}
     """
-    return read_table(source, _WANTED, dialect, most)
+    return read_table(source, _COLUMN_NAMES, dialect, most)
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:
@@ -127,11 +127,11 @@ class Measured:
     def _read(self, data: dict[str, Any]) -> None:
         """Columns of one length, (n,), in SI."""
         friction = read("mu_macro", data.pop("mu_macro"))
-        measured: dict[str, Any] = {"mu_macro": friction.si}
+        columns: dict[str, Any] = {"mu_macro": friction.si}
         if STD in data:
-            measured[STD] = _number(STD, data.pop(STD))
+            columns[STD] = _number(STD, data.pop(STD))
         elif friction.std is not None:
-            measured[STD] = friction.std
+            columns[STD] = friction.std
         # labels are dropped: a fit is not labelled
         values = {name: _number(name, x) for name, x in data.items()}
         inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
@@ -139,7 +139,7 @@ class Measured:
         numbers = columns_of(inputs, self.kind)
         check(numbers, inputs.get("f"))
         all_columns = {
-            name: np.asarray(x, np.float64) for name, x in {**numbers, **measured}.items()
+            name: np.asarray(x, np.float64) for name, x in {**numbers, **columns}.items()
         }
         lengths = {name: x.shape for name, x in all_columns.items() if x.ndim}
         if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in all_columns.values()):
@@ -196,17 +196,17 @@ class Measured:
 
     def remarks(self) -> list[Remark]:
         """What is probably a wrong unit in the points."""
-        found = remarks(self.columns, self._has_f)
+        doubts = remarks(self.columns, self._has_f)
         doubtful = self.mu > _PERCENT
         if not doubtful.any():
-            return found
+            return doubts
         largest = float(self.mu.max())
         text = (
             f"mu_macro up to {largest:.4g}, and mu_macro above {_PERCENT:g} is rare: is it in per "
             "cent? Then name the column mu_macro [%], or divide by 100"
         )
         cases = int(np.count_nonzero(doubtful))
-        return [{"row": UNITS, "field": "mu_macro", "cases": cases, "text": text}, *found]
+        return [{"row": UNITS, "field": "mu_macro", "cases": cases, "text": text}, *doubts]
 
     def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The inputs of :meth:`model` at other places: those given, the others as at all points."""
@@ -218,30 +218,32 @@ class Measured:
                 raise InputError(
                     name, inputs[name], f"one of {', '.join(names)}; {unknown_name(name, names)}"
                 )
-        given = {} if cases is None else select("cases", cases, [*names, *self.unknowns])
-        for name in given:
+        values = {} if cases is None else select("cases", cases, [*names, *self.unknowns])
+        for name in values:
             if name in self.unknowns:
                 raise InputError(name, "a column", "left out: it is fitted")
             if name in inputs:
                 raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
-        given = {name: _number(name, value) for name, value in {**given, **inputs}.items()}
-        if not given:
+        values = {name: _number(name, value) for name, value in {**values, **inputs}.items()}
+        if not values:
             return dict(self.columns)
         same = dict(self.columns)
-        if "f" in given:
+        if "f" in values:
             del same["omega"]
-            if "omega" in given:
+            if "omega" in values:
                 same["omega"] = self.columns["omega"]  # both are given: refused with the inputs
         for name, column in same.items():
-            if name in given:
+            if name in values:
                 continue
             if np.unique(column).size > 1:
-                listed = ", ".join(given)
+                inputs_text = ", ".join(values)
                 raise InputError(
-                    name, f"{listed} alone", f"given beside {listed}: it differs between the points"
+                    name,
+                    f"{inputs_text} alone",
+                    f"given beside {inputs_text}: it differs between the points",
                 )
-            given[name] = float(column[0])
-        return given
+            values[name] = float(column[0])
+        return values
 
     # --- the model --------------------------------------------------------------------------------
 

@@ -99,8 +99,8 @@ class Profile:
 
     def lowest(self) -> Places:
         """The samples that are minima."""
-        walled = np.concatenate(([np.inf], self.at.chi2, [np.inf]))
-        return np.flatnonzero((walled[1:-1] < walled[:-2]) & (walled[1:-1] <= walled[2:]))
+        chi2 = np.concatenate(([np.inf], self.at.chi2, [np.inf]))
+        return np.flatnonzero((chi2[1:-1] < chi2[:-2]) & (chi2[1:-1] <= chi2[2:]))
 
     def ridge(self, one: int, other: int) -> float:
         """The largest chi2 on the way from one sample to another."""
@@ -178,11 +178,14 @@ class Profile:
         s, f = self.at.s.tolist(), of(self.at).tolist()
 
         def zero(i: int) -> float:
-            known = {s[i]: f[i], s[i + 1]: f[i + 1]}  # computed again, they may differ by rounding
+            samples = {
+                s[i]: f[i],
+                s[i + 1]: f[i + 1],
+            }  # computed again, they may differ by rounding
 
             def value(place: float) -> float:
-                if place in known:
-                    return float(known[place])
+                if place in samples:
+                    return float(samples[place])
                 return float(of(self.samples(np.array([place]), slopes))[0])
 
             return float(brentq(value, s[i], s[i + 1], xtol=tolerance, rtol=1e-14))
@@ -221,8 +224,8 @@ class Profile:
         """Finite places that are allowed, ascending: the samples, their borders, and some
         between."""
         finite, limit = np.isfinite(self.at.s), self.limit
-        crossed = np.flatnonzero((inside[:-1] != inside[1:]) & finite[1:])
-        borders = self._zeros(crossed, lambda at: at.chi2 - limit, 1e-9, slopes=False)
+        crossings = np.flatnonzero((inside[:-1] != inside[1:]) & finite[1:])
+        borders = self._zeros(crossings, lambda at: at.chi2 - limit, 1e-9, slopes=False)
         s = np.unique(np.concatenate([self.at.s[inside & finite], borders]))
         parts = 1 + _INSIDE // max(s.size, 1)
         between = np.linspace(s[:-1], s[1:], parts, endpoint=False).ravel()

@@ -231,10 +231,10 @@ def solve_for(
     [['2.8656e-06 m'], []]
     """
     kind = kind_of(contact, direction)
-    given, (unknown, per) = unknown, field_of(unknown)
-    ends_given = None if within is None else _ends(given, within)
+    name, (unknown, per) = unknown, field_of(unknown)
+    ends_given = None if within is None else _ends(name, within)
     if per != 1.0:
-        fixed_inputs(without_interval(case)[0], given, kind)  # messages name what was asked for
+        fixed_inputs(without_interval(case)[0], name, kind)  # messages name what was asked for
         solution = solve_for(
             surrogate,
             unknown,
@@ -245,7 +245,7 @@ def solve_for(
             stiffness_exponent=stiffness_exponent,
             **case,
         )
-        solution = _in_unit(solution, given, per)
+        solution = _in_unit(solution, name, per)
         if ends_given is None:
             return solution
         low, high = ends_given

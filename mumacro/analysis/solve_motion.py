@@ -235,8 +235,8 @@ def solve_motion(
     solution = _solved(curve, low, high, targets)
     if unknown != "v0" or any(solution.roots) or not {"x", "normal"} <= case.keys():
         return solution
-    turned = _solved(curve.turned(), low, high, targets)
-    return replace(solution, other_way=turned if any(turned.roots) else None)
+    opposite = _solved(curve.opposite(), low, high, targets)
+    return replace(solution, other_way=opposite if any(opposite.roots) else None)
 
 
 def _solved(curve: "Curve", low: float, high: float, targets: Array) -> MotionSolution:
@@ -264,11 +264,11 @@ class Curve:
         self.unknown, self.of, self.case = unknown, of, dict(case)
         part, _, member = unknown.partition(".")
         if member:
-            given = read_oscillation(part, case.get(part, 0.0))
-            if len(given) > 1:
+            oscillation = read_oscillation(part, case.get(part, 0.0))
+            if len(oscillation) > 1:
                 bound = f"of one harmonic where {unknown} is the unknown"
                 raise InputError(part, case[part], bound)
-            self._harmonic, self._amplitude, self._phase = given[0]
+            self._harmonic, self._amplitude, self._phase = oscillation[0]
             if member == "phase" and not np.any(self._amplitude):
                 raise InputError(
                     part, case.get(part), f"an amplitude > 0, whose {unknown} is unknown"
@@ -283,11 +283,11 @@ class Curve:
             if case.get(name) is not None:
                 self.case[name] = self.number(name)
 
-    def turned(self) -> "Curve":
+    def opposite(self) -> "Curve":
         """The same motion with x turned by half a period: it moves the other way."""
         terms = read_oscillation("x", self.case["x"])
-        turned = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
-        return Curve(self.unknown, self.of, {**self.case, "x": turned})
+        opposite = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
+        return Curve(self.unknown, self.of, {**self.case, "x": opposite})
 
     def at(self, values: Array) -> tuple[Array, Array]:
         """The mean force and the estimate of its error, (n,) both; NaN where there is no motion."""

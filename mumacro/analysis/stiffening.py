@@ -51,12 +51,12 @@ class Stiffening(NamedTuple):
     def scaled(self, case: Mapping[str, Any], load: ArrayLike) -> dict[str, Array]:
         """The stiffnesses of a case, k or the ends of its interval, at loads [N], (n,)."""
         if "k" not in case:
-            given = {name: read(name, case[name]).si for name in ENDS if name in case}
+            stiffness = {name: read(name, case[name]).si for name in ENDS if name in case}
         elif (one := read("k", case["k"])).low is not None and one.high is not None:
-            given = dict(zip(ENDS, (one.low, one.high), strict=True))
+            stiffness = dict(zip(ENDS, (one.low, one.high), strict=True))
         else:
-            given = {"k": one.si}
-        return {name: self.stiffness(float(k), load) for name, k in given.items()}
+            stiffness = {"k": one.si}
+        return {name: self.stiffness(float(k), load) for name, k in stiffness.items()}
 
     def place(self, ratio: float) -> float:
         """The load [N] at which k/Fz is ``ratio`` times what it is at :attr:`load`; for m < 1."""

@@ -70,10 +70,10 @@ class OneLineParser(argparse.ArgumentParser):
         """End the program with code 2 and the fault, with the choice that may have been meant, or
         with the example of the help where something is missing."""
         fault, _, offer = message.rpartition(" (choose from ")
-        _, wrong, chosen = fault.rpartition(": invalid choice: ")
+        _, wrong, choice = fault.rpartition(": invalid choice: ")
         if wrong:
             choices = [word.strip(" '") for word in offer.removesuffix(")").split(",")]
-            near = difflib.get_close_matches(chosen.strip("'").lower(), choices, n=1)
+            near = difflib.get_close_matches(choice.strip("'").lower(), choices, n=1)
             message = f"{fault}, did you mean {near[0]}?" if near else message
         message = message.replace("the following arguments are required", "missing")
         lines = (self.epilog or "").splitlines()
@@ -128,15 +128,15 @@ def add_include(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
 
 
-def included(chosen: argparse.Namespace) -> tuple[str, ...]:
+def included(options: argparse.Namespace) -> tuple[str, ...]:
     """The outputs that ``--include`` names; InputError for an unknown one."""
-    return tuple(name for text in chosen.include for name in names_in(text))
+    return tuple(name for text in options.include for name in names_in(text))
 
 
-def kind_in(chosen: argparse.Namespace) -> Kind:
+def kind_in(options: argparse.Namespace) -> Kind:
     """The contact and direction that were chosen; InputError for a ball whose normal force
     oscillates."""
-    return kind_of(chosen.contact, chosen.direction)
+    return kind_of(options.contact, options.direction)
 
 
 def add_table(parser: OneLineParser) -> None:
@@ -159,16 +159,16 @@ def add_format(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out N lines")
 
 
-def dialect_in(chosen: argparse.Namespace) -> Dialect:
+def dialect_in(options: argparse.Namespace) -> Dialect:
     """How a table as text is written, as far as the options say."""
-    if chosen.skip < 0:
-        raise UsageError(f"--skip {chosen.skip}: a number of lines, 0 or more")
+    if options.skip < 0:
+        raise UsageError(f"--skip {options.skip}: a number of lines, 0 or more")
     return Dialect(
-        None if chosen.sep is None else SEPARATORS[chosen.sep],
-        chosen.decimal,
-        None if chosen.thousands is None else THOUSANDS[chosen.thousands],
-        chosen.encoding,
-        chosen.skip,
+        None if options.sep is None else SEPARATORS[options.sep],
+        options.decimal,
+        None if options.thousands is None else THOUSANDS[options.thousands],
+        options.encoding,
+        options.skip,
     )
 
 
@@ -245,9 +245,9 @@ def read_case(
             strange.append(repr(name))
             continue
         if name not in kind.columns:
-            meant = suggestion(name)
-            case[meant or name] = math.nan  # not reported as missing, too
-            faults.append(_unknown(name, text, meant, kind))
+            similar = suggestion(name)
+            case[similar or name] = math.nan  # not reported as missing, too
+            faults.append(_unknown(name, text, similar, kind))
             continue
         if name in case:
             faults.append(f"{name} is given twice")
@@ -288,7 +288,7 @@ def _read(
     return float(value.si), value.std
 
 
-def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
+def _unknown(name: str, text: str, similar: str | None, kind: Kind) -> str:
     """Why a name is refused, and what to write."""
     if name in ("contact", "direction"):
         return f"{name} is an option: --{name} {text}"
@@ -296,7 +296,7 @@ def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
         return f"{name} is the amplitude of --direction normal; otherwise it is y0"
     if name == "y0":
         return f"y0 does not belong to --direction normal, whose amplitude is {AMPLITUDE}"
-    advice = f"did you mean {meant}?" if meant else f"there are {', '.join(kind.columns)}"
+    advice = f"did you mean {similar}?" if similar else f"there are {', '.join(kind.columns)}"
     return f"unknown input {name!r}: {advice}"
 
 
@@ -364,12 +364,12 @@ def in_words(text: str, case: Mapping[str, Any]) -> str:
 
 
 def format_for(
-    chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING
+    options: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING
 ) -> str:
     """How numbers are printed: with ``--digits``, or as many as the stiffness of a case
     supports."""
-    if chosen.digits is not None:
-        return f".{chosen.digits}g"
+    if options.digits is not None:
+        return f".{options.digits}g"
     contact, direction = kind.names.values()
     return f".{digits(k_effect(surrogate, case, contact, direction))}g"
 

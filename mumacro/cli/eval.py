@@ -81,9 +81,11 @@ def main(words: Sequence[str]) -> int:
     )
     add_include(parser)
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
-    chosen = parser.parse_intermixed_args(words)
-    surrogate = open_table(chosen.table)
-    options = {name: getattr(chosen, name) for name in ("rigid", "contact", "direction", "force")}
+    arguments = parser.parse_intermixed_args(words)
+    surrogate = open_table(arguments.table)
+    options = {
+        name: getattr(arguments, name) for name in ("rigid", "contact", "direction", "force")
+    }
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     bars = (
         BarColumn(),
@@ -99,37 +101,39 @@ def main(words: Sequence[str]) -> int:
 
     try:
         with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
-            cases = [_spooled(Path(folder)) if name == "-" else name for name in chosen.cases]
-            out = chosen.out
+            cases = [_spooled(Path(folder)) if name == "-" else name for name in arguments.cases]
+            out = arguments.out
             if out == "-":
                 ending = "ndjson" if find_files(cases)[1] == "ndjson" else "csv"
                 out = f"{folder}/standard-output.{ending}"
             with bar:
-                done = evaluate_files(
+                outcome = evaluate_files(
                     cases,
                     out,
                     surrogate,
-                    dialect=dialect_in(chosen),
-                    include=included(chosen),
+                    dialect=dialect_in(arguments),
+                    include=included(arguments),
                     progress=progress,
                     say=lambda text: console.print(f"mumacro eval: {text}"),
                     **options,
                 )
-            counts = f"{done.answered:,} of {done.rows:,} rows evaluated with {surrogate.id}"
-            if chosen.out == "-":
-                with done.out.open("rb") as stream:
+            counts = f"{outcome.answered:,} of {outcome.rows:,} rows evaluated with {surrogate.id}"
+            if arguments.out == "-":
+                with outcome.out.open("rb") as stream:
                     shutil.copyfileobj(stream, sys.stdout.buffer)
                 sys.stderr.write(
-                    (done.rejects.read_text("utf-8", "replace") if done.rejects else "")
+                    (outcome.rejects.read_text("utf-8", "replace") if outcome.rejects else "")
                     + f"{counts}\n"
                 )
             else:
-                rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
-                print(f"{counts}: {done.out}{rejects}")
-            for remark in done.remarks:
+                rejects = (
+                    f"; {outcome.rejected:,} rejected: {outcome.rejects}" if outcome.rejects else ""
+                )
+                print(f"{counts}: {outcome.out}{rejects}")
+            for remark in outcome.remarks:
                 rows = f"{remark['cases']:,} rows, " if remark["cases"] > 1 else ""
                 console.print(f"doubtful: {rows}{remark['text']}")
     except KeyboardInterrupt:
         print("mumacro eval: interrupted; nothing was written", file=sys.stderr)
         return 130
-    return 3 if done.rejected else 0
+    return 3 if outcome.rejected else 0

@@ -48,28 +48,28 @@ def run(words: Sequence[str]) -> str:
     )
     parser.add_argument("--plot", dest="out", type=Path, metavar="FILE", help="the same as --out")
     common.add_format(parser)
-    chosen = parser.parse_intermixed_args(words)
+    options = parser.parse_intermixed_args(words)
     unknown, more = (
-        [x for x in chosen.unknown or () if ("=" in x) == has_value] for has_value in (False, True)
+        [x for x in options.unknown or () if ("=" in x) == has_value] for has_value in (False, True)
     )
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
-    kind = common.kind_in(chosen)
-    source = sys.stdin.buffer.read() if chosen.points == "-" else Path(chosen.points)
+    kind = common.kind_in(options)
+    source = sys.stdin.buffer.read() if options.points == "-" else Path(options.points)
     try:
-        table = read_points(source, common.dialect_in(chosen))
+        table = read_points(source, common.dialect_in(options))
     except TextError as error:
-        raise ImpossibleError(f"{chosen.points}: {error}") from None
+        raise ImpossibleError(f"{options.points}: {error}") from None
     points: dict[str, Any] = {**table.columns}
     unknown = unknown or unknowns_beside(points)
     there = [*unknown, *(name for name in points if name in kind.columns)]
     case = common.read_case(
-        [*chosen.words, *more],
+        [*options.words, *more],
         kind,
         there,
         one_k="one k is needed; or leave it out, and it is fitted",
     )
-    surrogate = open_table(chosen.table)
+    surrogate = open_table(options.table)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # they are in the result
@@ -77,12 +77,12 @@ def run(words: Sequence[str]) -> str:
     except InputError as error:
         at_line = f"line {table.lines[error.index]}: " if error.index is not None else ""
         fault = InputError(error.field, error.value, error.bound) if at_line else error
-        raise ImpossibleError(f"{chosen.points}: {at_line}{fault}") from None
+        raise ImpossibleError(f"{options.points}: {at_line}{fault}") from None
     except ModuleNotFoundError as error:  # says what to install
         raise ImpossibleError(str(error)) from None
     if table.read_as:
         print(f"mumacro fit: read as: {table.read_as}", file=sys.stderr)
-    if chosen.out is not None:
+    if options.out is not None:
         heads = [
             name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]"
             for name in result.points
@@ -90,13 +90,13 @@ def run(words: Sequence[str]) -> str:
         columns = dict(zip(heads, result.points.values(), strict=True))
         columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
         return (
-            common.write_result(chosen.out, columns, result.plot, plotting.OF_FIT)
+            common.write_result(options.out, columns, result.plot, plotting.OF_FIT)
             + "\n"
-            + _text(result, chosen.digits)
+            + _text(result, options.digits)
         )
-    if chosen.json:
+    if options.json:
         return as_json({**result.to_dict(), "table": common.about(surrogate)})
-    return _text(result, chosen.digits)
+    return _text(result, options.digits)
 
 
 def _text(result: Fit, shown: int | None) -> str:

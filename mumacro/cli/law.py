@@ -32,32 +32,32 @@ def run(words: Sequence[str]) -> str:
         "--approximations", action="store_true", help="also the approximations of the article"
     )
     common.add_exponent(parser)
-    chosen = parser.parse_intermixed_args(words)
-    (along, *ends), kind = chosen.along, common.kind_in(chosen)
+    options = parser.parse_intermixed_args(words)
+    (along, *ends), kind = options.along, common.kind_in(options)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
     unit = unit_of(along)
-    case = read_case(chosen.words, kind, **common.without_or_load(along))
+    case = read_case(options.words, kind, **common.without_or_load(along))
     start, stop = common.read_values(((along, end) for end in ends), read_one)
-    drawn = chosen.out is not None and chosen.out.suffix != ".csv"
-    surrogate = open_table(chosen.table)
+    is_picture = options.out is not None and options.out.suffix != ".csv"
+    surrogate = open_table(options.table)
     law = friction_law(
         surrogate,
         along,
         start=start,
         stop=stop,
-        points=(CURVE if drawn else 25) if chosen.points is None else chosen.points,
-        scale=chosen.scale,
-        refine=drawn,
-        stiffness_exponent=chosen.stiffness_exponent,
+        points=(CURVE if is_picture else 25) if options.points is None else options.points,
+        scale=options.scale,
+        refine=is_picture,
+        stiffness_exponent=options.stiffness_exponent,
         **kind.names,
         **case,
     )
-    model = load_rows(along, law.case, chosen.contact, law.stiffening)
-    columns = law.columns | (approximations(surrogate, law) if chosen.approximations else {})
+    model = load_rows(along, law.case, options.contact, law.stiffening)
+    columns = law.columns | (approximations(surrogate, law) if options.approximations else {})
     by_unit = {along: unit, "k": unit_of("k")}
     border = [{along: c.value, "mu_macro": c.mu_macro} for c in law.border]
-    if chosen.json:
+    if options.json:
         return as_json(
             {
                 "along": along,
@@ -73,14 +73,14 @@ def run(words: Sequence[str]) -> str:
         for name, column in columns.items()
     }
     middle = float(law.values[law.values.size // 2])
-    form = common.format_for(chosen, surrogate, {**case, along: middle}, kind)
+    form = common.format_for(options, surrogate, {**case, along: middle}, kind)
     of_k = ", for the geometric middle of k" if law.band else ""
     marks = [f"{c.name} at {along} = {c.value:{form}} {unit}{of_k}" for c in law.border]
     marks += common.model_lines(model)
-    if chosen.out is not None:
+    if options.out is not None:
         return "\n".join(
             [
-                common.write_result(chosen.out, headed, law.plot),
+                common.write_result(options.out, headed, law.plot),
                 *marks,
             ]
         )

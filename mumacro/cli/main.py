@@ -99,9 +99,9 @@ def _no_command(words: Sequence[str]) -> str:
     """A case, or what helps a person who wrote something else."""
     if not words:
         return FIRST
-    meant = difflib.get_close_matches(words[0], COMMANDS, n=1, cutoff=0.7)
-    if meant and words[0] not in NAMES:
-        raise UsageError(f"unknown command {words[0]!r}: did you mean {meant[0]}?")
+    similar = difflib.get_close_matches(words[0], COMMANDS, n=1, cutoff=0.7)
+    if similar and words[0] not in NAMES:
+        raise UsageError(f"unknown command {words[0]!r}: did you mean {similar[0]}?")
     return one_case.run(words, OVERVIEW)
 
 

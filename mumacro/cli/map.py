@@ -17,13 +17,13 @@ def run(words: Sequence[str]) -> str:
     )
     epilog = f"{common.ABOUT_INPUTS}\nexample:\n  mumacro map -o map.png"
     parser = common.question("map", description, epilog, "a case to mark, if any", "*")
-    chosen = parser.parse_intermixed_args(words)
-    if chosen.out is None:
+    options = parser.parse_intermixed_args(words)
+    if options.out is None:
         raise UsageError("a map is written to a file: give -o map.png")
-    kind, surrogate = common.kind_in(chosen), open_table(chosen.table)
+    kind, surrogate = common.kind_in(options), open_table(options.table)
     answer = None
-    if chosen.words:
-        answer = surrogate.evaluate(read_case(chosen.words, kind), **kind.names)
+    if options.words:
+        answer = surrogate.evaluate(read_case(options.words, kind), **kind.names)
     grid = np.meshgrid(plotting.speeds(141), plotting.amplitudes(101, kind.normal))
     v, y = (x.ravel() for x in grid)
     ranges = ((v[0], v[-1]), (y[0], y[-1]))
@@ -33,7 +33,7 @@ def run(words: Sequence[str]) -> str:
         "mu_ratio": surrogate.quantity("mu_ratio", v, y, **kind.names)[0],
     }
     text = common.write_result(
-        chosen.out,
+        options.out,
         columns,
         (lambda ax: surrogate.plot(ax, **kind.names)) if answer is None else answer.plot,
     )

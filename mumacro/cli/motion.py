@@ -61,32 +61,34 @@ def run(words: Sequence[str]) -> str:
     text = "write the cycle there: a picture, .png, .svg or .pdf, or .csv"
     parser.add_argument("-o", "--out", type=Path, help=text)
     common.add_form(parser)
-    chosen = parser.parse_intermixed_args(words)
-    case = read_case(chosen.words, one_k="one motion has one k; ask for both ends", optional=["y0"])
+    options = parser.parse_intermixed_args(words)
+    case = read_case(
+        options.words, one_k="one motion has one k; ask for both ends", optional=["y0"]
+    )
     if "y0" in case:
         raise UsageError("y0 is an option here: --y for across, --x for along the drag")
-    texts = [(name, text) for name in PARTS if (text := getattr(chosen, name)) is not None]
+    texts = [(name, text) for name in PARTS if (text := getattr(options, name)) is not None]
     parts = common.read_values(texts, read_oscillation)
     motion = steady_cycle(
         **case,
         **dict(zip((name for name, _ in texts), parts, strict=True)),
-        contact=chosen.contact,
-        tolerance=chosen.tolerance,
+        contact=options.contact,
+        tolerance=options.tolerance,
     )
     names = [*(name for name, _, _ in _ROWS), "error_estimate"]
-    if chosen.json:
+    if options.json:
         lines = as_json({name: getattr(motion, name) for name in names})
     else:
-        form = f"#.{chosen.digits or 6}g"
+        form = f"#.{options.digits or 6}g"
         rows = [
             (name, f"{getattr(motion, name):{form}}", f"[{unit}]", text)
             for name, unit, text in _ROWS
         ]
         lines = f"{in_columns(rows)}\nnumerical error of both about {motion.error_estimate:.1e}"
-    if chosen.out is None:
+    if options.out is None:
         return lines
     columns = {}
-    if chosen.out.suffix == ".csv":
+    if options.out.suffix == ".csv":
         columns = {f"{name} [{_SI[name]}]": x for name, x in motion.cycle()._asdict().items()}
-    written = common.write_result(chosen.out, columns, motion.plot, plotting.OF_CYCLE)
-    return lines if chosen.json else f"{lines}\n{written}"
+    report = common.write_result(options.out, columns, motion.plot, plotting.OF_CYCLE)
+    return lines if options.json else f"{lines}\n{report}"

@@ -25,23 +25,23 @@ def run(words: Sequence[str], description: str) -> str:
         "--model", action="store_true", help="in JSON, too: what the model leaves out in this case"
     )
     parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
-    chosen = parser.parse_intermixed_args(words)
-    kind = common.kind_in(chosen)
-    case = read_case(chosen.words, kind, deviations=True)
-    surrogate, std = open_table(chosen.table), case.pop("std", None)
-    include = (*common.included(chosen), *(["gradient"] if chosen.gradient else []))
+    arguments = parser.parse_intermixed_args(words)
+    kind = common.kind_in(arguments)
+    case = read_case(arguments.words, kind, deviations=True)
+    surrogate, std = open_table(arguments.table), case.pop("std", None)
+    include = (*common.included(arguments), *(["gradient"] if arguments.gradient else []))
     options: dict[str, Any] = {**kind.names, "include": include, "std": std}
     answer: Any = surrogate.evaluate(case, **options)
-    if chosen.json:
+    if arguments.json:
         middle = common.middle_of(case)
         members = answer.to_dict()
         ends = {name: members.pop(name) for name in BAND if "k_range" in case}
         result = {name: members.pop(name) for name in DEFAULT}
         result |= {"v_tilde": answer.v_tilde, "y_tilde": answer.y_tilde, **members}
         result |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
-        if chosen.model:
+        if arguments.model:
             result["model"] = model_rows(surrogate, middle, **kind.names)
         result |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**result, "table": common.about(surrogate)})
-    rows, notes, error = words_of_one_case(answer, chosen.digits)
+    rows, notes, error = words_of_one_case(answer, arguments.digits)
     return "\n".join([in_columns(rows), *([in_columns(notes)] if notes else []), error])

@@ -59,33 +59,33 @@ def run(words: Sequence[str]) -> str:
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     common.add_exponent(parser)
     motion.add_parts(parser)
-    chosen = parser.parse_intermixed_args(words)
-    if solve_motion.is_motion(chosen):
-        return solve_motion.run(chosen, chosen.between)
-    unknown, unit = chosen.unknown, unit_of(chosen.unknown)
-    kind = common.kind_in(chosen)
+    options = parser.parse_intermixed_args(words)
+    if solve_motion.is_motion(options):
+        return solve_motion.run(options, options.between)
+    unknown, unit = options.unknown, unit_of(options.unknown)
+    kind = common.kind_in(options)
     if unknown not in kind.columns:
         raise UsageError(
-            f"{unknown} does not belong to --direction {chosen.direction}: "
+            f"{unknown} does not belong to --direction {options.direction}: "
             f"{', '.join(kind.columns)} do"
         )
-    case = read_case(chosen.words, kind, **common.without_or_load(unknown))
-    if chosen.ratio and unknown == "mu0":
+    case = read_case(options.words, kind, **common.without_or_load(unknown))
+    if options.ratio and unknown == "mu0":
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
-    target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
-    between = [(unknown, text) for text in chosen.between or ()]
+    target = options.target * case["mu0"] if options.ratio else options.target
+    between = [(unknown, text) for text in options.between or ()]
     ends = common.read_values(between, read_one)
-    surrogate = open_table(chosen.table)
+    surrogate = open_table(options.table)
     solution = solve_for(
         surrogate,
         unknown,
         target,
         within=(ends[0], ends[1]) if ends else None,
-        stiffness_exponent=chosen.stiffness_exponent,
+        stiffness_exponent=options.stiffness_exponent,
         **kind.names,
         **case,
     )
-    model = load_rows(unknown, common.middle_of(case), chosen.contact, solution.stiffening)
+    model = load_rows(unknown, common.middle_of(case), options.contact, solution.stiffening)
     reach, two = solution.reach, solution.ends
     if not solution.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low:.6g} to {reach.high:.6g} {unit}"
@@ -115,14 +115,14 @@ def run(words: Sequence[str]) -> str:
         for r in one.roots[0]
     ]
     names = (*(("k",) if two else ()), unknown, "low", "high", "mu_macro", "regime")
-    if chosen.json:
-        listed = [dict(zip(names, root, strict=True)) for root in roots]
+    if options.json:
+        rows = [dict(zip(names, root, strict=True)) for root in roots]
         return as_json(
             {
                 "unknown": unknown,
                 "unit": unit,
                 "target": target,
-                "roots": listed,
+                "roots": rows,
                 **({"model": model} if model else {}),
                 "table": common.about(surrogate),
             }
@@ -135,7 +135,7 @@ def run(words: Sequence[str]) -> str:
         "mu_macro [-]",
         "regime",
     ]
-    if chosen.out is not None:
+    if options.out is not None:
         at = [root.value for one in places.values() for root in one.roots[0]]
         # a decade around the roots; what is at 0 is shown up to 1
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
@@ -147,18 +147,18 @@ def run(words: Sequence[str]) -> str:
             points=CURVE,
             scale="log" if low > 0.0 else "linear",
             refine=True,
-            stiffness_exponent=chosen.stiffness_exponent,
+            stiffness_exponent=options.stiffness_exponent,
             **kind.names,
             **case,
         )
         columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
         return common.write_result(
-            chosen.out,
+            options.out,
             columns,
             lambda axes: curve.plot(axes, roots=at, target=target),
         )
     at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
-    form = common.format_for(chosen, surrogate, {**case, unknown: at_one}, kind)
+    form = common.format_for(options, surrogate, {**case, unknown: at_one}, kind)
     text = in_columns(
         [heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)]
     )

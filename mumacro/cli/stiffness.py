@@ -42,15 +42,15 @@ def run(words: Sequence[str]) -> str:
                 f"--{argument}", required=needed, choices=choices, help=f"{about.meaning}{unit}"
             )
         common.add_form(part)
-    chosen = parser.parse_args(words)
-    names = (*GEOMETRIES[chosen.geometry].arguments, *BODIES)
-    texts = {name: text for name in names if (text := getattr(chosen, name)) is not None}
+    options = parser.parse_args(words)
+    names = (*GEOMETRIES[options.geometry].arguments, *BODIES)
+    texts = {name: text for name in names if (text := getattr(options, name)) is not None}
     arguments = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
-    contact = contact_of(chosen.geometry, **arguments)
+    contact = contact_of(options.geometry, **arguments)
     stiffnesses = asdict(contact)
-    if chosen.json:
-        return as_json({**stiffnesses, "geometry": chosen.geometry, **arguments})
-    form = f".{chosen.digits or 4}g"  # what materials and geometry give at best
+    if options.json:
+        return as_json({**stiffnesses, "geometry": options.geometry, **arguments})
+    form = f".{options.digits or 4}g"  # what materials and geometry give at best
     rows = [(name, f"{stiffnesses[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
     rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]

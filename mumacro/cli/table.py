@@ -17,8 +17,8 @@ def run(words: Sequence[str]) -> str:
         epilog="example:\n  mumacro table --table 1e-7",
     )
     common.add_table(parser)
-    chosen = parser.parse_args(words)
-    surrogate = open_table(chosen.table)
+    options = parser.parse_args(words)
+    surrogate = open_table(options.table)
     names = (
         "verified_max_abs_error",
         "verified_max_rel_error",
@@ -26,16 +26,16 @@ def run(words: Sequence[str]) -> str:
         "format_version",
         "product_version",
     )
-    stated = {name: surrogate.attributes.get(name) for name in names}
-    stated["checksum"] = stated.pop("content_sha256")
+    properties = {name: surrogate.attributes.get(name) for name in names}
+    properties["checksum"] = properties.pop("content_sha256")
     about = {
         **common.about(surrogate),
         "path": str(surrogate.path),
-        **stated,
+        **properties,
         "bytes": surrogate.path.stat().st_size,
     }
     bundled = [str(path) for path in bundled_tables()]
-    if chosen.json:
+    if options.json:
         errors = surrogate.error_distribution
         return as_json({**about, "error_distribution": errors, "bundled": bundled})
     rows = [

@@ -19,7 +19,7 @@ import pyarrow.dataset
 from mumacro.files.errors import FilesError
 from mumacro.files.text_source import Block, TextTable, excerpt
 from mumacro.inputs.decoding import TextError, file_pieces
-from mumacro.inputs.text_tables import Dialect, Wanted
+from mumacro.inputs.text_tables import ColumnNames, Dialect
 
 #: endings of files that are written, and their format
 WRITTEN = {
@@ -76,14 +76,14 @@ def find_files(
             continue
         pattern = f"{glob.escape(str(path))}/**/*" if path.is_dir() else str(path)
         matches = sorted(map(Path, glob.glob(pattern, recursive=True)))
-        found, strays = _tables_among([match for match in matches if match.is_file()])
-        if not found:
+        tables, strays = _tables_among([match for match in matches if match.is_file()])
+        if not tables:
             raise FilesError(f"{entry}: no such file, or none that ends in {ENDINGS}")
         if strays:
             names = ", ".join(stray.name for stray in strays[:5])
             say(f"{entry}: skipped {names}{f' and {len(strays) - 5} more' * (len(strays) > 5)}")
-        files += found
-        formats |= dict.fromkeys(format_of(one, FORMATS)[0] for one in found)
+        files += tables
+        formats |= dict.fromkeys(format_of(one, FORMATS)[0] for one in tables)
     if len(formats) > 1:
         raise FilesError(f"the files are of several formats: {', '.join(sorted(formats))}")
     return files, next(iter(formats))
@@ -144,9 +144,9 @@ class TextSource:
     """
 
     def __init__(
-        self, files: Sequence[Path], dialect: Dialect, wanted: Wanted, verbatim: bool
+        self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, verbatim: bool
     ) -> None:
-        self.tables = [TextTable(path, wanted, dialect) for path in files]
+        self.tables = [TextTable(path, column_names, dialect) for path in files]
         first = self.tables[0]
         for table in self.tables:
             if table.layout.heads != first.layout.heads:
@@ -244,15 +244,15 @@ def _lines(
     path: Path, seen: Callable[[int], None] = lambda _at: None
 ) -> Iterator[tuple[int, bytes]]:
     """The lines of a file that are not empty, and their numbers."""
-    begun, number = b"", 0
+    rest, number = b"", 0
     try:
         for piece in chain(file_pieces(path, seen), [b"\n"]):
-            *lines, begun = (begun + piece).split(b"\n")
+            *lines, rest = (rest + piece).split(b"\n")
             for line in lines:
                 number += 1
                 if text := line.strip():
                     yield number, text
-            if len(begun) > LONGEST:
+            if len(rest) > LONGEST:
                 raise TextError(f"line {number + 1} has more than {LONGEST >> 20} MiB")
     except TextError as error:
         raise FilesError(f"{path}: {error}") from None

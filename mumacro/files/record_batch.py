@@ -24,7 +24,7 @@ from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
-from mumacro.inputs.text_tables import Wanted
+from mumacro.inputs.text_tables import ColumnNames
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS
@@ -102,8 +102,8 @@ def answer(
     columns = find_columns(batch.schema.names, rigid, include, kind_of(contact, direction))
     result = answer_columns(batch, surrogate or Surrogate.open(), columns)
     schema = pa.schema([*batch.schema, *added_fields(columns.added)], batch.schema.metadata)
-    answered = pa.RecordBatch.from_arrays([*batch.columns, *result.added], schema=schema)
-    return answered, pa.RecordBatch.from_pylist(
+    answers = pa.RecordBatch.from_arrays([*batch.columns, *result.added], schema=schema)
+    return answers, pa.RecordBatch.from_pylist(
         [dict(zip(REJECTS.names, row, strict=True)) for row in result.rejects], REJECTS
     )
 
@@ -151,8 +151,8 @@ def find_columns(
     for name, word in kind.names.items():
         if name in words and word != SPRING.names[name]:
             faults.append(f"--{name} {word} is given, but there is a column {name}; leave one out")
-    known = {*heads, *words}
-    other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in known)
+    all_names = {*heads, *words}
+    other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in all_names)
     counts = Counter(names)
     faults += [
         f"the column {name!r} is there twice" for name in (*other_names, *words) if counts[name] > 1
@@ -176,8 +176,8 @@ def find_columns(
         names,
     )
     deviations = any(column in heads for column in DEVIATIONS)
-    wanted = {*names_in(include)} | ({"std"} if deviations else set())
-    outputs = [output for name, output in OUTPUTS.items() if name in wanted]
+    output_names = {*names_in(include)} | ({"std"} if deviations else set())
+    outputs = [output for name, output in OUTPUTS.items() if name in output_names]
     band = BAND if ends == ENDS else ()
     added = [DEFAULT[0], *band, *DEFAULT[1:], *paths_of(outputs, fields)]
     faults += [
@@ -189,14 +189,14 @@ def find_columns(
     return Columns(headings, words, kind, tuple(include), added)
 
 
-def wanted_columns(rigid: bool = False) -> Wanted:
+def names_of_columns(rigid: bool = False) -> ColumnNames:
     """The columns that a table of cases may have, and those that it needs."""
     names = [*SI, *LIKE]
     like = {name: LIKE.get(name, name) for name in names}
     like |= {f"std_{name}": unit for name, unit in like.items()}
     stiffness = [] if rigid else [("k", ENDS[0])]
     groups = [("mu0",), ("Fz",), *stiffness, ("y0", AMPLITUDE), ("omega", "f"), ("v0",)]
-    return Wanted(like, groups)
+    return ColumnNames(like, groups)
 
 
 def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
@@ -215,11 +215,11 @@ def answer_columns(
     batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs | None = None
 ) -> Answered:
     """The answers to a batch; ``signs`` are those of numbers as text."""
-    own: dict[str, Array] = {}
+    by_heading: dict[str, Array] = {}
     values: dict[str, Any] = {} if {"k", *ENDS} & columns.headings.keys() else {"k": math.inf}
     faults: dict[str, dict[int, str]] = {}
     for name, (heading, scale) in columns.headings.items():
-        own[heading], values[name], faults[name] = numbers(
+        by_heading[heading], values[name], faults[name] = numbers(
             batch.column(heading), name, signs or Signs(".", None), scale
         )
     values |= columns.kind.names
@@ -246,7 +246,7 @@ def answer_columns(
         cell = batch.column(heading)[i].as_py()
         reason = faults.get(name, {}).get(i, reason)
         rejects.append((i, name, None if cell is None else str(cell), reason))
-    return Answered([arrays[path] for path in columns.added], rejects, own, result.remarks)
+    return Answered([arrays[path] for path in columns.added], rejects, by_heading, result.remarks)
 
 
 def _words(column: pa.Array) -> Any:

@@ -18,7 +18,7 @@ from mumacro.files.record_batch import (
     added_fields,
     answer_columns,
     find_columns,
-    wanted_columns,
+    names_of_columns,
 )
 from mumacro.files.text_source import Block
 from mumacro.files.writing import Output, csv_lines, written_as
@@ -147,7 +147,7 @@ class _Run:
             self.source = reading.NdjsonSource(self.files, self.verbatim)
         else:
             self.source = reading.TextSource(
-                self.files, dialect, wanted_columns(rigid), self.verbatim
+                self.files, dialect, names_of_columns(rigid), self.verbatim
             )
             where = self.source.where
         self.surrogate, self.remarks = surrogate, list[Remark]()
@@ -226,15 +226,15 @@ class _Run:
         self._refuse_changed()
 
     def _refuse_changed(self) -> None:
-        for path, begun in zip(self.files, self.begun, strict=True):
-            if _state_of(path) != begun:
+        for path, beginning in zip(self.files, self.begun, strict=True):
+            if _state_of(path) != beginning:
                 raise FilesError(
                     f"{path}: changed while it was read; give the command again"
                 ) from None
 
     def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
-        added, rejects, own, remarks = answer_columns(
+        added, rejects, by_heading, remarks = answer_columns(
             block.batch, self.surrogate, self.columns, block.signs
         )
         for remark in remarks:
@@ -242,7 +242,7 @@ class _Run:
         faults = {row: reason for row, *reason in rejects}
         faults |= {i: [None, text, reason] for i, text, reason in block.unreadable}
         columns = [
-            column if column.type == field.type else pa.array(own[field.name])
+            column if column.type == field.type else pa.array(by_heading[field.name])
             for field, column in zip(
                 self.schema, [] if self.verbatim else block.batch.columns, strict=False
             )

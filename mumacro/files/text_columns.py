@@ -28,8 +28,8 @@ def numbers_of(
     if signs.decimal == "," or not pc.all(plain).as_py():
         text = _as_written_by_programs(text, name, signs)
         plain = pc.fill_null(pc.match_substring_regex(text, _NUMBER), False)
-    own = pc.cast(pc.if_else(plain, text, None), pa.float64())
-    values: Array = pc.fill_null(own, math.nan).to_numpy(zero_copy_only=False).copy()
+    numbers = pc.cast(pc.if_else(plain, text, None), pa.float64())
+    values: Array = pc.fill_null(numbers, math.nan).to_numpy(zero_copy_only=False).copy()
     with np.errstate(over="ignore"):
         si: Array = values * scale.times / scale.over
     faults: dict[int, str] = {}

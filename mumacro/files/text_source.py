@@ -20,9 +20,9 @@ from mumacro.inputs.signs import Cell, Signs
 from mumacro.inputs.text_tables import (
     BLANKS,
     COMMENT,
+    ColumnNames,
     Dialect,
     Record,
-    Wanted,
     begin,
     is_row,
     may_be_head,
@@ -63,12 +63,12 @@ class TextTable:
     ``as_lines`` are its rows as texts, else they are cells; FilesError says why it is no table.
     """
 
-    def __init__(self, path: Path, wanted: Wanted, dialect: Dialect) -> None:
-        self.path, self.wanted, self.dialect = path, wanted, dialect
+    def __init__(self, path: Path, column_names: ColumnNames, dialect: Dialect) -> None:
+        self.path, self.column_names, self.dialect = path, column_names, dialect
         try:
             pieces, self.dialect = source_of(path, dialect)
             text = Text(pieces, self.dialect.encoding)
-            self.layout, lines = begin(text, wanted, self.dialect)
+            self.layout, lines = begin(text, column_names, self.dialect)
             self.signs = self.dialect.signs(self.layout)
             self._find_signs(lines)
         except TextError as error:
@@ -91,8 +91,8 @@ class TextTable:
 
     def _find_signs(self, lines: Iterator[tuple[int, str]]) -> None:
         """Find the decimal sign in the first rows that tell it."""
-        places, _ = find_heads(self.layout.heads, self.wanted.like)
-        rows = islice(records(lines, self.layout, self.wanted), _LOOKED_AT)
+        places, _ = find_heads(self.layout.heads, self.column_names.like)
+        rows = islice(records(lines, self.layout, self.column_names), _LOOKED_AT)
         while some := [*islice(rows, _AT_ONCE)]:
             self.signs.see(
                 Cell(row.line, name, row.cells[i])
@@ -107,7 +107,7 @@ class TextTable:
         """Find the decimal sign in a block, where all numbers before it have none."""
         names = [split_unit(head)[0] for head in block.batch.schema.names]
         for name, column in zip(names, block.batch.columns, strict=True):
-            if name in self.wanted.like:
+            if name in self.column_names.like:
                 signed = pc.match_substring_regex(column, "[.,]")
                 if pc.any(signed).as_py():
                     self.signs.see(
@@ -146,14 +146,14 @@ class TextTable:
         numbers: Sequence[int] = range(piece.first, piece.first + len(lines))
         doubtful = {"", " ", "\t", sep, *(mark[0] for mark in COMMENT)}
         if any(line[:1] in doubtful for line in lines):
-            kept = [i for i, x in enumerate(lines) if x[:1] not in doubtful or is_row(x, layout)]
-            lines, numbers = [lines[i] for i in kept], [numbers[i] for i in kept]
+            indices = [i for i, x in enumerate(lines) if x[:1] not in doubtful or is_row(x, layout)]
+            lines, numbers = [lines[i] for i in indices], [numbers[i] for i in indices]
         if not lines:
             return Block(pa.RecordBatch.from_pylist([], self._schema(names)), 0.0, [])
         if layout.sep == BLANKS:
             lines = [sep.join(line.split()) for line in lines]
         text, width, count = "\n".join(lines), len(layout.heads), lines[0].count(sep) + 1
-        if may_be_head(text, layout, self.wanted):
+        if may_be_head(text, layout, self.column_names):
             return None
         if '"' in text:
             return None if layout.sep == BLANKS else self._of_cells(lines, numbers, names, texts)
@@ -196,7 +196,7 @@ class TextTable:
     def _by_row(self, piece: Piece, text: Text, names: Sequence[str], texts: str) -> Block:
         """A block whose rows are read one by one; the last may go on in the next piece."""
         lines, rows, width = _Lines(piece, text), list[Record](), len(self.layout.heads)
-        for row in records(lines, self.layout, self.wanted):
+        for row in records(lines, self.layout, self.column_names):
             rows.append(row)
             if lines.at_end:
                 break

@@ -76,7 +76,7 @@ class Output(NamedTuple):
             else [f"{text[:-1].decode().rstrip()}, " for text in texts]
         )
         return self.pack(
-            "".join(begun + line % row for begun, row in zip(first, rows, strict=True))
+            "".join(start + line % row for start, row in zip(first, rows, strict=True))
         )
 
     def _lines(self, rows: Iterable[Sequence[Any]], texts: Sequence[Any] | None) -> str:

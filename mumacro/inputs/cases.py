@@ -111,22 +111,22 @@ class Cases(NamedTuple):
             kind, texts = kind_of(**texts), {}
         fields = _fields(texts) if kind is None else kind.fields
         strange = {} if kind is None else _strange_amplitude(values, kind)
-        columns, given, std, ends = _numbers(values, fields)
+        columns, others, std, ends = _numbers(values, fields)
         std |= _deviations(values, fields, std)
-        given |= strange | texts
-        shape = _shape_of(columns, std, given)
-        for part in (columns, std, given):
+        others |= strange | texts
+        shape = _shape_of(columns, std, others)
+        for part in (columns, std, others):
             for name, x in part.items():
                 if isinstance(x, np.ndarray):
                     part[name] = flat(x, shape) if x.size != 1 else x.item()
         if ends is not None:
             ends = _flat_ends(ends, shape, strict)
-        codes = codes_of(given, (math.prod(shape),)) if texts else None
-        cases = cls(kind, fields, columns, shape, ends, std, codes, given)
+        codes = codes_of(others, (math.prod(shape),)) if texts else None
+        cases = cls(kind, fields, columns, shape, ends, std, codes, others)
         if std or strange or texts:
             return cases._where_they_agree(values, strict or not shape)
         if strict or not shape:
-            check(columns, given.get("f"), (cases.size,) if shape else ())
+            check(columns, others.get("f"), (cases.size,) if shape else ())
         return cases
 
     @property
@@ -191,22 +191,22 @@ class Cases(NamedTuple):
         def at(column: Any) -> Any:
             return column[index] if isinstance(column, np.ndarray) else column
 
-        columns, std, given = (
+        columns, std, others = (
             {name: at(x) for name, x in part.items()}
             for part in (self.columns, self.std, self.given)
         )
         ends = self.ends and tuple(float(end[index]) for end in self.ends)
         try:
-            kind = self.kind or kind_of(given["contact"], given["direction"])
+            kind = self.kind or kind_of(others["contact"], others["direction"])
             for name in _AMPLITUDES:
                 if np.broadcast_to(self._strange(name), max(self.size, 1))[index]:
-                    raise _no_such_amplitude(name, float({**columns, **given}[name]), kind)
+                    raise _no_such_amplitude(name, float({**columns, **others}[name]), kind)
             if ends and math.isnan(columns["k"]):
                 raise InputError("k_range", ends, BOUND)
             for name, deviation in std.items():
                 if name in kind.fields and not 0.0 <= deviation < math.inf:
                     raise InputError(f"std_{name}", float(deviation), EXACT)
-            check({name: float(columns[name]) for name in kind.fields}, given.get("f"))
+            check({name: float(columns[name]) for name in kind.fields}, others.get("f"))
         except InputError as error:
             return error
         raise AssertionError(f"the case {columns} has an answer")
@@ -320,12 +320,12 @@ def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
 
 def unknown(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
     """The error for a name that is none of ``allowed``."""
-    shown = [name for name in allowed if name not in DEVIATIONS]
-    if (own := unit_in_name(name, allowed)) is not None:
-        return InputError(name, value, own)
-    meant = suggestion(name)
-    advice = f"; did you mean {meant}?" if meant in shown else ""
-    return InputError(name, value, f"one of {', '.join(shown)}{advice}")
+    names = [name for name in allowed if name not in DEVIATIONS]
+    if (bound := unit_in_name(name, allowed)) is not None:
+        return InputError(name, value, bound)
+    similar = suggestion(name)
+    advice = f"; did you mean {similar}?" if similar in names else ""
+    return InputError(name, value, f"one of {', '.join(names)}{advice}")
 
 
 def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
@@ -339,10 +339,10 @@ def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
     if present >= {*ALL_FIELDS}:
         return
     for column in rest:
-        meant = suggestion(str(column))
-        if meant is not None and meant not in present:
+        similar = suggestion(str(column))
+        if similar is not None and similar not in present:
             raise InputError(
-                str(column), "a column", f"named {meant} if it is that: {meant} is missing"
+                str(column), "a column", f"named {similar} if it is that: {similar} is missing"
             )
 
 
@@ -373,15 +373,15 @@ def _columns_in(
             else getattr(cases, "column_names", None) or cases.columns
         )
         names = dict.fromkeys(names)  # in their order: the first one is named where two are wrong
-        found = {name: cases[name] for name in names if name in present}
+        columns = {name: cases[name] for name in names if name in present}
         for head in present:
             name, unit = split_unit(head) if isinstance(head, str) else (head, None)
             if unit is None or name not in names or head in names:
                 continue
-            if name in found:
+            if name in columns:
                 raise InputError(name, head, "given once")
-            found[name] = in_unit(name, cases[head], unit)
-        return found, present
+            columns[name] = in_unit(name, cases[head], unit)
+        return columns, present
     except (AttributeError, TypeError, KeyError) as error:
         type_name = f"{type(cases).__module__}.{type(cases).__qualname__}".removeprefix("builtins.")
         raise InputError(
@@ -472,10 +472,10 @@ def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
 def _pair(pair: Any) -> tuple[Any, Any]:
     """Both ends of an interval, of a text such as 0.8..1.2 N/um or of a pair."""
     if isinstance(pair, str):
-        typed = read("k_range", pair)
-        if typed.low is None:
+        reading = read("k_range", pair)
+        if reading.low is None:
             raise InputError("k_range", pair, BOUND)
-        return typed.low, typed.high
+        return reading.low, reading.high
     try:
         low, high = pair
     except (TypeError, ValueError) as error:
@@ -523,8 +523,8 @@ def without_interval(
     inputs = {name: value for name, value in case.items() if value is not None or name == "k"}
     ends = ends_in(inputs)
     if ends is None and isinstance(inputs.get("k"), str):
-        typed = read("k", inputs["k"])
-        ends = None if typed.low is None else (typed.low, typed.high)
+        reading = read("k", inputs["k"])
+        ends = None if reading.low is None else (reading.low, reading.high)
     if ends is None:
         return case, {}
     if along == "k":
@@ -564,7 +564,7 @@ def _numbers(
     that stand in the values themselves."""
     columns: _Numbers = {}
     std: _Numbers = {}
-    given: dict[str, Any] = {}
+    others: dict[str, Any] = {}
     ends = ends_in(values)
     for name in fields:
         source = name if name != "omega" else _frequency_in(values, fields)
@@ -586,10 +586,10 @@ def _numbers(
             if quantity.low is not None:
                 ends = quantity.low, quantity.high
         if source == "f":
-            given["f"] = value
+            others["f"] = value
             value = _angular(value)
         columns[name] = value
-    return columns, given, std, ends
+    return columns, others, std, ends
 
 
 def _deviations(

@@ -80,13 +80,13 @@ def encoding_of(name: str) -> str:
     """
     python_name = name.strip().lower().replace("windows-", "cp")
     try:
-        found = codecs.lookup(python_name).name
+        codec = codecs.lookup(python_name).name
     except (LookupError, ValueError):
-        found = ""
-    if not _ENCODING.fullmatch(found.replace("-", "_")):
+        codec = ""
+    if not _ENCODING.fullmatch(codec.replace("-", "_")):
         such_as = "utf-8, utf-16, windows-1252, iso-8859-15, mac-roman, gb18030, shift-jis"
         raise TextError(f"{name[:40]!r} is no encoding; give one such as {such_as}")
-    return found
+    return codec
 
 
 def file_pieces(path: Path, seen: Callable[[int], None] = lambda _at: None) -> Iterator[bytes]:

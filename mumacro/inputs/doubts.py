@@ -57,32 +57,32 @@ def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]
     if _usual(columns):
         rigid = columns["k"] == math.inf
         return [_of_rigid(columns["mu0"] * columns["Fz"] / columns["y0"])] if rigid else []
-    given = {name: np.asarray(column, np.float64) for name, column in columns.items()}
-    shape = np.broadcast_shapes(*(column.shape for column in given.values()))
+    arrays = {name: np.asarray(column, np.float64) for name, column in columns.items()}
+    shape = np.broadcast_shapes(*(column.shape for column in arrays.values()))
     six = dict.fromkeys(_USUAL, np.broadcast_to(math.nan, shape)) | {
-        name: np.broadcast_to(column, shape) for name, column in given.items()
+        name: np.broadcast_to(column, shape) for name, column in arrays.items()
     }
-    found: dict[str, Remark] = {}
-    told: Bools = np.zeros(shape, np.bool_)
+    by_row: dict[str, Remark] = {}
+    has_reason: Bools = np.zeros(shape, np.bool_)
     with np.errstate(all="ignore"):
         for field, where in (*_out_of_range(six), *_groups_out_of_range(six)):
-            new = np.asarray(where & ~told)  # one reason for each case
+            new = np.asarray(where & ~has_reason)  # one reason for each case
             if not new.any():
                 continue
-            told |= new
+            has_reason |= new
             first = int(np.flatnonzero(new)[0])
             at = {name: float(column.flat[first]) for name, column in six.items()}
             name, text = _sentence(field, at, frequency)
-            if name in found:
-                found[name]["cases"] += int(np.count_nonzero(new))
+            if name in by_row:
+                by_row[name]["cases"] += int(np.count_nonzero(new))
             else:
                 cases = int(np.count_nonzero(new))
-                found[name] = {"row": UNITS, "field": name, "cases": cases, "text": text}
+                by_row[name] = {"row": UNITS, "field": name, "cases": cases, "text": text}
         rigid = np.asarray(np.isposinf(six["k"]) & _oscillates(six))
         if not rigid.any():
-            return [*found.values()]
+            return [*by_row.values()]
         stiffest = float(np.fmax.reduce((six["mu0"] * six["Fz"] / six["y0"])[rigid]))
-        return [*found.values(), _of_rigid(stiffest, int(np.count_nonzero(rigid)))]
+        return [*by_row.values(), _of_rigid(stiffest, int(np.count_nonzero(rigid)))]
 
 
 def _usual(columns: Mapping[str, Any]) -> bool:
@@ -156,8 +156,8 @@ def _sentence(what: str, case: Mapping[str, float], frequency: bool) -> tuple[st
     least, most = field.usual
     unit = "" if field.unit == "-" else f" {field.unit}"
     usual = f"up to {most:g}{unit}" if least == 0.0 else f"{least:g} to {most:g}{unit}"
-    asked = f"is it in {field.words}" if unit else "is it a number, not per cent"
-    return name, f"{name} = {value:.6g}{unit}, usual is {usual}: {asked}?"
+    question = f"is it in {field.words}" if unit else "is it a number, not per cent"
+    return name, f"{name} = {value:.6g}{unit}, usual is {usual}: {question}?"
 
 
 _CONTACTS = "contacts have 0.01 to 100"

@@ -102,11 +102,11 @@ def absent_together(names: Sequence[str], heads: Sequence[str]) -> str:
 
 def _listed(heads: Sequence[str]) -> str:
     """The heads for a message of bounded length."""
-    shown = ", ".join(
+    text = ", ".join(
         repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED]
     )
     more = len(heads) - _LISTED
-    return f"{shown} and {more:,} more" if more > 0 else shown
+    return f"{text} and {more:,} more" if more > 0 else text
 
 
 def _heading(name: str) -> str:

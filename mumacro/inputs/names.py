@@ -88,10 +88,10 @@ def unit_in_name(name: str, allowed: Iterable[str]) -> str | None:
     >>> unit_in_name("y0 [um]", ["y0"])
     'named y0, with the unit in the value, as in "2 um"'
     """
-    own, unit = split_unit(name[:80])
-    if unit is None or own not in allowed:
+    field, unit = split_unit(name[:80])
+    if unit is None or field not in allowed:
         return None
-    return f'named {own}, with the unit in the value, as in "2 {unit}"'
+    return f'named {field}, with the unit in the value, as in "2 {unit}"'
 
 
 def unknown_name(name: str, allowed: Iterable[str]) -> str:
@@ -101,8 +101,8 @@ def unknown_name(name: str, allowed: Iterable[str]) -> str:
     'unknown field; did you mean omega? allowed: omega, f'
     """
     names = list(allowed)
-    if (own := unit_in_name(name, names)) is not None:
-        return f"must be {own}"
+    if (bound := unit_in_name(name, names)) is not None:
+        return f"must be {bound}"
     nearest = suggestion(name[:80], loosely=False)
     if nearest not in names:
         nearest = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)

@@ -80,12 +80,13 @@ def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
         if ":" in before or "@" in phase or not amplitude.strip() or (at and not phase.strip()):
             raise InputError(name, text, _FORM)
         if "," in amplitude and not at:
-            shown = amplitude.partition(",")[0].strip()
+            amplitude_text = amplitude.partition(",")[0].strip()
             try:
                 _amplitude(name, amplitude)
             except InputError as error:
                 behind = amplitude.partition(",")[2].strip()
-                bound = f"an amplitude, and its phase behind @: did you mean {shown}@{behind}deg?"
+                remedy = f"did you mean {amplitude_text}@{behind}deg?"
+                bound = f"an amplitude, and its phase behind @: {remedy}"
                 raise InputError(name, text, bound) from error
         parts.append((before.strip() if colon else 1, amplitude, phase if at else 0.0))
     return parts

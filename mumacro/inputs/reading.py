@@ -409,15 +409,15 @@ def _unit(value: Any) -> Any:
     library = _library(value)
     if library not in ("xarray", "pandas"):
         return _own_unit(value) if library != "numpy" else None
-    own = (
+    reading = (
         getattr(value.dtype, "units", None)
         if library == "pandas" and hasattr(value, "dtype")
         else _own_unit(getattr(value, "data", None))
         if library == "xarray"
         else None
     )
-    if own is not None:
-        return own
+    if reading is not None:
+        return reading
     attributes = getattr(value, "attrs", None) or {}
     text = attributes.get("units", attributes.get("unit"))
     return text if isinstance(text, str) and text.strip() else None
@@ -459,10 +459,10 @@ def _of_quantity(name: str, value: Any, unit: Any, quantity: str) -> tuple[Value
     text = _unit_text(unit)
     scale = scale_in(quantity, text) or scale_in(quantity, str(unit))
     if scale is None:
-        converted = _converted(value, text, QUANTITIES[quantity].unit, quantity)
-        if converted is None:
+        si = _converted(value, text, QUANTITIES[quantity].unit, quantity)
+        if si is None:
             raise InputError(name, _shown(value, text), _bound(quantity, value, text))
-        scale, value = Scale(), converted
+        scale, value = Scale(), si
     numbers = _numbers(value)
     whole, reasons = _read_plain(name, numbers, quantity)
     return whole.scaled(scale, unit_in(quantity, text)), reasons
@@ -570,11 +570,11 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
 
 def _of_no_number(quantity: str, reason: str) -> str:
     """The bound where a text has no number, or may have two."""
-    known, reason = QUANTITIES[quantity], reason.removeprefix("must be ")
+    about, reason = QUANTITIES[quantity], reason.removeprefix("must be ")
     if reason != "a number":
         return f"one number: it {reason}" if reason.startswith(("is ", "may ")) else reason
     word = ", or rigid" if quantity in _OR_RIGID else ""
-    return f"a number [{known.unit}], or with a unit such as {known.such_as}{word}"
+    return f"a number [{about.unit}], or with a unit such as {about.such_as}{word}"
 
 
 def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: str) -> Scale:
@@ -596,8 +596,8 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
                 raise InputError(name, raw, bound)
     if (last := _LAST_DIGITS.fullmatch(tidy(raw))) is not None:
         deviation = f"{int(last['std']) / 10 ** len(last['part'] or ''):.12g}"
-        typed = f"{last['number'].replace(',', '.')} ± {deviation}{last['unit']}"
-        raise InputError(name, raw, f"a number; write its deviation as {typed}")
+        value_text = f"{last['number'].replace(',', '.')} ± {deviation}{last['unit']}"
+        raise InputError(name, raw, f"a number; write its deviation as {value_text}")
     raise InputError(name, raw, bound_of_unit(quantity, number, unit))
 
 
@@ -621,8 +621,8 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
         value = _scale_or_refuse(name, quantity, raw, number, unit).si(number)
         return Value(value, abs(value) * deviation / 100.0, text=raw, unit=own_unit)
     scale = _scale_or_refuse(name, quantity, raw, number, unit or behind)
-    own = _scale_or_refuse(name, quantity, raw, deviation, behind or unit)
-    return Value(scale.si(number), own.si(deviation), text=raw, unit=own_unit)
+    scale_behind = _scale_or_refuse(name, quantity, raw, deviation, behind or unit)
+    return Value(scale.si(number), scale_behind.si(deviation), text=raw, unit=own_unit)
 
 
 def _interval(name: str, quantity: str, raw: str, text: str) -> Value:

@@ -76,7 +76,7 @@ class Dialect(NamedTuple):
         return Signs(self.decimal or layout.decimal, self.thousands, layout.sep, self.dashes)
 
 
-class Wanted(NamedTuple):
+class ColumnNames(NamedTuple):
     """The columns of a table that mean something."""
 
     like: Mapping[str, str]  #: by name, the input whose units it has
@@ -105,9 +105,9 @@ class Layout(NamedTuple):
     def described(self, signs: Signs) -> str:
         """How the table is read, in a few words; empty for plain CSV.
 
-        >>> wanted = Wanted({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
+        >>> column_names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
         >>> start = Piece(1, ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"])
-        >>> layout = find_layout(start, wanted, Dialect())
+        >>> layout = find_layout(start, column_names, Dialect())
         >>> (signs := Dialect().signs(layout)).see([Cell(4, "v0", "1,5")])
         >>> layout.described(signs)
         'semicolon, decimal comma, head in line 2, units in line 3'
@@ -154,44 +154,51 @@ class _Head(NamedTuple):
     cells: list[str]
 
 
-def find_layout(start: Piece, wanted: Wanted, dialect: Dialect, encoding: str = "") -> Layout:
+def find_layout(
+    start: Piece, column_names: ColumnNames, dialect: Dialect, encoding: str = ""
+) -> Layout:
     """How a table is written, from its first lines.
 
     Where no line names all that is needed, the head is the line that most probably is meant for it.
     TextError where there is no line at all, or the row of units has a unit that is none.
     """
     lines, number = start.lines, start.first
-    declared = _declared(lines)
-    sep = dialect.sep or declared.sep
+    preamble = _declared(lines)
+    sep = dialect.sep or preamble.sep
     seps = (sep,) if sep else tuple(SEPARATORS.values())
-    found = [*islice(_heads_in(lines, dialect.skip, seps, wanted), 20)]
-    head = next((one for one in found if _fits(one, lines, declared.labview)), None)
+    found = [*islice(_heads_in(lines, dialect.skip, seps, column_names), 20)]
+    head = next((one for one in found if _fits(one, lines, preamble.labview)), None)
     head = head or (found[0] if found else _likely_head(lines, dialect.skip, seps))
     cells = head.cells
     while cells and not cells[-1]:
         cells = cells[:-1]
-    heads = [heading(cell, wanted.like) for cell in cells]
+    heads = [heading(cell, column_names.like) for cell in cells]
     units = None
-    if declared.units is not None:
-        label_line = _split(lines[declared.units], head.sep)
-        heads = _with_units(heads, ["", *label_line[1:]], wanted, number + declared.units) or heads
-        units = number + declared.units
+    if preamble.units is not None:
+        label_line = _split(lines[preamble.units], head.sep)
+        heads = (
+            _with_units(heads, ["", *label_line[1:]], column_names, number + preamble.units)
+            or heads
+        )
+        units = number + preamble.units
     layout = Layout(
         head.sep,
-        declared.decimal,
+        preamble.decimal,
         number + head.at,
         units,
         heads,
         number + head.end,
-        bool(heads) and split_unit(heads[0])[0] not in wanted.like,
-        declared.labview,
+        bool(heads) and split_unit(heads[0])[0] not in column_names.like,
+        preamble.labview,
         encoding,
         [number + i for i in range(head.at) if lines[i].strip()],
     )
-    return _with_row_of_units(layout, head, start, wanted)
+    return _with_row_of_units(layout, head, start, column_names)
 
 
-def _with_row_of_units(layout: Layout, head: _Head, start: Piece, wanted: Wanted) -> Layout:
+def _with_row_of_units(
+    layout: Layout, head: _Head, start: Piece, column_names: ColumnNames
+) -> Layout:
     """The layout with the units in the first row behind the head, where that is a row of units."""
     lines = start.lines
     in_comments = lines[head.at].lstrip("\ufeff ").startswith(COMMENT)
@@ -203,7 +210,7 @@ def _with_row_of_units(layout: Layout, head: _Head, start: Piece, wanted: Wanted
         line = start.first + i
         if cells == head.cells:  # the head again
             return layout
-        heads = _with_units(layout.heads, cells, wanted, line, is_comment)
+        heads = _with_units(layout.heads, cells, column_names, line, is_comment)
         return layout._replace(heads=heads, first=line + 1, units=line) if heads else layout
     return layout
 
@@ -230,19 +237,19 @@ def _declared(lines: Sequence[str]) -> _Declared:
 
 
 def _heads_in(
-    lines: Sequence[str], skip: int, seps: Sequence[str], wanted: Wanted
+    lines: Sequence[str], skip: int, seps: Sequence[str], column_names: ColumnNames
 ) -> Iterator[_Head]:
     """The lines that name all that is needed."""
     for i in range(skip, min(len(lines), _LOOKED_AT)):
-        names_all = all(any(name in lines[i] for name in names) for names in wanted.needed)
+        names_all = all(any(name in lines[i] for name in names) for names in column_names.needed)
         # of an odd number of quotes a cell goes on in the next line
         if not names_all and lines[i].count('"') % 2 == 0:
             continue
         text, end = _whole(lines, i)
         for sep in seps:
             cells = _split(_uncommented(text), sep)
-            there = {split_unit(heading(cell, wanted.like))[0] for cell in cells}
-            if all(there.intersection(names) for names in wanted.needed):
+            there = {split_unit(heading(cell, column_names.like))[0] for cell in cells}
+            if all(there.intersection(names) for names in column_names.needed):
                 yield _Head(i, end, sep, cells)
 
 
@@ -325,7 +332,7 @@ def _is_number(cell: str) -> bool:
 def _with_units(
     heads: Sequence[str],
     cells: Sequence[str],
-    wanted: Wanted,
+    column_names: ColumnNames,
     line: int,
     may_be_prose: bool = False,
 ) -> list[str] | None:
@@ -336,43 +343,45 @@ def _with_units(
     """
     names = [split_unit(head) for head in heads]
     texts = [cell.strip(" []()") for cell in cells[: len(heads)]] + [""] * (len(heads) - len(cells))
-    known = [i for i, (name, _) in enumerate(names) if name in wanted.like and texts[i]]
-    scales = {i: scale_of(wanted.like[names[i][0]], texts[i]) for i in known}
-    units = [i for i in known if scales[i] is not None and texts[i] not in ("-", "1")]
-    numbers = [texts[i] for i in known if i not in units and _is_number(texts[i])]
+    places = [i for i, (name, _) in enumerate(names) if name in column_names.like and texts[i]]
+    scales = {i: scale_of(column_names.like[names[i][0]], texts[i]) for i in places}
+    units = [i for i in places if scales[i] is not None and texts[i] not in ("-", "1")]
+    numbers = [texts[i] for i in places if i not in units and _is_number(texts[i])]
     if any(number != "1" for number in numbers) or any(map(str.strip, cells[len(heads) :])):
         return None
-    is_empty = any(texts[i].lower() in GAPS or is_rigid(texts[i]) for i in known)
-    if not known or (not units and (numbers or is_empty)):
+    is_empty = any(texts[i].lower() in GAPS or is_rigid(texts[i]) for i in places)
+    if not places or (not units and (numbers or is_empty)):
         return None
-    if may_be_prose and len(units) < len(known):
+    if may_be_prose and len(units) < len(places):
         return None
-    for i in known:
-        name, own = names[i]
+    for i in places:
+        name, unit = names[i]
         if scales[i] is None:
             raise TextError(
                 f"line {line}: {texts[i][:40]!r} is neither a number nor a unit of {name}"
             )
-        if own is not None and scale_of(wanted.like[name], own) != scales[i]:
+        if unit is not None and scale_of(column_names.like[name], unit) != scales[i]:
             raise TextError(
-                f"line {line}: {name} is in {texts[i]}, its head says {own}; leave one of them out"
+                f"line {line}: {name} is in {texts[i]}, its head says {unit}; leave one of them out"
             )
     return [
         f"{head} [{text}]"
-        if own is None and text not in ("", "-", "1") and len(text) <= 20
+        if unit is None and text not in ("", "-", "1") and len(text) <= 20
         else head
-        for head, text, (_, own) in zip(heads, texts, names, strict=True)
+        for head, text, (_, unit) in zip(heads, texts, names, strict=True)
     ]
 
 
-def begin(text: Text, wanted: Wanted, dialect: Dialect) -> tuple[Layout, Iterator[tuple[int, str]]]:
+def begin(
+    text: Text, column_names: ColumnNames, dialect: Dialect
+) -> tuple[Layout, Iterator[tuple[int, str]]]:
     """How a text is written, and the numbered lines behind the head."""
     start = list[str]()
     for piece in text:
         start += piece.lines
         if len(start) >= _LOOKED_AT:
             break
-    layout = find_layout(Piece(1, start), wanted, dialect, text.encoding)
+    layout = find_layout(Piece(1, start), column_names, dialect, text.encoding)
     lines = chain(start, chain.from_iterable(piece.lines for piece in text))
     return layout, iter(enumerate(islice(lines, layout.first - 1, None), layout.first))
 
@@ -394,17 +403,17 @@ def is_row(line: str, layout: Layout) -> bool:
     return layout.names_first and cells == len(layout.heads) > 1
 
 
-def may_be_head(text: str, layout: Layout, wanted: Wanted) -> bool:
+def may_be_head(text: str, layout: Layout, column_names: ColumnNames) -> bool:
     """Whether a text has all names that a head needs, or begins another segment of LabVIEW."""
     if layout.labview and _END_OF_HEADER in text:
         return True
-    return all(any(name in text for name in names) for names in wanted.needed)
+    return all(any(name in text for name in names) for names in column_names.needed)
 
 
 def records(
     lines: Iterator[tuple[int, str]],
     layout: Layout,
-    wanted: Wanted,
+    column_names: ColumnNames,
     skip: Callable[[int], None] = lambda _line: None,
 ) -> Iterator[Record]:
     """The rows among numbered lines; a quoted cell may go on in the next lines.
@@ -418,7 +427,9 @@ def records(
             if text.strip(f" \t{sep}"):
                 skip(line)
             continue
-        if may_be_head(text, layout, wanted) and _repeats_head(line, text, layout, wanted):
+        if may_be_head(text, layout, column_names) and _repeats_head(
+            line, text, layout, column_names
+        ):
             skip(line)
             continue
         if '"' in text:
@@ -433,13 +444,13 @@ def records(
         yield _regular(Record(line, cells, None, text), layout)
 
 
-def _repeats_head(line: int, text: str, layout: Layout, wanted: Wanted) -> bool:
+def _repeats_head(line: int, text: str, layout: Layout, column_names: ColumnNames) -> bool:
     """Whether a line is the head again; TextError where it is another one."""
-    heads = [heading(cell, wanted.like) for cell in _split(_uncommented(text), layout.sep)]
+    heads = [heading(cell, column_names.like) for cell in _split(_uncommented(text), layout.sep)]
     names = [split_unit(head)[0] for head in heads]
     if text.startswith(_END_OF_HEADER):
         raise TextError(f"line {line} begins another segment: {_APART}")
-    if not all(any(name in names for name in group) for group in wanted.needed):
+    if not all(any(name in names for name in group) for group in column_names.needed):
         return False
     if names[: len(layout.heads)] == [split_unit(head)[0] for head in layout.heads]:
         return True
@@ -539,8 +550,8 @@ class Table(NamedTuple):
 
 def _in_unit(values: Array, scale: Scale) -> Array:
     """Values in SI in another unit, with the digits that both have."""
-    own = values * scale.over / scale.times
-    return np.array([float(f"{value:.15g}") for value in own.tolist()])
+    numbers = values * scale.over / scale.times
+    return np.array([float(f"{value:.15g}") for value in numbers.tolist()])
 
 
 def source_of(
@@ -568,7 +579,7 @@ def _sheet_in(path: Path) -> Iterator[bytes]:
 
 
 def read_table(
-    source: Path | bytes, wanted: Wanted, dialect: Dialect, most: int = 1_000_000
+    source: Path | bytes, column_names: ColumnNames, dialect: Dialect, most: int = 1_000_000
 ) -> Table:
     """The columns of a table that mean something, in SI, from a file or its bytes.
 
@@ -576,7 +587,7 @@ def read_table(
     ``most`` rows.
 
     >>> data = "Rig 7\\n\\nv0\\tmu_macro\\nmm/s\\t%\\n1,5\\t7\\n2,5\\t9\\n".encode()
-    >>> table = read_table(data, Wanted({"v0": "v0", "mu_macro": "mu0"}, [["v0"]]), Dialect())
+    >>> table = read_table(data, ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]]), Dialect())
     >>> table.columns["mu_macro"].tolist(), table.skipped
     ([0.07, 0.09], [1])
     >>> table.read_as
@@ -584,9 +595,9 @@ def read_table(
     """
     pieces, dialect = source_of(source, dialect)
     text = Text(pieces, dialect.encoding)
-    layout, lines = begin(text, wanted, dialect)
-    columns, faults = find_heads(layout.heads, wanted.like)
-    missing = [group[0] for group in wanted.needed if not columns.keys() & set(group)]
+    layout, lines = begin(text, column_names, dialect)
+    columns, faults = find_heads(layout.heads, column_names.like)
+    missing = [group[0] for group in column_names.needed if not columns.keys() & set(group)]
     if missing:
         one = len(missing) == 1
         faults.append(
@@ -595,7 +606,7 @@ def read_table(
     if faults:
         raise TextError.of([f"line {layout.head}: {fault}" for fault in faults])
     skipped = [*layout.skipped]
-    rows = [*islice(records(lines, layout, wanted, skipped.append), most + 1)]
+    rows = [*islice(records(lines, layout, column_names, skipped.append), most + 1)]
     if len(rows) > most:
         raise TextError(f"line {rows[-1].line}: there are more than {most:,} rows: average them")
     if not rows:

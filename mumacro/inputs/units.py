@@ -451,25 +451,25 @@ def bound_of_unit(quantity: str, number: float, unit: str) -> str:
     >>> bound_of_unit("angular frequency", 20.0, "kHz")
     'in radians per second: did you mean f=20kHz?'
     """
-    known, shown = QUANTITIES[quantity], unit.strip()[:LONGEST]
-    plain = "".join(sign for sign in shown.lower() if sign not in "-_. ()[]")
+    about, text = QUANTITIES[quantity], unit.strip()[:LONGEST]
+    plain = "".join(sign for sign in text.lower() if sign not in "-_. ()[]")
     for ending in _WHOLE:
         size = ending.replace(" ", "")
         if plain.endswith(size) and quantity in ("length", "force"):
             rest = plain.removesuffix(size)
-            mine = next((u for u in known.units if u.lower() == canonical(rest).lower()), None)
+            mine = next((u for u in about.units if u.lower() == canonical(rest).lower()), None)
             if mine is not None or not rest:
                 return f"half of peak to peak: give {0.5 * number:.12g}{mine or ''}"
     if plain.endswith("rms") and quantity in ("length", "force"):
-        mine = next((u for u in known.units if u.lower() == canonical(plain[:-3]).lower()), None)
+        mine = next((u for u in about.units if u.lower() == canonical(plain[:-3]).lower()), None)
         if mine is not None:
             return (
                 f"the amplitude, of a sine {math.sqrt(2.0):.6g} times its rms value: give "
                 f"{math.sqrt(2.0) * number:.12g}{mine}"
             )
-    if is_level(shown):
+    if is_level(text):
         return "the value itself: the reference of a level in dB is not known"
-    key = canonical(shown)
+    key = canonical(text)
     if quantity == "stiffness" and key in QUANTITIES["pressure"].units:
         return "a force over a length: mumacro stiffness computes it from a modulus and the bodies"
     if quantity == "force" and key in _MASS:
@@ -484,14 +484,14 @@ def bound_of_unit(quantity: str, number: float, unit: str) -> str:
         return f"a length: of a velocity amplitude give {speed.si(number):.12g}/(2 pi f) metres"
     if quantity == "speed" and (turns := QUANTITIES["angular frequency"].units.get(key)):
         return f"a speed: give {turns.si(number):.12g} m/s times the radius in metres"
-    if shown in ("k", "M", "G") and (meant := shown + known.unit) in known.units:
-        return f"in {known.words}: did you mean {number:.12g}{meant}?"
+    if text in ("k", "M", "G") and (remedy := text + about.unit) in about.units:
+        return f"in {about.words}: did you mean {number:.12g}{remedy}?"
     lower = key.lower()
-    if alike := [symbol for symbol in known.units if symbol and symbol.lower() == lower]:
-        meant = " or ".join(f"{number:.12g}{symbol}" for symbol in alike)
-        return f"in {known.words}: did you mean {meant}?"
+    if alike := [symbol for symbol in about.units if symbol and symbol.lower() == lower]:
+        remedy = " or ".join(f"{number:.12g}{symbol}" for symbol in alike)
+        return f"in {about.words}: did you mean {remedy}?"
     if (other := _OTHER.get(quantity)) is not None:
         units = QUANTITIES[other].units
         if mine := next((symbol for symbol in units if symbol.lower() == lower), None):
-            return f"in {known.words}: did you mean {_INPUT[other]}={number:.12g}{mine}?"
-    return known.bound
+            return f"in {about.words}: did you mean {_INPUT[other]}={number:.12g}{mine}?"
+    return about.bound

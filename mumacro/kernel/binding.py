@@ -52,9 +52,9 @@ def _numbers(array: Array | None) -> Any:
 
 def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
     """How many harmonics x, y and the normal force have, and all of them."""
-    joined = [float(order) for part in orders for order in part]
+    all_orders = [float(order) for part in orders for order in part]
     return _FFI.new("int32_t[3]", [len(part) for part in orders]), _FFI.new(
-        "double[]", joined or [0.0]
+        "double[]", all_orders or [0.0]
     )
 
 
@@ -383,12 +383,12 @@ class Kernel:
     ) -> None:
         """Steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms), see
         ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force."""
-        counts, joined = _harmonics(orders)
+        counts, all_orders = _harmonics(orders)
         self._functions.motions(
             contact,
             cases.shape[0],
             counts,
-            joined,
+            all_orders,
             _numbers(cases),
             tolerance,
             MOST_STEPS,
@@ -406,10 +406,10 @@ class Kernel:
         n: int,
     ) -> Array:
         """Forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
-        forces, (counts, joined) = np.empty((n + 1, 2)), _harmonics(orders)
+        forces, (counts, all_orders) = np.empty((n + 1, 2)), _harmonics(orders)
         self._functions.motion_cycle(
             counts,
-            joined,
+            all_orders,
             _numbers(case),
             shares.size,
             *map(_numbers, (shares, weights)),

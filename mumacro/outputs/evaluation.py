@@ -91,8 +91,8 @@ def cost(outputs: Iterable[Output], cases: Cases) -> float:
 @cache
 def _cost_of(kind: Kind) -> float:
     words = [*kind.names.values()]
-    both = _BALL_ALONG if words == ["ball", "along"] else 1.0
-    return both * math.prod(_COSTS.get(word, 1.0) for word in words)
+    factor = _BALL_ALONG if words == ["ball", "along"] else 1.0
+    return factor * math.prod(_COSTS.get(word, 1.0) for word in words)
 
 
 def answer(
@@ -107,9 +107,9 @@ def answer(
     plain = cases.codes is None and cases.ends is None
     if cases.shape and plain and not outputs:
         rows = tabulated.rows(cases, detail)  # the kernel's arrays are the answer
-        kept = (rows.v_tilde, rows.y_tilde, rows.length_scale) if groups else None
+        group_values = (rows.v_tilde, rows.y_tilde, rows.length_scale) if groups else None
         numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
-        return Answer(*numbers, rows.source, kept, cases)
+        return Answer(*numbers, rows.source, group_values, cases)
     remarks: list[Remark] = []
     columns: Values = {}
     if cases.codes is None:
@@ -134,16 +134,16 @@ _SLOPES = ("gradient", "gradient_bound")
 def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Remark]) -> Values:
     """All that is computed of cases of one kind: outputs by path, and what stands beside them by
     name; NaN where a case lacks an output, or is not legal."""
-    lacking: dict[str, Any] = {}
+    gaps: dict[str, Any] = {}
     for output, word, why, where in _lacked(outputs, evaluated.cases):
-        lacking[output.name] = where
+        gaps[output.name] = where
         number = evaluated.cases.size if where is True else int(np.count_nonzero(where))
         text = f"there is no {output.name} for {word}: {why}"
         add(remarks, {"row": "include", "field": output.name, "cases": number, "text": text})
     columns: Values = {}
     with np.errstate(all="ignore"):
         for output in outputs:
-            absent = lacking.get(output.name)
+            absent = gaps.get(output.name)
             if absent is True:
                 continue
             part = output.compute(evaluated)
@@ -158,10 +158,10 @@ def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Re
                 columns[path] = np.where(illegal, math.nan, x)
     else:
         columns = {path: float(x) for path, x in columns.items()}
-    own = evaluated.__dict__
-    columns |= {name: own[name] for name in (*_ALWAYS, *GROUPS, *BAND) if name in own}
+    members = evaluated.__dict__
+    columns |= {name: members[name] for name in (*_ALWAYS, *GROUPS, *BAND) if name in members}
     for name in _SLOPES:
-        columns |= {f"{name} {field}": x for field, x in own.get(name, {}).items()}
+        columns |= {f"{name} {field}": x for field, x in members.get(name, {}).items()}
     return columns
 
 

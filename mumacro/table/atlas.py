@@ -224,12 +224,12 @@ def _quantity(q: Any) -> Quantity:
     return Quantity(*texts, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
-def _charts(listed: Any, count: int) -> tuple[Chart, ...]:
+def _charts(records: Any, count: int) -> tuple[Chart, ...]:
     return tuple(
         Chart(
             _text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding
         )
-        for c in (listed[i] for i in range(count))
+        for c in (records[i] for i in range(count))
     )
 
 

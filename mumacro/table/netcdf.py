@@ -155,10 +155,10 @@ def _write(root: Any, table: Table) -> None:
         extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
         _add_variable(root, name, getattr(table, name), long_name, axes, **extra)
     border = root.createGroup("border")
-    for (name, axis, tabulated), piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
+    for (name, axis, meaning), piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
         group = border.createGroup(name)
         _add_variable(group, axis.name, piece.nodes, atlas.COORDINATES[axis.name])
-        _add_variable(group, "value", piece.values, tabulated, (axis.name,))
+        _add_variable(group, "value", piece.values, meaning, (axis.name,))
         group.setncatts(
             {
                 "cells": np.int32(piece.cells),
@@ -285,11 +285,11 @@ def _error(group: hdf5.Group, name: str) -> float:
 
 
 def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
-    stored = group.attribute(name)
-    if not np.array_equal(stored, expected):
+    value = group.attribute(name)
+    if not np.array_equal(value, expected):
         printable = expected.tolist() if isinstance(expected, np.ndarray) else expected
         raise group.refuse(
-            f"{group.path}: {name} is {stored!r}, this program's atlas has {printable!r}"
+            f"{group.path}: {name} is {value!r}, this program's atlas has {printable!r}"
         )
 
 
@@ -384,8 +384,8 @@ def _check_root(root: hdf5.Group, spring: TabulatedContact) -> None:
 
 def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str]) -> None:
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
-    stored = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
-    for name, errors in zip(names, _errors(group, "cell_errors", stored), strict=True):
+    numbers = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
+    for name, errors in zip(names, _errors(group, "cell_errors", numbers), strict=True):
         for block, part in zip(blocks, np.split(errors, last[:-1]), strict=True):
             if name in block.nodes:
                 block.cell_errors[name] = part

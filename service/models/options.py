@@ -90,8 +90,8 @@ class InputStd(Strict):
     def columns(self) -> dict[str, Any]:
         """Those that are given, as the library names them: ``std_k`` and so on; none of them says
         that the inputs are exact."""
-        given = {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
-        return given or {"std_mu0": 0.0}
+        members = {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
+        return members or {"std_mu0": 0.0}
 
 
 class StdColumns(Strict):
@@ -157,8 +157,8 @@ class Case(CaseInputs):
         """All that the library takes."""
         words = {"contact": self.contact, "direction": self.direction}
         deviations = {} if self.std is None else self.std.columns
-        given = {name: word for name, word in words.items() if word is not None}
-        return self.inputs | given | deviations
+        members = {name: word for name, word in words.items() if word is not None}
+        return self.inputs | members | deviations
 
 
 class CaseColumns(Outputs, InputColumns):
@@ -229,10 +229,10 @@ class BatchOptions(Deviations, Outputs):
     def members(self) -> dict[str, Any]:
         """What is given, as in a body."""
         names = ("contact", "direction", "tolerance", "include")
-        given = {name: value for name in names if (value := getattr(self, name)) is not None}
+        inputs = {name: value for name in names if (value := getattr(self, name)) is not None}
         if deviations := self.deviations:
-            given["std"] = {name.removeprefix("std_"): x for name, x in deviations.items()}
-        return given
+            inputs["std"] = {name.removeprefix("std_"): x for name, x in deviations.items()}
+        return inputs
 
 
 class CaseQuery(QueryOptions, OneCase):

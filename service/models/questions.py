@@ -178,15 +178,15 @@ class SolveForRequest(Options, OtherInputs):
     @property
     def motion(self) -> dict[str, Any]:
         """The motion that is asked about; InputError for what a motion does not have."""
-        given = {
+        values = {
             name: value
             for name in self.model_fields_set
             if (value := getattr(self, name)) is not None
         }
         for name in _NOT_OF_A_MOTION:
-            if name in given:
+            if name in values:
                 raise InputError(name, None, "left out over a motion: x, y and normal say it")
-        return {name: value for name, value in given.items() if name in (*_OF_A_MOTION, *PARTS)}
+        return {name: value for name, value in values.items() if name in (*_OF_A_MOTION, *PARTS)}
 
 
 # --- stiffness ------------------------------------------------------------------------------------

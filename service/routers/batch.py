@@ -113,15 +113,15 @@ def _by_one(text: bytearray) -> float:
 
 def _gathered(pieces: Iterator[bytes], least: float) -> Iterator[bytes]:
     """The same bytes in pieces of at least so many."""
-    gathered, size = list[bytes](), 0
+    parts, size = list[bytes](), 0
     for piece in pieces:
-        gathered.append(piece)
+        parts.append(piece)
         size += len(piece)
         if size >= least:
-            yield b"".join(gathered)
-            gathered, size = [], 0
+            yield b"".join(parts)
+            parts, size = [], 0
     if size:
-        yield b"".join(gathered)
+        yield b"".join(parts)
 
 
 def _ref(name: str) -> dict[str, str]:

@@ -105,10 +105,10 @@ async def post_law(question: LawRequest, tables: Loaded, work: Working) -> Respo
         table = tables.pick(question.tolerance)
         law, columns = _law(question, table)
         along = question.along
-        swept = {"along": along, "unit": unit_of(along), "values": law.values}
+        axis = {"along": along, "unit": unit_of(along), "values": law.values}
         border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in law.border]
         remarks = _remarks_on(question, along, question.inputs, law.stiffening)
-        return Json({**swept, **nested(columns), "border": border, **remarks, **table.signature})
+        return Json({**axis, **nested(columns), "border": border, **remarks, **table.signature})
 
     return await work.question(answer)
 
@@ -133,8 +133,8 @@ async def get_law_csv(
         along = question.along
         heads = {f"{along} [{unit_of(along)}]": law.values.tolist()}
         for path in sorted(columns, key=lambda path: path in _TEXTS):  # texts last
-            shown = ["" if value != value else value for value in columns[path]]
-            heads[path if path in _TEXTS else f"{path} [{unit_at(path)}]"] = shown
+            row = ["" if value != value else value for value in columns[path]]
+            heads[path if path in _TEXTS else f"{path} [{unit_at(path)}]"] = row
         text = io.StringIO()
         writer = csv.writer(text)
         writer.writerow(heads)
@@ -278,8 +278,8 @@ def _results(
         "min_included": reach.min_included,
         "max_included": reach.max_included,
     }
-    searched = [reach.low, None if reach.high > _NO_LIMIT else reach.high]
-    return {"results": results, "range": searched, "reachable": reachable}
+    span = [reach.low, None if reach.high > _NO_LIMIT else reach.high]
+    return {"results": results, "range": span, "reachable": reachable}
 
 
 def _included(

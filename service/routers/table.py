@@ -32,9 +32,9 @@ Chosen = Annotated[TableQuery, Query()]
     responses={200: {"model": TableAnswer}, **GET_PROBLEMS},
     summary="Properties of a table",
 )
-async def get_table(chosen: Chosen, tables: Loaded) -> Response:
+async def get_table(query: Chosen, tables: Loaded) -> Response:
     """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
-    table = tables.pick(chosen.tolerance)
+    table = tables.pick(query.tolerance)
     surrogate = table.surrogate
     answer = {
         name: getattr(surrogate, name)
@@ -63,10 +63,10 @@ _PARTS: dict[int | str, Any] = {
     responses={**_PARTS, **GET_PROBLEMS, **problems(416)},
     summary="The table as a netCDF-4 file",
 )
-async def get_table_file(request: Request, chosen: Chosen, tables: Loaded) -> Response:
+async def get_table_file(request: Request, query: Chosen, tables: Loaded) -> Response:
     """Stream the file from disk; ranges are supported.  It is the file that the answers come
     from."""
-    table = tables.pick(chosen.tolerance)
+    table = tables.pick(query.tolerance)
     table.check()  # a file that was replaced after loading holds another table with the same name
     path = table.surrogate.path
     headers = {"ETag": f'"{table.surrogate.checksum}"', "Cache-Control": "no-cache"}

@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import fixed_quad
 
 from builder.solver import sections, steady
-from builder.solver import slip as model
+from builder.solver import slip as slip_phase
 from builder.solver.slip import (
     ANGLE,
     CHART,
@@ -315,11 +315,11 @@ def test_an_excess_that_is_not_that_of_the_amplitude_is_refused(eta: float, swee
 
 def test_every_status_has_advice() -> None:
     codes = {
-        model.OK,
-        model.NO_SLIP,
-        model.NO_STICK,
-        model.TOO_MANY_STEPS,
-        model.DIVERGED,
+        slip_phase.OK,
+        slip_phase.NO_SLIP,
+        slip_phase.NO_STICK,
+        slip_phase.TOO_MANY_STEPS,
+        slip_phase.DIVERGED,
         sections.NOT_CONVERGED,
     }
     assert codes == set(ADVICE)

@@ -22,9 +22,9 @@ from mumacro.inputs.signs import Signs, evidence
 from mumacro.inputs.text_tables import (
     BLANKS,
     GAPS,
+    ColumnNames,
     Dialect,
     Table,
-    Wanted,
     read_cell,
     read_table,
 )
@@ -47,7 +47,7 @@ RIGS = {
     "testing_machine.csv": "head in line 7, units in line 8",
     "windows_1252.csv": "Windows-1252, semicolon, decimal comma",
 }
-POINTS = Wanted({"v0": "v0", "mu_macro": "mu0", "note": "mu0"}, [["v0"], ["mu_macro"]])
+POINTS = ColumnNames({"v0": "v0", "mu_macro": "mu0", "note": "mu0"}, [["v0"], ["mu_macro"]])
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def refused(text: str | bytes, **options: Any) -> TextError:
 def read(text: str | bytes, **options: Any) -> Table:
     data = text if isinstance(text, bytes) else text.encode()
     return read_table(
-        data, Wanted(dict(list(POINTS.like.items())[:2]), POINTS.needed), Dialect(**options)
+        data, ColumnNames(dict(list(POINTS.like.items())[:2]), POINTS.needed), Dialect(**options)
     )
 
 
