@@ -4,8 +4,8 @@
     python requirements/lock.py --check    exit code 1 if pyproject.toml has changed since
 
 test.txt is made first and constrains the others.  peers.txt has only what test.txt and tools.txt
-lack: it is installed beside them.  No index is named in the result: the installing machine chooses
-it.
+lack: it is installed beside them.  npm/package-lock.json pins npm/package.json where there is npm.
+No index is named in the result: the installing machine chooses it.
 """
 
 import hashlib
@@ -20,6 +20,7 @@ import venv
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
+NPM = FOLDER / "npm"
 EXTRAS = ("arrow", "builder", "dask", "figures", "files", "service")  # that tests need
 UV = "uv==0.13.8"  # pins the resolver too: two people who lock on the same day get the same file
 PROJECT = tomllib.loads((FOLDER.parent / "pyproject.toml").read_text("utf-8"))
@@ -56,6 +57,35 @@ def stale() -> list[str]:
     return [
         path.name for path in FOLDER.glob("*.txt") if not path.read_text("utf-8").startswith(HEADER)
     ]
+
+
+def stale_npm() -> list[str]:
+    """The lock of npm, if it is that of another package.json."""
+    wanted, pinned = (
+        json.loads((NPM / name).read_text("utf-8"))
+        for name in ("package.json", "package-lock.json")
+    )
+    same = wanted["dependencies"] == pinned["packages"][""]["dependencies"]
+    return [] if same else ["npm/package-lock.json"]
+
+
+def lock_npm() -> None:
+    """Write the lock of npm, without the addresses of those who can be paid."""
+    npm = shutil.which("npm")
+    if npm is None:
+        print("npm is not installed: requirements/npm stays as it is")
+        return
+    options = ("--package-lock-only", "--ignore-scripts", "--no-audit", "--no-fund")
+    subprocess.run([npm, "install", *options], cwd=NPM, check=True)  # noqa: S603
+    path = NPM / "package-lock.json"
+    pins = json.loads(path.read_text("utf-8"))
+    for package in pins["packages"].values():
+        package.pop("funding", None)
+    text = json.dumps(pins, indent=2) + "\n"
+    if "://" in text:
+        raise SystemExit("the lock of npm names a place to download from; it must not")
+    path.write_text(text, encoding="utf-8", newline="\n")
+    print(f"requirements/npm: {len(pins['packages']) - 1} pins")
 
 
 def lock(folder: Path, arguments: list[str]) -> None:
@@ -124,11 +154,12 @@ def lock(folder: Path, arguments: list[str]) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--check"]:
-        names = stale()
+        names = stale() + stale_npm()
         raise SystemExit(
-            f"{', '.join(names)}: pyproject.toml has changed; run python3 dev.py lock"
+            f"{', '.join(names)}: the dependencies have changed; run python3 dev.py lock"
             if names
             else 0
         )
     with tempfile.TemporaryDirectory() as name:
         lock(Path(name), sys.argv[1:])
+    lock_npm()

@@ -25,6 +25,7 @@ from .guide_pages import GuidePages
 from .limits import ConnectionLimit, Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
+from .models.inputs import without_null
 from .models.options import Case, CaseColumns, CaseRequest
 from .observe import Observe, Observer
 from .problems import HANDLERS, Failures
@@ -170,6 +171,15 @@ _MORE: Any = [(model, "validation") for model in (Case, CaseRequest, CaseColumns
 _MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
 
 
+def _without_default(member: dict[str, Any]) -> None:
+    """Say in words what a member is where it is left out: clients that are made from the
+    description require a member with a default."""
+    default = member.pop("default", None)
+    if default is not None and "description" in member:
+        shown = default if isinstance(default, str) else orjson.dumps(default).decode()
+        member["description"] += f"; left out: {shown}"
+
+
 def _described(app: FastAPI, closed: bool) -> dict[str, Any]:
     """FastAPI's description, with what it cannot know."""
     if app.openapi_schema:
@@ -182,8 +192,16 @@ def _described(app: FastAPI, closed: bool) -> dict[str, Any]:
         tags=app.openapi_tags,
         servers=app.servers,
     )
-    models = models_json_schema(_MORE, ref_template=REF_TEMPLATE)[1]["$defs"]
-    document["components"]["schemas"] |= models
+    schemas = document["components"]["schemas"]
+    schemas |= models_json_schema(_MORE, ref_template=REF_TEMPLATE)[1]["$defs"]
+    for schema in schemas.values():
+        for member in schema.get("properties", {}).values():
+            _without_default(member)
+    for path in document["paths"].values():
+        for parameter in path.get("get", {}).get("parameters", ()):
+            usual = {name: x for name, x in parameter["schema"].items() if name == "default"}
+            without_null(parameter["schema"])
+            parameter["schema"] |= usual
     if closed:
         document |= {"security": [{name: []} for name in SCHEMES]}
         document["components"]["securitySchemes"] = SCHEMES

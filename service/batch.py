@@ -22,7 +22,7 @@ from mumacro.outputs.evaluation import chosen, cost
 
 from .forms import SLICE, Body, Reason, too_large, write_columns, write_rows
 from .models.inputs import MAX_REASONS, Column
-from .models.options import MODEL, BatchOptions, CaseColumns
+from .models.options import BatchOptions, CaseColumns
 from .problems import FieldFault, reason_of, refuse
 from .reading import dump, of_members
 from .tables import LoadedTable, Tables
@@ -67,8 +67,8 @@ class Batch:
         std = {name: x for name, x in body.members.items() if name.startswith("std_")}
         members = {name: x for name, x in body.members.items() if name not in std}
         model = of_members(CaseColumns, body_and_query(members, options))
-        if model.model:
-            raise InputError("include", MODEL, f"without {MODEL}, which is for one case")
+        if beside := model.beside:
+            raise InputError("include", beside[0], f"without {beside[0]}, which is for one case")
         values, reasons = model.columns | std, dict(body.reasons)
         # the first bad input of a case, in the order of the inputs, is told
         for name, column in [*values.items()]:

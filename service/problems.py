@@ -11,7 +11,7 @@ import json
 import logging
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from enum import Enum
@@ -163,11 +163,13 @@ def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
     if kind == "missing":
         return "is required"
     if kind == "extra_forbidden":
+        if name == "k_range" and "k_low" in allowed:  # of a query
+            return "unknown field; write the interval as k=low..high"
         return unknown_name(name, allowed)
     if kind == "float_type" and type(value) is int and name in BOUNDS:  # beyond double range
         return refusal(name, math.inf)
     if kind == "float_type":
-        return no_number(name, value)
+        return no_number(name if len(error["loc"]) == 1 else "", value)
     if kind in _OUT_OF_BOUNDS and name in BOUNDS and len(error["loc"]) == 1:
         return refusal(name, math.inf if abs(value) > _LARGE else float(value))
     if kind == "finite_number":
@@ -195,7 +197,7 @@ _LEAST = {"greater_than": (">", "gt"), "greater_than_equal": (">=", "ge")}
 _LARGE = 1e308
 
 
-def choicesof(model: type[BaseModel]) -> tuple[str, ...]:
+def names_of(model: type[BaseModel]) -> tuple[str, ...]:
     """What a model may be given: inputs first, options after them."""
     fields = model.model_fields
     inputs = [name for name in (*INPUTS, *LIKE, "k_range") if name in fields]
@@ -209,7 +211,7 @@ def invalid(
     parameter: bool | None = None,
 ) -> "RequestError":
     """The error that reports what a model refuses in the members of a body or query."""
-    faults = faults_of(error.errors(include_url=False), choicesof(model), parameter)
+    faults = faults_of(error.errors(include_url=False), names_of(model), parameter)
     if "mu0" in model.model_fields and model.model_fields["mu0"].is_required():
         paths = {fault.path for fault in faults}
         faults += [fault for fault in _absent_in(members) if fault.path not in paths]
@@ -297,8 +299,21 @@ def _of_fastapi(error: RequestValidationError, scope: Scope) -> RequestError:
     """What FastAPI refuses: a body, or a query, that is not as its endpoint declares it."""
     dependant = scope["route"].dependant
     declared = (dependant.body_params or dependant.query_params)[0].field_info.annotation
-    errors = [{**fault, "loc": fault["loc"][1:]} for fault in error.errors()]
-    return refused(faults_of(errors, choicesof(declared)), **_understood(error.body))
+    errors = [{**fault, "loc": _place(fault["loc"][1:], error.body)} for fault in error.errors()]
+    return refused(faults_of(errors, names_of(declared)), **_understood(error.body))
+
+
+def _place(path: tuple[str | int, ...], body: Any) -> tuple[str | int, ...]:
+    """A place as far as the body has it: within a value that stands for a list of one, such as a
+    target, there is none."""
+    for i, step in enumerate(path):
+        if isinstance(step, int) and not isinstance(body, list):
+            return path[:i]
+        try:
+            body = body[step]
+        except (LookupError, TypeError):
+            body = None
+    return path
 
 
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:
@@ -341,6 +356,18 @@ def of_input(error: InputError, **members: Any) -> RequestError:
     if error.index is not None:
         path = (*path, error.index)
     return refused([FieldFault(path, reason_of(error), value)], **members)
+
+
+@contextmanager
+def with_members(**members: Any) -> Iterator[None]:
+    """Members that the problem document of a refusal has beside its faults."""
+    try:
+        yield
+    except InputError as error:
+        raise of_input(error, **members) from None
+    except RequestError as error:
+        error.members |= members
+        raise
 
 
 def _of_table(error: TableError, _: Scope) -> RequestError:

@@ -4,9 +4,14 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from fastapi import Request
+
+from mumacro.analysis.motion import PARTS
 from mumacro.errors import InputError
-from mumacro.inputs.fields import INPUTS, RIGID
+from mumacro.inputs.fields import INPUTS, QUANTITY_OF, RIGID
+from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.reading import read
+from mumacro.inputs.units import QUANTITIES
 
 UNDERSTOOD = "inputs"  # the name in include
 
@@ -17,32 +22,79 @@ def is_wanted(members: Mapping[str, Any]) -> bool:
     return isinstance(include, (list, tuple, set)) and UNDERSTOOD in include
 
 
+async def understood_in(request: Request, wanted: bool) -> dict[str, Any]:
+    """The member of an answer to a request in JSON, where it is wanted."""
+    return {UNDERSTOOD: understood(await request.json())} if wanted else {}
+
+
 def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Each input that can be read: its text, its value in SI, the unit that was typed or the SI
     unit; the deviation and the ends of an interval where it has them.  An input that is refused is
-    left out."""
+    left out.
+
+    >>> understood({"k": "1 ± 0.1 N/um", "target": "15 %"})["target"]
+    {'text': '15 %', 'value': 0.15, 'unit': '%'}
+    """
+    along = members.get("along", "v0")
+    of_ends = QUANTITY_OF[along] if isinstance(along, str) and along in INPUTS else ""
+    quantities = {name: field.quantity for name, field in INPUTS.items()}
+    quantities |= {"start": of_ends, "stop": of_ends, "target": "ratio"}
     inputs: dict[str, dict[str, Any]] = {}
-    for name, field in INPUTS.items():
+    for name, quantity in quantities.items():
         try:
-            one = _of(name, members.get(name))
-            if one is not None:
-                inputs[name] = {**one, "unit": one["unit"] or field.unit}
-            deviation = _of(name, _deviation(members, name))
+            if quantity and (one := _of(name, members.get(name), quantity)) is not None:
+                inputs[name] = one
+            deviation = _of(name, _deviation(members, name), quantity)
             if name in inputs and deviation is not None:
                 inputs[name]["std"] = deviation["value"]
         except InputError:
             continue
-    ends = members.get("k_range")
-    if isinstance(ends, (list, tuple)) and len(ends) == 2:
-        try:
-            low, high = (_of("k", end) for end in ends)
-        except InputError:
-            return inputs
-        if low and high and all(isinstance(end["value"], float) for end in (low, high)):
-            middle = math.sqrt(low["value"]) * math.sqrt(high["value"])
-            inputs["k"] = {"text": None, "value": middle, "unit": low["unit"] or "N/m"}
-            inputs["k"] |= {"low": low["value"], "high": high["value"]}
+    if (interval := _interval(members.get("k_range"))) is not None:
+        inputs["k"] = interval
+    for name in PARTS:
+        if (part := _part(name, members.get(name))) is not None:
+            inputs[name] = part
     return inputs
+
+
+def _interval(ends: Any) -> dict[str, Any] | None:
+    """An interval of k, of a text or of both ends."""
+    try:
+        if isinstance(ends, str):
+            one = _of("k_range", ends, "stiffness")
+            return one if one and "low" in one else None
+        if not isinstance(ends, (list, tuple)) or len(ends) != 2:
+            return None
+        low, high = (_of("k", end, "stiffness") for end in ends)
+    except InputError:
+        return None
+    if not low or not high or not all(isinstance(end["value"], float) for end in (low, high)):
+        return None
+    middle = math.sqrt(low["value"]) * math.sqrt(high["value"])
+    span = {"low": low["value"], "high": high["value"]}
+    return {"text": None, "value": middle, "unit": low["unit"], **span}
+
+
+def _part(name: str, value: Any) -> dict[str, Any] | None:
+    """An oscillation of a motion: the amplitude of its first harmonic, and all of them."""
+    if value is None:
+        return None
+    try:
+        parts = read_oscillation(name, tuple(value) if _is_pair(value) else value)
+    except InputError:
+        return None
+    members = ("harmonic", "amplitude", "phase")
+    return {
+        "text": value if isinstance(value, str) else None,
+        "value": parts[0][1],
+        "unit": QUANTITIES[QUANTITY_OF[name]].unit,
+        "harmonics": [dict(zip(members, part, strict=True)) for part in parts],
+    }
+
+
+def _is_pair(value: Any) -> bool:
+    """Whether a list of JSON is an amplitude and its phase."""
+    return isinstance(value, list) and len(value) == 2 and not isinstance(value[0], dict)
 
 
 def _deviation(members: Mapping[str, Any], name: str) -> Any:
@@ -51,12 +103,12 @@ def _deviation(members: Mapping[str, Any], name: str) -> Any:
     return members.get(f"std_{name}") if within is None else within
 
 
-def _of(name: str, value: Any) -> dict[str, Any] | None:
+def _of(name: str, value: Any, quantity: str) -> dict[str, Any] | None:
     """One value, None where there is none; InputError where it cannot be read."""
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         return None
-    one = read(name, value)
+    one, unit = read(name, value, quantity), QUANTITIES[quantity].unit
     number = RIGID if math.isinf(one.si) else one.si
-    entry: dict[str, Any] = {"text": one.text, "value": number, "unit": one.unit}
+    entry: dict[str, Any] = {"text": one.text, "value": number, "unit": one.unit or unit}
     more = {"std": one.std, "low": one.low, "high": one.high}
     return entry | {part: x for part, x in more.items() if x is not None}

@@ -9,7 +9,7 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.fields import QUANTITY_OF
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.numbers import read_number
+from mumacro.inputs.numbers import read_number, tidy
 from mumacro.inputs.reading import NO_DEVIATION, read
 
 MOST_HARMONIC = 1000
@@ -68,7 +68,7 @@ def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
     A comma without a harmonic behind it is a decimal sign.
     """
     pieces: list[str] = []
-    for piece in text.split(","):
+    for piece in tidy(text).split(","):
         if pieces and ":" not in piece:
             pieces[-1] += f",{piece}"
         else:

@@ -548,7 +548,7 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
     if text.lower().strip("+-") in ("inf", "infinity", "nan"):
         return Value(float(text), text=raw)
     if not text:
-        raise InputError(name, raw, _gap(name))
+        raise InputError(name, raw, _of_no_number(quantity, "must be a number"))
     if rigid and "rigid" in text.lower() and any(mark in text for mark in (*_DEVIATIONS, "..")):
         raise InputError(name, raw, _NOT_BOTH)
     try:

@@ -161,6 +161,14 @@ class Answered(BaseModel):
     api_version: str
 
 
+class HarmonicRead(BaseModel):
+    """One harmonic of an oscillation."""
+
+    harmonic: int
+    amplitude: float = Field(description="[SI]")
+    phase: float = Field(description="[degrees]")
+
+
 class Understood(BaseModel):
     """What was understood of one input."""
 
@@ -170,6 +178,9 @@ class Understood(BaseModel):
     std: float | None = Field(None, description="One standard deviation [SI]")
     low: float | None = Field(None, description="Ends of an interval [SI]")
     high: float | None = None
+    harmonics: list[HarmonicRead] | None = Field(
+        None, description="Of an oscillation of a motion, whose value is the first amplitude"
+    )
 
 
 class ModelRow(BaseModel):
@@ -193,6 +204,11 @@ _REMARKS = "What is doubtful; left out where nothing is"
 _UNDERSTOOD = "Only if requested: what was understood of each input"
 
 
+def understood_inputs() -> Any:
+    """The member of an answer with what was understood."""
+    return Field(None, description=_UNDERSTOOD)
+
+
 class Result(OneOrMany[Number, Regime, str]):
     """Answer to one case."""
 
@@ -211,7 +227,7 @@ class CaseAnswer(Result, Answered):
     )
     digits: int | None = Field(None, description="With model: digits of mu_macro that k supports")
     remarks: list[Remark] | None = Field(None, description=_REMARKS)
-    inputs: dict[str, Understood] | None = Field(None, description=_UNDERSTOOD)
+    inputs: dict[str, Understood] | None = understood_inputs()
 
 
 # --- batches --------------------------------------------------------------------------------------
@@ -269,6 +285,7 @@ class LawAnswer(Columns, Answered):
     )
     model: list[ModelRow] | None = Field(None, description=_MODEL)
     border: list[BorderMark] = Field(description="Up to two points inside the range")
+    inputs: dict[str, Understood] | None = understood_inputs()
 
 
 class Root(Included[Number]):
@@ -326,6 +343,7 @@ class SolveForAnswer(Solved, Answered):
         None, description="Only with an interval of k: for both ends; the rest is for the middle"
     )
     model: list[ModelRow] | None = Field(None, description=_MODEL)
+    inputs: dict[str, Understood] | None = understood_inputs()
 
 
 class MotionRoot(BaseModel):
@@ -364,6 +382,7 @@ class SolveMotionAnswer(BaseModel):
         "moves the other way, at these speeds",
     )
     api_version: str
+    inputs: dict[str, Understood] | None = understood_inputs()
 
 
 class StiffnessAnswer(BaseModel):
@@ -531,4 +550,4 @@ class Problem(BaseModel):
     request_id: str | None = None
     errors: list[FieldProblem] | None = None
     n_errors: int | None = None
-    inputs: dict[str, Understood] | None = Field(None, description=_UNDERSTOOD)
+    inputs: dict[str, Understood] | None = understood_inputs()

@@ -15,9 +15,11 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainValidator,
+    ValidationError,
     ValidationInfo,
     WithJsonSchema,
 )
+from pydantic_core import InitErrorDetails
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import DEVIATIONS, EXACT
@@ -28,6 +30,9 @@ from mumacro.inputs.reading import Value, no_number, read, reason_of
 from mumacro.kernel.arrays import Array
 
 from .values import (
+    PLAIN_TEXT,
+    POSITIVE_TEXT,
+    RIGID,
     Amplitude,
     AngularFrequency,
     Force,
@@ -35,12 +40,12 @@ from .values import (
     Frequency,
     Friction,
     OtherSpeed,
-    Positive,
     Speed,
     Stiffness,
     StiffnessEnd,
     fault,
     stiffness_inputs,
+    text_schema,
 )
 
 #: what a case may hold, in the order in which it is described
@@ -62,24 +67,36 @@ EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20
 MAX_REASONS = 1000  # bad cases of a batch that are listed
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
-OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, {"const": "rigid", "type": "string"}]
+OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, RIGID]
+
+
+NULL = {"type": "null"}
 
 
 def optional(description: str, **more: Any) -> Any:
-    """A member that may be left out.  Null says the same, which the description leaves out: a query
-    has none."""
-    return Field(None, description=description, json_schema_extra=_without_null, **more)
+    """A member that may be left out; null says the same, but for a query, which has none."""
+    return Field(None, description=description, json_schema_extra=_or_null, **more)
 
 
 def either(description: str, **more: Any) -> Any:
     """A member that another one may stand for; null is refused."""
-    return Field(None, description=description, json_schema_extra=_without_null, **more)
+    return Field(None, description=description, json_schema_extra=without_null, **more)
 
 
-def _without_null(schema: dict[str, Any]) -> None:
+def without_null(schema: dict[str, Any]) -> None:
+    """Describe a member that is no null."""
     schema.pop("default", None)
-    kinds = [kind for kind in schema.pop("anyOf", [schema]) if kind != {"type": "null"}]
+    kinds = [kind for kind in schema.pop("anyOf", [schema]) if kind != NULL]
     schema |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+
+
+def _or_null(schema: dict[str, Any]) -> None:
+    without_null(schema)
+    about = {name: schema.pop(name) for name in ("title", "description") if name in schema}
+    examples = {"examples": schema.pop("examples")} if "examples" in schema else {}
+    kinds = schema.pop("anyOf", None) or [{**schema}]
+    schema.clear()
+    schema |= about | {"anyOf": [*kinds, NULL]} | examples
 
 
 class Strict(BaseModel):
@@ -108,21 +125,36 @@ _AMPLITUDE = (
 )
 
 
+def _given_together(*names: str) -> dict[str, Any]:
+    """The schema of members that are all given: there, and no null."""
+    return {"required": [*names], "properties": {name: {"not": NULL} for name in names}}
+
+
 def one_of(*names: str) -> dict[str, Any]:
     """The schema of alternatives: exactly one of these members is given."""
-    return {"oneOf": [{"required": [name]} for name in names]}
+    return {"oneOf": [_given_together(name) for name in names]}
 
 
 def not_both(one: str, other: str) -> dict[str, Any]:
     """The schema of two members of which one at most is given."""
-    return {"not": {"required": [one, other]}}
+    return {"not": _given_together(one, other)}
+
+
+def both_or_none(one: str, other: str) -> dict[str, Any]:
+    """The schema of two members of which each needs the other."""
+    neither = {"not": {"anyOf": [_given_together(one), _given_together(other)]}}
+    return {"anyOf": [_given_together(one, other), neither]}
 
 
 ONE_FREQUENCY = one_of("omega", "f")
 #: what is given of every case, beside what is always required
 ALTERNATIVES: Any = {
-    "allOf": [one_of("k", "k_range", "k_low"), one_of("y0", "Fz_amplitude"), ONE_FREQUENCY],
-    "dependentRequired": {"k_low": ["k_high"], "k_high": ["k_low"]},
+    "allOf": [
+        one_of("k", "k_range", "k_low"),
+        one_of("y0", "Fz_amplitude"),
+        ONE_FREQUENCY,
+        both_or_none("k_low", "k_high"),
+    ]
 }
 #: the same of a case whose unknown or swept input is left out
 NOT_BOTH: Any = {
@@ -133,7 +165,46 @@ NOT_BOTH: Any = {
         not_both("omega", "f"),
     ]
 }
-Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+
+
+def _of_interval(value: Any) -> Any:
+    """Both ends of an interval, numbers or texts, or a text such as 0.8..1.2 N/um, as they came."""
+    if isinstance(value, str):
+        try:
+            typed = read("k_range", value)
+        except InputError as error:
+            raise fault(reason_of(error.bound)) from None
+        if typed.low is None:
+            raise fault(f"must be {BOUND}")
+        return value
+    if not isinstance(value, list) or len(value) != 2:
+        raise fault(f"must be {BOUND}")
+    for i, end in enumerate(value):
+        one, reason = entry("k_low", end)
+        if reason is None and (one.low is not None or one.std is not None):
+            reason = "must be one number: an end of the interval"
+        if reason is not None:
+            one_fault = InitErrorDetails(type=fault(reason), loc=(i,), input=end)
+            raise ValidationError.from_exception_data("k_range", [one_fault])
+    return value
+
+
+_END: Any = {
+    "anyOf": [{"type": "number", "exclusiveMinimum": 0}, text_schema("stiffness", positive=True)]
+}
+#: an interval of k
+Interval = Annotated[
+    Any,
+    PlainValidator(_of_interval),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "array", "items": _END, "minItems": 2, "maxItems": 2},
+                {"type": "string", "pattern": r"^[1-4]\.\.[5-9]( ?(N/m|N/mm|N/um))?$"},
+            ]
+        }
+    ),
+]
 
 
 class OneCase(Strict):
@@ -161,7 +232,7 @@ class CaseInputs(OneCase):
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})
 
-    k_range: Pair | None = optional(f"In place of k: {BOUND}")
+    k_range: Interval | None = optional(f"In place of k: {BOUND}; or a text as 0.8..1.2 N/um")
 
 
 class OtherInputs(Strict):
@@ -291,6 +362,8 @@ def _of_cases(value: Any, info: ValidationInfo) -> float | str | Column | None:
 
 
 def _of_deviations(value: Any, info: ValidationInfo) -> float | str | Column | None:
+    if value is None:
+        raise fault("must be a number")
     return cells(f"std_{info.field_name}", value)
 
 
@@ -306,30 +379,26 @@ def _words(value: Any, info: ValidationInfo) -> Any:
     return value
 
 
-def _or_listed(*one: dict[str, Any]) -> WithJsonSchema:
-    one = (*one, {"type": "string"})
-    several = {"type": "array", "items": {"anyOf": [*one, {"type": "null"}]}}
-    return WithJsonSchema({"anyOf": [*one, several]})
+def _or_listed(one: dict[str, Any], *texts: dict[str, Any]) -> WithJsonSchema:
+    """One value for all cases, which ``texts`` describe, too, or a list of any, where a bad entry
+    spoils its case only."""
+    several = {"type": "array", "items": {"anyOf": [one, {"type": "string"}, NULL]}}
+    return WithJsonSchema({"anyOf": [one, *texts, several]})
 
 
 _CELLS = PlainValidator(_of_cases)
-PositiveColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "exclusiveMinimum": 0})]
-NotNegativeColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "minimum": 0})]
-HertzColumn = Annotated[
-    Any, _CELLS, _or_listed({"type": "number", "minimum": 0, "maximum": MOST_HZ})
-]
-StiffnessColumn = Annotated[Any, _CELLS, _or_listed({"type": "number", "exclusiveMinimum": 0})]
+_ABOVE_ZERO: Any = {"type": "number", "exclusiveMinimum": 0}
+_FROM_ZERO: Any = {"type": "number", "minimum": 0}
+PositiveColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, POSITIVE_TEXT)]
+NotNegativeColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO, PLAIN_TEXT)]
+HertzColumn = Annotated[Any, _CELLS, _or_listed({**_FROM_ZERO, "maximum": MOST_HZ}, PLAIN_TEXT)]
+StiffnessColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, POSITIVE_TEXT, RIGID)]
 
 
-DeviationColumn = Annotated[
-    Any, PlainValidator(_of_deviations), _or_listed({"type": "number", "minimum": 0})
-]
-ContactColumn = Annotated[
-    Any, PlainValidator(_words), _or_listed({"type": "string", "enum": [*CONTACTS]})
-]
-DirectionColumn = Annotated[
-    Any, PlainValidator(_words), _or_listed({"type": "string", "enum": [*DIRECTIONS]})
-]
+DeviationColumn = Annotated[Any, PlainValidator(_of_deviations), _or_listed(_FROM_ZERO, PLAIN_TEXT)]
+_WORDS = PlainValidator(_words)
+ContactColumn = Annotated[Any, _WORDS, _or_listed({"type": "string", "enum": [*CONTACTS]})]
+DirectionColumn = Annotated[Any, _WORDS, _or_listed({"type": "string", "enum": [*DIRECTIONS]})]
 
 
 class InputColumns(Strict):
@@ -341,14 +410,14 @@ class InputColumns(Strict):
     mu0: PositiveColumn = Field(description=_MU0)
     Fz: PositiveColumn = Field(description=_FZ)
     k: StiffnessColumn = either('Tangential stiffness [N/m], or "rigid"; or k_low and k_high')
-    y0: NotNegativeColumn = either("Amplitude of the oscillation [m], half of peak to peak")
-    omega: NotNegativeColumn = either("Angular frequency [rad/s]; or f")
-    f: HertzColumn = either("Frequency [Hz], in place of omega")
+    y0: NotNegativeColumn = optional("Amplitude of the oscillation [m], half of peak to peak")
+    omega: NotNegativeColumn = optional("Angular frequency [rad/s]; or f")
+    f: HertzColumn = optional("Frequency [Hz], in place of omega")
     v0: NotNegativeColumn = Field(description=_V0)
-    Fz_amplitude: NotNegativeColumn = either(_AMPLITUDE)
-    k_low: PositiveColumn = either(_LOW)
-    k_high: PositiveColumn = either(_HIGH)
-    k_range: Pair | None = optional(f"For every case, in place of k: {BOUND}")
+    Fz_amplitude: NotNegativeColumn = optional(_AMPLITUDE)
+    k_low: PositiveColumn = optional(_LOW)
+    k_high: PositiveColumn = optional(_HIGH)
+    k_range: Interval | None = optional(f"For every case, in place of k: {BOUND}")
 
     @property
     def columns(self) -> dict[str, Any]:

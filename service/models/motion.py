@@ -1,6 +1,6 @@
 """Any periodic motion: what is asked, and its steady cycle."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -23,8 +23,8 @@ from mumacro.inputs.kind import ContactName
 from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
 from mumacro.inputs.reading import read_one, reason_of
 
-from .answers import Number, Numbers, quantity
-from .inputs import EXAMPLE, ONE_FREQUENCY, Strict, optional
+from .answers import Number, Numbers, Understood, quantity, understood_inputs
+from .inputs import EXAMPLE, ONE_FREQUENCY, Strict, either, optional
 from .values import (
     AngularFrequency,
     Force,
@@ -93,7 +93,7 @@ def _of_its_form(value: Any, _: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, list):
         return _AMPLITUDE.validate_python(value)
     if value and not isinstance(value[0], dict):
-        return _PAIR.validate_python(value)
+        return _PAIR.validate_python(_pair_of_numbers(name, value))
     parts = [
         _with_numbers(name, part, (i,)) if isinstance(part, dict) else part
         for i, part in enumerate(value[: MAX_TERMS + 1])
@@ -101,18 +101,30 @@ def _of_its_form(value: Any, _: Any, info: ValidationInfo) -> Any:
     return [(one.harmonic, one.amplitude, one.phase) for one in _LISTED.validate_python(parts)]
 
 
+def _pair_of_numbers(name: str, pair: list[Any]) -> list[Any]:
+    """An amplitude and its phase as numbers, where they are texts."""
+    numbers = [*pair]
+    for i, kind in enumerate((QUANTITY_OF[name], "angle")[: len(pair)]):
+        if isinstance(pair[i], str):
+            numbers[i] = _number(name, pair[i], kind, (i,))
+    return numbers
+
+
+def _number(name: str, text: str, kind: str, place: tuple[str | int, ...]) -> float:
+    """The number of a text in SI, refused at its place within the oscillation."""
+    try:
+        return read_one(name, text, kind)
+    except InputError as error:
+        reason = InitErrorDetails(type=fault(reason_of(error.bound)), loc=place, input=text)
+        raise ValidationError.from_exception_data(name, [reason]) from None
+
+
 def _with_numbers(name: str, part: dict[str, Any], place: tuple[int, ...]) -> dict[str, Any]:
     """A part with numbers for amplitude and phase that are texts, such as "2um" and "90 deg"."""
     numbers = dict(part)
     for member, kind in (("amplitude", QUANTITY_OF[name]), ("phase", "angle")):
         if isinstance(part.get(member), str):
-            try:
-                numbers[member] = read_one(member, part[member], kind)
-            except InputError as error:
-                reason = InitErrorDetails(
-                    type=fault(reason_of(error.bound)), loc=(*place, member), input=part[member]
-                )
-                raise ValidationError.from_exception_data(name, [reason]) from None
+            numbers[member] = _number(name, part[member], kind, (*place, member))
     return numbers
 
 
@@ -178,6 +190,9 @@ class MotionRequest(Strict):
         1e-6, description="Of the mean force over mu0 Fz"
     )
     cycle: bool = Field(False, description="Whether the answer has one period of the forces")
+    include: Annotated[list[Literal["inputs"]], Field(max_length=16)] = either(
+        "More to answer: inputs (what was understood of them)"
+    )
 
     @model_validator(mode="after")
     def _within_the_time(self) -> Self:
@@ -202,7 +217,8 @@ class MotionRequest(Strict):
     def case(self) -> dict[str, Any]:
         """The arguments of ``mumacro.motion`` that are given."""
         values = self.__dict__
-        return {name: x for name, x in values.items() if name != "cycle" and x is not None}
+        own = ("cycle", "include")
+        return {name: x for name, x in values.items() if name not in own and x is not None}
 
 
 class CycleColumns(BaseModel):
@@ -236,4 +252,5 @@ class MotionAnswer(BaseModel):
     )
     contact: ContactName
     cycle: CycleColumns | None = Field(None, description="Only if requested")
+    inputs: dict[str, Understood] | None = understood_inputs()
     api_version: str

@@ -3,7 +3,7 @@
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from mumacro.errors import InputError
 from mumacro.inputs.kind import ContactName, DirectionName, Kind, kind_of
@@ -33,8 +33,8 @@ else:
     Include = Literal[(*OUTPUTS, *_BESIDE)]
 _INCLUDE = (
     "More to compute: groups (v~, y~, l0), limits (of the friction law), gradient, std (standard "
-    "deviation), stick_fraction, power, settling, and for one case model (what it leaves out here) "
-    "and inputs (what was understood of them)"
+    "deviation), stick_fraction, power, settling; for one case model (what it leaves out here); "
+    "not for a batch inputs (what was understood of them)"
 )
 _CONTACT = "One spring of stiffness k, or a ball on a flat (Hertz) whose stiffness before slip is k"
 _DIRECTION = (
@@ -115,7 +115,7 @@ class StdColumns(Strict):
 class Outputs(Strict):
     """What is computed beside the default answer."""
 
-    include: Annotated[list[Include], Field(max_length=16)] | None = optional(
+    include: Annotated[list[Include], Field(max_length=16)] = either(
         f"{_INCLUDE}; in a query joined by commas"
     )
 
@@ -125,9 +125,19 @@ class Outputs(Strict):
         return tuple(name for name in self.include or () if name not in _BESIDE)
 
     @property
+    def beside(self) -> list[str]:
+        """The others: ``model`` and ``inputs``."""
+        return [name for name in self.include or () if name in _BESIDE]
+
+    @property
     def model(self) -> bool:
         """Whether remarks on the model are wanted."""
-        return MODEL in (self.include or ())
+        return MODEL in self.beside
+
+    @property
+    def understood(self) -> bool:
+        """Whether it is wanted what was understood of the inputs."""
+        return UNDERSTOOD in self.beside
 
 
 class Options(Outputs, Choice):
@@ -242,4 +252,6 @@ class CaseQuery(QueryOptions, OneCase):
 class TextQuery(CaseQuery):
     """One case and the value that is wanted of its answer."""
 
-    value: str = Field("mu_macro", description="Such as mu_macro, regime or power.saved")
+    value: Annotated[str, BeforeValidator(str)] = Field(
+        "mu_macro", description="Such as mu_macro, regime or power.saved"
+    )

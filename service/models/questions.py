@@ -32,9 +32,9 @@ from .inputs import (
     EXAMPLE,
     NOT_BOTH,
     OR_RIGID,
+    Interval,
     Name,
     OtherInputs,
-    Pair,
     Strict,
     optional,
 )
@@ -59,12 +59,20 @@ MAX_TARGETS = 10_000
 MAX_POINTS = 1000  # of a fit, which scipy answers within seconds
 
 # JSON has one kind of number: 55.0 is an integer there, and in a JSON Schema
-_Whole = Annotated[
-    int,
-    Field(ge=2, le=MAX_VALUES),
-    BeforeValidator(lambda n: int(n) if isinstance(n, float) and n.is_integer() else n),
+_AS_WHOLE = BeforeValidator(lambda n: int(n) if isinstance(n, float) and n.is_integer() else n)
+_Whole = Annotated[int, Field(ge=2, le=MAX_VALUES), _AS_WHOLE]
+_Exponent = Annotated[
+    Ratio,
+    Field(ge=0, le=1),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0, "maximum": 1},
+                {"type": "string", "pattern": r"^0(\.[0-9]{1,9})?$"},
+            ]
+        }
+    ),
 ]
-_Exponent = Annotated[Ratio, Field(ge=0, le=1)]
 _EXPONENT = (
     "For Fz only: k grows as Fz to this power, and Fz of the case is the load at which k holds; "
     "left out: 1/3 for a ball with Fz, else k is constant"
@@ -102,7 +110,7 @@ class LawRequest(Options, Sweep, OtherInputs):
         }
     )
 
-    k_range: Pair | None = optional(f"In place of k: {BOUND}")
+    k_range: Interval | None = optional(f"In place of k: {BOUND}")
 
 
 class LawQuery(QueryOptions, Sweep, OtherInputs):
@@ -127,7 +135,7 @@ class SolveForRequest(Options, OtherInputs):
         }
     )
 
-    k_range: Pair | None = optional(f"In place of k: {BOUND}")
+    k_range: Interval | None = optional(f"In place of k: {BOUND}")
     unknown: Unknown = Field(
         description="The input to solve for, which is left out of the case; of a motion also the "
         "amplitude or the phase of a part"
@@ -173,7 +181,8 @@ class SolveForRequest(Options, OtherInputs):
     @property
     def is_motion(self) -> bool:
         """Whether the question is about any motion."""
-        return "." in self.unknown or not self.model_fields_set.isdisjoint((*PARTS, "of"))
+        of_motions = (getattr(self, name) for name in (*PARTS, "of"))
+        return "." in self.unknown or any(part is not None for part in of_motions)
 
     @property
     def motion(self) -> dict[str, Any]:
@@ -183,6 +192,8 @@ class SolveForRequest(Options, OtherInputs):
             for name in self.model_fields_set
             if (value := getattr(self, name)) is not None
         }
+        if not (self.outputs or self.model):  # inputs, what was understood
+            given.pop("include", None)
         for name in _NOT_OF_A_MOTION:
             if name in values:
                 raise InputError(name, None, "left out over a motion: x, y and normal say it")
@@ -191,7 +202,18 @@ class SolveForRequest(Options, OtherInputs):
 
 # --- stiffness ------------------------------------------------------------------------------------
 
-_Poisson = Annotated[Ratio, Field(gt=-1, le=0.5)]
+_Poisson = Annotated[
+    Ratio,
+    Field(gt=-1, le=0.5),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": -1, "maximum": 0.5},
+                {"type": "string", "pattern": r"^0(\.[0-4][0-9]{0,8})?$"},
+            ]
+        }
+    ),
+]
 if TYPE_CHECKING:
     _Geometry = str
 else:
@@ -333,7 +355,7 @@ class FitRequest(Choice):
     encoding: Annotated[str, Field(max_length=40)] | None = optional(
         "Of the bytes, such as utf-8, utf-16, windows-1252; left out: found in them"
     )
-    skip: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
+    skip: Annotated[int, Field(ge=0, le=1_000_000), _AS_WHOLE] = Field(
         0, description="Lines to leave out at the beginning of the table"
     )
     read_only: bool = Field(False, description="Answer what was read of the table, without a fit")
@@ -355,7 +377,7 @@ class FitRequest(Choice):
                 if getattr(self, column) is None:
                     raise InputError(column, None, "given: a list, or a table as points")
             for option in ("sep", "decimal", "thousands", "encoding", "skip", "read_only"):
-                if option in self.model_fields_set:
+                if option in self.model_fields_set and getattr(self, option) is not None:
                     raise InputError(option, None, "left out: it belongs to a table, points")
         return self
 

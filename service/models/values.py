@@ -22,6 +22,7 @@ Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 RIGID = {"const": "rigid", "type": "string"}
 #: a number as text; the library reads more than this pattern
 PLAIN_TEXT = {"type": "string", "pattern": r"^[0-9]{1,9}(\.[0-9]{1,9})?$"}
+POSITIVE_TEXT = {"type": "string", "pattern": r"^[1-9][0-9]{0,8}(\.[0-9]{1,9})?$"}
 
 
 def fault(reason: str) -> PydanticCustomError:

@@ -3,7 +3,7 @@
 from dataclasses import fields
 from typing import Any
 
-from fastapi import Response
+from fastapi import Request, Response
 
 import mumacro
 from mumacro.errors import InputError
@@ -11,8 +11,9 @@ from mumacro.errors import InputError
 from .. import API_VERSION
 from ..limits import Working
 from ..models.motion import MotionAnswer, MotionRequest
-from ..problems import FieldFault, reason_of, refuse
+from ..problems import FieldFault, reason_of, refuse, with_members
 from ..reading import Json, StrictRoute
+from ..understood import understood_in
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers", StrictRoute)
@@ -24,10 +25,12 @@ _NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnsw
     responses={200: {"model": MotionAnswer}, **POST_PROBLEMS},
     summary="The mean friction of any periodic motion",
 )
-async def post_motion(scene: MotionRequest, work: Working) -> Response:
+async def post_motion(request: Request, scene: MotionRequest, work: Working) -> Response:
     """Compute the steady cycle of a contact that is shaken obliquely, in an ellipse, with harmonics
     or with an oscillating load."""
-    return await work.question(lambda: Json(_answered(scene)), scene.cost)
+    more = await understood_in(request, bool(scene.include))
+    with with_members(**more):
+        return await work.question(lambda: Json(_answered(scene) | more), scene.cost)
 
 
 def _answered(scene: MotionRequest) -> dict[str, Any]:

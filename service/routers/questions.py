@@ -7,7 +7,7 @@ import itertools
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import Query, Response
+from fastapi import Query, Request, Response
 
 import mumacro
 from mumacro.analysis.law import Law
@@ -15,7 +15,7 @@ from mumacro.analysis.solve_for import Solution
 from mumacro.analysis.stiffening import Stiffening
 from mumacro.answer import Answer, nested
 from mumacro.errors import InputError
-from mumacro.inputs.cases import Cases, named
+from mumacro.inputs.cases import Cases, ends_in, named
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.reading import read_one
 from mumacro.kernel.arrays import Array
@@ -30,8 +30,10 @@ from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
 from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
 from ..models.questions import LawQuery, LawRequest, SolveForRequest
+from ..problems import with_members
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
+from ..understood import UNDERSTOOD, understood_in
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers", StrictRoute)
@@ -98,8 +100,11 @@ def _remarks_on(
     responses={200: {"model": LawAnswer}, **POST_PROBLEMS},
     summary="mu_macro over a range of one input",
 )
-async def post_law(question: LawRequest, tables: Loaded, work: Working) -> Response:
+async def post_law(
+    request: Request, question: LawRequest, tables: Loaded, work: Working
+) -> Response:
     """Return the law in columns, with its static limit and its border."""
+    more = await understood_in(request, question.understood)
 
     def answer() -> Response:
         table = tables.pick(question.tolerance)
@@ -108,9 +113,11 @@ async def post_law(question: LawRequest, tables: Loaded, work: Working) -> Respo
         axis = {"along": along, "unit": unit_of(along), "values": law.values}
         border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in law.border]
         remarks = _remarks_on(question, along, question.inputs, law.stiffening)
+        remarks |= more
         return Json({**axis, **nested(columns), "border": border, **remarks, **table.signature})
 
-    return await work.question(answer)
+    with with_members(**more):
+        return await work.question(answer)
 
 
 _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
@@ -129,6 +136,8 @@ async def get_law_csv(
     units."""
 
     def answer() -> Response:
+        if question.understood:
+            raise InputError("include", UNDERSTOOD, f"without {UNDERSTOOD}, which JSON has")
         law, columns = _law(question, tables.pick(question.tolerance))
         along = question.along
         heads = {f"{along} [{unit_of(along)}]": law.values.tolist()}
@@ -170,15 +179,19 @@ _NO_LIMIT = 1e300
     responses={200: {"model": SolveForAnswer | SolveMotionAnswer}, **POST_PROBLEMS},
     summary="The value of one input that gives a wanted mu_macro",
 )
-async def post_solve_for(question: SolveForRequest, tables: Loaded, work: Working) -> Response:
+async def post_solve_for(
+    request: Request, question: SolveForRequest, tables: Loaded, work: Working
+) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the
     range of mu_macro.  With ``x``, ``y`` or ``normal`` the question is about any motion."""
-    if question.is_motion:
-        cost = MOTIONS_OF_A_SEARCH * cost_of(
-            question.contact, question.x, question.y, question.normal
-        )
-        return await work.question(lambda: Json(_solved_motion(question)), cost)
-    return await work.question(lambda: Json(_solved(question, tables)))
+    more = await understood_in(request, question.understood)
+    with with_members(**more):
+        if question.is_motion:
+            cost = MOTIONS_OF_A_SEARCH * cost_of(
+                question.contact, question.x, question.y, question.normal
+            )
+            return await work.question(lambda: Json(_solved_motion(question) | more), cost)
+        return await work.question(lambda: Json(_solved(question, tables) | more))
 
 
 def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
@@ -248,7 +261,7 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     answer["quantity"] = question.quantity
     answer |= _results(question, solution, included, unit)
     if solution.ends:
-        ks = case.get("k_range") or (case["k_low"], case["k_high"])
+        ks = ends_in(case) or ()
         answer["ends"] = [
             {"k": k, **_results(question, end, None, unit)}
             for k, end in zip(ks, solution.ends, strict=True)

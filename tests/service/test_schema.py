@@ -60,7 +60,12 @@ RELATIONS = (
     r"must be left out where",
     r"must be given\b",
     r"must be without \w+ for ",
-    r"must be without model",
+    r"must be without (model|inputs)",
+    r"must be left out over a motion",
+    r"speed must be at most",
+    r"must be > 0, or x or y an oscillation",
+    r"must be left out: this direction has no",
+    r"must be >= 1e-07 for a ball",
     r"must be one of mu_macro",
     r"must be left out, because \w+ is the unknown",
     r"must be finite and > 0, or rigid",  # a law that goes along k from 0
@@ -70,8 +75,9 @@ RELATIONS = (
 OF_PATH = {
     "/v1/stiffness": (
         r"must be finite in at least one of the two bodies",
-        r"must be >= \S+, the width of the contact",
+        r"must be >= \S+, the (half )?width of the contact",
         r"must be finite and > 0, from ",
+        r"must be in pascals: did you mean",
     ),
     "/v1/fit": (
         r"must be left out: it is among the unknowns",

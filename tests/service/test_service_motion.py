@@ -32,6 +32,7 @@ NUMBERS = (
 SCENES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "across": ({"y": 2e-6}, {"y": 2e-6}),
     "ellipse": ({"x": [1e-6, 90], "y": 2e-6}, {"x": (1e-6, 90.0), "y": 2e-6}),
+    "texts": ({"x": ["1um", "90 deg"], "y": "2 µm"}, {"x": (1e-6, 90.0), "y": 2e-6}),
     "harmonics": (
         {"y": [{"amplitude": 2e-6}, {"harmonic": 3.0, "amplitude": 4e-7, "phase": 450}]},
         {"y": [(1, 2e-6, 0.0), (3, 4e-7, 450.0)]},
@@ -96,7 +97,7 @@ def test_what_never_slips_has_no_period_of_decay(client: Any) -> None:
         ({"y": "2 kN"}, "#/y", "metres"),
         ({"y": True}, "#/y", "number"),
         ({"y": [2e-6]}, "#/y/1", "required"),
-        ({"y": [2e-6, "90"]}, "#/y/1", "number"),
+        ({"y": [2e-6, "90 N"]}, "#/y/1", "degrees"),
         ({"y": [2e-6, 0, 1]}, "#/y", "2 entries"),
         ({"y": [{"amplitude": 2e-6, "harmonic": 1.5}]}, "#/y/0/harmonic", WHOLE),
         ({"y": [{"amplitude": 2e-6, "harmonic": 0}]}, "#/y/0/harmonic", WHOLE),

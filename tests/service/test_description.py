@@ -1,0 +1,89 @@
+"""The description agrees with the service: where null is accepted, and what may be left out."""
+
+from typing import Any
+
+import pytest
+
+from tests.support.serving import CASE
+
+LAW = {name: x for name, x in CASE.items() if name != "v0"} | {
+    "start": 1e-3,
+    "stop": 1.0,
+    "points": 3,
+}
+TARGET = {name: x for name, x in CASE.items() if name != "y0"} | {"unknown": "y0", "target": 0.15}
+POINTS = {"v0": [0.001, 0.005, 0.02, 0.1], "mu_macro": [0.069, 0.174, 0.247, 0.289]}
+#: by model: the path, and a body that is answered
+BODIES: dict[str, tuple[str, dict[str, Any]]] = {
+    "CaseRequest": ("mu-macro", CASE),
+    "Case": ("mu-macro/batch", CASE),
+    "CaseColumns": ("mu-macro/batch", {**CASE, "v0": [0.01, 0.1]}),
+    "LawRequest": ("law", LAW),
+    "SolveForRequest": ("solve-for", TARGET),
+    "MotionRequest": ("motion", {n: x for n, x in CASE.items() if n != "y0"} | {"y": 2e-6}),
+    "StiffnessRequest": (
+        "stiffness",
+        {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3},
+    ),
+    "FitRequest": ("fit", {**POINTS, "Fz": 10.0, "y0": 4e-7, "f": 20e3}),
+}
+#: null is accepted where the input is the unknown one, which no schema of a member says
+OF_RELATIONS = {("LawRequest", "k"), ("SolveForRequest", "k"), ("FitRequest", "k")}
+
+
+@pytest.fixture(scope="module")
+def schemas(client: Any) -> dict[str, Any]:
+    described: dict[str, Any] = client.get("/openapi.json").json()
+    return described["components"]["schemas"]  # type: ignore[no-any-return]
+
+
+def _asked(client: Any, model: str, body: dict[str, Any]) -> tuple[int, Any]:
+    path = BODIES[model][0]
+    answer = client.post(f"/v1/{path}", json=[body] if model == "Case" else body)
+    document = answer.json()
+    if model == "Case" and document["errors"]:
+        return 422, document
+    return answer.status_code, document
+
+
+@pytest.mark.parametrize("model", BODIES)
+def test_null_is_accepted_where_the_description_has_it(
+    client: Any, schemas: dict[str, Any], model: str
+) -> None:
+    body = BODIES[model][1]
+    status, right = _asked(client, model, body)
+    assert status == 200, right
+    assert body.keys() <= schemas[model]["properties"].keys()
+    for name, schema in schemas[model]["properties"].items():
+        if (model, name) in OF_RELATIONS:
+            continue
+        nullable = {"type": "null"} in schema.get("anyOf", ())
+        with_null = {**body, name: None}
+        status, answer = _asked(client, model, with_null)
+        if not nullable:
+            assert status == 422, name
+        elif name in body:  # the same as left out, which may be refused for what is missing
+            rest = {member: x for member, x in body.items() if member != name}
+            again, same = _asked(client, model, rest)
+            assert status == again, name
+            assert status != 200 or answer == same, name
+        else:
+            assert (status, answer) == (200, right), name
+
+
+def test_members_that_may_be_left_out_have_no_default_in_the_description(
+    schemas: dict[str, Any],
+) -> None:
+    """Clients that are made from it would require them."""
+    for name, schema in schemas.items():
+        for member, described in schema.get("properties", {}).items():
+            assert "default" not in described, f"{name}.{member}"
+    contact = schemas["CaseRequest"]["properties"]["contact"]
+    assert contact["description"].endswith("left out: spring")
+    assert "contact" not in schemas["CaseRequest"]["required"]
+
+
+def test_no_parameter_of_a_query_is_null(client: Any) -> None:
+    for path, operations in client.get("/openapi.json").json()["paths"].items():
+        for parameter in operations.get("get", {}).get("parameters", ()):
+            assert {"type": "null"} not in parameter["schema"].get("anyOf", ()), path
