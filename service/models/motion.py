@@ -32,7 +32,7 @@ from .values import (
     Friction,
     NotNegative,
     Speed,
-    Stiffness,
+    StiffnessEnd,
     fault,
     text_schema,
 )
@@ -165,7 +165,7 @@ class MotionRequest(Strict):
 
     mu0: Friction = Field(description="Coulomb friction coefficient of the contact [-]")
     Fz: Force = Field(description="Mean normal force [N]")
-    k: Stiffness = Field(
+    k: StiffnessEnd = Field(
         description="Tangential stiffness of the contact [N/m]; a rigid contact is the limit of a "
         "large one"
     )

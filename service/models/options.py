@@ -132,12 +132,12 @@ class Outputs(Strict):
     @property
     def model(self) -> bool:
         """Whether remarks on the model are wanted."""
-        return MODEL in self.beside
+        return MODEL in (self.include or ())
 
     @property
     def understood(self) -> bool:
         """Whether it is wanted what was understood of the inputs."""
-        return UNDERSTOOD in self.beside
+        return UNDERSTOOD in (self.include or ())
 
 
 class Options(Outputs, Choice):

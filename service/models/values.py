@@ -64,19 +64,21 @@ def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
     return {"type": "string", "pattern": rf"^{digits}(\.[0-9]{{1,9}})?({of_unit})?$"}
 
 
-def _schema(name: str, positive: bool, example: float | None = None) -> dict[str, Any]:
+def _schema(
+    name: str, positive: bool, example: float | None = None, rigid: bool = True
+) -> dict[str, Any]:
     sign = "exclusiveMinimum" if positive else "minimum"
     number: dict[str, Any] = {"type": "number", sign: 0}
     if QUANTITY_OF[name] == "frequency":
         number["maximum"] = MOST_HZ
     kinds = [number, text_schema(QUANTITY_OF[name], positive)]
-    if QUANTITY_OF[name] in ("stiffness", "pressure") and positive:
+    if rigid and QUANTITY_OF[name] in ("stiffness", "pressure") and positive:
         kinds.append(RIGID)
     return {"anyOf": kinds, **({} if example is None else {"examples": [example]})}
 
 
-def _is(name: str, positive: bool, example: float | None = None) -> WithJsonSchema:
-    return WithJsonSchema(_schema(name, positive, example))
+def _is(name: str, positive: bool, example: float | None = None, **more: bool) -> WithJsonSchema:
+    return WithJsonSchema(_schema(name, positive, example, **more))
 
 
 _CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
@@ -84,8 +86,9 @@ _CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
 Friction = Annotated[Positive, _CHECKED, _is("mu0", True, 0.3)]
 Force = Annotated[Positive, _CHECKED, _is("Fz", True, 10.0)]
 Stiffness = Annotated[Positive, _CHECKED, _is("k", True, 1e6)]
-#: stands in place of k, so the example of a whole request has none
-StiffnessEnd = Annotated[Positive, _CHECKED, _is("k", True)]
+#: of a contact that is not rigid; an end of an interval stands in place of k, so the example of a
+#: whole request has none
+StiffnessEnd = Annotated[Positive, _CHECKED, _is("k", True, rigid=False)]
 Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False, 2e-6)]
 ForceAmplitude = Annotated[NotNegative, _CHECKED, _is("Fz_amplitude", False)]
 AngularFrequency = Annotated[NotNegative, _CHECKED, _is("omega", False)]

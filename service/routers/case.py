@@ -14,7 +14,7 @@ from mumacro.validity import digits, k_effect, model_rows
 
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
-from ..problems import with_members
+from ..problems import of_input
 from ..reading import DirectRoute, Json, dump
 from ..understood import UNDERSTOOD, understood
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
@@ -39,9 +39,9 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     state, inputs = request.app.state, case.inputs
     table = state.tables.pick(case.tolerance)
     more: dict[str, Any] = {}
-    if case.understood:
+    if case.include and UNDERSTOOD in case.include:
         more = {UNDERSTOOD: understood(case.model_dump(warnings=False))}
-    with with_members(**more):
+    try:
         if case.model_fields_set <= _PLAIN and "k_range" not in inputs:
             answer = table.surrogate.evaluate(**inputs)
         else:
@@ -53,6 +53,8 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
         if case.model:
             work = partial(_of_model, table.surrogate, inputs, case.kind.names)
             more |= await state.work.question(work)
+    except InputError as error:  # as with_members has it, which is a function more
+        raise of_input(error, **more) from None
     state.metrics.case(table, answer.source_code)
     return {**answer.to_dict(), **more, **table.signature}
 

@@ -63,6 +63,8 @@ RELATIONS = (
     r"must be without (model|inputs)",
     r"must be left out over a motion",
     r"speed must be at most",
+    r"mu0 Fz / k must be a length",
+    r"must be finite: a rigid contact is the limit",
     r"must be > 0, or x or y an oscillation",
     r"must be left out: this direction has no",
     r"must be >= 1e-07 for a ball",
