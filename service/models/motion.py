@@ -18,7 +18,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mumacro.analysis.motion import TOLERANCES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import QUANTITY_OF
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF
 from mumacro.inputs.kind import ContactName
 from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
 from mumacro.inputs.reading import read_one, reason_of
@@ -58,6 +58,7 @@ _Harmonic = Annotated[
     WithJsonSchema({"type": "integer", "minimum": 1, "maximum": MOST_HARMONIC}),
 ]
 _POSITIVE = WithJsonSchema({"type": "number", "exclusiveMinimum": 0})  # the library has the reason
+_HERTZ = WithJsonSchema({"type": "number", "exclusiveMinimum": 0, "maximum": MOST_HZ})
 _Degrees = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -172,7 +173,7 @@ class MotionRequest(Strict):
     omega: Annotated[AngularFrequency, _POSITIVE] | None = optional(
         "Angular frequency of the period [rad/s]; omega or f is required"
     )
-    f: Annotated[Frequency, _POSITIVE] | None = optional(
+    f: Annotated[Frequency, _HERTZ] | None = optional(
         "Frequency of the period [Hz], in place of omega"
     )
     v0: Speed = Field(description="Speed of the drag along x [m/s]")

@@ -21,7 +21,7 @@ from mumacro.analysis.motion import PARTS
 from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import QUANTITY_OF, STIFFNESS
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.reading import no_number, read_one, reason_of
@@ -193,7 +193,7 @@ class SolveForRequest(Options, OtherInputs):
             if (value := getattr(self, name)) is not None
         }
         if not (self.outputs or self.model):  # inputs, what was understood
-            given.pop("include", None)
+            values.pop("include", None)
         for name in _NOT_OF_A_MOTION:
             if name in values:
                 raise InputError(name, None, "left out over a motion: x, y and normal say it")
@@ -294,6 +294,11 @@ PositivePoints = Annotated[
 NotNegativePoints = Annotated[
     Any, _POINTS, WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, _LISTED]})
 ]
+HertzPoints = Annotated[
+    Any,
+    _POINTS,
+    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0, "maximum": MOST_HZ}, _LISTED]}),
+]
 StiffnessPoints = Annotated[Any, _POINTS, WithJsonSchema({"anyOf": [*OR_RIGID, _LISTED]})]
 MeasuredPoints = Annotated[Any, _POINTS, WithJsonSchema(_LISTED)]
 
@@ -335,7 +340,7 @@ class FitRequest(Choice):
         "Amplitude of the oscillation [m], half of peak to peak"
     )
     omega: NotNegativePoints | None = optional("Angular frequency [rad/s]; or f")
-    f: NotNegativePoints | None = optional("Frequency [Hz], in place of omega")
+    f: HertzPoints | None = optional("Frequency [Hz], in place of omega")
     Fz_amplitude: NotNegativePoints | None = optional(
         "Amplitude of the normal force [N], for direction normal in place of y0"
     )
