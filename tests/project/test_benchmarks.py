@@ -45,12 +45,15 @@ def test_a_result_is_put_between_its_markers(
 ) -> None:
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- begin times -->\n\nold\n\n<!-- end times -->\nafter\n", "utf-8")
-    monkeypatch.setattr(measuring, "PAGES", (page,))
+    other = tmp_path / "other.md"
+    empty = "<!-- begin trial-other, table -->\n\n{}\n\n<!-- end trial-other -->\n"
+    other.write_text(empty.format("old"), "utf-8")
+    monkeypatch.setattr(measuring, "PAGES", (page, other))
     monkeypatch.setattr(measuring, "RESULTS", tmp_path / "results")
     monkeypatch.setattr(sys, "argv", ["benchmarks/trial.py", "--write", "--points", "7"])
     sections = {
         "times": lambda points: f"{points} points",
-        "other": lambda points: "elsewhere",  # noqa: ARG005
+        "other": lambda points: "| elsewhere |\n| --- |\n| 1 |\n\nIn words.",  # noqa: ARG005
     }
     measuring.main(None, sections, points=5)
     stored = (tmp_path / "results" / "trial-times.md").read_text("utf-8")
@@ -60,7 +63,8 @@ def test_a_result_is_put_between_its_markers(
         == f"before\n<!-- begin times -->\n\n{stored}\n<!-- end times -->\nafter\n"
     )
     assert (tmp_path / "results" / "trial-other.md").exists()
-    assert "## other\n\nelsewhere" in capsys.readouterr().out
+    assert other.read_text("utf-8") == empty.format("| elsewhere |\n| --- |\n| 1 |")
+    assert "## other\n\n| elsewhere" in capsys.readouterr().out
     for short in ("--quick", "--share=0.5"):  # short runs are never stored
         monkeypatch.setattr(sys, "argv", ["trial.py", "--write", short])
         with pytest.raises(SystemExit):

@@ -28,7 +28,7 @@ IMAGES = ROOT / "docs" / "img"
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvicorn")
 FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 #: the documents that hold results, each between a begin and an end marker with the name of its
-#: section
+#: section; or its table alone, between "begin SCRIPT-SECTION, table" and "end SCRIPT-SECTION"
 PAGES = tuple(
     ROOT / path
     for path in (
@@ -36,6 +36,8 @@ PAGES = tuple(
         "docs/python.md",
         "docs/service.md",
         "docs/fits-and-motions.md",
+        "docs/how-to/friction-models.md",
+        "docs/measured.md",
         "tables/README.md",
     )
 )
@@ -91,13 +93,17 @@ def main(
 
 def write(script: str, section: str, text: str) -> None:
     RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{'-'.join(dict.fromkeys((script, section)))}.md").write_text(f"{text}\n", "utf-8")
+    name = "-".join(dict.fromkeys((script, section)))
+    (RESULTS / f"{name}.md").write_text(f"{text}\n", "utf-8")
+    table = "\n".join(line for line in text.splitlines() if line.startswith("|"))
     for path in PAGES:
         page = path.read_text("utf-8")
-        begin, end = f"<!-- begin {section} -->\n", f"<!-- end {section} -->"
-        if begin in page:
-            before, _, rest = page.partition(begin)
-            path.write_text(f"{before}{begin}\n{text}\n\n{end}{rest.partition(end)[2]}", "utf-8")
+        for shown, what, of in ((text, section, section), (table, f"{name}, table", name)):
+            begin, end = f"<!-- begin {what} -->\n", f"<!-- end {of} -->"
+            if begin in page:
+                before, _, rest = page.partition(begin)
+                page = f"{before}{begin}\n{shown}\n\n{end}{rest.partition(end)[2]}"
+                path.write_text(page, "utf-8")
 
 
 def processor() -> str:
