@@ -23,7 +23,7 @@ from mumacro.inputs.cases import KIND, check, without_interval
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.reading import NO_DEVIATION, read
+from mumacro.inputs.reading import NO_DEVIATION, read, read_one
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import belongs_to_value
@@ -175,7 +175,8 @@ def dialect_in(options: argparse.Namespace) -> Dialect:
 def add_exponent(parser: OneLineParser) -> None:
     """The option for a stiffness that grows with the load."""
     text = "k grows as Fz^M from its value at the case's Fz; of a ball: 1/3"
-    parser.add_argument("--stiffness-exponent", type=float, metavar="M", help=text)
+    number = number_of("stiffness_exponent")
+    parser.add_argument("--stiffness-exponent", type=number, metavar="M", help=text)
 
 
 def add_form(parser: argparse.ArgumentParser) -> None:
@@ -372,6 +373,19 @@ def format_for(
         return f".{options.digits}g"
     contact, direction = kind.names.values()
     return f".{digits(k_effect(surrogate, case, contact, direction))}g"
+
+
+def number_of(name: str, advice: str = "") -> Callable[[str], float]:
+    """The reader of an option that is a number, as 0.15, 0,15 or 15%; argparse says the fault of
+    another text, with the ``advice``."""
+
+    def number(text: str) -> float:
+        try:
+            return read_one(name, text)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(f"{error}{advice}") from None
+
+    return number
 
 
 def read_values(pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any]) -> list[Any]:

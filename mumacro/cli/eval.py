@@ -20,6 +20,7 @@ from mumacro.cli.common import (
 )
 from mumacro.files.reading import find_files
 from mumacro.files.run import evaluate_files
+from mumacro.inputs.doubts import Remark
 
 _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
@@ -118,22 +119,27 @@ def main(words: Sequence[str]) -> int:
                     **options,
                 )
             counts = f"{outcome.answered:,} of {outcome.rows:,} rows evaluated with {surrogate.id}"
+            remarks = "".join(map(_remark, outcome.remarks))
             if arguments.out == "-":
                 with outcome.out.open("rb") as stream:
                     shutil.copyfileobj(stream, sys.stdout.buffer)
                 sys.stderr.write(
                     (outcome.rejects.read_text("utf-8", "replace") if outcome.rejects else "")
-                    + f"{counts}\n"
+                    + f"{counts}{remarks}\n"
                 )
             else:
                 rejects = (
                     f"; {outcome.rejected:,} rejected: {outcome.rejects}" if outcome.rejects else ""
                 )
-                print(f"{counts}: {outcome.out}{rejects}")
-            for remark in outcome.remarks:
-                rows = f"{remark['cases']:,} rows, " if remark["cases"] > 1 else ""
-                console.print(f"doubtful: {rows}{remark['text']}")
+                print(f"{counts}: {outcome.out}{rejects}{remarks}")
     except KeyboardInterrupt:
         print("mumacro eval: interrupted; nothing was written", file=sys.stderr)
         return 130
     return 3 if outcome.rejected else 0
+
+
+def _remark(remark: Remark) -> str:
+    """A remark in the last line."""
+    cases = remark["cases"]
+    rows = f" in {cases:,} rows" if cases > 1 else ""
+    return f"; remark on {remark['field']}{rows}: {remark['text']}"

@@ -57,7 +57,7 @@ def run(words: Sequence[str]) -> str:
     add_parts(parser)
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
     text = "of the mean force over mu0 Fz, 1e-9 to 1e-2; default: 1e-6"
-    parser.add_argument("--tolerance", type=float, default=1e-6, help=text)
+    parser.add_argument("--tolerance", type=common.number_of("tolerance"), default=1e-6, help=text)
     text = "write the cycle there: a picture, .png, .svg or .pdf, or .csv"
     parser.add_argument("-o", "--out", type=Path, help=text)
     common.add_form(parser)

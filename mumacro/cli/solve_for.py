@@ -1,6 +1,5 @@
 """``mumacro solve-for``: the values of one input that give a mu_macro."""
 
-import argparse
 from collections.abc import Sequence
 
 from mumacro.analysis.law import law as friction_law
@@ -13,6 +12,7 @@ from mumacro.cli.common import (
     UsageError,
     as_json,
     in_columns,
+    number_of,
     open_table,
     read_case,
 )
@@ -22,17 +22,7 @@ from mumacro.inputs.reading import read_one
 from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
-
-
-def _target(text: str) -> float:
-    """A number; argparse says the fault of another text."""
-    try:
-        return float(text)
-    except ValueError:
-        fault = (
-            f"{text!r} is not a number: give mu_macro, such as 0.15, or with --ratio mu_macro/mu0"
-        )
-        raise argparse.ArgumentTypeError(fault) from None
+_TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"
 
 
 def run(words: Sequence[str]) -> str:
@@ -53,7 +43,9 @@ def run(words: Sequence[str]) -> str:
         },
     )
     parser = common.question("solve-for", description, epilog, "the other five inputs", first=first)
-    parser.add_argument("--target", type=_target, required=True, help="wanted mu_macro [-]")
+    parser.add_argument(
+        "--target", type=number_of("target", _TARGET), required=True, help="wanted mu_macro [-]"
+    )
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)

@@ -791,7 +791,9 @@ def test_headings_and_numbers_are_read_as_they_are_written() -> None:
         (("law", CASE, "--along", "v0"), 'expected 3 arguments, as in mumacro law "'),
         (("solve-for", "y0", CASE), 'missing: --target, as in mumacro solve-for y0 "'),
         (("stiffness",), "missing: GEOMETRY, as in mumacro stiffness ball"),
-        (("solve-for", "y0", CASE, "--target", "50%"), "'50%' is not a number: give mu_macro"),
+        (("solve-for", "y0", CASE, "--target", "half"), "got 'half': give mu_macro, such as 0.15"),
+        (("solve-for", "y0", CASE, "--target", "1..2"), "target must be one number"),
+        (("law", CASE, "--stiffness-exponent", "third"), "stiffness_exponent must be"),
     ],
 )
 def test_a_fault_of_the_words_says_what_to_write(capsys: Any, words: Any, fault: str) -> None:
@@ -801,3 +803,22 @@ def test_a_fault_of_the_words_says_what_to_write(capsys: Any, words: Any, fault:
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
     assert fault in lines[0]
+
+
+@pytest.mark.parametrize("text", ["0.15", "15%", "0,15", "15 percent", "1.5×10⁻¹"])
+def test_a_target_is_read_as_other_values_are(capsys: Capture, text: str) -> None:
+    words = CASE.replace("y0=2e-6 ", "")
+    answer = json.loads(output_of(capsys, 0, "solve-for", "y0", words, "--target", text, "--json"))
+    assert answer["target"] == 0.15
+
+
+def test_the_last_line_of_eval_has_the_remarks(capsys: Capture, tmp_path: Path) -> None:
+    cases = tmp_path / "cases.csv"
+    cases.write_text(
+        "mu0,Fz,k,y0,f,v0\n0.3,10,1,2e-6,2e4,0.01\n0.3,10,1,2e-6,2e4,0.1\n30,10,1e6,2e-6,2e4,1\n"
+    )
+    last = output_of(capsys, 0, "eval", str(cases), "-o", str(tmp_path / "out.csv")).splitlines()
+    assert len(last) == 1
+    assert last[0].startswith("3 of 3 rows evaluated with")
+    assert "; remark on mu0: mu0 = 30" in last[0]
+    assert "; remark on k in 2 rows: l0 = mu0 Fz / k = 3 m" in last[0]
