@@ -42,6 +42,7 @@ class CommandHelp(SphinxDirective):
     final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
+        self.env.note_reread()  # the program may have changed where the page has not
         (command,) = self.arguments
         text = help_of(command).strip()
         if "usage" not in text.lower():
@@ -57,6 +58,7 @@ class ScriptList(SphinxDirective):
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
+        self.env.note_reread()
         (folder,) = self.arguments
         rows = ["| script | what it does |", "| --- | --- |"]
         for path in sorted((ROOT / folder).glob("*.py")):
@@ -71,6 +73,7 @@ class RestReference(SphinxDirective):
     /openapi.json."""
 
     def run(self) -> list[nodes.Node]:
+        self.env.note_reread()
         from service.app import create_app
         from service.settings import Settings
 
@@ -90,7 +93,11 @@ def _operations(description: dict[str, Any]) -> Iterator[str]:
                 f"{operation.get('description', '')}\n"
             )
             fields = [
-                (p["name"], p["schema"], p.get("required", False))
+                (
+                    p["name"],
+                    {"description": p.get("description", ""), **p["schema"]},
+                    p.get("required", False),
+                )
                 for p in operation.get("parameters", [])
             ]
             yield from _table("query", fields, schemas)
@@ -122,7 +129,8 @@ def _resolved(schema: dict[str, Any], schemas: dict[str, Any]) -> list[dict[str,
 
 def _fields(schema: dict[str, Any], schemas: dict[str, Any], what: str) -> Iterator[str]:
     for one in _resolved(schema, schemas):
-        title = f"{what} {one['title']}" if "title" in one else what
+        name = one.get("title", "")
+        title = what if name.lower() in ("", what) else f"{what} {name}"
         yield from _table(title, _entries(one), schemas)
 
 
@@ -136,7 +144,7 @@ def _table(
     what: str, fields: list[tuple[str, dict[str, Any], bool]], schemas: dict[str, Any]
 ) -> Iterator[str]:
     if fields:
-        yield f"\n| {what} | | |\n| --- | --- | --- |"
+        yield f"\n| {what} | type | meaning |\n| --- | --- | --- |"
     for name, schema, required in fields:
         yield from _rows(name, schema, required, schemas)
 

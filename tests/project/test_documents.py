@@ -233,6 +233,7 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
         "errors[].reason",
     }
     assert paths <= {field for field, _ in rows}
+    assert "number > 0 or string | Coulomb friction coefficient of the contact [-] |" in text
     # an object is followed by its fields, unless the description does not fix them
     objects = (
         (one, other)
