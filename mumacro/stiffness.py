@@ -45,9 +45,9 @@ from typing import Any
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
 
-SMALLEST, LARGEST = 1e-60, 1e60  # of numbers in SI: every product of them below is a double
+SMALLEST, LARGEST = 1e-60, 1e60  # numbers in SI; every product of them below is a double
 AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
-# of the radius of a ball or cylinder: the half width of a contact above which Hertz's theory is off
+# the half width of a contact over the radius of ball or cylinder above which Hertz's theory is off
 WIDE = 0.1
 SOFT = 1e6  # [Pa]; a modulus below it may be meant in GPa
 

@@ -33,7 +33,7 @@ Reason = tuple[str | None, str]
 MORE_CASES = "send several requests, or give `mumacro eval` a file, or use Dask"
 SLICE = 8192  # cases that are computed and written at a time
 _READ = 256 * 1024  # bytes of a list that are read at a time
-_KNOWN = len(CaseColumns.model_fields)  # names that a case or its columns may have
+_KNOWN = len(CaseColumns.model_fields)  # number of names that a case or its columns may have
 
 
 class Body(NamedTuple):

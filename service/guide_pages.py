@@ -19,7 +19,7 @@ class GuidePages(StaticFiles):
     def __init__(self, directory: Path) -> None:
         super().__init__(directory=directory, html=True)
         hashes = "".join(sorted(f" 'sha256-{one}'" for one in set(_inline_scripts(directory))))
-        # styles are set on elements by the theme
+        # inline styles are allowed: the theme sets some on elements
         self._policy = (
             f"default-src 'none'; script-src 'self'{hashes}; style-src 'self' 'unsafe-inline'; "
             "img-src 'self' data:; font-src 'self'; connect-src 'self'; base-uri 'none'; "

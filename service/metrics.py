@@ -27,7 +27,7 @@ from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 from .tables import LoadedTable, Tables
 
 _SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
-# the files of prometheus_client for one worker, and what they hold with the labels below
+# the files of prometheus_client for one worker, and their size with the labels below
 _FILES = ("counter", "histogram", "gauge_mostrecent")
 _FILE_BYTES = 2**19
 _METHODS = frozenset({"GET", "HEAD", "POST"})

@@ -29,9 +29,10 @@ from .security import HEALTH_PATHS, NOSNIFF
 _GONE = 499  # the usual status for a client that disconnected before the answer
 _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs
 _OF_PROXIES = (b"x-forwarded-for", b"x-forwarded-proto")
-_MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
+# characters that are shown of a client's address, which behind a proxy is a header of any length
+_MOST_SHOWN = 64
 _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
-_MOST_OF_ODD = 1000  # characters of a value that cannot be written as it is
+_MOST_OF_ODD = 1000  # characters that are shown of a value that cannot be written as it is
 _WRITE_EVERY_S = 0.05
 
 _ESCAPED = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}

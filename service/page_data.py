@@ -78,8 +78,8 @@ _MATERIALS = {
         )
     ],
 }
-_WIDTH, _HEIGHT = 141, 101  # of the map's grid: twenty points a decade
-_UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
+_WIDTH, _HEIGHT = 141, 101  # points of the map's grid, twenty a decade
+_UNIT = 1e-4  # what 1 means in the map's integers; a shade of colour is a hundred times coarser
 
 
 def _impossible(contact: str, direction: str) -> str:

@@ -41,9 +41,9 @@ MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()
 CLOSE = {"Connection": "close"}
-# the members of an object within a body; of std the inputs
+# the members of the objects within a body
 _WITHIN = dict.fromkeys(PARTS, ("harmonic", "amplitude", "phase"))
-# how long, and how many bytes of a refused body are read
+# for how long, and how many bytes, a refused body is read
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
 _PAUSE_S = 1.0  # a client that sends nothing for so long has read the answer
 _log = logging.getLogger("mumacro.error")

@@ -26,11 +26,11 @@ from .limits import JSON, SMALL_BODY, Work, only_json, read_body
 from .problems import FieldFault, ProblemKind, RequestError, invalid, refuse
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
-# of a query that needs no decoding
+# the characters of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
-_FEW = 100  # members of a body that is not small
+_FEW = 100  # members, at most, of a body that is not small
 _LISTS = frozenset(("include",))
-_MOST_MEMBERS = 200  # of an object in a small body
+_MOST_MEMBERS = 200  # members of an object in a small body, at most
 
 
 # --- JSON -----------------------------------------------------------------------------------------

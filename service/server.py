@@ -17,12 +17,13 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from .observe import Observer
 from .problems import ProblemKind, RequestError, problem_of
 
-MAX_HEAD = 64 * 1024  # bytes of a request's head
-MAX_FIELDS = 100  # fields of a head
-_MOST_SHOWN = 200  # bytes of a path that is refused here
+MAX_HEAD = 64 * 1024  # bytes of a request's head, at most
+MAX_FIELDS = 100  # fields of a head, at most
+_MOST_SHOWN = 200  # bytes that are shown of a path that is refused here
 _PIECE = 2048  # bytes of a head that are read before its fields are counted
-_MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
-_LOOK_EVERY_S = 0.25  # whether the time of a connection is over
+# seconds after the deadline of an answer, which the application keeps itself where it can
+_MARGIN_S = 2.0
+_LOOK_EVERY_S = 0.25  # seconds between two looks whether the time of a connection is over
 _TOO_LARGE = RequestError(
     ProblemKind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
 )

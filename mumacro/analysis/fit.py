@@ -21,10 +21,10 @@ from mumacro.errors import InputError
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
-_PER_DECADE, _MOST_NODES = 10, 600  # of the first samples
+_PER_DECADE, _MOST_NODES = 10, 600  # the first samples: places a decade, places at most
 # y~, for normal v~, at which a contact is so soft that friction is mu0 to 6 digits or more
 _SOFT = {"across": 1e-4, "along": 1e-6, "normal": 1e-6}
-_NARROW = 1e-6  # of an interval in logarithms, where chi2 is a parabola
+_NARROW = 1e-6  # width in logarithms of an interval in which chi2 is a parabola
 
 
 def fit(

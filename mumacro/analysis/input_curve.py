@@ -15,7 +15,8 @@ from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
-_CHORD, _HALVINGS = 1e-3, 8  # of a refined curve: error of a straight line over the height, rounds
+# of a refined curve: the error of a straight line over the height, the number of halvings
+_CHORD, _HALVINGS = 1e-3, 8
 
 
 class InputCurve:

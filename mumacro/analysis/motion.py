@@ -27,13 +27,13 @@ from mumacro.kernel.threads import default_threads
 from mumacro.shown import cell, frame_of, html_of, html_of_rows, listed, text_of
 
 TOLERANCES = 1e-9, 1e-2
-# of ways per radian, in units of mu0 Fz / k; below the last, rounding decides which way the drag
-# pulls
+# the longest and the shortest way in a radian, in units of mu0 Fz / k; below the last, rounding
+# decides in which direction the drag pulls
 FURTHEST, SLOWEST = 1e9, 1e-9
-REMAINING = 0.01  # of a disturbance, after ``periods``
+REMAINING = 0.01  # the share of a disturbance that is left after ``periods``
 PARTS = ("x", "y", "normal")
-_SPRINGS = 64  # of a ball that is drawn
-_AT_ONCE = 16, 1  # cases of a thread, of springs and balls
+_SPRINGS = 64  # the springs of a ball in a picture
+_AT_ONCE = 16, 1  # cases that a thread takes at a time: springs, balls
 _KERNEL = kernels[-1]
 _LIFTS_OFF = "an oscillation that leaves a load > 0 at every moment: at 0 the contact lifts off"
 _STILL = "> 0, or x or y an oscillation: the friction of a contact that does not move is not fixed"

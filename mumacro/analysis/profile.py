@@ -21,11 +21,13 @@ import numpy as np
 from mumacro.kernel.arrays import Array, Bools, Places
 
 _ROUNDS = 40
-_NARROWEST = 1e-6  # of a chord that is halved, in s
-_RIPPLE = 1e-9  # a dip of chi2 that is no minimum, as a share of what is allowed
-_FINE = 0.1  # of a chord's error: what it may change chi2, as a share of what is allowed
+_NARROWEST = 1e-6  # in s: a shorter chord is not halved
+# as shares of the rise of chi2 that is allowed: a dip that counts as no minimum, and what the error
+# of a chord may change chi2
+_RIPPLE = 1e-9
+_FINE = 0.1
 _ZOOM, _ZOOMS = 9, 3  # places and rounds of the search for the end of an interval
-_INSIDE = 32  # places at least in the ranges that are allowed
+_INSIDE = 32  # places, at least, in the ranges that are allowed
 
 #: s (m,), whether slopes are asked for -> friction over its standard deviation, and its slope along
 #: s or zero: (m, n) each

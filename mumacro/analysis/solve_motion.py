@@ -34,11 +34,11 @@ UNKNOWNS = (*INPUTS, *(f"{part}.{member}" for part in PARTS for member in MEMBER
 #: what may be the target: mean forces, which have an estimate of their error
 OF = ("mu_macro", "mu_lateral")
 FIRST, LEVELS = 49, 7  # samples of the whole range, and how often an interval is halved
-# how many times the difference between a sample and the cubic through its neighbours the target
-# must be away for an interval to be left alone: found by search in 1,000 random problems
-# (benchmarks/solve_motion.py), where 1 missed a root
+# An interval is not searched if the target is away by this many times the difference between a
+# sample and the cubic through its neighbours.  Found with 1,000 random problems
+# (benchmarks/solve_motion.py): with 1 a root was missed.
 _CLEAR = 4.0
-_NARROW = 1e-12  # of the range, where a bracket is one place
+_NARROW = 1e-12  # share of the range in which a bracket counts as one place
 _MOST_STEPS = 80
 _DECADES = 20.0  # a range whose ends are further apart than this factor is searched in logarithms
 

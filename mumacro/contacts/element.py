@@ -27,7 +27,7 @@ from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 
-SPRINGS, MOST_SPRINGS = 32, 100_000  # of a ball, if not said, and at the most
+SPRINGS, MOST_SPRINGS = 32, 100_000  # the springs of a ball: by default, and at most
 _KERNEL = kernels[-1]
 
 

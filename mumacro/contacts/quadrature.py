@@ -10,7 +10,8 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Data
 
 DRIVEN_NODES = 28
-# Gauss's rule after t -> xi with d xi proportional to t (1 - t): what ends in a root becomes smooth
+# Gauss's rule in t, where xi(t) has a slope proportional to t (1 - t): a function of xi that ends
+# in a square root is smooth in t
 _P = _Q = 2
 
 

@@ -30,15 +30,15 @@ WRITTEN = {
     ".ndjson": "ndjson",
     ".jsonl": "ndjson",
 }
-#: of files that are read
+#: endings of files that are read, and their format
 FORMATS = WRITTEN | dict.fromkeys((".lvm", ".dat", ".asc", ".prn", ".xlsx"), "text")
 ENDINGS = f"{', '.join(WRITTEN)} (text also .gz)"
-# of tables; texts that have another ending may be notes beside them
+# endings that only tables have; a text with another ending may be a note beside them
 _TABLES = {".csv", ".tsv", ".parquet", ".ndjson", ".jsonl"}
 # what begins the names of files that others leave in a folder: metadata, hidden files, Excel's lock
 _STRAY = ("_", ".", "~$")
-ROWS = 65_536  # of a block, at most: a third of a second of work
-LONGEST = 64 * 2**20  # bytes of a line
+ROWS = 65_536  # rows of a block, at most: a third of a second of work
+LONGEST = 64 * 2**20  # bytes of a line, at most
 
 
 def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:

@@ -31,9 +31,9 @@ from mumacro.inputs.text_tables import (
 )
 from mumacro.inputs.units import split_unit
 
-# rows in which the decimal sign is looked for: at a time, and in all before the first block
+# rows that are searched for the decimal sign: at a time, and in all, before the first block
 _AT_ONCE, _LOOKED_AT = 2_000, 60_000
-_EXCERPT = 500  # characters of a row that is refused
+_EXCERPT = 500  # characters that are kept of a row that is refused
 
 
 class Block(NamedTuple):

@@ -19,8 +19,8 @@ from mumacro.errors import MumacroError
 
 PIECE = 4 * 2**20  #: bytes that are read at once
 LONGEST = 16 * 2**20  #: characters of a line, at most
-_SHOWN = 5  # faults in one line
-_START = 1024  # bytes that tell the encoding
+_SHOWN = 5  # faults that one line of a message names
+_START = 1024  # bytes from which the encoding is decided
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -40,7 +40,7 @@ _OTHERS = (
     (b"%PDF", "is a PDF"),
     (b"<", "is HTML or XML; save it as CSV"),
 )
-# what Python calls encodings and are none of texts, or slow ones
+# the encodings that are read: without those of Python that are not for texts, or are slow
 _ENCODING = re.compile(
     r"ascii|big5\w*|cp\w+|euc\w+|gb\w+|hp_roman8|iso8859\w+|johab|koi8\w+|latin\w+|mac\w+"
     r"|ptcp154|shift\w+|tis_620|utf_(?:8|8_sig|16|16_le|16_be|32|32_le|32_be)"

@@ -16,9 +16,9 @@ from mumacro.inputs.fields import BOUNDS, INPUTS, NOT_NEGATIVE, RAD_PER_CYCLE
 from mumacro.kernel.arrays import Array, Bools
 
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
-LONGEST = 1e-2  # [m], of l0
-FURTHEST = 1e4  # of v~ and y~
-_LARGE = {"k": 1e9, "y0": 1e-4, "v0": 1.0}  # of contacts that are shaken
+LONGEST = 1e-2  # l0 [m]; no contact has more
+FURTHEST = 1e4  # v~ and y~; no contact has more
+_LARGE = {"k": 1e9, "y0": 1e-4, "v0": 1.0}  # shaken contacts have less
 _SMALL_LOAD = 1e-2  # [N]
 _USUAL = {name: INPUTS[name].usual for name in ("mu0", "Fz", "k", "y0", "omega", "v0")}
 _USUAL["Fz_amplitude"] = INPUTS["Fz_amplitude"].usual

@@ -10,7 +10,7 @@ from mumacro.inputs.units import QUANTITIES, Scale, scale_of, split_unit
 
 # heads that a message lists, and that are compared with misspelt names
 _LISTED, _COMPARED = 20, 100
-# k in N/mm, k / (N/mm), k, N/mm: as standards for tables have it
+# "k in N/mm", "k / (N/mm)", "k, N/mm": forms of standards for tables
 _WITH_UNIT = re.compile(r"(\w+)(?: ?/ ?| in |, ?)(\S.*)")
 
 

@@ -16,9 +16,9 @@ from mumacro.inputs.signs import evidence
 
 BEGIN = b"PK\x03\x04"  #: the first bytes of a workbook
 SEP = "\t"  #: between the cells of a line
-_ROWS = 1_048_576  # of a sheet of Excel
-_UNPACKED = 512 * 2**20  # bytes
-_LINES = 4096  # of a piece
+_ROWS = 1_048_576  # rows of a sheet of Excel, at most
+_UNPACKED = 512 * 2**20  # bytes of an unpacked workbook, at most
+_LINES = 4096  # lines of a piece
 
 
 def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array, Codes
 
-MOST_STEPS = 200_000  # of a period of a motion
+MOST_STEPS = 200_000  # steps of a period of a motion, at most
 
 _HERE = Path(__file__).resolve().parent.parent
 _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")

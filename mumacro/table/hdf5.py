@@ -19,9 +19,9 @@ from mumacro.kernel.arrays import Array
 
 Refuse = Callable[[str], Exception]
 
-MOST_ATTRIBUTES = 64  # of a group whose attributes are all read
-MOST_TEXT = 65_536  # bytes of an attribute
-MOST_ITEMS = 64  # numbers of an attribute
+MOST_ATTRIBUTES = 64  # attributes of a group, at most, where all of them are read
+MOST_TEXT = 65_536  # bytes of an attribute, at most
+MOST_ITEMS = 64  # numbers of an attribute, at most
 _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
 
 

@@ -31,12 +31,13 @@ from mumacro.table.blocks import (
 from mumacro.table.polynomials import nodes
 
 FORMAT_VERSION = 1
-# More is refused before memory is taken; of the largest table that the builder makes:
-MOST_BYTES = 16 * 2**20  # of a file: 425 kB
-MOST_NUMBERS = 200_000  # of a variable: 14,641
-MOST_NODES = 1024  # along an axis: 91; preparing cells takes matrices of its square
-MOST_CELLS = 1024  # along an axis: 156
-MOST_PATCHES = 8192  # cells of a block: 1833, of 512 bytes each and quantity
+# What is larger is refused before memory is taken; behind each limit the figure of the largest
+# table that the builder makes
+MOST_BYTES = 16 * 2**20  # bytes of a file: 425 kB
+MOST_NUMBERS = 200_000  # numbers of a variable: 14,641
+MOST_NODES = 1024  # nodes along an axis: 91; preparing cells takes matrices of its square
+MOST_CELLS = 1024  # cells along an axis: 156
+MOST_PATCHES = 8192  # cells of a block: 1833; each takes 512 bytes for each quantity
 
 _netcdf_lock = threading.Lock()
 

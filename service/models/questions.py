@@ -42,7 +42,7 @@ from .motion import FORMS, Oscillation
 from .options import Choice, Options, QueryOptions
 from .values import End, Length, Load, Modulus, Ratio, Start, Stop, fault, text_schema
 
-MAX_VALUES = 10_001  # of a law
+MAX_VALUES = 10_001  # values of a law, at most
 _OF_A_MOTION = ("mu0", "Fz", "k", "omega", "f", "v0", "contact")
 _NOT_OF_A_MOTION = (
     "y0",
@@ -56,9 +56,9 @@ _NOT_OF_A_MOTION = (
     "stiffness_exponent",
 )
 MAX_TARGETS = 10_000
-MAX_POINTS = 1000  # of a fit, which scipy answers within seconds
+MAX_POINTS = 1000  # points of a fit, at most: scipy answers it within seconds
 
-# JSON has one kind of number: 55.0 is an integer there, and in a JSON Schema
+# JSON has one kind of number: in JSON and in a JSON Schema 55.0 is an integer
 _AS_WHOLE = BeforeValidator(lambda n: int(n) if isinstance(n, float) and n.is_integer() else n)
 _Whole = Annotated[int, Field(ge=2, le=MAX_VALUES), _AS_WHOLE]
 _Exponent = Annotated[

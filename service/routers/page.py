@@ -20,7 +20,8 @@ from . import file_answer
 STATIC = Path(__file__).resolve().parent.parent / "static"
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _FRESH = {"Cache-Control": "no-cache"}
-LIBRARIES = ("lib", "swagger-ui")  # of others; they change with their versions only
+# folders of libraries of others, which change with their versions only
+LIBRARIES = ("lib", "swagger-ui")
 _ONE_DAY = {"Cache-Control": "public, max-age=86400"}
 # Inline styles are allowed at /docs: the interface sets some on its elements.
 _DOCS_POLICY = (
