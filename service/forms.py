@@ -126,6 +126,7 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
         if size > max_batch:
             raise too_large(max_batch)
         yield values
+        del values  # before the next are read
         start = end.end() if end else len(text)
 
 
@@ -215,7 +216,9 @@ def _columns_of(slices: Iterable[list[Any]], words: Mapping[str, Any]) -> dict[s
             if isinstance(values, list) and None in values:
                 raise ValueError("a null")
             parts.append(values)
-    return {name: _joined(parts) for name, parts in columns.items()}
+        del rows, lists  # before the next are read
+    # the parts of a column are let go when they are one
+    return {name: _joined(columns.pop(name)) for name in [*columns]}
 
 
 def _names_of_case(rows: list[Any], words: Mapping[str, Any]) -> list[str]:
