@@ -212,7 +212,7 @@ MU_INLINE int mu_is_left(int64_t block) {
                              : block >= MU_FAST || block == MU_CORNER;
 }
 
-/* What is told of where a ball's answer comes from. */
+/* Where a ball's answer comes from, as it is reported. */
 static int mu_ball_source(int source) {
     if (source == -1 || source == MU_NO_OSCILLATION || source == MU_STATIC_LIMIT) return source;
     if (mu_is_ball(source))
