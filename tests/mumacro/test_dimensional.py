@@ -17,6 +17,7 @@ from mumacro import InputError, Surrogate, fit, law, settling, solve_for
 from mumacro.inputs.fields import BOUNDS, FIELDS, POSITIVE, STIFFNESS
 from tests.support.cases import CASE, Case, log_uniform, tables, without
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 positive = st.floats(
     min_value=5e-324, max_value=1.7976931348623157e308, allow_nan=False, allow_infinity=False
@@ -247,7 +248,7 @@ def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
     assert whole.mu_macro[0] == expected.mu_macro
     with pytest.raises(InputError, match="not both"):
         table.evaluate(**CASE, f=frequency)
-    with pytest.raises(InputError, match=r"omega must be given, or f \[Hz\]"):
+    with refused("omega"):
         table.evaluate(**rest, f=None, omega=None)
     for bad, index in ((x, i) for x in (-2e4, math.nan, math.inf) for i in (None, 1)):
         with pytest.raises(InputError) as caught:
@@ -293,17 +294,17 @@ def test_every_input_is_named_in_the_signature(table: Surrogate) -> None:
 def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> None:
     rest: Any = without(CASE, "v0")
     expected = table.evaluate(**CASE).mu_macro
-    with pytest.raises(InputError, match=r"^note must be one of mu0, "):
+    with refused("note"):
         table.evaluate({**CASE, "note": "dry"})
     assert table.evaluate(rest, v0=CASE["v0"]).mu_macro == expected
-    with pytest.raises(InputError, match=r"^v0 must be given once"):
+    with refused("v0"):
         table.evaluate(CASE, v0=1.0)
-    with pytest.raises(InputError, match=r"^speed must be one of mu0, "):
+    with refused("speed"):
         table.evaluate(**CASE, speed=1.0)  # type: ignore[call-overload]
     for bad in ([1.0], 3.0, "cases", object()):
-        with pytest.raises(InputError, match=r"^cases must be a mapping"):
+        with refused("cases"):
             table.evaluate(bad)
-    with pytest.raises(InputError, match=r"^illegal must be"):
+    with refused("illegal"):
         table.evaluate(**CASE, illegal="ignore")
 
 

@@ -15,6 +15,7 @@ import xarray as xr
 from mumacro import REGIMES, SOURCES, InputError, Surrogate
 from mumacro.inputs.fields import FIELDS
 from tests.support.cases import CASE, Case, tables
+from tests.support.refusals import refused
 
 N = 60
 VALUES = (
@@ -172,15 +173,15 @@ def test_indexes_that_differ_are_refused(table: Surrogate) -> None:
 
 def test_policies_hold_for_labels_too(table: Surrogate) -> None:
     frame = pd.DataFrame(columns())
-    with pytest.raises(InputError, match=r"mu0 at index 3 must be finite and > 0, got -0.3"):
+    with refused("mu0[3]"):
         table.evaluate(frame, illegal="raise")
-    with pytest.raises(InputError, match=r"^Fz must be given"):
+    with refused("Fz"):
         table.evaluate(frame.drop(columns="Fz"))
-    with pytest.raises(InputError, match=r"^v0 must be given once"):
+    with refused("v0"):
         table.evaluate(frame, v0=1.0)
-    with pytest.raises(InputError, match=r"^v0 at index 0 must be a number"):
+    with refused("v0[0]"):
         table.evaluate(frame.assign(v0="fast"))
-    with pytest.raises(InputError, match="objects of one library"):
+    with refused("inputs"):
         table.evaluate(**{**CASE, "v0": pd.Series([0.1]), "Fz": xr.DataArray([1.0])})
 
 
@@ -294,7 +295,7 @@ def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surr
     da = pytest.importorskip("dask.array")
     v0 = da.from_array(np.array([0.01, -1.0, 0.02]), chunks=2)
     answer = table.evaluate(**{**CASE, "v0": v0}, illegal="raise")
-    with pytest.raises(InputError, match="v0 at index 1"):
+    with refused("v0[1]"):
         answer.mu_macro.compute(scheduler="threads")
     assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [
         False,
@@ -385,9 +386,9 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
     pd.testing.assert_frame_equal(
         answer.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0)
     )
-    with pytest.raises(InputError, match=r"^v0 must be given once"):
+    with refused("v0"):
         table.evaluate(lazy, Fz=10.0, v0=0.01)
-    with pytest.raises(InputError, match=r"^Fz must be given"):
+    with refused("Fz"):
         table.evaluate(lazy)
     with pytest.raises(InputError, match=r"^v0 must be a Dask array: .to_dask_array"):
         table.evaluate(**{**CASE, "v0": lazy["v0"]})

@@ -12,6 +12,7 @@ import pytest
 from mumacro import InputError, Surrogate
 from mumacro.table.atlas import QUANTITY_NAMES
 from tests.support.cases import CASE, tables, without
+from tests.support.refusals import refused
 
 #: methods of (v~, y~)
 PLANE: dict[str, Callable[..., Any]] = {
@@ -143,7 +144,7 @@ def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
     assert table.evaluate({**CASE, "v0": masked}).source_code.tolist()[1] == -1
     assert masked.data.tolist() == [1, 2, 3]
     for v, y, field in ((np.ma.masked, 0.5, "v_tilde"), (1.0, math.inf, "y_tilde")):
-        with pytest.raises(InputError, match=f"^{field}"):
+        with refused(field):
             table.mu_ratio(v, y)
 
 
@@ -163,14 +164,14 @@ def test_the_callers_floating_point_settings_are_unchanged(table: Surrogate) -> 
 
 @pytest.mark.parametrize("method", PLANE)
 def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate, method: str) -> None:
-    with pytest.raises(InputError, match="broadcasts with that of v_tilde"):
+    with refused("y_tilde"):
         PLANE[method](table, np.ones(3), np.ones(2))
 
 
 def test_of_must_be_a_quantity(table: Surrogate) -> None:
     bad: Any
     for bad in ("mu", "", None, 3, ["power"]):
-        with pytest.raises(InputError, match=r"^of must be one of mu_ratio, power, stick_fraction"):
+        with refused("of"):
             table.slopes(0.1, 0.5, of=bad)
 
 

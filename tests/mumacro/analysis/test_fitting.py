@@ -12,6 +12,7 @@ from mumacro import InputError, Surrogate, fit
 from mumacro.inputs.kind import CONTACTS
 from tests.support.cases import Case
 from tests.support.comparing import close
+from tests.support.refusals import refused
 from tests.support.scripts import script
 
 fit_coverage = script("benchmarks.fit_coverage")
@@ -110,7 +111,7 @@ def test_mu0_may_be_known_at_each_point(surrogate: Surrogate) -> None:
     for unknowns in (None, "k"):
         assert fit(points, unknowns, **RIG).values == {"k": close(1e6, rel=1e-8)}
     for name, both in (("mu0", ["mu0"]), ("k", ["k", "mu0"]), ("k", ["k"])):
-        with pytest.raises(InputError, match=f"{name} must be left out, or taken from unknowns"):
+        with refused(name):
             fit({**points, "k": 1e6}, both, **RIG)
 
 
@@ -507,14 +508,14 @@ def test_bad_input_is_named_with_the_remedy(data: Any, inputs: Any, message: Any
 @pytest.mark.parametrize("amplitude", [-1.0, 10.0, 20.0])
 def test_an_amplitude_that_lifts_the_contact_off_is_refused(amplitude: float) -> None:
     rig: dict[str, Any] = {"Fz": 10.0, "f": 20e3, "Fz_amplitude": amplitude}
-    with pytest.raises(InputError, match="lifts off") as caught:
+    with refused("Fz_amplitude") as caught:
         fit({"v0": [0.01, 0.02, 0.03], "mu_macro": [0.2, 0.22, 0.24]}, direction="normal", **rig)
     assert (caught.value.field, caught.value.value) == ("Fz_amplitude", amplitude)
 
 
 def test_points_that_do_not_depend_on_k_are_refused() -> None:
     data = {"v0": [0.0, 0.1], "y0": [2e-6, 0.0], "mu_macro": [0.0, 0.3]}
-    with pytest.raises(InputError, match="points in which k matters"):
+    with refused("data"):
         fit({**data, "y0": [0.0, 1e-15], "v0": [0.1, 1e6], "mu_macro": [0.3, 0.3]}, Fz=10.0, f=2e4)
     # noise may lie on the other side of what is possible, if it is said
     within = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.301], "std": 1e-3}

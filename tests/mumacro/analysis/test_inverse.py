@@ -10,13 +10,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mumacro import InputError, Surrogate
+from mumacro import Surrogate
 from mumacro.analysis.borders import border_crossings
 from mumacro.analysis.input_curve import InputCurve
 from mumacro.analysis.rootfinding import TINY, Branch, last_double
 from mumacro.analysis.solve_for import solve_for
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 
 def only_root(solution: Any) -> Any:
@@ -261,51 +262,51 @@ def test_along_and_normal_the_whole_friction_is_reached(
 def test_the_amplitude_of_the_force_stays_below_the_force(surrogate: Surrogate) -> None:
     words, _, case = as_kind(CASE, ("spring", "normal"))
     for unknown, within in (("Fz_amplitude", (0.1, 10.0)), ("Fz", (4.0, 100.0))):
-        with pytest.raises(InputError, match=r"range must be two ascending.*Fz_amplitude below Fz"):
+        with refused("range"):
             solve_for(surrogate, unknown, 0.2, **without(case, unknown), within=within, **words)
         reach = solve_for(surrogate, unknown, 0.2, **without(case, unknown), **words).reach
         assert reach.high < 10.0 if unknown == "Fz_amplitude" else reach.low > 4.0
 
 
 ANY = 0.2  # a target
-# direction, the first arguments, what is changed in the case, why
+# direction, the first arguments, what is changed in the case, what is refused
 REFUSED: list[tuple[str, Any, Case, str]] = [
-    ("across", ("w0", ANY), {}, "unknown must be"),
-    ("across", ("v0", ANY), {"v0": 1.0}, "v0 must be"),
-    ("across", ("v0", ANY), {"Fz": None}, "Fz must be"),
-    ("across", ("v0", -0.1), {}, "target must be"),
-    ("across", ("v0", [0.1, math.nan]), {}, "target at index 1 must be"),
-    ("across", ("v0", ANY), {"mu0": 0.0}, "mu0 must"),
-    ("across", ("v0", ANY, (1.0, 1.0)), {}, "range must"),
-    ("across", ("k", ANY, (0.0, 1.0)), {}, "range must"),
-    ("across", ("v0", ANY, (0.0, math.inf)), {}, "range must"),
-    ("across", ("v0", ANY, 1.0), {}, "range must"),
-    ("across", ("v0", "fast"), {}, "target must be a number"),
-    ("across", ("v0", ANY), {"fz": 1.0}, "fz must be one of .*did you mean Fz"),
-    ("across", ("omega", ANY), {"f": 1e3}, "f must"),
-    ("across", ("v0", ANY), {"omega": None, "f": 1e308}, "f must"),
-    ("across", ("v0", ANY), {"k": [1e6, 2e6]}, "k must"),
-    ("normal", ("v0", ANY), {"Fz_amplitude": 10.0}, "Fz_amplitude must be >= 0 and below Fz"),
-    ("normal", ("v0", ANY), {"y0": 1e-6}, "y0 must be left out for direction normal"),
+    ("across", ("w0", ANY), {}, "unknown"),
+    ("across", ("v0", ANY), {"v0": 1.0}, "v0"),
+    ("across", ("v0", ANY), {"Fz": None}, "Fz"),
+    ("across", ("v0", -0.1), {}, "target"),
+    ("across", ("v0", [0.1, math.nan]), {}, "target[1]"),
+    ("across", ("v0", ANY), {"mu0": 0.0}, "mu0"),
+    ("across", ("v0", ANY, (1.0, 1.0)), {}, "range"),
+    ("across", ("k", ANY, (0.0, 1.0)), {}, "range"),
+    ("across", ("v0", ANY, (0.0, math.inf)), {}, "range"),
+    ("across", ("v0", ANY, 1.0), {}, "range"),
+    ("across", ("v0", "fast"), {}, "target"),
+    ("across", ("v0", ANY), {"fz": 1.0}, "fz"),
+    ("across", ("omega", ANY), {"f": 1e3}, "f"),
+    ("across", ("v0", ANY), {"omega": None, "f": 1e308}, "f"),
+    ("across", ("v0", ANY), {"k": [1e6, 2e6]}, "k"),
+    ("normal", ("v0", ANY), {"Fz_amplitude": 10.0}, "Fz_amplitude"),
+    ("normal", ("v0", ANY), {"y0": 1e-6}, "y0"),
     (
         "across",
         ("v0", ANY),
         {"Fz_amplitude": 1.0},
-        "Fz_amplitude must be left out for direction across",
+        "Fz_amplitude",
     ),
-    ("normal", ("y0", ANY), {}, "unknown must be one of mu0, Fz, k, Fz_amplitude"),
+    ("normal", ("y0", ANY), {}, "unknown"),
 ]
 
 
-@pytest.mark.parametrize(("direction", "question", "changed", "message"), REFUSED)
+@pytest.mark.parametrize(("direction", "question", "changed", "place"), REFUSED)
 def test_a_bad_question_is_refused(
-    surrogate: Surrogate, direction: str, question: Any, changed: Case, message: str
+    surrogate: Surrogate, direction: str, question: Any, changed: Case, place: str
 ) -> None:
     keywords, _, case = as_kind(CASE, ("spring", direction))
     unknown, target, *within = question
     inputs = {**without(case, unknown), **changed}
     gone = [name for name, value in changed.items() if value is None and name != "k"]
-    with pytest.raises(InputError, match=f"^{message}"):
+    with refused(place):
         solve_for(
             surrogate,
             unknown,
@@ -505,5 +506,5 @@ def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> No
         assert solution.roots[0][0].value == close(
             solve_for(surrogate, "y0", 0.15, **{**rest, "k": 1e6}).roots[0][0].value, rel=1e-9
         )
-    with pytest.raises(InputError, match="k_range must be left out where k is the swept input"):
+    with refused("k_range"):
         solve_for(surrogate, "k", 0.15, **{**without(CASE, "k"), "k_range": (8e5, 1.25e6)})

@@ -20,6 +20,7 @@ from mumacro.inputs.fields import FIELDS
 from mumacro.inputs.kind import kind_of
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 INTERVAL: Case = {"k_range": (0.8e6, 1.2e6)}
 LINE = without({**CASE, "y0": 4e-6}, "v0")
@@ -184,36 +185,36 @@ def test_the_articles_formulas_are_refused_for_another_contact(
     surrogate: Surrogate, pair: Any
 ) -> None:
     for formulas in (approximations, border_speeds):
-        with pytest.raises(InputError, match="they are those of one spring, across"):
+        with refused("approximations"):
             formulas(surrogate, law_of(surrogate, pair)[0])
 
 
 @pytest.mark.parametrize(
-    ("along", "case", "direction", "message"),
+    ("along", "case", "direction", "place"),
     [
-        ("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
-        ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
-        ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high must be given"),
-        ("v0", {**LINE, "step": 9}, "across", "step must be one of mu0, Fz, k"),
-        ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude must be left out"),
+        ("v0", {**LINE, **INTERVAL}, "across", "k"),
+        ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range"),
+        ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high"),
+        ("v0", {**LINE, "step": 9}, "across", "step"),
+        ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude"),
         (
             "k",
             {**without(LINE, "k"), "v0": 0.01, **INTERVAL},
             "across",
-            "k_range .* left out where k is the swept",
+            "k_range",
         ),
         (
             "Fz_amplitude",
             without(CASE, "y0"),
             "normal",
-            "Fz_amplitude at index 1 must be >= 0 and below Fz",
+            "Fz_amplitude[1]",
         ),
     ],
 )
 def test_a_bad_interval_is_named(
-    surrogate: Surrogate, along: Any, case: Case, direction: Any, message: Any
+    surrogate: Surrogate, along: Any, case: Case, direction: Any, place: str
 ) -> None:
-    with pytest.raises(InputError, match=message):
+    with refused(place):
         friction_law(surrogate, along, values=[1.0, 10.0], **case, direction=direction)
 
 

@@ -14,6 +14,7 @@ from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close
+from tests.support.refusals import refused
 from tests.support.scripts import script
 
 benchmark = script("benchmarks.motion")
@@ -615,9 +616,8 @@ def test_what_has_no_answer_is_refused_with_advice(
 @pytest.mark.parametrize("name", ["mu0", "Fz", "k", "v0"])
 def test_a_missing_input_is_named(name: str) -> None:
     scene = {key: value for key, value in SCENE.items() if key != name}
-    with pytest.raises(InputError, match=f"{name} must be given") as caught:
+    with refused(name):
         motion(**scene, y=2e-6)
-    assert caught.value.field == name
 
 
 @pytest.mark.parametrize(
@@ -639,7 +639,7 @@ def test_in_an_array_such_a_case_is_nan_alone(change: dict[str, Any], name: str,
         assert answer.mu_macro[0] == close(good, abs=1e-8)  # harmonics set the steps
     assert math.isnan(answer.mu_macro[1])
     assert math.isnan(answer.periods[1])
-    with pytest.raises(InputError, match="with an answer"):
+    with refused("index"):
         answer.cycle(1)
 
 
@@ -652,9 +652,9 @@ def test_a_load_that_stays_above_zero_is_no_lift_off() -> None:
 def test_places_and_points_of_a_cycle_are_checked() -> None:
     many = motion(**{**SCENE, "v0": [0.01, 0.02]}, y=2e-6)
     for index in (None, 2, -1, True, 0.5):
-        with pytest.raises(InputError, match="from 0 to 1"):
+        with refused("index"):
             many.cycle(index)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="from 2"):
+    with refused("points"):
         many.cycle(0, points=1)
 
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from builder.solver.steady import solve, solve_raw, workspace
-from mumacro import InputError, Surrogate
+from mumacro import Surrogate
 from mumacro.analysis.settling import settling
 from tests.support import naive
 from tests.support.cases import CASE, UNIT
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 STEPS = 40_000
 SLIDING = [(0.3, 0.3), (0.1, 0.2), (0.6, 1.0), (1.0, 0.5)]
@@ -117,7 +118,7 @@ def test_the_frequency_may_be_f(surrogate: Surrogate) -> None:
     assert settling(surrogate, **rest, f=2e4) == expected
     wrong: list[Any] = [{}, {"f": 2e4, "omega": 1e5}]
     for frequency in wrong:
-        with pytest.raises(InputError, match=r"omega must be (given, or f|left out beside f)"):
+        with refused("omega"):
             settling(surrogate, **rest, **frequency)
 
 
@@ -155,29 +156,23 @@ def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> 
 
 
 @pytest.mark.parametrize(
-    ("changed", "message"),
+    ("changed", "place"),
     [
-        *(({"remaining": x}, "remaining must be") for x in (0.0, 1.0, -1.0, math.nan, 2.0)),
-        ({"Fz": -1.0}, "Fz must be"),
-        *(
-            ({"direction": x}, "across: how a disturbance decays is derived for no other")
-            for x in ("along", "normal")
-        ),
+        *(({"remaining": x}, "remaining") for x in (0.0, 1.0, -1.0, math.nan, 2.0)),
+        ({"Fz": -1.0}, "Fz"),
+        *(({"direction": x}, "direction") for x in ("along", "normal")),
     ],
 )
-def test_bad_input_is_named_with_the_reason(
-    surrogate: Surrogate, changed: Any, message: Any
-) -> None:
-    with pytest.raises(InputError, match=message):
+def test_bad_input_is_named(surrogate: Surrogate, changed: Any, place: str) -> None:
+    with refused(place):
         settling(surrogate, **{**CASE, **changed})
 
 
 @pytest.mark.parametrize("name", ["mu0", "Fz", "k", "y0", "v0"])
 def test_a_missing_input_is_named(surrogate: Surrogate, name: str) -> None:
     case = {key: value for key, value in CASE.items() if key != name}
-    with pytest.raises(InputError, match=f"{name} must be given") as caught:
+    with refused(name):
         settling(surrogate, **case)
-    assert caught.value.field == name
 
 
 def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:

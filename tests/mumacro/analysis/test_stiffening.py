@@ -12,7 +12,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mumacro import InputError, Surrogate
+from mumacro import Surrogate
 from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.borders import border_crossings
 from mumacro.analysis.law import law as friction_law
@@ -22,6 +22,7 @@ from mumacro.cli.main import main
 from mumacro.validity import load_rows
 from tests.support.cases import CASE, PAIRS, Case, as_kind, without
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 LOADS = np.geomspace(0.1, 1000.0, 41)  # N; k of CASE holds at its Fz
 EXPONENTS = [0.2, 1.0 / 3.0, 0.5, 0.9]
@@ -231,32 +232,32 @@ def test_a_rigid_contact_stays_rigid(surrogate: Surrogate) -> None:
 
 @pytest.mark.parametrize("question", ["law", "solve_for"])
 @pytest.mark.parametrize(
-    ("along", "case", "options", "message"),
+    ("along", "case", "options", "place"),
     [
-        ("Fz", CASE, {}, "Fz must be left out, because Fz is the unknown"),
-        ("Fz", without(CASE, "Fz"), {"stiffness_exponent": 0.5}, "the load at which k holds"),
-        ("v0", without(CASE, "v0"), {"stiffness_exponent": 0.5}, "left out where v0 is"),
-        ("Fz", CASE, {"stiffness_exponent": 1.1}, "one number from 0 to 1"),
-        ("Fz", CASE, {"stiffness_exponent": -0.1}, "one number from 0 to 1"),
-        ("Fz", CASE, {"stiffness_exponent": math.nan}, "one number from 0 to 1"),
-        ("Fz", CASE, {"stiffness_exponent": "1/3"}, "one number from 0 to 1"),
-        ("Fz", CASE, {"stiffness_exponent": [0.5]}, "one number from 0 to 1"),
-        ("Fz", {**CASE, "Fz": 0.0}, {"stiffness_exponent": 0.5}, "Fz must be finite and > 0"),
-        ("Fz", {**CASE, "Fz": [1.0, 2.0]}, {"stiffness_exponent": 0.5}, "one number"),
+        ("Fz", CASE, {}, "Fz"),
+        ("Fz", without(CASE, "Fz"), {"stiffness_exponent": 0.5}, "Fz"),
+        ("v0", without(CASE, "v0"), {"stiffness_exponent": 0.5}, "stiffness_exponent"),
+        ("Fz", CASE, {"stiffness_exponent": 1.1}, "stiffness_exponent"),
+        ("Fz", CASE, {"stiffness_exponent": -0.1}, "stiffness_exponent"),
+        ("Fz", CASE, {"stiffness_exponent": math.nan}, "stiffness_exponent"),
+        ("Fz", CASE, {"stiffness_exponent": "1/3"}, "stiffness_exponent"),
+        ("Fz", CASE, {"stiffness_exponent": [0.5]}, "stiffness_exponent"),
+        ("Fz", {**CASE, "Fz": 0.0}, {"stiffness_exponent": 0.5}, "Fz"),
+        ("Fz", {**CASE, "Fz": [1.0, 2.0]}, {"stiffness_exponent": 0.5}, "Fz"),
     ],
 )
 def test_what_cannot_be_is_refused(
-    surrogate: Surrogate, question: str, along: str, case: Case, options: Any, message: str
+    surrogate: Surrogate, question: str, along: str, case: Case, options: Any, place: str
 ) -> None:
     request: Any = friction_law if question == "law" else solve_for
     two = {"values" if question == "law" else "target": [0.1, 0.2]}
-    with pytest.raises(InputError, match=message):
+    with refused(place):
         request(surrogate, along, **two, **options, **case)
 
 
 def test_a_stiffness_beyond_all_numbers_is_refused(surrogate: Surrogate) -> None:
     far = {**CASE, "k": 1e300}
-    with pytest.raises(InputError, match=r"Fz at index 1 must be such that k = 1e\+300 N/m"):
+    with refused("Fz[1]"):
         friction_law(surrogate, "Fz", values=np.array([1.0, 1e200]), stiffness_exponent=0.9, **far)
     # and is not met in a search over all loads
     reach = solve_for(surrogate, "Fz", 0.2, stiffness_exponent=0.9, **far).reach

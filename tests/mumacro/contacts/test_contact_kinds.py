@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mumacro import InputError, Surrogate
+from mumacro import Surrogate
 from mumacro.inputs.kind import kind_of
 from mumacro.table.atlas import QUANTITY_NAMES, SOURCES
 from tests.support.cases import (
@@ -25,6 +25,7 @@ from tests.support.cases import (
     without,
 )
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 BALL: Case = {"contact": "ball"}
 NORMAL: Case = {"direction": "normal"}
@@ -133,41 +134,39 @@ def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table: Surrogate, 
 
 
 REFUSED = [
-    ({"contact": "cube"}, "contact", "one of spring, ball"),
-    ({"contact": None}, "contact", "one of"),
-    ({"direction": "up"}, "direction", "one of across"),
-    ({**NORMAL, **BALL}, "direction", "contact radius"),
-    ({"Fz_amplitude": 1.0, **BALL}, "Fz_amplitude", "left out"),
-    ({"v0": -1.0, **BALL}, "v0", ">= 0"),
-    ({"y0": None, "Fz_amplitude": 10.0, **NORMAL}, "Fz_amplitude", "lifts off"),
-    ({"y0": None, "Fz_amplitude": -1.0, **NORMAL}, "Fz_amplitude", ">= 0"),
-    ({"y0": None, **NORMAL}, "Fz_amplitude", "given"),
-    ({"Fz_amplitude": 1.0, **NORMAL}, "y0", "left out"),
-    ({"v0": [-1.0, 0.01], "illegal": "raise", **BALL}, "v0", "index 0"),
+    ({"contact": "cube"}, "contact"),
+    ({"contact": None}, "contact"),
+    ({"direction": "up"}, "direction"),
+    ({**NORMAL, **BALL}, "direction"),
+    ({"Fz_amplitude": 1.0, **BALL}, "Fz_amplitude"),
+    ({"v0": -1.0, **BALL}, "v0"),
+    ({"y0": None, "Fz_amplitude": 10.0, **NORMAL}, "Fz_amplitude"),
+    ({"y0": None, "Fz_amplitude": -1.0, **NORMAL}, "Fz_amplitude"),
+    ({"y0": None, **NORMAL}, "Fz_amplitude"),
+    ({"Fz_amplitude": 1.0, **NORMAL}, "y0"),
+    ({"v0": [-1.0, 0.01], "illegal": "raise", **BALL}, "v0[0]"),
     (
         {"y0": None, "Fz_amplitude": [1.0, 10.0], "illegal": "raise", **NORMAL},
-        "Fz_amplitude",
-        "at index 1",
+        "Fz_amplitude[1]",
     ),
-    ({"k_range": (1e6, 2e6)}, "k", "left out beside"),
-    ({"k": None, "k_range": (2e6, 1e6)}, "k_range", "low <= high"),
-    ({"k": None, "k_range": 1e6}, "k_range", "two"),
-    ({"k": None, "k_range": (0.0, 1e6)}, "k_range", "0 < low"),
-    ({"k": None, "k_range": (1e6, math.inf)}, "k_range", "finite"),
-    ({"k": None, "k_low": 1e6}, "k_high", "given"),
-    ({"k": None, "k_range": ("a", 1e6)}, "k_low", "a number"),
+    ({"k_range": (1e6, 2e6)}, "k"),
+    ({"k": None, "k_range": (2e6, 1e6)}, "k_range"),
+    ({"k": None, "k_range": 1e6}, "k_range"),
+    ({"k": None, "k_range": (0.0, 1e6)}, "k_range"),
+    ({"k": None, "k_range": (1e6, math.inf)}, "k_range"),
+    ({"k": None, "k_low": 1e6}, "k_high"),
+    ({"k": None, "k_range": ("a", 1e6)}, "k_low"),
 ]
 
 
-@pytest.mark.parametrize(("changed", "field", "message"), REFUSED)
+@pytest.mark.parametrize(("changed", "place"), REFUSED)
 def test_what_does_not_belong_is_refused_by_name(
-    table: Surrogate, changed: Any, field: str, message: Any
+    table: Surrogate, changed: Any, place: str
 ) -> None:
     inputs = {**CASE, **changed}
     absent = [name for name in ("k", "y0") if inputs[name] is None]
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(place):
         table.evaluate(**without(inputs, *absent))
-    assert caught.value.field == field
 
 
 def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(
@@ -177,9 +176,9 @@ def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(
     assert bad.source_code.tolist() == [-1, SOURCES.index("ball_partial_slip")]
     lifted = table.evaluate(**without(CASE, "y0"), Fz_amplitude=[1.0, 10.0, 11.0], **NORMAL)
     assert lifted.source_code.tolist()[1:] == [-1, -1]
-    with pytest.raises(InputError, match="not modelled"):
+    with refused("direction"):
         table.power(0.1, 0.5, **NORMAL)
-    with pytest.raises(InputError, match="< 1"):
+    with refused("y_tilde"):
         table.quantity("mu_ratio", 0.1, 1.0, **NORMAL)
 
 
@@ -310,5 +309,5 @@ def test_intervals_in_arrays_columns_and_of_one_point(table: Any) -> None:
     pairs = table.evaluate(k_range=(frame.k_low.to_numpy(), frame.k_high.to_numpy()), **case)
     assert answers.mu_macro_low.tolist() == pairs.mu_macro_low.tolist()
     assert answers.mu_macro_high.tolist() == pairs.mu_macro_high.tolist()
-    with pytest.raises(InputError, match="k must be left out beside an interval of it"):
+    with refused("k"):
         table.evaluate(frame.assign(k=1e6))

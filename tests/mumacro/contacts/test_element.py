@@ -8,10 +8,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from mumacro import Element, InputError, Surrogate
+from mumacro import Element, Surrogate
 from mumacro.closed_forms import master_curve_limit
 from tests.support.cases import Case
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6}
 
@@ -262,57 +263,57 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("call", "place"),
     [
-        (lambda: Element(0.3, 10.0, 1e6, contact="cube"), "contact must be one of spring, ball"),
+        (lambda: Element(0.3, 10.0, 1e6, contact="cube"), "contact"),
         (
             lambda: Element(0.3, 10.0, 1e6, springs=2),
-            "springs must be a whole number from 1 to 1 for contact='spring'",
+            "springs",
         ),
         (
             lambda: Element(0.3, 10.0, 1e6, "ball", springs=0),
-            "springs must be a whole number from 1 to 100000",
+            "springs",
         ),
-        (lambda: Element(0.0, 10.0, 1e6), "mu0 must be finite and > 0, got 0.0"),
+        (lambda: Element(0.0, 10.0, 1e6), "mu0"),
         (
             lambda: Element(0.3, [10.0, math.nan], 1e6),
-            "Fz at index 1 must be finite and > 0, got nan",
+            "Fz[1]",
         ),
-        (lambda: Element(0.3, 10.0, math.inf), "k must be finite: a rigid contact"),
-        (lambda: Element(0.3, 10.0, "rigid"), "k must be finite: a rigid contact"),
-        (lambda: Element(0.3, 10.0, cast(Any, None)), "k must be a number > 0"),
+        (lambda: Element(0.3, 10.0, math.inf), "k"),
+        (lambda: Element(0.3, 10.0, "rigid"), "k"),
+        (lambda: Element(0.3, 10.0, cast(Any, None)), "k"),
         (
             lambda: Element(1e200, 1e200, 1.0),
-            "Fz at index 0 must be finite and >= 0, with mu0 Fz below",
+            "Fz[0]",
         ),
         (
             lambda: Element([0.3, 0.2], [1.0, 2.0, 3.0], 1.0),
-            "inputs must be arrays whose shapes broadcast",
+            "inputs",
         ),
-        (lambda: Element(0.3, 10.0, 1e6).step(math.nan, 0.0), "dx must be finite, got nan"),
-        (lambda: Element(0.3, 10.0, 1e6).step(0.0, "1N"), "dy must be "),
+        (lambda: Element(0.3, 10.0, 1e6).step(math.nan, 0.0), "dx"),
+        (lambda: Element(0.3, 10.0, 1e6).step(0.0, "1N"), "dy"),
         (
             lambda: Element(0.3, 10.0, 1e6).step([1.0, 2.0], 0.0),
-            "dx must be of a shape that broadcasts",
+            "dx",
         ),
         (
             lambda: Element(0.3, 10.0, 1e6, "ball").step(0.0, 0.0, Fz=1.0),
-            "Fz must be left out for a ball",
+            "Fz",
         ),
         (
             lambda: Element(0.3, 10.0, 1e6).step(0.0, 0.0, Fz=-1.0),
-            "Fz at index 0 must be finite and >= 0",
+            "Fz[0]",
         ),
         (
             lambda: setattr(Element(0.3, 10.0, 1e6), "state", [1.0, 2.0]),
-            "state must be of the shape",
+            "state",
         ),
         (
             lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[math.inf, 0.0]]),
-            "state must be finite",
+            "state",
         ),
     ],
 )
-def test_bad_input_is_named_and_moves_nothing(call: Any, message: Any) -> None:
-    with pytest.raises(InputError, match=message):
+def test_bad_input_is_named_and_moves_nothing(call: Any, place: str) -> None:
+    with refused(place):
         call()

@@ -1,0 +1,18 @@
+"""What is refused: which input, and which value of an array; the wording is no promise."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from mumacro import InputError
+
+
+@contextmanager
+def refused(place: str) -> Iterator[pytest.ExceptionInfo[InputError]]:
+    """The block raises :class:`InputError` for this input: ``"v0"``, or ``"v0[1]"`` for one value
+    of an array."""
+    with pytest.raises(InputError) as caught:
+        yield caught
+    error = caught.value
+    assert place == error.field + ("" if error.index is None else f"[{error.index}]"), error
