@@ -362,7 +362,7 @@ class _Problem(Measured):
 
 
 def _around(values: Mapping[str, float], half_widths: Array) -> dict[str, tuple[float, float]]:
-    """Intervals about values whose logarithms may be off by ``apart`` (unknowns,)."""
+    """Intervals about values whose logarithms may be off by ``half_widths`` (unknowns,)."""
     with np.errstate(over="ignore"):
         return {
             name: (

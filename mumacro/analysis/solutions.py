@@ -15,9 +15,11 @@ def counts(roots: Sequence[Sequence[Any]]) -> str:
     >>> counts([(1.0,), ()]), counts([(1.0, 2.0)])
     ('2 targets, 1 root', '1 target, 2 roots')
     """
-    number = sum(map(len, roots))
-    targets = f"{len(roots)} target{'s' * (len(roots) != 1)}"
-    return f"{targets}, {number} root{'s' * (number != 1)}"
+    return f"{_counted(len(roots), 'target')}, {_counted(sum(map(len, roots)), 'root')}"
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def one_value(roots: Sequence[Sequence[Any]], reason: Callable[[int], str]) -> float:

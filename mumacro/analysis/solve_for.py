@@ -345,7 +345,8 @@ def _checked_range(curve: InputCurve, within: tuple[float, float]) -> tuple[floa
     least, most = _legal(curve)
     if not least <= low < high <= most:
         bound = "two ascending, finite numbers " + ("> 0" if curve.unknown in POSITIVE else ">= 0")
-        bound += ", with Fz_amplitude below Fz" * curve.kind.normal
+        if curve.kind.normal:
+            bound += ", with Fz_amplitude below Fz"
         raise InputError("range", [low, high], bound)
     return low, high
 

@@ -49,7 +49,8 @@ def _spooled(folder: Path) -> Path:
         begin = stream.read(4)
     endings = {b"PAR1": ".parquet", b"PK\x03\x04": ".xlsx"}
     kind = endings.get(begin, ".ndjson" if begin.lstrip()[:1] == b"{" else ".csv")
-    return path.rename(f"{path}{kind}" + ".gz" * (begin[:2] == b"\x1f\x8b"))
+    packing = ".gz" if begin[:2] == b"\x1f\x8b" else ""
+    return path.rename(f"{path}{kind}{packing}")
 
 
 def main(words: Sequence[str]) -> int:

@@ -81,7 +81,8 @@ def find_files(
             raise FilesError(f"{entry}: no such file, or none that ends in {ENDINGS}")
         if strays:
             names = ", ".join(stray.name for stray in strays[:5])
-            say(f"{entry}: skipped {names}{f' and {len(strays) - 5} more' * (len(strays) > 5)}")
+            more = f" and {len(strays) - 5} more" if len(strays) > 5 else ""
+            say(f"{entry}: skipped {names}{more}")
         files += tables
         formats |= dict.fromkeys(format_of(one, FORMATS)[0] for one in tables)
     if len(formats) > 1:

@@ -216,7 +216,7 @@ class _Run:
         state = _State()
         if self.output.format == "text":
             headings = [*(self.source.head if self.verbatim else ()), *self.schema.names]
-            mark = "\ufeff" * (self.verbatim and self.source.has_mark)
+            mark = "\ufeff" if self.verbatim and self.source.has_mark else ""
             yield state, self.output.pack(mark + csv_lines([headings], self.output.sep)), 0.0
         for file in range(len(self.files)):
             state = state._replace(file=file)

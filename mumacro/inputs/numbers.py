@@ -37,7 +37,7 @@ def tidy(text: str) -> str:
     raised, out = False, []
     for sign in text:
         if sign in _SUPERSCRIPTS:
-            out.append("^" * (not raised))
+            out.append("" if raised else "^")
             raised = True
         else:
             raised = False

@@ -493,7 +493,8 @@ def _regular(record: Record, layout: Layout) -> Record:
 
 
 def _irregular(count: int, width: int) -> str:
-    return f"has {count:,} cell{'s' * (count != 1)}, the head has {width:,}"
+    cells = "cell" if count == 1 else "cells"
+    return f"has {count:,} {cells}, the head has {width:,}"
 
 
 # --- its numbers ----------------------------------------------------------------------------------

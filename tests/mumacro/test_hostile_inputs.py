@@ -126,7 +126,7 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
         for one, two in zip(parts(ask(table, layout, y)), parts(expected), strict=True):
             np.testing.assert_array_equal(one, two, err_msg=name)
     assert np.array_equal(spread[::2, ::3], v)
-    for one in (True, np.True_, np.float16(1), np.longdouble(1), np.uint64(1), np.array(1), 1):
+    for one in (np.float16(1), np.longdouble(1), np.uint64(1), np.array(1), 1):
         assert parts(ask(table, one, 0.5))[0] == parts(ask(table, 1.0, 0.5))[0]
     empty: Any
     for empty in (np.empty(0), [], np.empty((0, 3))):
