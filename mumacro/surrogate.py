@@ -467,26 +467,26 @@ class Surrogate:
             refused in a mapping; other columns of a frame, a table or a Dataset are ignored.  One
             row of a frame, a Series, is one case.
         mu0 : array_like
-            Coulomb friction coefficient [-], > 0.
+            Coulomb friction coefficient of the contact [-], > 0.
         Fz : array_like
             Normal force [N], > 0.
         k : array_like or "rigid"
-            Tangential stiffness [N/m], > 0; "rigid" or infinity is rigid contact, eq. (37).  It
-            must always be given, here or as an interval: None is refused.
+            Tangential stiffness of the contact [N/m], > 0; "rigid" or infinity is rigid contact,
+            eq. (37).  It must always be given, here or as an interval: None is refused.
         k_range : pair of array_like
             Lowest and highest stiffness [N/m] in place of k.
         k_low, k_high : array_like
             The same as two columns.
         y0 : array_like
-            Amplitude of the oscillation [m], half of peak to peak, >= 0, across or along the
+            Amplitude of the oscillation, half of peak to peak [m], >= 0, across or along the
             sliding direction.
         Fz_amplitude : array_like
-            Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction
-            is "normal".
+            Amplitude of the normal force, half of peak to peak, below Fz [N], >= 0, in place of y0
+            where the direction is "normal".
         omega : array_like
-            Angular frequency [rad/s], >= 0; or
+            Angular frequency of the oscillation [rad/s], >= 0; or
         f : array_like
-            frequency [Hz], >= 0, in its place.
+            Frequency of the oscillation [Hz], >= 0, in its place.
         v0 : array_like
             Sliding speed [m/s], >= 0.
         contact : str or array_like

@@ -17,6 +17,7 @@ from mumacro.analysis.settling import settling
 from mumacro.analysis.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, without_interval
+from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
 from mumacro.inputs.kind import SPRINGS_OF, Kind, kind_of
 from mumacro.surrogate import Surrogate
@@ -25,7 +26,7 @@ from mumacro.surrogate import Surrogate
 ROWS = (
     "one spring",
     "k is known",
-    "units",
+    UNITS,
     "steady cycle",
     "Coulomb friction",
     "constant normal force",
@@ -34,8 +35,6 @@ ROWS = (
 K_UNCERTAINTY = (
     0.1  # relative uncertainty of k by default: materials and geometry give no better one
 )
-_FAR = 1e4  # no contact has such a y~
-_LARGEST_AMPLITUDE, _LARGEST_STIFFNESS = 1e-3, 1e10  # [m], [N/m]: no shaken contact has more
 _RATE = 0.01  # a of mu0 + a ln(slip speed), rock, polymers and metals (docs/validity.md)
 _TILT, _NORMAL = 0.01, 1.21  # misalignment; normal over tangential stiffness of steel on steel
 # slip paths [m] between which a row is shown: friction follows a new slip speed after micrometres
@@ -50,15 +49,6 @@ class Row(TypedDict):
     row: str
     text: str
     effect: float | None
-
-
-def _doubtful(six: Mapping[str, float]) -> str:
-    """The input whose unit explains an amplitude y~ that no contact has."""
-    if six["y0"] > _LARGEST_AMPLITUDE:
-        return f"y0 = {six['y0']:.3g} in metres"
-    if six["k"] > _LARGEST_STIFFNESS:
-        return f"k = {six['k']:.3g} in N/m"
-    return f"Fz = {six['Fz']:.3g} in newtons"
 
 
 def model_rows(
@@ -90,9 +80,9 @@ def model_rows(
     if math.isinf(six["k"]) or six["omega"] == 0.0 or swing == 0.0:
         return []
     y = 0.0 if kind.normal else answer.y_tilde
-    if y > _FAR:
-        text = f"y~ = {y:.3g}; contacts have 0.1 to 100: is {_doubtful(six)}?"
-        return [{"row": "units", "text": text, "effect": None}]
+    if y > FURTHEST:  # no contact has such a y~: the remark on it stands alone
+        doubts = [one for one in answer.remarks if one["row"] == UNITS]
+        return [{"row": UNITS, "text": one["text"], "effect": None} for one in doubts]
     rows = [
         _other_contact(surrogate, case, mu, contact, direction),
         None if ends else _stiffness(surrogate, case, y, contact, direction),

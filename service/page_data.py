@@ -30,15 +30,15 @@ POLICY = (
 )
 
 _HALF = "half of peak to peak"
-# label, symbol, offered units, decimal exponents of the slider [SI], text at the start, a note
+# label, offered units, decimal exponents of the slider [SI], text at the start, a note
 _INPUTS = {
-    "mu0": ("friction", "µ₀", ["-"], [-2, 0.5], "0.3", ""),
-    "Fz": ("force", "Fz", ["N", "mN", "kN"], [-3, 5], "10 N", ""),
-    "k": ("stiffness", "k", ["N/µm", "kN/m", "N/m"], [2, 10], "1 N/µm", ""),
-    "y0": ("amplitude", "y₀", ["µm", "nm", "mm", "m"], [-10, -3], "2 µm", _HALF),
-    AMPLITUDE: ("amplitude", "ΔFz", ["N", "mN", "kN"], [-3, 5], "5 N", _HALF),
-    "f": ("frequency", "f", ["kHz", "Hz", "MHz"], [0, 7], "20 kHz", ""),
-    "v0": ("speed", "v₀", ["mm/s", "µm/s", "m/s"], [-7, 2], "10 mm/s", ""),
+    "mu0": ("friction", ["-"], [-2, 0.5], "0.3", ""),
+    "Fz": ("force", ["N", "mN", "kN"], [-3, 5], "10 N", ""),
+    "k": ("stiffness", ["N/µm", "kN/m", "N/m"], [2, 10], "1 N/µm", ""),
+    "y0": ("amplitude", ["µm", "nm", "mm", "m"], [-10, -3], "2 µm", _HALF),
+    AMPLITUDE: ("amplitude", ["N", "mN", "kN"], [-3, 5], "5 N", _HALF),
+    "f": ("frequency", ["kHz", "Hz", "MHz"], [0, 7], "20 kHz", ""),
+    "v0": ("speed", ["mm/s", "µm/s", "m/s"], [-7, 2], "10 mm/s", ""),
 }
 # what may be chosen, with its part of the set-up in words; the first is the usual one
 _CHOICES = {
@@ -97,14 +97,14 @@ def names(guide: bool) -> dict[str, Any]:
     inputs: dict[str, dict[str, Any]] = {
         name: {
             "label": label,
-            "symbol": symbol,
+            "symbol": INPUTS[name].symbol,
             "meaning": INPUTS[name].meaning,
             "offered": offered,
             "range": slider,
             "note": note,
             "units": _scales(UNITS_OF[LIKE.get(name, name)]),
         }
-        for name, (label, symbol, offered, slider, _, note) in _INPUTS.items()
+        for name, (label, offered, slider, _, note) in _INPUTS.items()
     }
     geometries = {
         name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]}

@@ -20,7 +20,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import KIND, check, without_interval
-from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, in_help, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import NO_DEVIATION, read, read_one
@@ -32,13 +32,13 @@ from mumacro.outputs.evaluation import names_in
 from mumacro.surrogate import Surrogate
 from mumacro.validity import Row, digits, k_effect
 
-ABOUT_INPUTS = """\
+ABOUT_INPUTS = f"""\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
-  mu0    Coulomb friction coefficient [-], > 0;   Fz  normal force [N], > 0
-  k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
-  y0     amplitude [m], half of peak to peak; with --direction normal Fz_amplitude [N], below Fz
-  omega  angular frequency [rad/s], or f, frequency [Hz], >= 0
-  v0     sliding speed [m/s], >= 0
+  mu0    {in_help("mu0")};   Fz  {in_help("Fz")}
+  k      {in_help("k")}; rigid; or k=0.8..1.2N/um
+  y0     {in_help("y0")}; or Fz_amplitude [N]
+  omega  {in_help("omega")}, or f [Hz] in its place
+  v0     {in_help("v0")}
 """
 
 

@@ -9,17 +9,18 @@ from mumacro.analysis.motion import PARTS
 from mumacro.analysis.motion import motion as steady_cycle
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
+from mumacro.inputs.fields import in_help
 from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.oscillation import read_oscillation
 
 EXAMPLE = 'mumacro motion "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s" --x 1um@90deg --y 2um'
-_INPUTS = """\
+_INPUTS = f"""\
 inputs, each as name=value, in SI units or with a unit as in v0=1cm/s:
-  mu0    Coulomb friction coefficient [-], > 0
-  Fz     mean normal force [N], > 0
-  k      tangential stiffness [N/m], > 0
-  omega  angular frequency [rad/s], or f, frequency [Hz], > 0
-  v0     speed of the drag along x [m/s], >= 0
+  mu0    {in_help("mu0")}
+  Fz     {in_help("Fz")}: its mean
+  k      {in_help("k")}
+  omega  {in_help("omega").replace(">=", ">")}, or f [Hz] in its place
+  v0     {in_help("v0")}: that of the drag along x
 an oscillation is amplitude@phase, of several harmonics a list such as 2um,3:0.4um@90deg
 """
 _ROWS = (

@@ -37,11 +37,12 @@ class Element:
     Parameters
     ----------
     mu0 : array_like
-        Coulomb friction coefficient [-], > 0.
+        Coulomb friction coefficient of the contact [-], > 0.
     Fz : array_like
         Normal force [N], > 0.
     k : array_like
-        Tangential stiffness [N/m], finite and > 0; of a ball that of full stick, 8 a G*.
+        Tangential stiffness of the contact [N/m], finite and > 0; of a ball that of full stick,
+        8 a G*.
     contact : str
         "spring", or "ball" under a constant normal force.
     springs : int, optional

@@ -39,7 +39,7 @@ class Field(NamedTuple):
 
 _ROWS = (
     Field(
-        "mu0", "μ₀", "ratio", "-", "a plain number",
+        "mu0", "µ₀", "ratio", "-", "a plain number",
         "Coulomb friction coefficient of the contact", ABOVE_ZERO, (1e-3, 2.0), "0.3",
     ),
     Field(
@@ -48,7 +48,7 @@ _ROWS = (
     ),
     Field(
         "k", "k", "stiffness", "N/m", "newtons per metre",
-        "Tangential stiffness of the contact, or rigid", ABOVE_ZERO, (1.0, 1e12), "1N/um",
+        "Tangential stiffness of the contact", ABOVE_ZERO, (1.0, 1e12), "1N/um",
     ),
     Field(
         "y0", "y₀", "length", "m", "metres",
@@ -68,7 +68,7 @@ _ROWS = (
         "Sliding speed", NOT_NEGATIVE, (0.0, 300.0), "10mm/s",
     ),
     Field(
-        "Fz_amplitude", "Fz_amplitude", "force", "N", "newtons",
+        "Fz_amplitude", "ΔFz", "force", "N", "newtons",
         "Amplitude of the normal force, half of peak to peak, below Fz", NOT_NEGATIVE,
         (1e-6, 1e6), "3N", "y0",
     ),
@@ -138,6 +138,26 @@ def unit_of(name: str) -> str:
     ('N/m', 'Hz')
     """
     return INPUTS[name].unit
+
+
+def described(name: str, more: str = "") -> str:
+    """What an input is, with its unit, as descriptions have it.
+
+    >>> described("v0"), described("f", ", in place of omega")
+    ('Sliding speed [m/s]', 'Frequency of the oscillation [Hz], in place of omega')
+    """
+    return f"{INPUTS[name].meaning} [{unit_of(name)}]{more}"
+
+
+def in_help(name: str) -> str:
+    """The same within a sentence, with the bound.
+
+    >>> in_help("mu0"), in_help("v0")
+    ('Coulomb friction coefficient of the contact [-], > 0', 'sliding speed [m/s], >= 0')
+    """
+    text = described(name)
+    text = text if text.startswith("Coulomb") else text[0].lower() + text[1:]
+    return f"{text}, {BOUNDS[name].removeprefix('finite and ')}"
 
 
 def field_of(name: str) -> tuple[str, float]:

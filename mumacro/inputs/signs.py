@@ -53,7 +53,8 @@ class Signs:
     """What the numbers of a table tell about its decimal sign, as far as they were seen.
 
     ``decimal`` and ``thousands`` are those given, or None; :attr:`decimal` stays empty while no
-    number has a sign.  Where commas separate the cells, a point is the decimal sign.
+    number has a sign.  Where commas separate the cells, a point is the decimal sign, unless another
+    number shows that it is not.
     """
 
     def __init__(
@@ -79,14 +80,15 @@ class Signs:
         for cell in cells:
             if "." in cell.text or "," in cell.text:
                 sign, sure = evidence(cell.text)
-                # a given thousands sign is neither of the two here
-                sure = sure or self.thousands is not None or (sign, self._sep) == (".", ",")
+                sure = sure or self.thousands is not None  # which is neither of the two here
                 if sign:
                     seen.setdefault((sign, sure), cell)
         if not self.decimal:
             surely = [sign for sign in (".", ",") if (sign, True) in seen]
             if len(surely) == 2:
                 raise self._contradiction(seen[".", True], seen[",", True])
+            if not surely and self._sep == "," and (".", False) in seen:
+                surely = ["."]
             if not surely and seen:
                 raise self._ambiguity(*seen.values())
             self.decimal = surely[0] if surely else ""

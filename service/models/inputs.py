@@ -23,7 +23,7 @@ from pydantic_core import InitErrorDetails
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import DEVIATIONS, EXACT
-from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, refusal
+from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, described, refusal
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from mumacro.inputs.reading import Value, no_number, read, reason_of
@@ -105,24 +105,13 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-_K = (
-    'Tangential stiffness of the contact [N/m], or "rigid"; it must be given, here or as an '
-    "interval"
-)
-_MU0 = "Coulomb friction coefficient of the contact [-]"
-_FZ = "Normal force [N]"
-_OMEGA = "Angular frequency of the oscillation [rad/s]; omega or f is required"
-_F = "Frequency of the oscillation [Hz], in place of omega"
-_V0 = "Sliding velocity [m/s]"
-_LOW, _HIGH = "Lowest stiffness [N/m], with k_high", "Highest stiffness [N/m], with k_low"
-_Y0 = (
-    "Amplitude of the oscillation [m], half of peak to peak, across or along the sliding "
-    "direction; required, unless the direction is normal"
-)
-_AMPLITUDE = (
-    "Amplitude of the normal force [N], half of peak to peak, below Fz: for direction normal in "
-    "place of y0"
-)
+_K = described("k", '; "rigid" in a text; it must be given, here or as an interval')
+_MU0, _FZ, _V0 = described("mu0"), described("Fz"), described("v0")
+_OMEGA = described("omega", "; omega or f is required")
+_F = described("f", ", in place of omega")
+_LOW, _HIGH = described("k_low"), described("k_high")
+_Y0 = described("y0", ", across or along; required, unless the direction is normal")
+_AMPLITUDE = described("Fz_amplitude", ": for direction normal in place of y0")
 
 
 def _given_together(*names: str) -> dict[str, Any]:
@@ -409,10 +398,10 @@ class InputColumns(Strict):
 
     mu0: PositiveColumn = Field(description=_MU0)
     Fz: PositiveColumn = Field(description=_FZ)
-    k: StiffnessColumn = either('Tangential stiffness [N/m], or "rigid"; or k_low and k_high')
-    y0: NotNegativeColumn = optional("Amplitude of the oscillation [m], half of peak to peak")
-    omega: NotNegativeColumn = optional("Angular frequency [rad/s]; or f")
-    f: HertzColumn = optional("Frequency [Hz], in place of omega")
+    k: StiffnessColumn = either(described("k", '; "rigid" in a text; or k_low and k_high'))
+    y0: NotNegativeColumn = optional(described("y0"))
+    omega: NotNegativeColumn = optional(described("omega", "; or f"))
+    f: HertzColumn = optional(_F)
     v0: NotNegativeColumn = Field(description=_V0)
     Fz_amplitude: NotNegativeColumn = optional(_AMPLITUDE)
     k_low: PositiveColumn = optional(_LOW)

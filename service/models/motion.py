@@ -18,7 +18,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mumacro.analysis.motion import TOLERANCES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, described
 from mumacro.inputs.kind import ContactName
 from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
 from mumacro.inputs.reading import read_one, reason_of
@@ -164,19 +164,18 @@ class MotionRequest(Strict):
         }
     )
 
-    mu0: Friction = Field(description="Coulomb friction coefficient of the contact [-]")
-    Fz: Force = Field(description="Mean normal force [N]")
+    mu0: Friction = Field(description=described("mu0"))
+    Fz: Force = Field(description=described("Fz", ", its mean"))
     k: StiffnessEnd = Field(
-        description="Tangential stiffness of the contact [N/m]; a rigid contact is the limit of a "
-        "large one"
+        description=described("k", ": here a number; a rigid contact is the limit of a large one")
     )
     omega: Annotated[AngularFrequency, _POSITIVE] | None = optional(
-        "Angular frequency of the period [rad/s]; omega or f is required"
+        described("omega", ", that of the period; omega or f is required")
     )
     f: Annotated[Frequency, _HERTZ] | None = optional(
-        "Frequency of the period [Hz], in place of omega"
+        described("f", ", that of the period, in place of omega")
     )
-    v0: Speed = Field(description="Speed of the drag along x [m/s]")
+    v0: Speed = Field(description=described("v0", ", of the drag along x"))
     x: Oscillation | None = optional(f"Oscillation along the drag [m]: {FORMS}")
     y: Oscillation | None = optional(f"Oscillation across it [m]: {FORMS}")
     normal: Oscillation | None = optional(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from mumacro.errors import InputError
+from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import ContactName, DirectionName, Kind, kind_of
 from mumacro.outputs import OUTPUTS
 
@@ -67,17 +68,24 @@ class Choice(Strict):
         return words
 
 
+def _unit(name: str, more: str = "", before: str = "") -> str:
+    """The unit of a deviation, which is that of its input."""
+    return f"{before}[{unit_of(name)}]{more}"
+
+
 class InputStd(Strict):
     """Standard deviations of the inputs, in their units; independent errors are assumed."""
 
-    mu0: Deviation = Field(0.0, description="[-]")
-    Fz: Deviation = Field(0.0, description="[N]")
-    k: Deviation = Field(0.0, description="[N/m]")
-    y0: Deviation = Field(0.0, description="[m]")
-    omega: Deviation = Field(0.0, description="[rad/s]; or f")
-    f: Deviation = Field(0.0, description="[Hz], in place of omega")
-    v0: Deviation = Field(0.0, description="[m/s]")
-    Fz_amplitude: Deviation = Field(0.0, description="[N], for direction normal")
+    mu0: Deviation = Field(0.0, description=_unit("mu0"))
+    Fz: Deviation = Field(0.0, description=_unit("Fz"))
+    k: Deviation = Field(0.0, description=_unit("k"))
+    y0: Deviation = Field(0.0, description=_unit("y0"))
+    omega: Deviation = Field(0.0, description=_unit("omega", "; or f"))
+    f: Deviation = Field(0.0, description=_unit("f", ", in place of omega"))
+    v0: Deviation = Field(0.0, description=_unit("v0"))
+    Fz_amplitude: Deviation = Field(
+        0.0, description=_unit("Fz_amplitude", ", for direction normal")
+    )
 
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
@@ -97,14 +105,14 @@ class InputStd(Strict):
 class StdColumns(Strict):
     """Standard deviations of the inputs of many cases: numbers, or lists with one for each case."""
 
-    mu0: DeviationColumn = either("[-]")
-    Fz: DeviationColumn = either("[N]")
-    k: DeviationColumn = either("[N/m]")
-    y0: DeviationColumn = either("[m]")
-    omega: DeviationColumn = either("[rad/s]; or f")
-    f: DeviationColumn = either("[Hz], in place of omega")
-    v0: DeviationColumn = either("[m/s]")
-    Fz_amplitude: DeviationColumn = either("[N], for direction normal")
+    mu0: DeviationColumn = either(_unit("mu0"))
+    Fz: DeviationColumn = either(_unit("Fz"))
+    k: DeviationColumn = either(_unit("k"))
+    y0: DeviationColumn = either(_unit("y0"))
+    omega: DeviationColumn = either(_unit("omega", "; or f"))
+    f: DeviationColumn = either(_unit("f", ", in place of omega"))
+    v0: DeviationColumn = either(_unit("v0"))
+    Fz_amplitude: DeviationColumn = either(_unit("Fz_amplitude", ", for direction normal"))
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -205,14 +213,16 @@ class CaseColumns(Outputs, InputColumns):
 class Deviations(Strict):
     """The members of ``std``, each as a parameter of its own."""
 
-    std_mu0: Deviation | None = optional("Standard deviation [-]")
-    std_Fz: Deviation | None = optional("Standard deviation [N]")
-    std_k: Deviation | None = optional("Standard deviation [N/m]")
-    std_y0: Deviation | None = optional("Standard deviation [m]")
-    std_omega: Deviation | None = optional("Standard deviation [rad/s]")
-    std_f: Deviation | None = optional("Standard deviation [Hz]")
-    std_v0: Deviation | None = optional("Standard deviation [m/s]")
-    std_Fz_amplitude: Deviation | None = optional("Standard deviation [N]")
+    std_mu0: Deviation | None = optional(_unit("mu0", before="Standard deviation "))
+    std_Fz: Deviation | None = optional(_unit("Fz", before="Standard deviation "))
+    std_k: Deviation | None = optional(_unit("k", before="Standard deviation "))
+    std_y0: Deviation | None = optional(_unit("y0", before="Standard deviation "))
+    std_omega: Deviation | None = optional(_unit("omega", before="Standard deviation "))
+    std_f: Deviation | None = optional(_unit("f", before="Standard deviation "))
+    std_v0: Deviation | None = optional(_unit("v0", before="Standard deviation "))
+    std_Fz_amplitude: Deviation | None = optional(
+        _unit("Fz_amplitude", before="Standard deviation ")
+    )
 
     @property
     def deviations(self) -> dict[str, Any]:

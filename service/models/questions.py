@@ -21,7 +21,7 @@ from mumacro.analysis.motion import PARTS
 from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS, described
 from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.reading import no_number, read_one, reason_of
@@ -233,7 +233,7 @@ class StiffnessRequest(Strict):
     geometry: _Geometry = Field(description=_GEOMETRIES)
     radius: Length | None = optional("Radius of the ball, pin or cylinder [m]")
     length: Length | None = optional("Length of the cylinder [m]; of: cylinder")
-    Fz: Load | None = optional("Normal force [N]")
+    Fz: Load | None = optional(described("Fz"))
     oscillation: Literal["across", "along"] | None = optional(
         "To the axis of the cylinder; of: cylinder"
     )
@@ -325,24 +325,20 @@ class FitRequest(Choice):
         ["k", "mu0"], description="What is fitted; with a table left out: k alone where it has mu0"
     )
     v0: PositivePoints | None = optional(
-        "Sliding velocity of each point [m/s]; required without a table"
+        described("v0", " of each point; required without a table")
     )
     mu_macro: MeasuredPoints | None = optional(
         "Measured mu_macro of each point [-]; required without a table"
     )
     std: PositivePoints | None = optional("Standard deviation of mu_macro [-]")
-    mu0: PositivePoints | None = optional("Friction coefficient, unless it is fitted [-]")
-    Fz: PositivePoints | None = optional("Normal force [N]")
-    k: StiffnessPoints | None = optional(
-        'Tangential stiffness, unless it is fitted [N/m], or "rigid"'
-    )
-    y0: NotNegativePoints | None = optional(
-        "Amplitude of the oscillation [m], half of peak to peak"
-    )
-    omega: NotNegativePoints | None = optional("Angular frequency [rad/s]; or f")
-    f: HertzPoints | None = optional("Frequency [Hz], in place of omega")
+    mu0: PositivePoints | None = optional(described("mu0", ", unless it is fitted"))
+    Fz: PositivePoints | None = optional(described("Fz"))
+    k: StiffnessPoints | None = optional(described("k", '; "rigid" in a text; unless it is fitted'))
+    y0: NotNegativePoints | None = optional(described("y0"))
+    omega: NotNegativePoints | None = optional(described("omega", "; or f"))
+    f: HertzPoints | None = optional(described("f", ", in place of omega"))
     Fz_amplitude: NotNegativePoints | None = optional(
-        "Amplitude of the normal force [N], for direction normal in place of y0"
+        described("Fz_amplitude", ": for direction normal in place of y0")
     )
     points: str | None = optional(
         "The points as a table: its head is the first line that names v0 and mu_macro, units stand "

@@ -59,9 +59,9 @@ def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) ->
 def test_amplitudes_beyond_those_of_contacts_ask_for_the_unit(surrogate: Surrogate) -> None:
     result = rows(surrogate, y0=2.0)
     assert list(result) == ["units"]
-    assert "is y0 = 2 in metres?" in result["units"][0]
+    assert "y0 = 2 m, usual is" in result["units"][0]
     assert "is k = 1e+12 in N/m?" in rows(surrogate, k=1e12)["units"][0]
-    assert "is Fz = 1e-05 in newtons?" in rows(surrogate, Fz=1e-5)["units"][0]
+    assert "is Fz = 1e-05 in N?" in rows(surrogate, Fz=1e-5)["units"][0]
     assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
 
 

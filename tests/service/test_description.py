@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from mumacro.inputs.fields import INPUTS, described
 from tests.support.serving import CASE
 
 LAW = {name: x for name, x in CASE.items() if name != "v0"} | {
@@ -76,8 +77,8 @@ def test_members_that_may_be_left_out_have_no_default_in_the_description(
 ) -> None:
     """Clients that are made from it would require them."""
     for name, schema in schemas.items():
-        for member, described in schema.get("properties", {}).items():
-            assert "default" not in described, f"{name}.{member}"
+        for member, of_member in schema.get("properties", {}).items():
+            assert "default" not in of_member, f"{name}.{member}"
     contact = schemas["CaseRequest"]["properties"]["contact"]
     assert contact["description"].endswith("left out: spring")
     assert "contact" not in schemas["CaseRequest"]["required"]
@@ -87,3 +88,27 @@ def test_no_parameter_of_a_query_is_null(client: Any) -> None:
     for path, operations in client.get("/openapi.json").json()["paths"].items():
         for parameter in operations.get("get", {}).get("parameters", ()):
             assert {"type": "null"} not in parameter["schema"].get("anyOf", ()), path
+
+
+def test_an_input_is_described_by_the_list_of_inputs(client: Any) -> None:
+    document = client.get("/openapi.json").json()
+    places = [
+        (name, member["description"], model)
+        for model, schema in document["components"]["schemas"].items()
+        if model in BODIES
+        for name, member in schema["properties"].items()
+        if name in INPUTS
+    ]
+    places += [
+        (
+            parameter["name"],
+            parameter.get("description", parameter["schema"].get("description")),
+            path,
+        )
+        for path, operations in document["paths"].items()
+        for parameter in operations.get("get", {}).get("parameters", ())
+        if parameter["name"] in INPUTS
+    ]
+    assert len(places) > 60
+    for name, text, place in places:
+        assert text.startswith(described(name)), (place, text)

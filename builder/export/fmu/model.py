@@ -25,7 +25,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from mumacro.inputs.fields import UNITS
+from mumacro.inputs.fields import INPUTS, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
@@ -38,13 +38,9 @@ STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.
 REST = 1e-4  # v_rest at the start [m/s]
 OPTIONS = ("-O2", "-std=c99", "-fPIC", "-shared", "-fvisibility=hidden")
 _TEXTS = {
-    "mu0": "Coulomb friction coefficient",
-    "Fz": "normal force",
-    "k": "tangential stiffness; infinite: rigid contact",
-    "y0": "amplitude of the oscillation, across or along",
-    "omega": "angular frequency of the oscillation",
-    "v0": "sliding velocity; all but force are those of its absolute value",
-    AMPLITUDE: "amplitude of the normal force, for direction normal",
+    **{name: INPUTS[name].meaning for name in STARTS},
+    "k": f"{INPUTS['k'].meaning}; infinite: rigid contact",
+    "v0": f"{INPUTS['v0'].meaning}; all but force are those of its absolute value",
     "mu_macro": "macroscopic friction coefficient",
     "mu_ratio": "mu_macro / mu0",
     "error_bound": "bound of the absolute error of mu_macro",
@@ -58,6 +54,7 @@ _TEXTS = {
     "force": "friction force along v0, mu_macro Fz from v_rest on",
     "v_rest": "speed below which force is regularised",
 }
+_MEASURED = (*STARTS, "force", "v_rest")  # in units
 _OUTPUTS, _INTEGERS = ("mu_macro", "mu_ratio", "force"), ("regime", "source")
 _CHOICES: dict[str, tuple[str, ...]] = {"contact": CONTACTS, "direction": DIRECTIONS}
 _UNITS = """<UnitDefinitions>
@@ -241,7 +238,7 @@ def _variable(fmi2: bool, name: str, reference: int) -> str:
         f'name="{name}" valueReference="{reference}" description={quoteattr(_TEXTS[name])} '
         f'causality="{causality}" variability="{variability}"'
     )
-    unit = {**UNITS, AMPLITUDE: "N", "force": "N", "v_rest": "m/s"}.get(name, "-")
+    unit = unit_of({"force": "Fz", "v_rest": "v0"}.get(name, name)) if name in _MEASURED else "-"
     value = "" if unit == "-" else f' unit="{unit}"'
     if name in STARTS:
         value += f' start="{STARTS[name]!r}"' + (' min="0"' if name != "v0" else "")

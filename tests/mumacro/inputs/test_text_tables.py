@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mumacro.analysis.measured_points import read_points
@@ -130,6 +130,7 @@ def value_of(text: str, decimal: str) -> float:
 
 
 @settings(max_examples=300, deadline=None)
+@example([(1000.0, 1.0)], ",", ",", (",.0f", "r"), "\n", "utf-8", [], "none", False, "")
 @given(
     rows=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=8),
     sep=st.sampled_from([",", ";", "\t", "|", BLANKS]),
