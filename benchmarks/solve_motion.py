@@ -9,6 +9,7 @@ the unknown crosses.
 from tests.support.measuring import IMAGES, main, sections  # isort: split
 
 import math
+import sys
 import time
 from collections import Counter
 from typing import Any
@@ -59,7 +60,9 @@ def search(share: float = 1.0) -> str:
     counts, several, spent, samples = Counter[str](), 0, 0.0, 0
     missed, wrong = list[object](), list[object]()
     problems = max(round(share * PROBLEMS), 1)
-    for _ in range(problems):
+    for done in range(1, problems + 1):
+        if done % 100 == 0:
+            print(f"{done} problems, {len(missed)} roots missed", file=sys.stderr, flush=True)
         unknown, case = problem(rng)
         x = mumacro.solve_motion(unknown, 1e9, **case).samples[0]  # how its range is spread
         fine = np.interp(np.linspace(0.0, 1.0, FINE), np.linspace(0.0, 1.0, x.size), x)

@@ -81,6 +81,18 @@ def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0)
     return f"{rounded:#.{count}g}".removesuffix(".")
 
 
+def tidy_zeros(text: str) -> str:
+    """A number without zeros at its end.
+
+    >>> [tidy_zeros(text) for text in ("2.500", "100", "1.0e-07", "2.0")]
+    ['2.5', '100', '1e-07', '2']
+    """
+    mantissa, e, exponent = text.partition("e")
+    if "." in mantissa:
+        mantissa = mantissa.rstrip("0").rstrip(".")
+    return f"{mantissa}{e}{exponent}"
+
+
 def cell(value: Any) -> str:
     """One value of a table."""
     if isinstance(value, (float, np.floating)):

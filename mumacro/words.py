@@ -7,17 +7,17 @@ from mumacro.answer import Answer
 from mumacro.inputs.doubts import UNITS
 from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import Kind
-from mumacro.inputs.units import suited
+from mumacro.inputs.units import Scale, scale_of, suited
 from mumacro.outputs import MEMBERS
-from mumacro.shown import known
+from mumacro.shown import known, tidy_zeros
 from mumacro.validity import digits, k_effect, model_rows
 
 REGIMES = {
     "continuous": "slips all the time",
     "stick_slip": "sticks during a part of each period",
-    "static": "at rest",
-    "partial_slip": "a part of the contact area slips all the time, the rest sticks during a part "
-    "of each period",
+    "static": "at rest: the limit v0 -> 0",
+    "partial_slip": "the rim of the contact slips all the time, its middle sticks during a part of "
+    "each period",
     "reverse_slip": "slips forwards and backwards in each period",
 }
 _SHOWN = ("std", "std_share", "gradient")  # in rows of their own
@@ -26,19 +26,21 @@ _ROW_OF_K = ("k is known", True)  # the answer for an interval says that already
 Rows = list[tuple[str, ...]]
 
 
-def of_one_case(answer: Answer[Any], shown: int | None = None) -> tuple[Rows, Rows, str]:
+def of_one_case(
+    answer: Answer[Any], shown: int | None = None, units: Mapping[str, str] | None = None
+) -> tuple[Rows, Rows, str]:
     """Rows of name, value, unit and meaning; what the answer assumes, and remarks, each with the
     word for which of them it is; and its numerical error.
 
-    Numbers have the digits that are known, and the unit that suits them; with ``shown`` that many
-    digits, in SI.
+    Numbers have the digits that are known, and the unit that ``units`` has for their input, or else
+    the one that suits them; with ``shown`` that many digits, in SI.
     """
     surrogate, cases = answer._surrogate, answer.cases
     kind, case = cases.one_kind, cases.columns
     ends = cases.ends and tuple(float(end[0]) for end in cases.ends)
     asked = {**case} if ends is None else {**_without_k(case), "k_range": ends}
     effect = k_effect(surrogate, asked, *kind.names.values()) if shown is None else 0.0
-    rows = _rows_of(answer, kind, shown, digits(effect))
+    rows = _rows_of(answer, kind, shown, digits(effect), units or {})
     notes: Rows = [
         ("assumes", f"{row['row']}: {in_words(row['text'], case)}")
         for row in model_rows(surrogate, asked, **kind.names)
@@ -60,22 +62,42 @@ def in_words(text: str, case: Mapping[str, Any]) -> str:
     return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}")
 
 
+#: paths that have the unit of an input
+_UNIT_OF = {"limits.v0_crit": "v0", "groups.l0": "y0"}
+
+
 def with_unit(
-    value: float, unit: str, count: int, shown: int | None = None, error: float = 0.0
+    value: float,
+    unit: str,
+    count: int,
+    shown: int | None = None,
+    error: float = 0.0,
+    typed: tuple[str, Scale] | None = None,
 ) -> tuple[str, str]:
-    """A number in an SI unit with ``count`` digits, and the unit that suits it; with ``shown`` that
-    many digits, in SI.
+    """A number in an SI unit with ``count`` digits, and the unit that was ``typed``, or suits it;
+    with ``shown`` that many digits, in SI.
 
     >>> with_unit(2.4547623e-6, "m", 4), with_unit(2.4547623e-6, "m", 4, 8)
     (('2.455', 'um'), ('2.4547623e-06', 'm'))
     """
     if shown is not None:
         return f"{value:.{shown}g}", unit
-    name, scale = suited(unit, value)
+    name, scale = typed or suited(unit, value)
     return known(scale.of_si(value), count, scale.of_si(error)), name
 
 
-def _rows_of(answer: Any, kind: Kind, shown: int | None, count: int) -> Rows:
+def _stiffness(k: float, shown: int | None, units: Mapping[str, str]) -> str:
+    """A stiffness that was given, or the middle of an interval."""
+    typed = None
+    if "k" in units and (scale := scale_of("k", units["k"])) is not None:
+        typed = units["k"], scale
+    number, unit = with_unit(k, "N/m", 6, shown, typed=typed)
+    return f"{tidy_zeros(number)} {unit}"
+
+
+def _rows_of(
+    answer: Any, kind: Kind, shown: int | None, count: int, units: Mapping[str, str]
+) -> Rows:
     """An answer as rows of name, value, unit, meaning."""
     surrogate, cases = answer._surrogate, answer.cases
     std = answer["std"] if "std" in answer.paths else 0.0
@@ -84,6 +106,11 @@ def _rows_of(answer: Any, kind: Kind, shown: int | None, count: int) -> Rows:
         if shown is not None:
             return f"{value:#.{shown}g}"
         return known(value, count, error, deviation)
+
+    def typed(path: str) -> tuple[str, Scale] | None:
+        name = _UNIT_OF.get(path, "")
+        scale = scale_of(name, units[name]) if name in units else None
+        return None if scale is None else (units[name], scale)
 
     error, mu0 = answer.error_bound, cases.columns["mu0"]
     groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
@@ -97,8 +124,8 @@ def _rows_of(answer: Any, kind: Kind, shown: int | None, count: int) -> Rows:
         ("source", answer.source, "", f"of {surrogate.id}, tolerance {surrogate.tolerance:g}"),
     ]
     if cases.ends is not None:
-        low, high = (" ".join(with_unit(float(end[0]), "N/m", 6, shown)) for end in cases.ends)
-        middle = " ".join(with_unit(cases.columns["k"], "N/m", 6, shown))
+        low, high = (_stiffness(float(end[0]), shown, units) for end in cases.ends)
+        middle = _stiffness(cases.columns["k"], shown, units)
         rows[:1] = [
             (*rows[0][:3], f"at k = {middle}, the geometric middle"),
             (
@@ -122,6 +149,6 @@ def _rows_of(answer: Any, kind: Kind, shown: int | None, count: int) -> Rows:
             continue
         name, dot, member = path.partition(".")
         error = answer.outputs.get(f"{name}_bound{dot}{member}", 0.0)
-        text, unit = with_unit(value, MEMBERS[path].unit, count, shown, error)
+        text, unit = with_unit(value, MEMBERS[path].unit, count, shown, error, typed(path))
         rows.append((path, text, f"[{unit}]", MEMBERS[path].meaning))
     return rows

@@ -8,7 +8,7 @@ the nearest place is looked for, since two roots may lie there.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from mumacro.analysis import solutions as tables
 from mumacro.analysis.motion import PARTS, motion
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
-from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.reading import read, read_one
@@ -177,6 +177,16 @@ def unit_of_unknown(unknown: str) -> str:
     return ("N" if part == "normal" else "m") if member else unit_of(part)
 
 
+def quantity_of_unknown(unknown: str) -> str:
+    """What an unknown of a motion measures.
+
+    >>> [quantity_of_unknown(name) for name in ("v0", "normal.amplitude", "y.phase")]
+    ['speed', 'force', 'angle']
+    """
+    part, _, member = unknown.partition(".")
+    return "angle" if member == "phase" else QUANTITY_OF[part]
+
+
 def solve_motion(
     unknown: str,
     target: Numbers = 0.0,
@@ -246,7 +256,7 @@ def _solved(curve: "Curve", low: float, high: float, targets: Array) -> MotionSo
         unknown=curve.unknown,
         of=curve.of,
         targets=tuple(targets.tolist()),
-        roots=tuple(scan.roots(float(one)) for one in targets),
+        roots=scan.roots(targets),
         reach=MotionReach(low, high, float(scan.mean.min()), float(scan.mean.max())),
         other_way=None,
         samples=(scan.x, scan.mean),
@@ -337,7 +347,7 @@ def _range(within: Any, unknown: str, curve: Curve) -> tuple[float, float]:
     if within is None:
         return _usual_range(unknown, curve)
     part, _, member = unknown.partition(".")
-    quantity = "angle" if member == "phase" else ""
+    quantity = quantity_of_unknown(unknown)
     name = part if member else unknown
     try:
         low, high = (read_one(name, end, quantity) for end in within)
@@ -403,6 +413,7 @@ class _Scan:
 
     def __init__(self, curve: Curve, low: float, high: float, targets: Array) -> None:
         self.curve, self.low, self.high = curve, low, high
+        self._known: dict[tuple[float, float], tuple[Array, Array, Array]] = {}
         # a speed of 0 leaves a choice of the cycle: the search begins right beside it
         start = 1e-6 * high if curve.unknown == "v0" and low == 0.0 else low
         if curve.unknown == "v0" and low == 0.0:
@@ -479,18 +490,42 @@ class _Scan:
             out += y[j] * factor
         return out
 
-    def roots(self, target: float) -> tuple[MotionRoot, ...]:
-        """All roots of one target, ascending."""
-        gap = self.mean - target
-        changes = np.flatnonzero(np.sign(gap[:-1]) * np.sign(gap[1:]) < 0.0)
-        found = [
-            self._narrowed(self.x[i], self.x[i + 1], gap[i], gap[i + 1], target) for i in changes
-        ]
-        found += [self._root(self.x[i]) for i in np.flatnonzero(gap == 0.0)]
-        for i in self._near(gap):
-            found += self._touched(i, gap, target)
+    def roots(self, targets: Array) -> tuple[tuple[MotionRoot, ...], ...]:
+        """All roots of every target, ascending."""
+        brackets: list[_Bracket] = []
+        exact: list[tuple[int, float]] = []  # target, place
+        for k, target in enumerate(targets.tolist()):
+            gap = self.mean - target
+            brackets += [
+                _Bracket(k, self.x[j], self.x[j + 1], gap[j], gap[j + 1])
+                for j in np.flatnonzero(np.sign(gap[:-1]) * np.sign(gap[1:]) < 0.0)
+            ]
+            exact += [(k, float(self.x[j])) for j in np.flatnonzero(gap == 0.0)]
+            for i in self._near(gap):
+                inside, touching = self._touched(i, gap, k, target)
+                brackets += inside
+                exact += [(k, place) for place in touching]
+        exact += self._narrowed(brackets, targets)
+        every = self._at([place for _, place in exact])
+        found: list[list[MotionRoot]] = [[] for _ in targets]
+        for (k, _), root in zip(exact, every, strict=True):
+            found[k].append(root)
+        return tuple(map(self._unique, found, targets.tolist()))
+
+    def _unique(self, roots: list[MotionRoot], target: float) -> tuple[MotionRoot, ...]:
+        """Roots of one target, ascending, each once; a range in which the mean force is the target
+        within its estimate, such as that of continuous sliding, is one root."""
         unique: list[MotionRoot] = []
-        for root in sorted(root for root in found if root is not None):
+        flat = np.abs(self.mean - target) <= self.error
+        for root in sorted(roots):
+            if unique and root.low > unique[-1].high:
+                last = unique[-1]
+                first, end = map(int, np.searchsorted(self.x, (last.value, root.value)))
+                # the samples between both, or else around them
+                near = slice(first, end) if first < end else slice(max(first - 1, 0), end + 1)
+                if flat[near].all():
+                    unique[-1] = last._replace(high=max(last.high, root.high))
+                    continue
             if not unique or root.low > unique[-1].high:
                 unique.append(root)
         if self._is_whole_turn and len(unique) > 1 and unique[-1].high - 360.0 >= unique[0].low:
@@ -509,14 +544,23 @@ class _Scan:
         same = (side[inner] == side[inner - 1]) & (side[inner] == side[inner + 1])
         return [int(i) for i in inner[lowest & same & (side[inner] != 0.0)]]
 
-    def _touched(self, i: int, gap: Array, target: float) -> list[MotionRoot | None]:
-        """Roots near a place where the curve comes near the target: two, one that touches, none."""
+    def _inside(self, low: float, high: float) -> tuple[Array, Array, Array]:
+        """Eight places within an interval, and the curve there, kept for other targets."""
+        if (low, high) not in self._known:
+            inner = np.linspace(low, high, 10)[1:-1]
+            self._known[low, high] = inner, *self.curve.at(inner)
+        return self._known[low, high]
+
+    def _touched(
+        self, i: int, gap: Array, k: int, target: float
+    ) -> tuple[list["_Bracket"], list[float]]:
+        """Near a place where the curve comes near the target: two brackets, or the place of a root
+        that touches, or none."""
         low, high, side = self.x[i - 1], self.x[i + 1], math.copysign(1.0, gap[i])
         best, least = self.x[i], abs(gap[i])
         for _ in range(12):
             # the parabola through the ends and the best place says whether it can still be reached
-            inner = np.linspace(low, high, 10)[1:-1]
-            mean, error = self.curve.at(inner)
+            inner, mean, error = self._inside(float(low), float(high))
             size = side * (mean - target)
             j = int(np.nanargmin(size))
             if size[j] < least:
@@ -524,53 +568,78 @@ class _Scan:
             if least <= 0.0:
                 ends = self.x[i - 1], best, self.x[i + 1]
                 gaps = gap[i - 1], side * least, gap[i + 1]
-                return [
-                    self._narrowed(ends[n], ends[n + 1], gaps[n], gaps[n + 1], target)
-                    for n in (0, 1)
-                ]
+                brackets = [_Bracket(k, ends[n], ends[n + 1], gaps[n], gaps[n + 1]) for n in (0, 1)]
+                return brackets, []
             spread = np.nanmax(size) - np.nanmin(size)
             if least > _CLEAR * spread + error[j]:
-                return []  # further away than what is left of its course
+                return [], []  # further away than what is left of its course
             step = (high - low) / 9.0
             low, high = max(best - step, self.x[i - 1]), min(best + step, self.x[i + 1])
-        return [self._root(float(best))] if least <= self._error_at(best) else []
+        return [], [float(best)] if least <= self._error_at(best) else []
 
     def _error_at(self, x: float) -> float:
         return float(self.curve.at(np.array([x]))[1][0])
 
-    def _narrowed(
-        self, a: float, b: float, fa: float, fb: float, target: float
-    ) -> MotionRoot | None:
-        """The root in a bracket, by the method of Illinois; None at a jump."""
-        width = b - a
-        side = 0
+    def _narrowed(self, brackets: Sequence["_Bracket"], targets: Array) -> list[tuple[int, float]]:
+        """The roots in brackets, all at once, by the method of Illinois: targets and places;
+        without those at a jump."""
+        if not brackets:
+            return []
+        k, a, b, fa, fb = (np.array(column) for column in zip(*brackets, strict=True))
+        width, side, active = b - a, np.zeros(a.size, np.int8), np.arange(a.size)
+        x, f, error = a.copy(), np.zeros(a.size), np.zeros(a.size)
         for step in range(_MOST_STEPS):
-            x = (fa * b - fb * a) / (fa - fb) if step % 4 != 3 else 0.5 * (a + b)
-            x = x if a < x < b else 0.5 * (a + b)
-            mean, error = self.curve.at(np.array([x]))
-            f = float(mean[0]) - target
-            if abs(f) <= 0.1 * error[0] or b - a <= _NARROW * max(abs(a), abs(b)):
+            ai, bi, fai, fbi = a[active], b[active], fa[active], fb[active]
+            middle = 0.5 * (ai + bi)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                new = middle if step % 4 == 3 else (fai * bi - fbi * ai) / (fai - fbi)
+            new = np.where((ai < new) & (new < bi), new, middle)
+            mean, error[active] = self.curve.at(new)
+            x[active], f[active] = new, mean - targets[k[active]]
+            fi = f[active]
+            narrow = bi - ai <= _NARROW * np.maximum(np.abs(ai), np.abs(bi))
+            going = ~((np.abs(fi) <= 0.1 * error[active]) | narrow)
+            active, fi, new = active[going], fi[going], new[going]
+            if not active.size:
                 break
-            if (f < 0.0) == (fa < 0.0):
-                a, fa, fb = x, f, fb * (0.5 if side == -1 else 1.0)
-                side = -1
-            else:
-                b, fb, fa = x, f, fa * (0.5 if side == 1 else 1.0)
-                side = 1
-        if abs(f) > 100.0 * error[0] and b - a <= _NARROW * width:
-            return None
-        return self._root(x)
+            left = (fi < 0.0) == (fa[active] < 0.0)
+            lefts, rights = active[left], active[~left]
+            fb[lefts] *= np.where(side[lefts] == -1, 0.5, 1.0)
+            a[lefts], fa[lefts], side[lefts] = new[left], fi[left], -1
+            fa[rights] *= np.where(side[rights] == 1, 0.5, 1.0)
+            b[rights], fb[rights], side[rights] = new[~left], fi[~left], 1
+        jump = (np.abs(f) > 100.0 * error) & (b - a <= _NARROW * width)
+        return [
+            (int(one), float(place))
+            for one, place, lost in zip(k, x, jump, strict=True)
+            if not lost
+        ]
 
-    def _root(self, x: float) -> MotionRoot:
-        """A root with the width in which the mean force is within its estimate of the target."""
-        step = 1e-4 * (abs(x) if x != 0.0 else self.high - self.low)
-        left, right = max(x - step, self.x[0]), min(x + step, self.x[-1])
-        mean, error = self.curve.at(np.array([left, x, right]))
-        slope = abs(float(mean[2] - mean[0])) / (right - left)
-        estimate = float(error[1])
-        # where the mean force hardly changes, a root is known to a wide range only
-        width = min(estimate / slope, self.high - self.low) if slope > 0.0 else step
-        return MotionRoot(float(x), float(x - width), float(x + width), float(mean[1]), estimate)
+    def _at(self, places: Sequence[float]) -> list[MotionRoot]:
+        """Roots with the width in which the mean force is within its estimate of the target."""
+        x = np.array(places, np.float64)
+        if not x.size:
+            return []
+        step = 1e-4 * np.where(x != 0.0, np.abs(x), self.high - self.low)
+        left, right = np.maximum(x - step, self.x[0]), np.minimum(x + step, self.x[-1])
+        mean, error = (part.reshape(3, -1) for part in self.curve.at(np.r_[left, x, right]))
+        slope = np.abs(mean[2] - mean[0]) / (right - left)
+        with np.errstate(divide="ignore"):
+            # where the mean force hardly changes, a root is known to a wide range only
+            width = np.minimum(error[1] / slope, self.high - self.low)
+        width = np.where(slope > 0.0, width, step)
+        columns = (x, x - width, x + width, mean[1], error[1])
+        return [MotionRoot(*root) for root in zip(*(c.tolist() for c in columns), strict=True)]
+
+
+class _Bracket(NamedTuple):
+    """An interval in which the mean force crosses a target."""
+
+    target: int  #: its place
+    low: float
+    high: float
+    at_low: float  #: the mean force minus the target at both ends
+    at_high: float
 
 
 def _between(a: Array, b: Array) -> Array:

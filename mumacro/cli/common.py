@@ -13,7 +13,7 @@ from argparse import RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -26,9 +26,10 @@ from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import NO_DEVIATION, read, read_one
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.text_tables import SEPARATORS, Dialect
-from mumacro.inputs.units import belongs_to_value
+from mumacro.inputs.units import Scale, belongs_to_value, scale_of, suited
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
+from mumacro.shown import known, tidy_zeros
 from mumacro.surrogate import Surrogate
 from mumacro.validity import Row, digits, k_effect
 
@@ -182,7 +183,7 @@ def add_exponent(parser: OneLineParser) -> None:
 def add_form(parser: argparse.ArgumentParser) -> None:
     """The options for the form of a result."""
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
-    text = "digits to print; default: as many as k supports, 4 to 6; 15: all"
+    text = "digits, in SI; default: those that are known, up to 6; 15: all"
     parser.add_argument("--digits", type=int, choices=range(1, 18), metavar="N", help=text)
 
 
@@ -357,11 +358,66 @@ def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
     return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
 
 
-def in_words(text: str, case: Mapping[str, Any]) -> str:
-    """The advice of a model line with what the command takes in place of Python's keyword."""
-    unit, size = ("N/um", 1e6) if case["k"] >= 1e5 else ("N/m", 1.0)
-    k = case["k"] / size
-    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}")
+def units_in(words: Sequence[str], **more: Sequence[str]) -> dict[str, str]:
+    """The units that were typed, by input; ``more`` are other texts of an input, such as the ends
+    of a range, which come first.
+
+    >>> units_in(["mu0=0.3 Fz=10N", "k=1 N/um v0=1mm/s"], v0=["0.1m/s", "1"])
+    {'v0': 'm/s', 'Fz': 'N', 'k': 'N/um'}
+    """
+    pairs = [(name, text) for name, texts in more.items() for text in texts]
+    pairs += [(name, text) for name, text in _pairs(words) if text is not None]
+    units: dict[str, str] = {}
+    for name, text in pairs:
+        if name in INPUTS and (unit := read(name, text).unit) not in (None, "", "1", "-"):
+            units.setdefault(name, str(unit))
+    return units
+
+
+class Unit(NamedTuple):
+    """The unit in which an answer is printed."""
+
+    name: str
+    scale: Scale
+
+    @classmethod
+    def of(cls, name: str, value: float, units: Mapping[str, str], digits: int | None) -> "Unit":
+        """That of an input: the one that was typed, or the one that suits a value [SI]; with
+        ``--digits`` the SI unit."""
+        if digits is not None:
+            return cls(unit_of(name), Scale())
+        if name in units:
+            scale = scale_of(name, units[name])
+            return cls(units[name], Scale() if scale is None else scale)
+        return cls(*suited(unit_of(name), value))
+
+    def head(self, name: str) -> str:
+        """The head of a column."""
+        return f"{name} [{self.name}]"
+
+    def shown(self, value: float, count: int, digits: int | None, error: float = 0.0) -> str:
+        """A value [SI] with ``count`` digits, those that its ``error`` leaves; or with
+        ``--digits``."""
+        if digits is not None:
+            return f"{value:.{digits}g}"
+        return known(self.scale.of_si(value), count, self.scale.of_si(error))
+
+
+def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *more: str) -> str:
+    """The case that was understood, in the units that were typed, and ``more`` of it."""
+    parts = []
+    for name, value in case.items():
+        if name == "std":
+            continue
+        field = "k" if name == "k_range" else name
+        ends = value if isinstance(value, tuple) else (value,)
+        if math.isinf(ends[-1]):
+            parts.append("k rigid")
+            continue
+        unit = Unit.of(field, float(ends[-1]), units, None)
+        numbers = " to ".join(tidy_zeros(unit.shown(float(end), 6, None)) for end in ends)
+        parts.append(f"{field} = {numbers} {unit.name}".removesuffix(" -"))
+    return "; ".join([", ".join([*parts, *more]), ", ".join(kind.names.values())])
 
 
 def format_for(
@@ -369,10 +425,17 @@ def format_for(
 ) -> str:
     """How numbers are printed: with ``--digits``, or as many as the stiffness of a case
     supports."""
+    return f".{count_for(options, surrogate, case, kind)}g"
+
+
+def count_for(
+    options: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING
+) -> int:
+    """The number of digits that is printed: that of ``--digits``, or what the stiffness of a case
+    supports."""
     if options.digits is not None:
-        return f".{options.digits}g"
-    contact, direction = kind.names.values()
-    return f".{digits(k_effect(surrogate, case, contact, direction))}g"
+        return int(options.digits)
+    return digits(k_effect(surrogate, case, *kind.names.values()))
 
 
 def number_of(name: str, advice: str = "") -> Callable[[str], float]:

@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from mumacro.analysis.approximations import approximations
 from mumacro.analysis.law import law as friction_law
 from mumacro.cli import common
-from mumacro.cli.common import CURVE, UsageError, as_json, in_columns, open_table, read_case
+from mumacro.cli.common import CURVE, Unit, UsageError, as_json, in_columns, open_table, read_case
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.reading import read_one
+from mumacro.shown import known, tidy_zeros
 from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
@@ -73,9 +75,14 @@ def run(words: Sequence[str]) -> str:
         for name, column in columns.items()
     }
     middle = float(law.values[law.values.size // 2])
-    form = common.format_for(options, surrogate, {**case, along: middle}, kind)
+    count = common.count_for(options, surrogate, {**case, along: middle}, kind)
+    units = common.units_in(options.words, **{along: ends})
+    swept = Unit.of(along, middle, units, options.digits)
     of_k = ", for the geometric middle of k" if law.band else ""
-    marks = [f"{c.name} at {along} = {c.value:{form}} {unit}{of_k}" for c in law.border]
+    marks = [
+        f"{c.name} at {along} = {swept.shown(c.value, count, options.digits)} {swept.name}{of_k}"
+        for c in law.border
+    ]
     marks += common.model_lines(model)
     if options.out is not None:
         return "\n".join(
@@ -84,13 +91,33 @@ def run(words: Sequence[str]) -> str:
                 *marks,
             ]
         )
-    del headed["source"]
-    shown = [
-        [cell if isinstance(cell, str) else _shown(cell, form) for cell in x]
-        for x in headed.values()
-    ]
-    return "\n".join([in_columns([[*headed], *zip(*shown, strict=True)]), *marks])
+    del columns["source"]
+    of_column = {along: swept}
+    if law.stiffening is not None:
+        of_column["k"] = Unit.of("k", float(law.inputs["k"].max()), units, options.digits)
+    shown = {
+        of_column[name].head(name) if name in of_column else name: [
+            _shown(x, name, of_column.get(name), count, options.digits, error)
+            for x, error in zip(column, law.answer.error_bound, strict=True)
+        ]
+        for name, column in columns.items()
+    }
+    table = in_columns([[*shown], *zip(*shown.values(), strict=True)])
+    return "\n".join([common.case_line(case, units, kind), table, *marks])
 
 
-def _shown(value: float, form: str) -> str:
-    return "-" if math.isnan(value) else f"{value:{form}}"
+def _shown(
+    value: Any, name: str, unit: Unit | None, count: int, digits: int | None, error: float
+) -> str:
+    """A cell: a text, or a number with the digits that are known."""
+    if isinstance(value, str):
+        return value
+    if math.isnan(value):
+        return "-"
+    if unit is not None:
+        return tidy_zeros(unit.shown(value, 6, digits))
+    if name == "error_bound":
+        return f"{value:.{digits or 2}g}"
+    if digits is not None:
+        return f"{value:.{digits}g}"
+    return tidy_zeros(known(value, count, error))

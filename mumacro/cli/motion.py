@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mumacro import plotting
-from mumacro.analysis.motion import PARTS
+from mumacro.analysis.motion import NUMBERS, PARTS, Motion
 from mumacro.analysis.motion import motion as steady_cycle
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
 from mumacro.inputs.fields import in_help
 from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.oscillation import read_oscillation
+from mumacro.words import with_unit
 
 EXAMPLE = 'mumacro motion "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s" --x 1um@90deg --y 2um'
 _INPUTS = f"""\
@@ -23,15 +24,6 @@ inputs, each as name=value, in SI units or with a unit as in v0=1cm/s:
   v0     {in_help("v0")}: that of the drag along x
 an oscillation is amplitude@phase, of several harmonics a list such as 2um,3:0.4um@90deg
 """
-_ROWS = (
-    ("mu_macro", "-", "mean force along / Fz"),
-    ("mu_lateral", "-", "mean force across / Fz"),
-    ("stick_fraction", "-", "share of the period"),
-    ("slip_path", "m", "of the foot per period"),
-    ("power", "W", "of the shaker"),
-    ("power_drive", "W", "of the drive, mu_macro Fz v0"),
-    ("periods", "-", "until a disturbance has fallen to 1 %"),
-)
 _SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N"}
 
 
@@ -76,16 +68,16 @@ def run(words: Sequence[str]) -> str:
         contact=options.contact,
         tolerance=options.tolerance,
     )
-    names = [*(name for name, _, _ in _ROWS), "error_estimate"]
     if options.json:
-        lines = as_json({name: getattr(motion, name) for name in names})
+        lines = as_json(motion.columns)
     else:
-        form = f"#.{options.digits or 6}g"
         rows = [
-            (name, f"{getattr(motion, name):{form}}", f"[{unit}]", text)
-            for name, unit, text in _ROWS
+            (name, *_shown(name, getattr(motion, name), unit, motion, options.digits), meaning)
+            for name, (unit, meaning) in NUMBERS.items()
+            if name != "error_estimate"
         ]
-        lines = f"{in_columns(rows)}\nnumerical error of both about {motion.error_estimate:.1e}"
+        error = f"numerical error of both about {motion.error_estimate:.1e}"
+        lines = f"{in_columns(rows)}\n{error}"
     if options.out is None:
         return lines
     columns = {}
@@ -93,3 +85,15 @@ def run(words: Sequence[str]) -> str:
         columns = {f"{name} [{_SI[name]}]": x for name, x in motion.cycle()._asdict().items()}
     report = common.write_result(options.out, columns, motion.plot, plotting.OF_CYCLE)
     return lines if options.json else f"{lines}\n{report}"
+
+
+def _shown(
+    name: str, value: float, unit: str, motion: Motion, digits: int | None
+) -> tuple[str, str]:
+    """A number with the digits that its estimate leaves, and its unit."""
+    share = {"mu_macro": 1.0, "mu_lateral": 1.0}
+    if name == "power_drive" and motion.mu_macro:  # mu_macro Fz v0
+        share[name] = abs(value / motion.mu_macro)
+    error = motion.error_estimate * share.get(name, 0.0)
+    text, unit = with_unit(value, unit, 6, digits, error)
+    return text, f"[{unit}]"

@@ -43,5 +43,7 @@ def run(words: Sequence[str], description: str) -> str:
             result["model"] = model_rows(surrogate, middle, **kind.names)
         result |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**result, "table": common.about(surrogate)})
-    rows, notes, error = words_of_one_case(answer, arguments.digits)
+    rows, notes, error = words_of_one_case(
+        answer, arguments.digits, common.units_in(arguments.words)
+    )
     return "\n".join([in_columns(rows), *([in_columns(notes)] if notes else []), error])

@@ -1,14 +1,18 @@
 """``mumacro solve-for``: the values of one input that give a mu_macro."""
 
-from collections.abc import Sequence
+import argparse
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.solve_for import solve_for
+from mumacro.analysis.solve_for import Solution, solve_for
 from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.cli import common, motion, solve_motion
 from mumacro.cli.common import (
     CURVE,
     ImpossibleError,
+    Unit,
     UsageError,
     as_json,
     in_columns,
@@ -18,11 +22,30 @@ from mumacro.cli.common import (
 )
 from mumacro.inputs.fields import NAMES, unit_of
 from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import read_one
+from mumacro.shown import tidy_zeros
 from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"
+
+
+#: what may be unknown, of a case or of a motion
+UNKNOWN = (*dict.fromkeys((*NAMES, AMPLITUDE, *UNKNOWNS)),)
+
+
+def _unknown(text: str) -> str:
+    """The name of an unknown; argparse says what another text may mean."""
+    if text in UNKNOWN:
+        return text
+    similar = suggestion(text, loosely=False)
+    if similar is None:
+        names = {name.lower(): name for name in UNKNOWN}
+        near = difflib.get_close_matches(text.lower(), names, n=1)
+        similar = names[near[0]] if near else suggestion(text)
+    advice = f"did you mean {similar}?" if similar else f"there are {', '.join(UNKNOWN)}"
+    raise argparse.ArgumentTypeError(f"{text!r} is no input: {advice}")
 
 
 def run(words: Sequence[str]) -> str:
@@ -33,18 +56,20 @@ def run(words: Sequence[str]) -> str:
         f"  {EXAMPLE}\nthe speed at which a conveyor carries its load:\n"
         f"  {solve_motion.EXAMPLE} --target 0"
     )
-    unknowns = dict.fromkeys((*NAMES, AMPLITUDE, *UNKNOWNS))
     first = (
         "unknown",
         {
-            "choices": [*unknowns],
+            "type": _unknown,
             "metavar": "unknown",
             "help": "the unknown input; of a motion also x.amplitude, x.phase, ...",
         },
     )
     parser = common.question("solve-for", description, epilog, "the other five inputs", first=first)
     parser.add_argument(
-        "--target", type=number_of("target", _TARGET), required=True, help="wanted mu_macro [-]"
+        "--target",
+        type=number_of("target", _TARGET),
+        required=True,
+        help="wanted mu_macro [-]; with --ratio over mu0",
     )
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
@@ -78,19 +103,9 @@ def run(words: Sequence[str]) -> str:
         **case,
     )
     model = load_rows(unknown, common.middle_of(case), options.contact, solution.stiffening)
-    reach, two = solution.reach, solution.ends
+    two = solution.ends
     if not solution.roots[0] and not (two and any(end.roots[0] for end in two)):
-        where = f"{unknown} from {reach.low:.6g} to {reach.high:.6g} {unit}"
-        if not ends:  # all that a double holds
-            where = f"any {unknown}"
-        if solution.constant:
-            raise ImpossibleError(
-                f"{unknown} has no influence here: mu_macro is {reach.mu_min:.6g} for {where}"
-            )
-        raise ImpossibleError(
-            f"mu_macro = {target:.6g} is out of reach: {where} gives {reach.mu_min:.4g} to "
-            f"{reach.mu_max:.4g}"
-        )
+        raise ImpossibleError(solution.reason() + _hint(options, case, solution))
     places = {common.middle_of(case).get("k"): solution}
     if two:
         places = dict(sorted({**places, **dict(zip(case["k_range"], two, strict=True))}.items()))
@@ -119,15 +134,15 @@ def run(words: Sequence[str]) -> str:
                 "table": common.about(surrogate),
             }
         )
-    heads = [
-        *(["k [N/m]"] if two else []),
-        f"{unknown} [{unit}]",
-        "between",
-        "and",
-        "mu_macro [-]",
-        "regime",
-    ]
     if options.out is not None:
+        heads = [
+            *(["k [N/m]"] if two else []),
+            f"{unknown} [{unit}]",
+            "between",
+            "and",
+            "mu_macro [-]",
+            "regime",
+        ]
         at = [root.value for one in places.values() for root in one.roots[0]]
         # a decade around the roots; what is at 0 is shown up to 1
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
@@ -150,13 +165,41 @@ def run(words: Sequence[str]) -> str:
             lambda axes: curve.plot(axes, roots=at, target=target),
         )
     at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
-    form = common.format_for(options, surrogate, {**case, unknown: at_one}, kind)
-    text = in_columns(
-        [heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)]
-    )
+    count = common.count_for(options, surrogate, {**case, unknown: at_one}, kind)
+    units = common.units_in(options.words, **{unknown: options.between or ()})
+    of_root = Unit.of(unknown, at_one, units, options.digits)
+    of_k = Unit.of("k", roots[-1][0], units, options.digits) if two else None
+    table = [
+        [
+            *([of_k.head("k")] if of_k else []),
+            of_root.head(unknown),
+            "between",
+            "and",
+            "mu_macro [-]",
+            "regime",
+        ]
+    ]
+    for *k, value, low, high, mu, regime in roots:
+        cells = [tidy_zeros(of_k.shown(k[0], 6, options.digits))] if of_k else []
+        cells += [of_root.shown(x, count, options.digits) for x in (value, low, high)]
+        table.append([*cells, f"{mu:.{count}g}", regime])
     none = [
         f"no {unknown} gives that for k = {k:.6g} N/m"
         for k, one in places.items()
         if not one.roots[0]
     ]
-    return "\n".join([text, *none, *common.model_lines(model)])
+    line = common.case_line(case, units, kind)
+    return "\n".join([line, in_columns(table), *none, *common.model_lines(model)])
+
+
+def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: Solution) -> str:
+    """What was perhaps meant where a target is out of reach: mu_macro, or its ratio to mu0."""
+    mu0 = case.get("mu0")
+    if mu0 is None or solution.constant:
+        return ""
+    if options.ratio:
+        if solution.reach.holds(options.target):
+            return f"; did you mean mu_macro = {options.target:g}? Then leave out --ratio"
+    elif solution.reach.holds(options.target * mu0):
+        return f"; did you mean mu_macro/mu0 = {options.target:g}? Then add --ratio"
+    return ""

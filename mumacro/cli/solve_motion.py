@@ -2,12 +2,18 @@
 friction."""
 
 import argparse
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from mumacro.analysis.motion import PARTS
-from mumacro.analysis.solve_motion import solve_motion
+from mumacro.analysis.solve_motion import MotionSolution, quantity_of_unknown, solve_motion
 from mumacro.cli import common
-from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, read_case
+from mumacro.cli.common import ImpossibleError, Unit, UsageError, as_json, in_columns, read_case
+from mumacro.inputs.kind import kind_of
 from mumacro.inputs.oscillation import read_oscillation
+from mumacro.inputs.reading import read
+from mumacro.inputs.units import Scale, scale_in, suited
+from mumacro.shown import known, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --normal 8N@-90deg'
 
@@ -47,7 +53,7 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
     )
     (roots,) = solution.roots
     if not roots:
-        raise ImpossibleError(solution.reason())
+        raise ImpossibleError(solution.reason() + _hint(options, case, solution))
     names = ("value", "low", "high", "mean", "error_estimate")
     if options.json:
         rows = [dict(zip(names, root, strict=True)) for root in roots]
@@ -59,16 +65,48 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
                 "roots": rows,
             }
         )
-    heads = [f"{solution.unknown} [{solution.unit}]", "between", "and", "mu_macro [-]"]
     if options.out is not None:
+        heads = [f"{solution.unknown} [{solution.unit}]", "between", "and", "mu_macro [-]"]
         columns = dict(zip(heads, zip(*(root[:4] for root in roots), strict=True), strict=True))
         return common.write_result(options.out, columns, solution.plot)
-    return in_columns([heads, *(_row(root, options.digits) for root in roots)])
+    unit = _unit_of(solution, within or (), options.digits)
+    table = [[unit.head(solution.unknown), "between", "and", "mu_macro [-]"]]
+    for root in roots:
+        width = root.high - root.low
+        cells = [unit.shown(root.value, 6, options.digits, width)]
+        cells += [unit.shown(x, 6, options.digits) for x in (root.low, root.high)]
+        mean = (
+            f"{root.mean:.{options.digits}g}"
+            if options.digits
+            else tidy_zeros(known(root.mean, 6, root.error_estimate))
+        )
+        table.append([*cells, mean])
+    oscillations = [f"{name} = {text}" for name, text in texts]
+    units = common.units_in(options.words)
+    first = common.case_line(case, units, kind_of(options.contact), *oscillations)
+    return "\n".join([first.removesuffix(", across"), in_columns(table)])
 
 
-def _row(root: tuple[float, ...], digits: int | None) -> list[str]:
-    """A root with the digits that its width leaves; a mean within its estimate of 0 is 0."""
-    value, low, high, mean, error = root
-    figures = digits or 6
-    shown = mean if abs(mean) > error else 0.0
-    return [*(f"{x:.{figures}g}" for x in (value, low, high)), f"{shown:.{figures}g}"]
+def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:
+    """The unit in which the roots are printed."""
+    unit, (first, *_) = solution.unit, solution.roots[0]
+    if digits is not None:
+        return Unit(unit, Scale())
+    quantity = quantity_of_unknown(solution.unknown)
+    for text in typed:
+        name = read(solution.unknown, text, quantity).unit
+        scale = None if name is None else scale_in(quantity, name)
+        if name is not None and scale is not None:
+            return Unit(name, scale)
+    return Unit(*suited(unit, first.value))
+
+
+def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:
+    """What was perhaps meant where a target is out of reach: mu_macro, or its ratio to mu0."""
+    reach, mu0 = solution.reach, case.get("mu0", 0.0)
+    other = options.target if options.ratio else options.target * mu0
+    if not mu0 or not reach.least <= other <= reach.most:
+        return ""
+    if options.ratio:
+        return f"; did you mean mu_macro = {options.target:g}? Then leave out --ratio"
+    return f"; did you mean mu_macro/mu0 = {options.target:g}? Then add --ratio"

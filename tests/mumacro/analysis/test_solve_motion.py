@@ -130,8 +130,8 @@ def test_the_command_gives_the_librarys_roots(capsys: Any, tmp_path: Any) -> Non
     assert [root["value"] for root in answer["roots"]] == [root.value for root in expected]
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 1 + len(expected)
-    assert lines[1].split()[-1] == "0"  # a mean within its estimate of 0
+    assert len(lines) == 2 + len(expected)
+    assert lines[2].split()[-1] == "0"  # a mean within its estimate of 0
     pytest.importorskip("matplotlib")
     picture = tmp_path / "roots.png"
     assert main([*words, "-o", str(picture)]) == 0
@@ -140,3 +140,27 @@ def test_the_command_gives_the_librarys_roots(capsys: Any, tmp_path: Any) -> Non
     words[2] = "mu0=0.3 Fz=10N k=0.1N/um f=50Hz"
     assert main([*words[:-4], "--normal", "8N@90deg", "--target", "0"]) == 1
     assert "180 degrees" in capsys.readouterr().err
+
+
+def test_many_targets_have_the_roots_of_each() -> None:
+    case = {name: x for name, x in CONVEYOR.items() if name != "v0"}
+    targets = np.linspace(-0.2, 0.4, 31)
+    for unknown, more in (("v0", {"normal": (8.0, -90.0)}), ("normal.phase", {"v0": 5e-3})):
+        motion = {**case, "normal": 8.0, **more}
+        together = mumacro.solve_motion(unknown, targets, **motion)
+        most = max(map(len, together.roots))
+        assert most == {"v0": 1, "normal.phase": 2}[unknown]
+        for target, roots in zip(targets, together.roots, strict=True):
+            (alone,) = mumacro.solve_motion(unknown, target, **motion).roots
+            assert len(alone) == len(roots)
+            for one, other in zip(alone, roots, strict=True):
+                assert one.value == close(other.value, abs=one.high - one.low + 1e-9 * one.value)
+
+
+def test_a_range_in_which_the_mean_is_the_target_is_one_root() -> None:
+    """In continuous sliding along, the mean force is mu0 at every speed."""
+    case = {name: x for name, x in CONVEYOR.items() if name != "v0"}
+    (root,) = mumacro.solve_motion("v0", 0.3, **case, within=(1e-3, 1.0)).roots[0]
+    swing = CONVEYOR["x"] * 2.0 * math.pi * CONVEYOR["f"]
+    assert root.value == close(swing, rel=0.1)
+    assert root.high == close(1.0, rel=1e-3)
