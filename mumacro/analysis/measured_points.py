@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import check, columns_of, select
+from mumacro.inputs.cases import check, columns_of, library_of, select, unknown
 from mumacro.inputs.doubts import UNITS, Remark, remarks
 from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.text_tables import ColumnNames, Dialect, Table, read_table
+from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
@@ -105,6 +106,11 @@ class Measured:
                 raise InputError(
                     name, fixed[name], f"one of {', '.join(names)}; {unknown_name(name, names)}"
                 )
+        if isinstance(data, Mapping) and not library_of(data):  # a table may have other columns
+            members = (*names, *UNKNOWNS, "mu_macro", STD)
+            for name in data:
+                if name not in members and split_unit(str(name))[0] not in members:
+                    raise unknown(str(name), data[name], members)
         columns = select("data", data, [*names, "mu_macro", STD])
         if duplicates := [name for name in select("data", data, UNKNOWNS) if name in self.unknowns]:
             raise InputError(

@@ -17,7 +17,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.cases import check, real
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import CONTACTS, SPRINGS_OF, Kind
-from mumacro.inputs.reading import read
+from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
 
 EXPONENT = "stiffness_exponent"
@@ -81,8 +81,8 @@ def stiffening_of(
     beside a spring without an exponent it is refused, too.  None where k is constant.
     """
     if exponent is not None:
-        value = np.asarray(exponent)
-        if value.ndim or value.dtype.kind not in "iuf" or not 0.0 <= float(value) <= 1.0:
+        power = read_one(EXPONENT, exponent)
+        if not 0.0 <= power <= 1.0:
             raise InputError(EXPONENT, exponent, _BOUND)
         if unknown != "Fz":
             bound = f"left out where {unknown} is the unknown or swept: k is that of the one load"
@@ -93,7 +93,8 @@ def stiffening_of(
     if load is None:
         bound = "given [N] beside a stiffness exponent: the load at which k holds"
         raise InputError("Fz", None, bound)
-    power = SPRINGS_OF[CONTACTS[kind.contact]].exponent if exponent is None else float(exponent)
+    if exponent is None:
+        power = SPRINGS_OF[CONTACTS[kind.contact]].exponent
     if exponent is None and not power:
         bound = (
             "left out, because Fz is the unknown or swept; beside a stiffness exponent it is the "

@@ -456,6 +456,8 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
         (POINTS, {**RIG, "y0": -1.0}, "y0 must be finite and >= 0"),
         ({"v0": [0.1, 0.2]}, RIG, "mu_macro must be a column of the data"),
         ([0.1, 0.2], RIG, "data must be a mapping, DataFrame"),
+        ({**POINTS, "vo": [0.01, 0.1, 1.0]}, RIG, "vo must be one of"),
+        ({**POINTS, "vo [mm/s]": [1.0, 2.0, 3.0]}, RIG, "must be one of"),
         (
             {"v0": [0.1, 0.1, 0.1], "mu_macro": [0.2, 0.21, 0.2]},
             RIG,

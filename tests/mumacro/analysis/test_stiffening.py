@@ -238,6 +238,8 @@ def test_a_rigid_contact_stays_rigid(surrogate: Surrogate) -> None:
         ("Fz", without(CASE, "Fz"), {"stiffness_exponent": 0.5}, "Fz"),
         ("v0", without(CASE, "v0"), {"stiffness_exponent": 0.5}, "stiffness_exponent"),
         ("Fz", CASE, {"stiffness_exponent": 1.1}, "stiffness_exponent"),
+        ("Fz", CASE, {"stiffness_exponent": "120 %"}, "stiffness_exponent"),
+        ("Fz", CASE, {"stiffness_exponent": True}, "stiffness_exponent"),
         ("Fz", CASE, {"stiffness_exponent": -0.1}, "stiffness_exponent"),
         ("Fz", CASE, {"stiffness_exponent": math.nan}, "stiffness_exponent"),
         ("Fz", CASE, {"stiffness_exponent": "1/3"}, "stiffness_exponent"),
@@ -397,3 +399,11 @@ def test_the_service_refuses_what_cannot_be(
     problem = json.dumps(posted(client, "law", 422, **question))
     assert message in problem
     assert f"/{field}" in problem
+
+
+def test_an_exponent_is_read_as_other_values_are(surrogate: Surrogate) -> None:
+    texts, numbers = (
+        friction_law(surrogate, "Fz", values=LOADS, stiffness_exponent=m, **CASE).answer.mu_macro
+        for m in ("50 %", 0.5)
+    )
+    assert (texts == numbers).all()
