@@ -91,6 +91,26 @@ def search(share: float = 1.0) -> str:
     return "\n".join(lines)
 
 
+def times(share: float = 1.0) -> str:
+    """Of one transport speed, and of 1,000 targets of one motion."""
+    conveyor = {**CONVEYOR, "normal": (8.0, -90.0)}
+    targets = np.linspace(-0.1, 0.29, max(round(share * PROBLEMS), 1))
+
+    def spent(target: Any) -> tuple[float, float, int]:
+        elapsed, processor = time.perf_counter(), time.process_time()
+        solution = mumacro.solve_motion("v0", target, **conveyor)
+        number = sum(map(len, solution.roots))
+        return time.perf_counter() - elapsed, time.process_time() - processor, number
+
+    one = min(spent(0.0) for _ in range(7))
+    many = spent(targets)
+    return (
+        f"One transport speed: {1e3 * one[0]:.0f} ms, {1e3 * one[1]:.0f} ms of processor time.\n"
+        f"{targets.size} targets, {many[2]} roots: {many[0]:.1f} s, {many[1]:.1f} s of processor "
+        "time."
+    )
+
+
 def picture(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
     """Writes the picture of docs/how-to/conveyor.md: transport speed over the phase of the load."""
     speeds = np.full(PHASES.size, np.nan)
@@ -116,7 +136,7 @@ def picture(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
     return f"fastest: {1e3 * speeds[best]:.2f} mm/s at {PHASES[best]:g} degrees"
 
 
-SECTIONS = sections(search, picture)
+SECTIONS = sections(search, times, picture)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS, share=1.0)

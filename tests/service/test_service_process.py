@@ -311,13 +311,14 @@ def test_a_log_reader_that_stalls_delays_no_request(
 
 
 @pytest.mark.slow
-def test_at_a_terminal_it_speaks_to_a_person(repository: Path) -> None:
+@pytest.mark.parametrize("words", [("mumacro", "serve"), ("service",)])
+def test_at_a_terminal_it_speaks_to_a_person(repository: Path, words: tuple[str, ...]) -> None:
     import pty
 
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     reader, writer = pty.openpty()
-    command = [sys.executable, "-m", "mumacro", "serve", "--port", str(port)]
+    command = [sys.executable, "-m", *words, "--port", str(port)]
     with subprocess.Popen(command, cwd=repository, stdout=writer, stderr=writer) as process:
         os.close(writer)
         shown, until = b"", time.monotonic() + 180.0
