@@ -97,7 +97,7 @@ ELSEWHERE = {
     "mumacro fit --json": ("tests/mumacro/cli/test_command.py", '*words, "--json")'),
     "python benchmarks/error_distribution.py": (
         "tests/project/test_benchmarks.py",
-        '"error_distribution --share',
+        'run("error_distribution", "--share"',
     ),
     "python -m builder verify TABLE --write": (
         "tests/builder/test_builder_cli.py",
