@@ -402,8 +402,9 @@ def test_the_service_refuses_what_cannot_be(
 
 
 def test_an_exponent_is_read_as_other_values_are(surrogate: Surrogate) -> None:
-    texts, numbers = (
+    exponents: list[Any] = ["50 %", 0.5]
+    typed, number = (
         friction_law(surrogate, "Fz", values=LOADS, stiffness_exponent=m, **CASE).answer.mu_macro
-        for m in ("50 %", 0.5)
+        for m in exponents
     )
-    assert (texts == numbers).all()
+    assert (typed == number).all()
