@@ -40,6 +40,7 @@ FIRST, LEVELS = 49, 7  # samples of the whole range, and how often an interval i
 _CLEAR = 4.0
 _NARROW = 1e-12  # share of the range in which a bracket counts as one place
 _MOST_STEPS = 80
+_DRAWN = 200  # more places of a curve that is drawn
 _DECADES = 20.0  # a range whose ends are further apart than this factor is searched in logarithms
 
 
@@ -109,11 +110,35 @@ class MotionSolution:
     def plot(self, ax: Any = None) -> Any:
         """The mean force over the unknown with the targets and their roots, on axes ``ax`` of
         matplotlib, or new ones, which are returned."""
-        x, mean = self.samples
+        x, _ = self.samples
         places = [root.value for roots in self.roots for root in roots]
+        even = np.geomspace if _log(x[0], x[-1]) else np.linspace
+        x = np.unique(np.clip([*x, *even(x[0], x[-1], _DRAWN), *places], x[0], x[-1]))
+        mean, _ = Curve(self.unknown, self.of, self.case).at(x)
+        case = {name: value for name, value in self.case.items() if name in INPUTS}
+        title = plotting.in_words(case, {"contact": self.case.get("contact", "spring")})
+        axis, log = _axis(self.unknown), _log(x[0], x[-1])
         return plotting.plot_roots(
-            _axis(self.unknown), x, mean, self.of, self.targets, places, _log(x[0], x[-1]), ax
+            axis,
+            x,
+            mean,
+            self.of,
+            self.targets,
+            places,
+            log,
+            ax,
+            f"{title}\n{self._motion_words()}",
         )
+
+    def _motion_words(self) -> str:
+        """The oscillations, without the unknown part."""
+        words = []
+        for part, symbol, unit in (("x", "$x$", "m"), ("y", "$y$", "m"), ("normal", "$F_z$", "N")):
+            terms = read_oscillation(part, self.case.get(part, 0.0))
+            shown = [(n, float(a), float(p)) for n, a, p in terms if np.any(a)]
+            if not self.unknown.startswith(part):
+                words.append(plotting.oscillation_words(symbol, unit, shown))
+        return "; ".join(filter(None, words))
 
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON of an inverse problem of a motion over HTTP, without
