@@ -230,7 +230,7 @@ def solve_motion(
         Wanted value [-], shape (n,) or a scalar; 0 is the speed at which the motion carries itself.
     of : str
         "mu_macro", the mean force along the drag over the mean load, or "mu_lateral", across it.
-    within : (low, high), optional
+    within : (float, float), optional
         Range to search, in SI (a phase in degrees), or texts with units.  Left out: all phases; a
         speed up to ten times the fastest of the oscillation; another input over the decades in
         which it matters.
