@@ -12,7 +12,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from mumacro.inputs.fields import BOUNDS, INPUTS, NOT_NEGATIVE, RAD_PER_CYCLE
+from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE
 from mumacro.kernel.arrays import Array, Bools
 
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
@@ -113,12 +113,10 @@ def _usual(columns: Mapping[str, Any]) -> bool:
 
 def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
     """Every input, and where it is outside its usual range; a rigid contact, zero where it is
-    legal, and NaN are not."""
+    legal, and what is not legal are not."""
     for name, (least, most) in _USUAL.items():
         column = six[name]
-        outside = ((column < least) | (column > most)) & np.isfinite(column)
-        if BOUNDS[name] == NOT_NEGATIVE:
-            outside &= column != 0.0
+        outside = ((column < least) | (column > most)) & np.isfinite(column) & (column > 0.0)
         yield name, outside
 
 

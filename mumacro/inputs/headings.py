@@ -131,5 +131,36 @@ def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
         for head in compared:
             field = meant_by(head, loosely=loosely)
             if field and field in (name, {"omega": "f"}.get(name)):
-                return head, f"{field} [{split_unit(head)[1] or unit_in_si(field)}]"
+                column = f"{field} [{_unit_of(head, field) or unit_in_si(field)}]"
+                return head, column + (_HALVED if _is_whole(head, field) else "")
     return None
+
+
+_HALVED = ", with half of each value: it is peak to peak"
+_PEAK_TO_PEAK = re.compile(
+    r"p(?:ea)?k[\W_]*(?:to|2)?[\W_]*p(?:ea)?k|(?<![a-z])p[\W_]?(?:to|2|t)?[\W_]?p(?![a-z])"
+    r"|double[\W_]amplitude",
+    re.IGNORECASE,
+)
+
+
+def _is_whole(head: str, field: str) -> bool:
+    """Whether a head says that its column is twice the amplitude.
+
+    >>> _is_whole("Amplitude p-p [um]", "y0"), _is_whole("peak amplitude [um]", "y0")
+    (True, False)
+    """
+    return field in ("y0", "Fz_amplitude") and _PEAK_TO_PEAK.search(head[:80]) is not None
+
+
+def _unit_of(head: str, field: str) -> str | None:
+    """The unit that a head has in brackets, or as its last word.
+
+    >>> _unit_of("Amplitude [um]", "y0"), _unit_of("Amplitude µm", "y0"), _unit_of("speed", "v0")
+    ('um', 'µm', None)
+    """
+    unit = split_unit(head)[1]
+    if unit is not None:
+        return unit
+    _, _, last = re.sub(r"[\s_]+", " ", head[:80].strip()).rpartition(" ")
+    return last if last and scale_of(field, last) is not None else None

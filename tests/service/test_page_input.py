@@ -191,6 +191,36 @@ def test_a_drag_is_one_step_and_the_map_stays_where_it_is(open_page: Any) -> Non
     assert page.value("#field-y0") == "2 µm"
 
 
+@pytest.mark.parametrize("plot", ["#map", "#law"])
+def test_a_finger_drags_the_point_and_scrolls_elsewhere(open_page: Any, plot: str) -> None:
+    page = open_page(width=390, height=844)
+    emulation = {"enabled": True, "maxTouchPoints": 1}
+    page.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", emulation)
+    try:
+        page.browser.refresh()
+        page.settle()
+        page.run(f"document.querySelector({plot!r}).scrollIntoView({{block: 'center'}});")
+        start = page.value("#field-v0")
+        point = page.run(
+            f"const [a, b] = [{plot!r}, {plot!r} + ' .point'].map("
+            "(one) => document.querySelector(one).getBoundingClientRect());"
+            "return [b.x + b.width / 2 - a.x, b.y + b.height / 2 - a.y];"
+        )
+        page.swipes(plot, point[0] + 60, point[1] + 70, *[(0, -6)] * 8)
+        assert page.value("#field-v0") == start  # the page scrolled
+        page.run(f"document.querySelector({plot!r}).scrollIntoView({{block: 'center'}});")
+        page.swipes(plot, *point, *[(5, 0)] * 8)
+        assert page.value("#field-v0") != start
+        moved = page.run(
+            f"const [a, b] = [{plot!r}, {plot!r} + ' .point'].map("
+            "(one) => document.querySelector(one).getBoundingClientRect());"
+            "return b.x + b.width / 2 - a.x;"
+        )
+        assert moved == close(point[0] + 40, abs=3)
+    finally:
+        page.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+
 def test_arrow_keys_move_a_step_that_is_seen(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.press("#map", "ARROW_RIGHT", "ARROW_UP")
@@ -250,8 +280,7 @@ def test_every_copy_of_a_case_gives_the_number_of_the_page(
         )
         return done.stdout
 
-    python = copied("python").replace("mumacro.open()", "print(mumacro.open()") + ".mu_macro)"
-    assert float(output(sys.executable, "-", text=python)) == close(number, rel=1e-8)
+    assert float(output(sys.executable, "-", text=copied("python"))) == close(number, rel=1e-8)
     words = shlex.split(copied("command"))
     command = output(sys.executable, "-m", *words, "--json")
     assert float(re.findall(r'"mu_macro": ([^,\s]+)', command)[0]) == close(number, rel=1e-8)

@@ -265,6 +265,25 @@ class Page:
         ActionChains(self.browser, duration=0).release().perform()
         self.settle()
 
+    def swipes(self, selector: str, x: float, y: float, *steps: tuple[int, int]) -> None:
+        """Put a finger on a place in an element, in pixels from its corner, move it by the steps,
+        and lift it."""
+        box = self.run(
+            f"return document.querySelector({selector!r}).getBoundingClientRect().toJSON();"
+        )
+        at = [box["x"] + x, box["y"] + y]
+
+        def touch(kind: str, *points: dict[str, float]) -> None:
+            event = {"type": kind, "touchPoints": [*points]}
+            self.browser.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+
+        touch("touchStart", {"x": at[0], "y": at[1]})
+        for right, down in steps:
+            at = [at[0] + right, at[1] + down]
+            touch("touchMove", {"x": at[0], "y": at[1]})
+        touch("touchEnd")
+        self.settle()
+
     def download(self, selector: str, folder: Path, name: str) -> Any:
         """The text of the file that is downloaded when an element is clicked."""
         behaviour = {"behavior": "allow", "downloadPath": str(folder)}

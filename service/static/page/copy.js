@@ -25,7 +25,7 @@ export function textsOf(state) {
     curl:
       `curl -s ${base}v1/mu-macro -H "Content-Type: application/json" ` +
       `-d '${body.replaceAll("'", "\\u0027")}'`,
-    python: `import mumacro\nmumacro.open().evaluate(${keywords.join(", ")})`,
+    python: `import mumacro\nprint(mumacro.open().evaluate(${keywords.join(", ")}).mu_macro)`,
     command: `mumacro "${words.join(" ")}"${options}`,
   };
 }

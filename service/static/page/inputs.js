@@ -28,9 +28,9 @@ export function choice(store, name, words, reasons = {}) {
   </fieldset>`;
 }
 
-/** What the service understood of a text, where that says more than the text. */
-function understood(name, { text, value, unit, std, low, high } = {}) {
-  if (typeof value !== "number") return "";
+/** What the service understood of the text that is typed, where that says more than the text. */
+function understood(name, typed, { text, value, unit, std, low, high } = {}) {
+  if (typeof value !== "number" || (text ?? typed) !== typed) return "";
   if (low !== undefined && high !== undefined)
     return `${inUnit(name, low, unit ?? undefined)} to ${inUnit(name, high, unit ?? undefined)}`;
   const said = inUnit(name, value, unit ?? undefined, 6);
@@ -58,7 +58,7 @@ export function inputsPanel(store, moved) {
     const { label, symbol, note, range } = about.inputs[name];
     const one = answer?.inputs[name];
     const rigid = name === "k" && store.state.contact === "rigid";
-    const below = fault ?? doubt ?? (understood(name, one) || note);
+    const below = fault ?? doubt ?? (understood(name, store.state[name], one) || note);
     const number = numberOf(one);
     const value = number > 0 ? Math.log10(number) : range[0];
     return html`

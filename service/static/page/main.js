@@ -108,8 +108,9 @@ function start(names) {
   tabs("panel-tabs");
   store.open();
   $("notice").hidden = !store.unknown.length;
-  $("notice-text").textContent =
-    `The page does not know this part of the link, and leaves it out: ${store.unknown.join(", ")}.`;
+  $("notice-text").textContent = store.unknown.length
+    ? `The page does not know this part of the link, and leaves it out: ${store.unknown.join(", ")}.`
+    : "";
 }
 
 $("reset").addEventListener("click", () => store.change(startState()));

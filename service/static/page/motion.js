@@ -10,7 +10,7 @@ const { extent } = globalThis.d3;
 
 const PARTS = {
   x: ["along the drag", "1 µm @ 90 deg"],
-  y: ["across it", "2 µm"],
+  y: ["across it", ""],
   normal: ["of the load", ""],
 };
 const UNKNOWNS = {

@@ -73,7 +73,7 @@ export function numberPanel(store) {
   });
   return (answer, trouble, old) => {
     $("status").textContent = trouble?.text
-      ? `${prose(trouble.text)}${old ? " The last answer stays." : ""}`
+      ? `${prose(trouble.text).replace(/[^.!?]$/, "$&.")}${old ? " The last answer stays." : ""}`
       : "";
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);

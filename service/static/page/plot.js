@@ -2,6 +2,7 @@
 // for download.  Scales, axes, shapes and dragging are those of d3.
 const { axisBottom, axisLeft, drag, scaleLinear, scaleLog, select, line } = globalThis.d3;
 
+const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 /** Of an input, by one press of an arrow key; with Shift. */
 const STEP = 1.05;
@@ -166,6 +167,7 @@ export class Plot {
       Math.sign(Math.trunc(100 * clamp(value - place[i], -1e6, 1e6))),
     );
     const outside = right !== 0 || down !== 0;
+    this.marked = place;
     const turn = (Math.atan2(down, right) * 180) / Math.PI;
     return this.over
       .append("path")
@@ -182,7 +184,8 @@ export class Plot {
   /**
    * Calls back with the place of the pointer in the plot: `read(place)` while it moves,
    * `read(null)` when it leaves; `pull(place)` for a click and each step of a drag;
-   * `grab(moving)` around it; and `step(right, up, factor)` for the arrow keys.
+   * `grab(moving)` around it; and `step(right, up, factor)` for the arrow keys.  A finger drags
+   * from the point alone, so that it scrolls the page elsewhere.
    */
   follow({ read, pull, grab, step }) {
     const { svg } = this;
@@ -201,19 +204,25 @@ export class Plot {
       read([x, y]);
       pull(inFrame([x, y]));
     };
-    select(svg).call(
-      drag()
-        .container(() => svg)
-        .filter((event) => !event.button && this.box)
-        .clickDistance(4)
-        .on("start", (event) => {
-          svg.focus({ preventScroll: true });
-          grab(true);
-          at(event);
-        })
-        .on("drag", at)
-        .on("end", () => grab(false)),
-    );
+    const byPoint = (event) => {
+      const [x, y] = place(event);
+      return this.marked && Math.hypot(x - this.marked[0], y - this.marked[1]) < FINGER;
+    };
+    const move = drag()
+      .container(() => svg)
+      .filter((event) => (event.touches ? byPoint(event.touches[0]) : !event.button && this.box))
+      .clickDistance(4)
+      .on("start", (event) => {
+        svg.focus({ preventScroll: true });
+        grab(true);
+        at(event);
+      })
+      .on("drag", at)
+      .on("end", () => grab(false));
+    select(svg).call(move).style("touch-action", "manipulation");
+    svg.addEventListener("click", (event) => {
+      if (event.pointerType === "touch" && this.box) pull(inFrame(place(event)));
+    });
     svg.addEventListener("pointermove", (event) => event.buttons || read(place(event)));
     svg.addEventListener("pointerleave", () => read(null));
     svg.addEventListener("keydown", (event) => {

@@ -49,7 +49,7 @@ export function stiffnessPanel(store, moved) {
       : html`<input
           id=${shared.id}
           spellcheck="false"
-          placeholder=${SUCH_AS[name] ?? nothing}
+          placeholder=${SUCH_AS[name] ? `such as ${SUCH_AS[name]}` : nothing}
           aria-invalid=${String(fault !== undefined)}
           aria-describedby=${`about-${name}`}
           .value=${typed[name] ?? ""}

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from mumacro.analysis.measured_points import read_points
 from mumacro.inputs.decoding import Text, TextError, encoding_of
+from mumacro.inputs.headings import absent
 from mumacro.inputs.signs import Signs, evidence
 from mumacro.inputs.text_tables import (
     BLANKS,
@@ -401,3 +402,23 @@ def test_no_table_takes_longer_than_in_proportion_to_its_size(name: str) -> None
 
     # a quadratic one takes 64 times as long
     assert seconds(800_000) < 20.0 * seconds(100_000) + 0.05
+
+
+@pytest.mark.parametrize(
+    ("head", "column"),
+    [
+        ("Amplitude [um]", "y0 [um]"),
+        ("Amplitude µm", "y0 [µm]"),
+        ("amplitude_mm", "y0 [mm]"),
+        ("Amplitude", "y0 [m]"),
+        ("peak amplitude [um]", "y0 [um]"),
+        ("Amplitude peak-peak [um]", "y0 [um], with half of each value: it is peak to peak"),
+        ("amplitude p-p µm", "y0 [µm], with half of each value: it is peak to peak"),
+        ("Amplitude (pk to pk) [um]", "y0 [um], with half of each value: it is peak to peak"),
+        ("amplitude_pp_um", "y0 [um], with half of each value: it is peak to peak"),
+    ],
+)
+def test_advice_to_rename_a_column_keeps_its_unit_and_halves_peak_to_peak(
+    head: str, column: str
+) -> None:
+    assert f"rename that column to {column} (or another unit" in absent("y0", [head])
