@@ -162,6 +162,7 @@ def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surr
     x_share, y_share = (np.log10(v) + 4) / 7, 1 - (np.log10(y) + 2) / 5
     colours = page.run(
         "const plot = document.querySelector('#map'); plot.scrollIntoView();"
+        "plot.querySelectorAll('.shade').forEach((one) => { one.style.pointerEvents = 'auto'; });"
         "const { x: left, y: top, width, height } = "
         "plot.querySelector('rect.shade').getBoundingClientRect(); return "
         f"{np.column_stack((x_share, y_share)).tolist()}.map(([x, y]) => "
@@ -431,6 +432,7 @@ def test_a_file_of_an_instrument_is_dropped(
 def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
     page = open_page()
     page.click("#tab-motion")
+    page.type("#motion-y", "2 um")
     page.click("#motion-form button:last-of-type")
     motion = mumacro.motion(mu0=0.3, Fz=10.0, k=1e6, f=20e3, v0=0.01, x=(1e-6, 90.0), y=2e-6)
     shown = page.shown()
