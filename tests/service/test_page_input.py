@@ -208,6 +208,10 @@ def test_a_finger_drags_the_point_and_scrolls_elsewhere(open_page: Any, plot: st
         )
         page.swipes(plot, point[0] + 60, point[1] + 70, *[(0, -6)] * 8)
         assert page.value("#field-v0") == start  # the page scrolled
+        page.run(  # until it rests
+            "let before; do { before = scrollY; "
+            "await new Promise((next) => setTimeout(next, 200)); } while (scrollY !== before);"
+        )
         page.run(f"document.querySelector({plot!r}).scrollIntoView({{block: 'center'}});")
         page.swipes(plot, *point, *[(5, 0)] * 8)
         assert page.value("#field-v0") != start

@@ -143,11 +143,12 @@ class Page:
             " await new Promise((next) => setTimeout(next, 10));"
             "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"
         )
-        assert [
+        complaints = [
             complaint
             for complaint in self.complaints()
             if not re.search(r"status of (401|422|50\d)", complaint)
-        ] == []
+        ]
+        assert complaints == [], complaints
         return self
 
     def until(self, condition: Any, message: Any) -> Any:
