@@ -115,11 +115,14 @@ def _list(text: bytes | bytearray, comma: re.Pattern[bytes], max_batch: int) -> 
         end = comma.search(text, start + _READ, start + 2 * _READ)
         if end is None and len(text) - start > 2 * _READ:
             raise ValueError("no comma for long")
-        opening = b"[" if start else b""
-        between = text[start : end.start()] + b"]" if end else text[start:]
-        values = orjson.loads(opening + between)
-        if b"{" in between and not _hold_all_members(values, _count(between, b":")):
-            raise ValueError("a name is given twice, or a text has a colon")
+        opening, stop, closing = b"[" if start else b"", len(text), b""
+        if end:
+            stop, closing = end.start(), b"]"
+        with memoryview(text) as whole:
+            some = b"".join((opening, whole[start:stop], closing))
+        values = orjson.loads(some)
+        if b"{" in some and not _hold_all_members(values, _count(some, b":")):
+            raise ValueError("a name is given twice, a text has a colon, or not all are objects")
         if not values and (start or end):
             raise ValueError("nothing beside a comma")
         size += len(values)

@@ -121,10 +121,11 @@ def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
 
 
 def _groups_out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """l0, y~ and v~, and where no contact has them."""
+    """l0, y~ and v~, and where no contact has them; of legal contacts alone."""
     length = six["mu0"] * six["Fz"] / six["k"]
-    moves = _oscillates(six) & np.isfinite(six["k"])
-    yield "l0", np.asarray((length > LONGEST) & np.isfinite(six["k"]))
+    elastic = (length > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0)
+    moves = _oscillates(six) & elastic
+    yield "l0", np.asarray((length > LONGEST) & elastic)
     yield "y~", np.asarray((six["y0"] / length > FURTHEST) & moves)
     yield "v~", np.asarray((six["v0"] / six["omega"] / length > FURTHEST) & moves)
 

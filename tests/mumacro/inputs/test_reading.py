@@ -287,3 +287,9 @@ def test_one_case_has_the_remarks_of_a_column_of_one(
 ) -> None:
     case = {**CASE, "k": k, "y0": y0, "omega": omega, "v0": v0}
     assert remarks(case) == remarks({**case, "k": np.array([k])})
+
+
+@pytest.mark.parametrize("name", ["mu0", "Fz", "k", "y0", "omega", "v0"])
+@pytest.mark.parametrize("value", [-1.0, -0.0, 0.0, -math.inf, math.nan])
+def test_what_is_not_legal_is_refused_and_not_doubted(name: str, value: float) -> None:
+    assert remarks({**CASE, name: np.array([CASE[name], value])}) == []
