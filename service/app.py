@@ -176,8 +176,8 @@ def _without_default(member: dict[str, Any]) -> None:
     description require a member with a default."""
     default = member.pop("default", None)
     if default is not None and "description" in member:
-        shown = default if isinstance(default, str) else orjson.dumps(default).decode()
-        member["description"] += f"; left out: {shown}"
+        default_text = default if isinstance(default, str) else orjson.dumps(default).decode()
+        member["description"] += f"; left out: {default_text}"
 
 
 def _described(app: FastAPI, closed: bool) -> dict[str, Any]:

@@ -121,13 +121,13 @@ class LogLines(logging.Handler):
         Line breaks within a line are escaped, so that a client cannot forge one.  Whatever happens,
         this thread goes on.
         """
-        reported, form = 0, for_people if os.isatty(1) else _as_json
+        losses, form = 0, for_people if os.isatty(1) else _as_json
         while True:
             time.sleep(_WRITE_EVERY_S)
             self._writes = True
             lines = [self._waiting.popleft() for _ in range(len(self._waiting))]
-            if more := self._dropped - reported:
-                reported += more
+            if more := self._dropped - losses:
+                losses += more
                 _log.warning(
                     "%d lines of the log were dropped: standard output was not read in time", more
                 )

@@ -480,11 +480,11 @@ class Failures:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
-        begun = False
+        has_begun = False
 
         async def send_noting(message: Message) -> None:
-            nonlocal begun
-            begun = True
+            nonlocal has_begun
+            has_begun = True
             await send(message)
 
         try:
@@ -495,7 +495,7 @@ class Failures:
             if not isinstance(error, (RequestError, MemoryError)) and not _expected(error):
                 fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
                 _log.exception("unexpected error", extra={"fields": fields})
-            if begun:  # end the connection without the end of the answer
+            if has_begun:  # end the connection without the end of the answer
                 raise ClientDisconnect from (error.__cause__ if _expected(error) else error)
             response = await handle(Request(scope, receive), error)
             await response(scope, receive, send)

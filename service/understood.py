@@ -22,9 +22,9 @@ def is_wanted(members: Mapping[str, Any]) -> bool:
     return isinstance(include, (list, tuple, set)) and UNDERSTOOD in include
 
 
-async def understood_in(request: Request, wanted: bool) -> dict[str, Any]:
+async def understood_in(request: Request, is_requested: bool) -> dict[str, Any]:
     """The member of an answer to a request in JSON, where it is wanted."""
-    return {UNDERSTOOD: understood(await request.json())} if wanted else {}
+    return {UNDERSTOOD: understood(await request.json())} if is_requested else {}
 
 
 def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -532,10 +532,10 @@ class _Scan:
                 exact += [(k, place) for place in touching]
         exact += self._narrowed(brackets, targets)
         every = self._at([place for _, place in exact])
-        found: list[list[MotionRoot]] = [[] for _ in targets]
+        candidates: list[list[MotionRoot]] = [[] for _ in targets]
         for (k, _), root in zip(exact, every, strict=True):
-            found[k].append(root)
-        return tuple(map(self._unique, found, targets.tolist()))
+            candidates[k].append(root)
+        return tuple(map(self._unique, candidates, targets.tolist()))
 
     def _unique(self, roots: list[MotionRoot], target: float) -> tuple[MotionRoot, ...]:
         """Roots of one target, ascending, each once; a range in which the mean force is the target

@@ -166,9 +166,9 @@ def find_layout(
     preamble = _declared(lines)
     sep = dialect.sep or preamble.sep
     seps = (sep,) if sep else tuple(SEPARATORS.values())
-    found = [*islice(_heads_in(lines, dialect.skip, seps, column_names), 20)]
-    head = next((one for one in found if _fits(one, lines, preamble.labview)), None)
-    head = head or (found[0] if found else _likely_head(lines, dialect.skip, seps))
+    candidates = [*islice(_heads_in(lines, dialect.skip, seps, column_names), 20)]
+    head = next((one for one in candidates if _fits(one, lines, preamble.labview)), None)
+    head = head or (candidates[0] if candidates else _likely_head(lines, dialect.skip, seps))
     cells = head.cells
     while cells and not cells[-1]:
         cells = cells[:-1]
@@ -637,14 +637,14 @@ def read_table(
 
 def _one_number(name: str, cell: str, signs: Signs, scale: Scale) -> float:
     """The number in a cell [SI]; ValueError where there is none, or more."""
-    shown = f", got {cell.strip()[:80]!r}"
+    value_text = f", got {cell.strip()[:80]!r}"
     try:
         value = read_cell(name, cell, signs, scale)
     except ValueError as error:
-        raise ValueError(f"{error}{shown}") from None
+        raise ValueError(f"{error}{value_text}") from None
     if value.std is not None or value.low is not None:
         column = "; a deviation of mu_macro is a column std" if name == "mu_macro" else ""
-        raise ValueError(f"must be one number{column}{shown}")
+        raise ValueError(f"must be one number{column}{value_text}")
     if math.isnan(value.si):
         raise ValueError("is missing")
     return float(value.si)

@@ -58,9 +58,9 @@ def _in_si(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> 
 def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
     """The JSON Schema of a text, for clients: the library reads more than its pattern."""
     digits = r"[1-9][0-9]{0,8}" if positive else r"[0-9]{1,9}"
-    known = QUANTITIES[quantity]
-    units = known.such_as.replace(":", ",").replace(";", ",").split(", ")
-    of_unit = f" ?({'|'.join(unit for unit in units if unit in known.units)})"
+    about = QUANTITIES[quantity]
+    units = about.such_as.replace(":", ",").replace(";", ",").split(", ")
+    of_unit = f" ?({'|'.join(unit for unit in units if unit in about.units)})"
     return {"type": "string", "pattern": rf"^{digits}(\.[0-9]{{1,9}})?({of_unit})?$"}
 
 

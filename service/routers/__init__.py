@@ -81,10 +81,10 @@ def file_answer(
     """
     answer = _File(path, headers=headers, stat_result=path.stat(), **options)
     etag = answer.headers["etag"]
-    offered = [
+    etags = [
         part.strip().removeprefix("W/")
         for part in request.headers.get("if-none-match", "").split(",")
     ]
-    if etag in offered or "*" in offered:
+    if etag in etags or "*" in etags:
         return Response(status_code=304, headers={**headers, "ETag": etag})
     return answer
