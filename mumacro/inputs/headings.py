@@ -138,7 +138,7 @@ def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
 
 _HALVED = ", with half of each value: it is peak to peak"
 _PEAK_TO_PEAK = re.compile(
-    r"p(?:ea)?k[\W_]*(?:to|2)?[\W_]*p(?:ea)?k|(?<![a-z])p[\W_]?(?:to|2|t)?[\W_]?p(?![a-z])"
+    r"p(?:ea)?k[\W_]*+(?:to|2)?+[\W_]*+p(?:ea)?k|(?<![a-z])p[\W_]?(?:to|2|t)?[\W_]?p(?![a-z])"
     r"|double[\W_]amplitude",
     re.IGNORECASE,
 )

@@ -107,9 +107,10 @@ function start(names) {
   };
   tabs("panel-tabs");
   store.open();
-  $("notice").hidden = !store.unknown.length;
-  $("notice-text").textContent = store.unknown.length
-    ? `The page does not know this part of the link, and leaves it out: ${store.unknown.join(", ")}.`
+  const unknown = store.unknown.join(", ");
+  $("notice").hidden = !unknown;
+  $("notice-text").textContent = unknown
+    ? `The page does not know this part of the link, and leaves it out: ${unknown}.`
     : "";
 }
 
