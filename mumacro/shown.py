@@ -30,7 +30,7 @@ def listed(value: Any) -> Any:
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {name: listed(entry) for name, entry in value.items()}
+        return members_of(value)
     if isinstance(value, (list, tuple)):
         return [listed(entry) for entry in value]
     if value is None or isinstance(value, (bool, int)):
@@ -42,6 +42,11 @@ def listed(value: Any) -> Any:
         texts = [x if isinstance(x, str) and x else None for x in array.ravel().tolist()]
         array = np.array(texts, object).reshape(array.shape)
     return array.tolist()
+
+
+def members_of(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by name for JSON, see :func:`listed`."""
+    return {name: listed(value) for name, value in values.items()}
 
 
 def frame_of(columns: Mapping[str, Any]) -> Any:

@@ -449,7 +449,8 @@ class _BeforeRest:
         self._answer = answer
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the answer, which has a Content-Length, drop the rest of the body, and end."""
+        """Send the answer, which has a Content-Length, and drop the rest of the body; only then
+        end the answer, upon which the server closes the connection."""
 
         async def send_unended(message: Message) -> None:
             if message["type"] == "http.response.body":

@@ -13,7 +13,7 @@ from mumacro.errors import missing
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array, Bools
-from mumacro.shown import frame_of, html_of, html_of_rows, listed, text_of
+from mumacro.shown import frame_of, html_of, html_of_rows, members_of, text_of
 
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 _CURVE = 200  # points of the fitted law
@@ -27,8 +27,7 @@ class Prediction(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Both by name: arrays as lists."""
-        result: dict[str, Any] = listed(self._asdict())
-        return result
+        return members_of(self._asdict())
 
     def to_frame(self) -> Any:
         """Both as a DataFrame of pandas, one row a case."""

@@ -19,7 +19,7 @@ from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
-from mumacro.shown import frame_of, html_of, listed, text_of
+from mumacro.shown import frame_of, html_of, members_of, text_of
 from mumacro.surrogate import Surrogate
 
 SCALES = ("log", "linear")
@@ -72,8 +72,7 @@ class Law:
         columns = {name: x for name, x in self.columns.items() if name != self.along}
         border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in self.border]
         members = {"along": self.along, "unit": unit_of(self.along), "values": self.values}
-        result: dict[str, Any] = listed({**members, **columns, "border": border})
-        return result
+        return members_of({**members, **columns, "border": border})
 
     def to_frame(self) -> Any:
         """The law as a DataFrame of pandas, one row a value of the swept input."""

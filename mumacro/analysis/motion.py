@@ -24,7 +24,7 @@ from mumacro.inputs.signature import Numbers, Oscillation
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
-from mumacro.shown import cell, frame_of, html_of, html_of_rows, listed, text_of
+from mumacro.shown import cell, frame_of, html_of, html_of_rows, members_of, text_of
 
 TOLERANCES = 1e-9, 1e-2
 # the longest and the shortest way in a radian, in units of mu0 Fz / k; below the last, rounding
@@ -68,8 +68,7 @@ class Cycle(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """The columns as lists."""
-        result: dict[str, Any] = listed(self._asdict())
-        return result
+        return members_of(self._asdict())
 
     def to_frame(self) -> Any:
         """The columns as a DataFrame of pandas."""
@@ -216,8 +215,7 @@ class Motion:
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON of a motion over HTTP, without cycle and api_version; arrays as
         lists, None where a number is not finite."""
-        result: dict[str, Any] = listed({**self.columns, "contact": self.scenes.contact})
-        return result
+        return members_of({**self.columns, "contact": self.scenes.contact})
 
     def to_frame(self) -> Any:
         """The numbers as a DataFrame of pandas, one row a case; ``cycle().to_frame()`` is the cycle

@@ -12,7 +12,7 @@ from mumacro.inputs.kind import kind_of
 from mumacro.inputs.reading import NO_DEVIATION
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.settling import REMAINING, decay
-from mumacro.shown import frame_of, html_of, listed, text_of
+from mumacro.shown import frame_of, html_of, members_of, text_of
 from mumacro.surrogate import Surrogate
 
 
@@ -39,8 +39,7 @@ class Settling:
 
     def to_dict(self) -> dict[str, Any]:
         """The numbers by name: arrays as lists, None where one is not finite."""
-        result: dict[str, Any] = listed(self.columns)
-        return result
+        return members_of(self.columns)
 
     def to_frame(self) -> Any:
         """The numbers as a DataFrame of pandas, one row a case."""

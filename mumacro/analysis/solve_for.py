@@ -48,7 +48,7 @@ from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.reading import read_one
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools, Places
-from mumacro.shown import frame_of, html_of, listed, text_of
+from mumacro.shown import frame_of, html_of, members_of, text_of
 from mumacro.surrogate import Surrogate
 
 HUGE = 1.7976931348623157e308
@@ -151,8 +151,7 @@ class Solution:
             "reachable": reachable,
             **({"ends": [end.to_dict() for end in self.ends]} if self.ends else {}),
         }
-        result: dict[str, Any] = listed(members)
-        return result
+        return members_of(members)
 
     @property
     def columns(self) -> dict[str, Any]:

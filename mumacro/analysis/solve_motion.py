@@ -25,7 +25,7 @@ from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.reading import read, read_one
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools
-from mumacro.shown import frame_of, html_of, listed, text_of
+from mumacro.shown import frame_of, html_of, members_of, text_of
 
 #: inputs of a motion that may be unknown
 INPUTS = ("v0", "k", "Fz", "f", "omega", "mu0")
@@ -159,8 +159,7 @@ class MotionSolution:
         }
         if other is not None:
             members["other_way"] = tables.results_of(other.targets, other.roots, other.reason)
-        result: dict[str, Any] = listed(members)
-        return result
+        return members_of(members)
 
     @property
     def columns(self) -> dict[str, Any]:

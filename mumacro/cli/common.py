@@ -346,6 +346,19 @@ def _faults_of_names(
     return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
 
 
+def other_meaning(
+    target: float, is_ratio: bool, case: Mapping[str, Any], holds: Callable[[float], bool]
+) -> str:
+    """The option that was perhaps forgotten or too much, where a target is out of reach: it may be
+    mu_macro, or its ratio to mu0.  ``holds`` says whether a mu_macro is in reach."""
+    mu0 = case.get("mu0")
+    if not mu0 or not holds(target if is_ratio else target * mu0):
+        return ""
+    if is_ratio:
+        return f"; did you mean mu_macro = {target:g}? Then leave out --ratio"
+    return f"; did you mean mu_macro/mu0 = {target:g}? Then add --ratio"
+
+
 def without_or_load(unknown: str) -> dict[str, Any]:
     """Keywords of ``read_case``: the unknown must not be there; Fz may be, as the load at which k
     holds."""

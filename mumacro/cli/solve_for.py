@@ -193,13 +193,7 @@ def run(words: Sequence[str]) -> str:
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: Solution) -> str:
-    """What was perhaps meant where a target is out of reach: mu_macro, or its ratio to mu0."""
-    mu0 = case.get("mu0")
-    if mu0 is None or solution.constant:
+    """What was perhaps meant where a target is out of reach."""
+    if solution.constant:
         return ""
-    if options.ratio:
-        if solution.reach.holds(options.target):
-            return f"; did you mean mu_macro = {options.target:g}? Then leave out --ratio"
-    elif solution.reach.holds(options.target * mu0):
-        return f"; did you mean mu_macro/mu0 = {options.target:g}? Then add --ratio"
-    return ""
+    return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

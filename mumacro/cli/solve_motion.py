@@ -102,11 +102,8 @@ def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None)
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:
-    """What was perhaps meant where a target is out of reach: mu_macro, or its ratio to mu0."""
-    reach, mu0 = solution.reach, case.get("mu0", 0.0)
-    other = options.target if options.ratio else options.target * mu0
-    if not mu0 or not reach.least <= other <= reach.most:
-        return ""
-    if options.ratio:
-        return f"; did you mean mu_macro = {options.target:g}? Then leave out --ratio"
-    return f"; did you mean mu_macro/mu0 = {options.target:g}? Then add --ratio"
+    """What was perhaps meant where a target is out of reach."""
+    reach = solution.reach
+    return common.other_meaning(
+        options.target, options.ratio, case, lambda target: reach.least <= target <= reach.most
+    )

@@ -200,7 +200,8 @@ def names_of_columns(rigid: bool = False) -> ColumnNames:
 
 
 def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    """The faults of columns that are missing."""
+    """The faults of columns that are missing, as parts of one sentence: the last, on k, goes on
+    with what is said of the columns before it."""
     if "y0" in inputs and AMPLITUDE in (split_unit(column)[0] for column in names):
         yield f"there is no column y0, but {AMPLITUDE}: give --direction normal"
         inputs = [name for name in inputs if name != "y0"]

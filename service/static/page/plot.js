@@ -219,7 +219,7 @@ export class Plot {
       })
       .on("drag", at)
       .on("end", () => grab(false));
-    select(svg).call(move).style("touch-action", "manipulation");
+    select(svg).call(move).style("touch-action", null);
     const hold = (event) => byPoint(event.touches[0]) && event.preventDefault();
     svg.addEventListener("touchstart", hold, { passive: false }); // the page does not scroll then
     svg.addEventListener("click", (event) => {
