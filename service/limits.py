@@ -157,8 +157,12 @@ class Work:
 
     async def client(self, move: Awaitable[T]) -> T:
         """Wait for the client to send or to read."""
-        async with within(self.settings.client_timeout_s, ProblemKind.SLOW_CLIENT):
-            return await move
+        limit = self.settings.client_timeout_s
+        try:
+            async with asyncio.timeout(limit):
+                return await move
+        except TimeoutError:
+            raise _late(ProblemKind.SLOW_CLIENT, limit) from None
 
 
 async def _work(request: Request) -> Work:
@@ -171,14 +175,17 @@ Working = Annotated[Work, Depends(_work)]
 
 
 @asynccontextmanager
-async def within(limit: int, late: ProblemKind = ProblemKind.TOOK_TOO_LONG) -> AsyncIterator[None]:
-    """A time limit: of a whole answer, its reading, computing and sending, or of a client's next
-    move."""
+async def within(limit: int) -> AsyncIterator[None]:
+    """A time limit of a whole answer: its reading, computing and sending."""
     try:
         async with asyncio.timeout(limit):
             yield
     except TimeoutError:
-        raise RequestError(late, f"this may take up to {limit} s") from None
+        raise _late(ProblemKind.TOOK_TOO_LONG, limit) from None
+
+
+def _late(kind: ProblemKind, limit: int) -> RequestError:
+    return RequestError(kind, f"this may take up to {limit} s")
 
 
 class ConnectionLimit:

@@ -21,9 +21,11 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.datastructures import ImmutableMultiDict
+from starlette.routing import Match, request_response
+from starlette.types import Scope
 
 from .limits import JSON, SMALL_BODY, Work, only_json, read_body
-from .problems import FieldFault, ProblemKind, RequestError, invalid, refuse
+from .problems import FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 # the characters of a query that needs no decoding
@@ -240,8 +242,19 @@ class DirectRoute(APIRoute):
     """A route for ``async def answer(request, model)``: the model is read straight from the bytes
     of the body, or from the query.
 
-    Nothing else is solved: such an endpoint declares no dependency.
+    Nothing else is solved: such an endpoint declares no dependency, and needs no stack for one.
+    Its path has no parameters, and is compared as it is.
     """
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.app = request_response(self.get_route_handler())
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        """Whether a request is for this route; most are told apart by their path alone."""
+        if path_in(scope) != self.path:
+            return Match.NONE, {}
+        return super().matches(scope)
 
     def get_route_handler(self) -> Handler:
         """Take the place of FastAPI's handler."""
