@@ -350,9 +350,7 @@ class Answer(Generic[Number]):
         """A table for notebooks: of one case what the command prints."""
         if not self._is_one():
             return html_of(self._heading(), self._columns())
-        from mumacro import words  # above this floor; the one place where a result needs it
-
-        rows, notes, error = words.of_one_case(self)
+        rows, notes, error = self._surrogate.in_words(self)
         return html_of_rows("", rows, [*map(" ".join, notes), error])
 
 

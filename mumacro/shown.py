@@ -11,6 +11,8 @@ import numpy as np
 
 from mumacro.errors import MumacroError
 
+Rows = list[tuple[str, ...]]  # of texts, as a table shows them
+
 LINES, WIDTH = 16, 100  # of a ``repr``
 _ENDS = 5  # rows at the beginning and at the end of a long table
 _DIGITS = 6

@@ -34,6 +34,7 @@ from mumacro.outputs import evaluation
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, names_in
 from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
+from mumacro.shown import Rows
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
 from mumacro.table.bundled import bundled_table, bundled_tables
@@ -607,6 +608,13 @@ class Surrogate:
         answer = evaluation.answer(self.tabulated, cases, outputs, groups)
         answer._surrogate = self
         return answer
+
+    @staticmethod
+    def in_words(answer: Answer[float]) -> tuple[Rows, Rows, str]:
+        """The answer to one case as the command prints it, and a notebook shows."""
+        from mumacro.words import of_one_case  # loaded by those alone who show an answer
+
+        return of_one_case(answer)
 
     def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
         """The answer to one case across in plain numbers; NaN where it is illegal."""

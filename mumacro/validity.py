@@ -7,20 +7,20 @@ inputs of a case, and have no row here: quasi-static contact, which needs masses
 """
 
 import math
-from collections.abc import Mapping
-from typing import Any, TypedDict
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol, TypedDict
 
 import numpy as np
 
-from mumacro.analysis.measured_points import HARDLY
-from mumacro.analysis.settling import settling
-from mumacro.analysis.stiffening import ROUGH, Stiffening
+from mumacro.contacts.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, without_interval
 from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
-from mumacro.inputs.kind import SPRINGS_OF, Kind, kind_of
-from mumacro.surrogate import Surrogate
+from mumacro.inputs.kind import SPRING, SPRINGS_OF, Kind, kind_of
+from mumacro.outputs.evaluated import Evaluated
+from mumacro.outputs.settling import decay
+from mumacro.outputs.tabulated import Tabulated
 
 #: names of the rows, as in the table of docs/validity.md
 ROWS = (
@@ -35,11 +35,22 @@ ROWS = (
 K_UNCERTAINTY = (
     0.1  # relative uncertainty of k by default: materials and geometry give no better one
 )
+HARDLY = 20.0  # y~ from which on mu_macro hardly depends on k (docs/validity.md)
 _RATE = 0.01  # a of mu0 + a ln(slip speed), rock, polymers and metals (docs/validity.md)
 _TILT, _NORMAL = 0.01, 1.21  # misalignment; normal over tangential stiffness of steel on steel
 # slip paths [m] between which a row is shown: friction follows a new slip speed after micrometres
 _ADAPTS = 1e-7, 1e-4
 _PERIODS, _WATTS = 100.0, 0.1  # above them there is a row on settling, and one on heat
+
+
+class Answers(Protocol):
+    """What answers cases: a :class:`mumacro.Surrogate`."""
+
+    tabulated: Tabulated
+
+    @property
+    def evaluate(self) -> Callable[..., Any]:
+        """The method of that name."""
 
 
 class Row(TypedDict):
@@ -52,7 +63,7 @@ class Row(TypedDict):
 
 
 def model_rows(
-    surrogate: Surrogate,
+    surrogate: Answers,
     case: Mapping[str, Any],
     contact: str = "spring",
     direction: str = "across",
@@ -65,6 +76,7 @@ def model_rows(
 
     Examples
     --------
+    >>> from mumacro import Surrogate
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
     >>> [k_row] = [row for row in model_rows(Surrogate.open(), case) if row["row"] == "k is known"]
     >>> k_row["text"]
@@ -126,7 +138,7 @@ def load_rows(
 
 
 def k_effect(
-    surrogate: Surrogate,
+    surrogate: Answers,
     case: Mapping[str, Any],
     contact: str = "spring",
     direction: str = "across",
@@ -181,7 +193,7 @@ def _six_inputs(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
 
 
 def _other_contact(
-    surrogate: Surrogate, case: Mapping[str, Any], mu: float, contact: str, direction: str
+    surrogate: Answers, case: Mapping[str, Any], mu: float, contact: str, direction: str
 ) -> Row | None:
     alternative = "ball" if contact == "spring" else "spring"
     try:
@@ -208,7 +220,7 @@ def _other_contact(
 
 
 def _stiffness(
-    surrogate: Surrogate, case: Mapping[str, Any], y: float, contact: str, direction: str
+    surrogate: Answers, case: Mapping[str, Any], y: float, contact: str, direction: str
 ) -> Row | None:
     effect = k_effect(surrogate, case, contact, direction)
     margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{100.0 * effect:.2g} %"
@@ -235,21 +247,19 @@ def _tilt(mu0: float, y: float) -> Row | None:
     return {"row": "constant normal force", "text": text, "effect": effect}
 
 
-def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
+def _cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
     """Rows that follow from the slip path of a period, taken from one spring."""
-    decay = settling(surrogate, **six)
+    cases = Evaluated(surrogate.tabulated, Cases.of(six, SPRING), "groups")
+    periods, time, slip, _ = decay(cases)
     force = six["mu0"] * six["Fz"]
     # [m], [Hz]
-    slip_path, frequency = float(decay.slip_path) * force / six["k"], six["omega"] / RAD_PER_CYCLE
+    slip_path, frequency = slip * force / six["k"], six["omega"] / RAD_PER_CYCLE
     watts, rows = force * slip_path * frequency, list[Row]()
-    if math.isinf(decay.periods):
+    if math.isinf(periods):
         text = "nothing slips at rest: this is the largest force that the contact can hold"
         rows.append({"row": "steady cycle", "text": text, "effect": None})
-    elif decay.periods > _PERIODS:
-        text = (
-            f"creeping: a disturbance falls to 1 % within {decay.periods:.3g} periods, "
-            f"{decay.time:.3g} s"
-        )
+    elif periods > _PERIODS:
+        text = f"creeping: a disturbance falls to 1 % within {periods:.3g} periods, {time:.3g} s"
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]

@@ -9,7 +9,7 @@ from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import Kind
 from mumacro.inputs.units import Scale, scale_of, suited
 from mumacro.outputs import MEMBERS
-from mumacro.shown import known, tidy_zeros
+from mumacro.shown import Rows, known, tidy_zeros
 from mumacro.validity import digits, k_effect, model_rows
 
 REGIMES = {
@@ -22,8 +22,6 @@ REGIMES = {
 }
 _SHOWN = ("std", "std_share", "gradient")  # in rows of their own
 _ROW_OF_K = ("k is known", True)  # the answer for an interval says that already
-
-Rows = list[tuple[str, ...]]
 
 
 def of_one_case(

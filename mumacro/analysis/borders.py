@@ -10,7 +10,7 @@ import numpy as np
 
 from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
 from mumacro.analysis.rootfinding import TINY, last_double
-from mumacro.analysis.stiffening import Stiffening
+from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools

@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro.analysis.fitted import Fit, quantile
-from mumacro.analysis.measured_points import HARDLY, STD, Measured
+from mumacro.analysis.measured_points import STD, Measured
 from mumacro.analysis.profile import Goal, Profile
 from mumacro.errors import InputError
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
+from mumacro.validity import HARDLY
 
 _PER_DECADE, _MOST_NODES = 10, 600  # the first samples: places a decade, places at most
 # y~, for normal v~, at which a contact is so soft that friction is mu0 to 6 digits or more

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.analysis.stiffening import Stiffening
 from mumacro.answer import Answer
+from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array

@@ -10,8 +10,8 @@ import numpy as np
 from mumacro import plotting
 from mumacro.analysis.borders import Crossing, border_crossings
 from mumacro.analysis.input_curve import InputCurve
-from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import BAND, Answer
+from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, without_interval
 from mumacro.inputs.fields import NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of

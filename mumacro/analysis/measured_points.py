@@ -20,7 +20,6 @@ from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
 
 UNKNOWNS = ("k", "mu0")
-HARDLY = 20.0  # y~ from which on mu_macro hardly depends on k (docs/validity.md)
 STD = "std"  # the column of standard deviations
 #: how far a point may lie outside of 0 <= mu_macro <= mu0: in standard deviations; where the
 #: points have none, as a share of mu0

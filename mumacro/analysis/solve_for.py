@@ -39,8 +39,8 @@ import numpy as np
 from mumacro.analysis import solutions as tables
 from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
 from mumacro.analysis.rootfinding import TINY, Branch, branches_between, last_double, samples
-from mumacro.analysis.stiffening import Stiffening, stiffening_of
 from mumacro.answer import Answer
+from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import POSITIVE, QUANTITY_OF, field_of, unit_of

@@ -12,8 +12,8 @@ from fastapi import Query, Request, Response
 import mumacro
 from mumacro.analysis.law import Law
 from mumacro.analysis.solve_for import Solution
-from mumacro.analysis.stiffening import Stiffening
 from mumacro.answer import Answer, nested
+from mumacro.contacts.stiffening import Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, ends_in, named
 from mumacro.inputs.fields import unit_of

@@ -17,8 +17,8 @@ from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.borders import border_crossings
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.solve_for import solve_for
-from mumacro.analysis.stiffening import Stiffening
 from mumacro.cli.main import main
+from mumacro.contacts.stiffening import Stiffening
 from mumacro.validity import load_rows
 from tests.support.cases import CASE, PAIRS, Case, as_kind, without
 from tests.support.comparing import close
