@@ -71,6 +71,9 @@ class _File(FileResponse):
         await super().__call__(scope, receive, send_checked)
 
 
+SMALL = 100_000  # bytes; the page's own files and libraries are smaller
+
+
 def file_answer(
     request: Request, path: Path, headers: Mapping[str, str], **options: Any
 ) -> Response:
@@ -87,4 +90,7 @@ def file_answer(
     ]
     if etag in etags or "*" in etags:
         return Response(status_code=304, headers={**headers, "ETag": etag})
-    return answer
+    if int(answer.headers["content-length"]) > SMALL or "range" in request.headers:
+        return answer
+    # three turns of the thread pool that FileResponse takes cost more than to read a small file
+    return Response(path.read_bytes(), headers={**answer.headers}, **options)

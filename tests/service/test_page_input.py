@@ -191,6 +191,31 @@ def test_a_drag_is_one_step_and_the_map_stays_where_it_is(open_page: Any) -> Non
     assert page.value("#field-y0") == "2 µm"
 
 
+def test_a_step_of_a_drag_draws_the_point_and_its_end_the_rest(open_page: Any) -> None:
+    page = open_page(width=1280, height=800)
+    page.run(
+        "window.drawn = 0; new MutationObserver(() => { window.drawn += 1; })"
+        ".observe(document.querySelector('#map'), { childList: true });"
+    )
+    copied = page.value("#copied")
+    place = "return document.querySelector('#map .point').getAttribute('transform');"
+    page.drag_begins("#map", 0.5, 0.6)
+    places = {page.run(place)}
+    for _ in range(4):
+        page.drag_moves(0, -8)
+        page.settle()
+        places.add(page.run(place))
+    assert len(places) == 5
+    assert page.run("return window.drawn;") == 0  # the map below the point stays
+    assert page.value("#copied") == copied
+    page.drag_ends()
+    amplitude = page.value("#field-y0").replace(" ", "")
+    assert f"y0={amplitude} " in page.value("#copied")
+    law = page.find("#law").get_attribute("aria-label")
+    again = open_page("#" + page.address(), width=1280, height=800)
+    assert again.find("#law").get_attribute("aria-label") == law
+
+
 @pytest.mark.parametrize("plot", ["#map", "#law"])
 def test_a_finger_drags_the_point_and_scrolls_elsewhere(open_page: Any, plot: str) -> None:
     page = open_page(width=390, height=844)

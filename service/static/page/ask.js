@@ -1,6 +1,6 @@
 // Asking and its failures: one question in flight, its report, the API key and its field.
 // The questions themselves are in service.js.
-export const $ = (id) => document.getElementById(id);
+import { $, markBusy } from "./dom.js";
 
 const SLOW_MS = 1_500; // after which the old answer is marked as old
 const AGAIN_S = 3; // between attempts, where the service does not say it
@@ -58,10 +58,9 @@ export class Channel {
     });
   }
 
-  /** Whether anything is asked, for who waits for it. */
   mark(busy) {
     this.busy = busy;
-    $("main")?.setAttribute("data-asking", String(channels.some((one) => one.busy)));
+    markBusy(this, busy);
   }
 }
 

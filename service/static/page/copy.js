@@ -1,6 +1,6 @@
 // The case as it is taken along: a link, curl, Python, the command.  Each text gives the number of
 // the page.
-import { $ } from "./ask.js";
+import { $, write } from "./dom.js";
 import { caseOf, toAddress } from "./state.js";
 
 const asText = (text) => JSON.stringify(text);
@@ -47,6 +47,6 @@ export function copyPanel(store) {
   });
   return () => {
     $("copied").value = textsOf(store.state).command;
-    $("copy-status").textContent = "";
+    write("copy-status", "");
   };
 }

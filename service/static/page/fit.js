@@ -1,6 +1,7 @@
 // The panel "k from measured points": a table pasted or dropped, what the service read of it, and
 // the fit with its residuals.
-import { $, Channel } from "./ask.js";
+import { Channel } from "./ask.js";
+import { $ } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
@@ -182,7 +183,7 @@ export function fitPanel(store, moved, openCase) {
   /** Points, fit and band above; below them, on the same axis, the residuals. */
   function paint() {
     if (!table?.columns.v0 || !table.columns.mu_macro) {
-      plot.svg.replaceChildren();
+      plot.clear();
       return;
     }
     const speeds = column("v0");

@@ -1,6 +1,6 @@
 // The card of the inputs: contact, direction, sketch, and a field for each input with what the
 // service understood below it.
-import { $ } from "./ask.js";
+import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
 import { about, inPrint, inUnit, numberOf, prose, typeset } from "./words.js";
@@ -112,8 +112,8 @@ export function inputsPanel(store, moved) {
     for (const part of $("sketch").querySelectorAll(".body, .motion"))
       part.toggleAttribute("hidden", !part.matches(`.body.${contact}, .motion.${direction}`));
     const words = `${about.choices.contact[contact]}, ${about.choices.direction[direction]}`;
-    $("sketch").setAttribute("aria-label", `The set-up: ${words}`);
-    $("chosen").textContent = `${words[0].toUpperCase()}${words.slice(1)}.`;
+    attribute("sketch", "aria-label", `The set-up: ${words}`);
+    write("chosen", `${words[0].toUpperCase()}${words.slice(1)}.`);
   }
 
   $("fields").addEventListener("change", ({ target: { name, value } }) => {

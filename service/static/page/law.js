@@ -1,5 +1,6 @@
 // The friction law: µ over one input, with the map's colours behind it.
-import { $, Channel } from "./ask.js";
+import { Channel } from "./ask.js";
+import { $, attribute, write } from "./dom.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf } from "./state.js";
@@ -50,7 +51,7 @@ export function lawPanel(store, moved) {
   let answer, law, colours, target, latest;
   let pointer = null; // where it is in the plot
   let refused = null;
-  const plot = new Plot($("law"), paint);
+  const plot = new Plot($("law"), paint, mark);
   const along = () => law?.along ?? store.state.along;
   /** The unit of the axis: that of the input as it was typed. */
   const unit = () => answer?.inputs[along()]?.unit || unitFor(along(), law?.values.at(-1) ?? 1);
@@ -61,12 +62,13 @@ export function lawPanel(store, moved) {
     (question) => post("v1/law", question),
     (reply, { scale }) => {
       law = { ...reply, scale };
-      $("law-status").textContent = "";
+      write("law-status", "");
+      plot.redraw();
       describe();
     },
     (reason) => {
       refused = reason;
-      $("law-status").textContent = reason ?? "";
+      write("law-status", reason ?? "");
       $("law").classList.toggle("old", refused !== null);
     },
   );
@@ -76,33 +78,31 @@ export function lawPanel(store, moved) {
     const marks = law.border
       .map(({ value }) => `; border of continuous sliding at ${text(value)}`)
       .join("");
-    $("law").setAttribute("aria-label", `Friction law from ${at(0)} to ${at(-1)}${marks}.`);
+    attribute("law", "aria-label", `Friction law from ${at(0)} to ${at(-1)}${marks}.`);
     read(pointer);
-    plot.redraw();
   }
 
-  /** µ₀ at each value of the law. */
-  const heights = () =>
-    law.along === "mu0" ? law.values : law.values.map(() => answer.inputs.mu0.value);
+  /** µ₀ where the law is drawn: at each value, or one for all of them. */
+  const heights = () => (law.along === "mu0" ? law.values : [answer.inputs.mu0.value]);
+  const shown = () => law.values.map((value) => toUnit(law.along, value, unit()));
 
   function paint() {
     if (!law || !answer) return;
-    const mu0 = heights();
-    const shown = law.values.map((value) => toUnit(law.along, value, unit()));
-    const top = 1.05 * Math.max(...mu0, ...(law.mu_macro_high ?? law.mu_macro)) || 1;
+    const top = 1.05 * Math.max(...heights(), ...(law.mu_macro_high ?? law.mu_macro)) || 1;
+    const places = shown();
     plot.axes({
-      x: { domain: [shown[0], shown.at(-1)], log: law.scale === "log", title: heading() },
+      x: { domain: [places[0], places.at(-1)], log: law.scale === "log", title: heading() },
       y: { domain: [0, top], log: false, title: "friction µ" },
     });
-    const { inside, over, box } = plot;
-    bands(shown, mu0);
+    const { inside, box } = plot;
+    bands(places);
     plot.path(
-      shown.map((x, i) => [x, law.mu_static[i]]),
+      places.map((x, i) => [x, law.mu_static[i]]),
       "still",
     );
-    if (law.mu_macro_low) range(shown, law.mu_macro_low, law.mu_macro_high, "band");
+    if (law.mu_macro_low) range(places, law.mu_macro_low, law.mu_macro_high, "band");
     plot.path(
-      shown.map((x, i) => [x, law.mu_macro[i]]),
+      places.map((x, i) => [x, law.mu_macro[i]]),
       "curve",
     );
     for (const { value } of law.border) {
@@ -119,9 +119,14 @@ export function lawPanel(store, moved) {
     }
     const still = plot.y(law.mu_static[0]);
     plot.text("static", box.x + 5, Math.min(still + 14, box.y + box.height - 6), "note", "start");
+  }
+
+  /** The line of the target and the user's point. */
+  function mark() {
     if (target?.along === law.along) {
+      const ends = plot.x.domain();
       plot.path(
-        shown.map((x) => [x, target.mu_macro]),
+        ends.map((x) => [x, target.mu_macro]),
         "target",
       );
     }
@@ -134,32 +139,36 @@ export function lawPanel(store, moved) {
       plot.path(
         ends.map((mu) => [x, mu]),
         "deviation",
-        over,
+        plot.over,
       );
     }
     plot.point(x, answer.mu_macro);
   }
 
   /** The areas between the levels of µ/µ₀, in the colours of the map. */
-  function bands(shown, mu0) {
+  function bands(places) {
     if (!colours) return;
     const levels = [0, ...colours.levels, 1];
+    const mu0 = heights();
+    const across = mu0.length === 1 ? plot.x.domain() : places;
     colours.colours.forEach((colour, i) => {
-      const [low, high] = [levels[i], levels[i + 1]].map((level) => mu0.map((one) => level * one));
-      range(shown, low, high, "shade").style("fill", colour);
+      const [low, high] = [levels[i], levels[i + 1]].map((level) =>
+        across.map((_, at) => level * (mu0[at] ?? mu0[0])),
+      );
+      range(across, low, high, "shade").style("fill", colour);
     });
   }
 
-  const range = (shown, low, high, className) =>
+  const range = (places, low, high, className) =>
     plot.inside
       .append("path")
       .attr("class", className)
       .attr(
         "d",
         area()
-          .x((_, i) => plot.x(shown[i]))
+          .x((_, i) => plot.x(places[i]))
           .y0((_, i) => plot.y(low[i]))
-          .y1((_, i) => plot.y(high[i]))(shown),
+          .y1((_, i) => plot.y(high[i]))(places),
       );
 
   /** What stands below the law: at the pointer, else at the user's point. */
@@ -170,13 +179,15 @@ export function lawPanel(store, moved) {
       const one = numberOf(answer?.inputs[law.along]);
       const words =
         one === undefined ? "" : `Your case: ${text(one)}: µ = ${show(answer.mu_macro)}`;
-      $("law-read").textContent = words;
+      write("law-read", words);
       return;
     }
     const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));
-    $("law-read").textContent =
+    write(
+      "law-read",
       `At the pointer: ${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ` +
-      inWords(law.regime[i]);
+        inWords(law.regime[i]),
+    );
   }
 
   plot.follow({
@@ -219,10 +230,15 @@ export function lawPanel(store, moved) {
     () => law && plot.save(caption(), `friction-law-${law.along}.svg`),
   );
 
+  let ground; // what the curve is drawn on
   return (state, reply, scale, wanted, old) => {
+    if (reply !== answer || wanted !== target) plot.remark();
     [answer, colours, target] = [reply, scale, wanted];
     $("law").classList.toggle("old", old || refused !== null);
     if (!answer) return;
+    const below = [unit(), answer.inputs.mu0.value, colours?.contact, colours?.direction].join();
+    if (below !== ground) plot.redraw();
+    ground = below;
     const question = lawQuestion(state, answer);
     const [start, stop] = [question.start, question.stop];
     $("from").placeholder = typeof start === "number" ? inUnit(state.along, start, unit(), 3) : "";

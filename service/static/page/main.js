@@ -1,5 +1,6 @@
 // The page: one state, the question that follows from it, and the cards that show the answer.
-import { $, Channel } from "./ask.js";
+import { Channel } from "./ask.js";
+import { $, afterPicture, write } from "./dom.js";
 import { copyPanel } from "./copy.js";
 import { fitPanel } from "./fit.js";
 import { inputsPanel } from "./inputs.js";
@@ -7,7 +8,7 @@ import { lawPanel } from "./law.js";
 import { mapPanel, textAt } from "./map.js";
 import { motionPanel } from "./motion.js";
 import { numberPanel } from "./number.js";
-import { get, post } from "./service.js";
+import { getPreloaded, post } from "./service.js";
 import { sidePanel, tabs } from "./side.js";
 import { Store, caseOf, fromAddress, startState, useStart } from "./state.js";
 import { stiffnessPanel } from "./stiffness.js";
@@ -22,6 +23,7 @@ const store = new Store(() => {
   ask();
   show();
 });
+let asked = null; // the state of the last question
 
 /** The question of a state: the texts as they are typed, and all outputs that its kind has. */
 function questionOf(state) {
@@ -47,7 +49,11 @@ const point = new Channel(
   },
 );
 
-const ask = () => point.push(store.state);
+function ask() {
+  if (asked === store.state) return;
+  asked = store.state;
+  point.push(asked);
+}
 
 /** Gives inputs other values [SI], in the units and with the deviations that they had. */
 function moved(values, digits = 4, more = {}) {
@@ -61,15 +67,24 @@ function moved(values, digits = 4, more = {}) {
   });
 }
 
+/** Fields, number and point follow at once, all else when these are on the screen. */
 function show() {
   if (!panels) return;
-  const { state } = store;
-  const old = answer !== null && answer.state !== state && trouble !== null;
-  const colours = panels.map(answer, target?.mu_ratio);
+  const old = answer !== null && answer.state !== store.state && trouble !== null;
   panels.inputs(answer, trouble?.faults ?? new Map());
   panels.number(answer, trouble, old);
-  panels.law(state, answer, colours, target, old);
+  panels.map?.(answer, target?.mu_ratio);
+  afterPicture(() => showRest(old));
+}
+
+/** While something is dragged, what does not belong to the case alone waits for the end of it. */
+function showRest(old) {
+  if (!answer && !trouble) return; // the first number comes before the other cards
+  if (!panels.map) Object.assign(panels, otherPanels());
+  const { state } = store;
+  panels.law(state, answer, panels.map(answer, target?.mu_ratio), target, old);
   panels.side(answer);
+  if (store.dragged) return;
   panels.copy();
   panels.stiffness();
   panels.fit(answer);
@@ -77,23 +92,15 @@ function show() {
   for (const name of ["along", "scale", "from", "to", "exponent"]) $(name).value = state[name];
   $("digits").checked = state.digits === "all";
   $("exponent-field").hidden = state.along !== "Fz" && state.unknown !== "Fz";
-  $("print-case").textContent = location.href;
-  $("print-date").textContent = new Date().toISOString().slice(0, 10);
+  write("print-case", location.href);
+  write("print-date", new Date().toISOString().slice(0, 10));
 }
 
-function start(names) {
-  Object.assign(about, names);
-  useStart(about.start);
-  $("version").textContent = about.version;
-  for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
-  const options = (id) =>
-    $(id).append(
-      ...Object.entries(about.inputs).map(([name, { symbol }]) => new Option(symbol, name)),
-    );
-  options("along");
-  panels = {
-    inputs: inputsPanel(store, moved),
-    number: numberPanel(store),
+function otherPanels() {
+  tabs("panel-tabs");
+  for (const [name, { symbol }] of Object.entries(about.inputs))
+    $("along").append(new Option(symbol, name));
+  return {
     map: mapPanel(store, moved, () => show()),
     law: lawPanel(store, moved),
     side: sidePanel(store, moved, (mark) => {
@@ -105,8 +112,16 @@ function start(names) {
     fit: fitPanel(store, moved, (address) => store.change(fromAddress(`#${address}`).state)),
     motion: motionPanel(store),
   };
-  tabs("panel-tabs");
-  store.open();
+}
+
+function start(names) {
+  Object.assign(about, names);
+  useStart(about.start);
+  store.open(); // the question is under way while the cards are made
+  panels = { inputs: inputsPanel(store, moved), number: numberPanel(store) };
+  show();
+  $("version").textContent = about.version;
+  for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
   const unknown = store.unknown.join(", ");
   $("notice").hidden = !unknown;
   $("notice-text").textContent = unknown
@@ -127,7 +142,7 @@ $("digits").addEventListener("change", ({ target: { checked } }) =>
 );
 $("print").addEventListener("click", () => window.print());
 new Channel(
-  () => get("static/page/names.json"),
+  () => getPreloaded("static/page/names.json"),
   start,
   (reason) => {
     $("status").textContent = reason ?? "";

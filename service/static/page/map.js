@@ -1,5 +1,6 @@
 // The map: µ/µ₀ over ṽ and ỹ with the user's point, which can be dragged.
-import { $, Channel } from "./ask.js";
+import { Channel } from "./ask.js";
+import { $, attribute, write } from "./dom.js";
 import { caseOf, inputsOf } from "./state.js";
 import { Plot } from "./plot.js";
 import { get } from "./service.js";
@@ -34,18 +35,19 @@ const AMPLITUDE = { y0: ["y0", "k", "mu0", "Fz"], Fz_amplitude: ["Fz_amplitude",
 export function mapPanel(store, moved, loaded) {
   let map, answer, target;
   let pointer = null; // where it is in the plot
-  const plot = new Plot($("map"), paint);
+  const plot = new Plot($("map"), paint, mark);
   const amplitude = () => inputsOf(store.state)[3];
   const channel = new Channel(
     (kind) => get(`static/page/map.json?${new URLSearchParams(kind)}`),
     (data, { contact, direction }) => {
       map = { ...data, contact, direction };
+      plot.redraw();
       map.shades = contours().size([data.v_tilde.n, data.y_tilde.n]).thresholds(data.levels)(
         data.mu_ratio.map((one) => one * data.unit),
       );
       loaded();
     },
-    (reason) => ($("map-read").textContent = reason ?? ""),
+    (reason) => write("map-read", reason ?? ""),
   );
 
   /** A ring of a contour in cells of the grid, as the path of a plot. */
@@ -91,12 +93,16 @@ export function mapPanel(store, moved, loaded) {
       plot.text(show(level), ...at(u, w), "tag").attr("dy", "0.35em");
     for (const [u, w, words] of map.areas) plot.text(words, ...at(u, w), "area");
     legend(over);
+  }
+
+  /** The line of the target and the user's point. */
+  function mark() {
     if (target) {
       const values = map.mu_ratio.map((one) => one * map.unit);
       const shape = contours().size([map.v_tilde.n, map.y_tilde.n]).contour(values, target);
-      inside.append("path").attr("class", "target").attr("d", outline(shape));
+      plot.inside.append("path").attr("class", "target").attr("d", outline(shape));
     }
-    if (answer?.groups && store.state.contact !== "rigid") mark(answer.groups, answer.inputs);
+    if (answer?.groups && store.state.contact !== "rigid") point(answer.groups, answer.inputs);
   }
 
   /** The colours and the levels between them, beside the map. */
@@ -129,7 +135,7 @@ export function mapPanel(store, moved, loaded) {
   }
 
   /** The user's point, with a bar for its deviation or for the interval of k. */
-  function mark({ v_tilde: v, y_tilde: y }, inputs) {
+  function point({ v_tilde: v, y_tilde: y }, inputs) {
     const [along, up] = [v ?? Infinity, y ?? Infinity];
     const bar = (from, to) => plot.path([from, to], "deviation", plot.over);
     const [dv, dy] = [SPEED, AMPLITUDE[amplitude()]].map((names) => deviationOf(inputs, names));
@@ -167,7 +173,7 @@ export function mapPanel(store, moved, loaded) {
         ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}: ` +
           `µ/µ₀ = ${show(answer.mu_ratio)}`
         : "";
-      $("map-read").textContent = outside() || words;
+      write("map-read", outside() || words);
       return;
     }
     const [v, y] = [plot.x.invert(at[0]), plot.y.invert(at[1])];
@@ -175,8 +181,10 @@ export function mapPanel(store, moved, loaded) {
     const column = cell(at[0], plot.box.x, plot.box.width, map.v_tilde.n);
     const row = cell(plot.box.y + plot.box.height - at[1], 0, plot.box.height, map.y_tilde.n);
     const ratio = map.mu_ratio[row * map.v_tilde.n + column] * map.unit;
-    $("map-read").textContent =
-      `At the pointer: ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}: µ/µ₀ ≈ ${show(ratio, 3)}`;
+    write(
+      "map-read",
+      `At the pointer: ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}: µ/µ₀ ≈ ${show(ratio, 3)}`,
+    );
   }
 
   /** The values of the case at a place of the map. */
@@ -211,6 +219,7 @@ export function mapPanel(store, moved, loaded) {
 
   let asked;
   return (latest, ratio) => {
+    if (latest !== answer || ratio !== target) plot.remark();
     [answer, target] = [latest, ratio];
     const { contact, direction } = caseOf(store.state);
     const kind = `${contact} ${direction}`;
@@ -218,7 +227,8 @@ export function mapPanel(store, moved, loaded) {
       asked = kind;
       channel.push({ contact, direction });
     }
-    $("map").setAttribute(
+    attribute(
+      "map",
       "aria-label",
       answer?.groups
         ? `Map of µ/µ₀. Your point: speed ${show(answer.groups.v_tilde ?? Infinity, 3)}, ` +
@@ -227,7 +237,6 @@ export function mapPanel(store, moved, loaded) {
         : "Map of µ/µ₀ over dimensionless speed and amplitude",
     );
     read(pointer);
-    plot.redraw();
     return map;
   };
 }

@@ -1,6 +1,7 @@
 // The panel "any motion": oscillations in x, y and the load at once, one steady cycle, and which
 // value of an input gives a wanted mean friction.
-import { $, Channel } from "./ask.js";
+import { Channel } from "./ask.js";
+import { $ } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";

@@ -1,6 +1,6 @@
 // The number: µ_macro, as large as the page has it, with its deviation, its doubt and what it
 // assumes.
-import { $ } from "./ask.js";
+import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import {
   about,
@@ -72,9 +72,12 @@ export function numberPanel(store) {
     if (target === currentTarget || target.closest("button")) currentTarget.close();
   });
   return (answer, trouble, old) => {
-    $("status").textContent = trouble?.text
-      ? `${prose(trouble.text).replace(/[^.!?]$/, "$&.")}${old ? " The last answer stays." : ""}`
-      : "";
+    write(
+      "status",
+      trouble?.text
+        ? `${prose(trouble.text).replace(/[^.!?]$/, "$&.")}${old ? " The last answer stays." : ""}`
+        : "",
+    );
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
     if (!answer) {
@@ -93,11 +96,9 @@ export function numberPanel(store) {
         }`,
       $("number"),
     );
-    $("regime").textContent = inWords(answer.regime);
-    $("spread").textContent = spread(answer, rows);
-    $("doubt").textContent = warning
-      ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}`
-      : "";
+    write("regime", inWords(answer.regime));
+    write("spread", spread(answer, rows));
+    write("doubt", warning ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}` : "");
     const lines = rows.filter(({ row }) => !BESIDE.includes(row));
     const words = (text) => sentence(text, answer.inputs);
     const line = ({ row, text }) =>

@@ -64,28 +64,47 @@ function ticked(axis, scale, room) {
 }
 
 /**
- * An SVG that `paint(plot)` fills when its size or what it shows changes.
+ * An SVG of two layers: `paint(plot)` fills the lower one when its size or what it shows changes,
+ * `mark(plot)` the upper one, which is drawn anew by itself in every step of a drag.
  *
  * `axes({ x, y })` gives it two scales { domain, log, title }; then `plot.x`, `plot.y` are d3's
- * scales, `plot.inside` the group that is cut off at the frame, `plot.over` the one above it.
+ * scales, `plot.inside` the group that is cut off at the frame, `plot.over` the one above it, each
+ * of the layer that is drawn.
  */
 export class Plot {
-  constructor(svg, paint) {
-    Object.assign(this, { svg, paint });
-    new ResizeObserver(() => this.redraw()).observe(svg);
+  constructor(svg, paint, mark = () => {}) {
+    Object.assign(this, { svg, paint, mark, stale: true, centred: [] });
+    new ResizeObserver(([{ contentRect }]) => {
+      [this.width, this.height] = [contentRect.width, contentRect.height].map(Math.round);
+      this.redraw();
+    }).observe(svg);
   }
 
+  /** Draws both layers, in the next picture of the page. */
   redraw() {
+    this.stale = true;
+    this.remark();
+  }
+
+  /** Draws the upper layer. */
+  remark() {
     cancelAnimationFrame(this.next);
     this.next = requestAnimationFrame(() => this.draw());
   }
 
   draw() {
-    const { clientWidth: width, clientHeight: height } = this.svg;
+    const { width, height } = this;
     if (!width || !height) return;
-    Object.assign(this, { width, height });
-    this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    this.paint(this);
+    if (this.stale) {
+      this.stale = false;
+      this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+      this.paint(this);
+      this.centre();
+    }
+    if (!this.marks) return;
+    [this.inside, this.over] = this.marks;
+    for (const group of this.marks) group.selectAll("*").remove();
+    this.mark(this);
   }
 
   /** Two axes with titles; `right` pixels are left free beside them. */
@@ -105,6 +124,7 @@ export class Plot {
     root.selectAll("*").remove();
     const { box } = this;
     const clip = `${this.svg.id}-clip`;
+    const clipped = () => root.append("g").attr("clip-path", `url(#${clip})`);
     root
       .append("clipPath")
       .attr("id", clip)
@@ -113,7 +133,7 @@ export class Plot {
       .attr("y", box.y)
       .attr("width", box.width)
       .attr("height", box.height);
-    this.inside = root.append("g").attr("clip-path", `url(#${clip})`);
+    this.inside = clipped();
     const bottom = root
       .append("g")
       .attr("class", "axis")
@@ -126,7 +146,14 @@ export class Plot {
     title(x.title, `translate(${box.x + box.width / 2} ${this.height - 8})`);
     title(y.title, `translate(13 ${box.y + box.height / 2}) rotate(-90)`);
     this.over = root.append("g");
+    this.marks = [clipped(), root.append("g")];
     return this;
+  }
+
+  /** An empty plot. */
+  clear() {
+    this.svg.replaceChildren();
+    this.marks = null;
   }
 
   path(points, className, where = this.inside) {
@@ -137,7 +164,7 @@ export class Plot {
     return where.append("path").attr("class", className).attr("d", shape(points));
   }
 
-  /** A text at a place; a centred one is kept within the frame. */
+  /** A text at a place; a centred one of the lower layer is kept within the frame. */
   text(words, x, y, className, anchor = "middle") {
     const text = this.over
       .append("text")
@@ -146,10 +173,18 @@ export class Plot {
       .attr("x", x)
       .attr("y", y)
       .text(words);
-    if (anchor !== "middle") return text;
-    const half = text.node().getComputedTextLength() / 2 + 3;
-    const { box } = this;
-    return text.attr("x", Math.min(Math.max(x, box.x + half), box.x + box.width - half));
+    if (anchor === "middle") this.centred.push([text, x]);
+    return text;
+  }
+
+  /** Moves centred texts into the frame: all are measured, then moved, which is one layout. */
+  centre() {
+    const { box, centred } = this;
+    const halves = centred.map(([text]) => text.node().getComputedTextLength() / 2 + 3);
+    centred.forEach(([text, x], i) =>
+      text.attr("x", Math.min(Math.max(x, box.x + halves[i]), box.x + box.width - halves[i])),
+    );
+    this.centred = [];
   }
 
   /** The user's point; where it is outside, an arrow on the frame that points to it. */
@@ -167,7 +202,7 @@ export class Plot {
       Math.sign(Math.trunc(100 * clamp(value - place[i], -1e6, 1e6))),
     );
     const outside = right !== 0 || down !== 0;
-    this.marked = place;
+    this.pointAt = place;
     const turn = (Math.atan2(down, right) * 180) / Math.PI;
     return this.over
       .append("path")
@@ -206,7 +241,7 @@ export class Plot {
     };
     const byPoint = (event) => {
       const [x, y] = place(event);
-      return this.marked && Math.hypot(x - this.marked[0], y - this.marked[1]) < FINGER;
+      return this.pointAt && Math.hypot(x - this.pointAt[0], y - this.pointAt[1]) < FINGER;
     };
     const move = drag()
       .container(() => svg)

@@ -36,6 +36,8 @@ async function ask(path, options) {
 }
 
 export const get = (path) => ask(path, withKey());
+/** What needs no key, and is on its way since the head of the document was read. */
+export const getPreloaded = (path) => ask(path, {});
 export const post = (path, body) =>
   ask(path, {
     method: "POST",

@@ -1,6 +1,7 @@
 // Beside the law: the other numbers of the case, how much each input matters, and which value of
 // an input reaches a target.
-import { $, Channel } from "./ask.js";
+import { Channel } from "./ask.js";
+import { $, write } from "./dom.js";
 import { html, render, svg } from "../lib/lit-html.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf } from "./state.js";
@@ -183,7 +184,7 @@ export function sidePanel(store, moved, found) {
   function compare() {
     const old = Boolean(solved && answer && JSON.stringify(question()) !== asked);
     $("solve-result").classList.toggle("old", old);
-    $("solve-status").textContent = refusal ?? (old ? "This was asked with other values." : "");
+    write("solve-status", refusal ?? (old ? "This was asked with other values." : ""));
     $("solve-status").classList.toggle("bad", refusal !== null);
   }
 
@@ -220,9 +221,11 @@ export function sidePanel(store, moved, found) {
       ),
       $("values"),
     );
-    $("origin").textContent =
+    write(
+      "origin",
       `Block ${answer.source} of the table ${answer.table.id}, ` +
-      `built to ${show(answer.table.tolerance)}.`;
+        `built to ${show(answer.table.tolerance)}.`,
+    );
     render(bars(answer), $("bars"));
     compare();
   };

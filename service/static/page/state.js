@@ -134,7 +134,9 @@ export class Store {
   drag(moving) {
     const ended = this.dragged && !moving;
     this.dragged = moving;
-    if (ended) this.remember();
+    if (!ended) return;
+    this.remember();
+    this.follow();
   }
 
   remember() {

@@ -1,5 +1,6 @@
 // The panel "k from materials": a geometry, two bodies, and the k that follows.
-import { $, Channel } from "./ask.js";
+import { Channel } from "./ask.js";
+import { $ } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { post } from "./service.js";
 import { about, prefixed, prose, typeset } from "./words.js";

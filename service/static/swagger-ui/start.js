@@ -1,5 +1,6 @@
 // The description is fetched here and not by the interface, so that a service with an API key can be asked for it.
-import { $, Channel, withKey } from "../page/ask.js";
+import { Channel, withKey } from "../page/ask.js";
+import { $ } from "../page/dom.js";
 import { get } from "../page/service.js";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
