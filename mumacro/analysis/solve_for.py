@@ -139,19 +139,20 @@ class Solution:
 
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON of an inverse problem over HTTP, without table and api_version;
-        ``ends`` are the same for the softest and the stiffest contact of an interval of k."""
+        ``ends`` have those of the softest and the stiffest contact of an interval of k."""
+        ends = {"ends": [end._members() for end in self.ends]} if self.ends else {}
+        return members_of({"unknown": self.unknown, "unit": self.unit, **self._members(), **ends})
+
+    def _members(self) -> dict[str, Any]:
+        """The roots, what was searched, and what is reachable there."""
         reach = self.reach
         reachable = {"min": reach.mu_min, "max": reach.mu_max}
         reachable |= {"min_included": reach.min_included, "max_included": reach.max_included}
-        members = {
-            "unknown": self.unknown,
-            "unit": self.unit,
+        return {
             "results": tables.results_of(self.targets, self.roots, self.reason),
             "range": [reach.low, None if reach.high > _NO_LIMIT else reach.high],
             "reachable": reachable,
-            **({"ends": [end.to_dict() for end in self.ends]} if self.ends else {}),
         }
-        return members_of(members)
 
     @property
     def columns(self) -> dict[str, Any]:

@@ -561,12 +561,15 @@ class _Scan:
         return self.curve.unknown.endswith(".phase") and self.high - self.low == 360.0
 
     def _near(self, gap: Array) -> list[int]:
-        """Inner samples nearer to the target than both neighbours, on the same side as these."""
+        """Inner samples nearer to the target than both neighbours, on the same side as these, and
+        not too far from it for the course of the curve there."""
         size, side = np.abs(gap), np.sign(gap)
         inner = np.arange(1, gap.size - 1)
         lowest = (size[inner] <= size[inner - 1]) & (size[inner] <= size[inner + 1])
         same = (side[inner] == side[inner - 1]) & (side[inner] == side[inner + 1])
-        return [int(i) for i in inner[lowest & same & (side[inner] != 0.0)]]
+        spread = np.maximum(size[inner - 1], size[inner + 1]) - size[inner]
+        within = size[inner] <= _CLEAR * spread + self.error[inner]
+        return [int(i) for i in inner[lowest & same & within & (side[inner] != 0.0)]]
 
     def _inside(self, low: float, high: float) -> tuple[Array, Array, Array]:
         """Eight places within an interval, and the curve there, kept for other targets."""

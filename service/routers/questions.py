@@ -3,7 +3,6 @@
 
 import csv
 import io
-import itertools
 from typing import Annotated, Any
 
 import numpy as np
@@ -171,8 +170,6 @@ def unit_at(path: str) -> str:
 
 # --- inverse --------------------------------------------------------------------------------------
 
-_NO_LIMIT = 1e300
-
 
 @router.post(
     "/solve-for",
@@ -205,30 +202,10 @@ def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
         within=None if question.range is None else (question.range[0], question.range[1]),
         **motion,
     )
-    reach = {"min": solution.reach.least / unit, "max": solution.reach.most / unit}
-    answer: dict[str, Any] = {
-        "unknown": question.unknown,
-        "unit": solution.unit,
-        "quantity": question.quantity,
-        "of": of,
-        "results": _motion_results(question, solution),
-        "range": [solution.reach.low, solution.reach.high],
-        "reachable": {**reach, "min_included": True, "max_included": True},
-        "api_version": API_VERSION,
-    }
-    if solution.other_way is not None:
-        answer["other_way"] = _motion_results(question, solution.other_way)
-    return answer
-
-
-def _motion_results(
-    question: SolveForRequest, solution: mumacro.MotionSolution
-) -> list[dict[str, Any]]:
-    results = []
-    for i, (target, roots) in enumerate(zip(question.target, solution.roots, strict=True)):
-        reason = {} if roots else {"reason": solution.reason(i)}
-        results.append({"target": target, "roots": [one._asdict() for one in roots], **reason})
-    return results
+    answer = _in_quantity(question, solution.to_dict(), unit)
+    if "other_way" in answer:
+        _with_targets(question, answer["other_way"])
+    return {**answer, "quantity": question.quantity, "api_version": API_VERSION}
 
 
 def _unit_of_target(question: SolveForRequest) -> float:
@@ -256,43 +233,30 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
         **question.kind.names,
         **case,
     )
-    included = _included(question, table, name, solution)
-    answer: dict[str, Any] = {"unknown": question.unknown, "unit": unit_of(question.unknown)}
-    answer["quantity"] = question.quantity
-    answer |= _results(question, solution, included, unit)
-    if solution.ends:
-        ks = ends_in(case) or ()
-        answer["ends"] = [
-            {"k": k, **_results(question, end, None, unit)}
-            for k, end in zip(ks, solution.ends, strict=True)
-        ]
+    answer = _in_quantity(question, solution.to_dict(), unit)
+    more = iter(_included(question, table, name, solution))
+    for result in answer["results"]:
+        result["roots"] = [root | next(more) for root in result["roots"]]
+    for k, end in zip(ends_in(case) or (), answer.get("ends", ()), strict=True):
+        end |= {"k": k, **_in_quantity(question, end, unit)}
+    answer |= {"quantity": question.quantity}
     answer |= _remarks_on(question, name, case, solution.stiffening)
     return {**answer, **table.signature}
 
 
-def _results(
-    question: SolveForRequest,
-    solution: Solution,
-    included: list[dict[str, Any]] | None,
-    unit: float,
-) -> dict[str, Any]:
-    """The roots of every target, what was searched, and what is reachable there."""
-    reach, more = solution.reach, itertools.repeat({}) if included is None else iter(included)
-    results: list[dict[str, Any]] = []
-    for target, roots in zip(question.target, solution.roots, strict=True):
-        results.append(
-            {"target": target, "roots": [{**root._asdict(), **next(more)} for root in roots]}
-        )
-        if not roots:
-            results[-1]["reason"] = _reason(question, target, solution, unit)
-    reachable = {
-        "min": reach.mu_min / unit,
-        "max": reach.mu_max / unit,
-        "min_included": reach.min_included,
-        "max_included": reach.max_included,
-    }
-    span = [reach.low, None if reach.high > _NO_LIMIT else reach.high]
-    return {"results": results, "range": span, "reachable": reachable}
+def _in_quantity(question: SolveForRequest, answer: dict[str, Any], unit: float) -> dict[str, Any]:
+    """The library's answer with targets, and what is reachable, in the quantity that was asked
+    for."""
+    _with_targets(question, answer["results"])
+    reach = answer["reachable"]
+    return answer | {"reachable": reach | {end: reach[end] / unit for end in ("min", "max")}}
+
+
+def _with_targets(question: SolveForRequest, results: list[dict[str, Any]]) -> None:
+    for target, result in zip(question.target, results, strict=True):
+        result["target"] = target
+        if "reason" in result and question.quantity != "mu_macro":
+            result["reason"] = f"{question.quantity} = {target:.6g}: {result['reason']}"
 
 
 def _included(
@@ -305,15 +269,3 @@ def _included(
     outputs = _answer_at(question, table, unknown, values, solution.stiffening).outputs
     rows = zip(*(column.tolist() for column in outputs.values()), strict=True)
     return [nested(dict(zip(outputs, row, strict=True))) for row in rows]
-
-
-def _reason(question: SolveForRequest, target: float, solution: Solution, unit: float) -> str:
-    reach = solution.reach
-    low, high = reach.mu_min / unit, reach.mu_max / unit
-    if solution.constant:
-        return (
-            f"{question.unknown} has no influence here: {question.quantity} is {low!r} for every "
-            "value in the range"
-        )
-    left, right = "[" if reach.min_included else "(", "]" if reach.max_included else ")"
-    return f"{target!r} is not in the reachable range {left}{low!r}, {high!r}{right}"

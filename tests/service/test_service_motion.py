@@ -61,6 +61,26 @@ def test_the_answer_is_the_librarys(client: Any, name: str) -> None:
     assert answer.json() == expected
 
 
+@pytest.mark.parametrize(
+    "question",
+    [
+        {"unknown": "v0", "target": [0.0], "x": [1e-4, 0], "normal": [8.0, -90]},
+        {"unknown": "v0", "target": [0.0], "x": [1e-4, 0], "normal": [8.0, 90]},
+        {"unknown": "x.phase", "target": [0.0, 0.1], "v0": 0.005, "x": 1e-4, "normal": 8.0},
+    ],
+)
+def test_a_solution_over_a_motion_is_the_librarys(client: Any, question: Any) -> None:
+    rig: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e5, "f": 50.0}
+    answer = client.post("/v1/solve-for", json={**rig, **question})
+    assert answer.status_code == 200, answer.text
+    arguments: Any = {
+        name: tuple(x) if name in ("x", "normal") and isinstance(x, list) else x
+        for name, x in question.items()
+    }
+    own = mumacro.solve_motion(**rig, **arguments).to_dict()
+    assert answer.json() == {**own, "quantity": "mu_macro", "api_version": "1"}
+
+
 def test_across_is_the_tables_case(client: Any) -> None:
     answer = client.post(PATH, json={**RIG, "y": 2e-6}).json()
     table = client.post("/v1/mu-macro", json={**RIG, "y0": 2e-6}).json()

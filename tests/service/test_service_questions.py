@@ -77,16 +77,66 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any
     reach = answer["reachable"]
     assert reach["min"] == close(0.3 * math.sqrt(5) / 3, rel=1e-9)
     assert (reach["max"], reach["min_included"], reach["max_included"]) == (0.3, True, False)
-    reason = f"is not in the reachable range [{reach['min']!r}, 0.3)"
-    assert [result.get("reason") for result in answer["results"]] == [
-        None,
-        f"0.1 {reason}",
-        None,
-        f"0.4 {reason}",
+    assert [result.get("reason", "")[:14] for result in answer["results"]] == [
+        "",
+        "mu_macro = 0.1",
+        "",
+        "mu_macro = 0.4",
     ]
+    of_ratio = answered(
+        client,
+        "solve-for",
+        SOLVE,
+        unknown="v0",
+        quantity="mu_ratio",
+        target=[0.5],
+        y0=CASE["y0"],
+        v0=None,
+    )
+    assert of_ratio["results"][0]["reason"].startswith("mu_ratio = 0.5: mu_macro = 0.15 is out")
+    assert of_ratio["reachable"]["max"] == 1.0
     (result,) = answered(client, "solve-for", SOLVE, unknown="v0", y0=0.0, v0=None)["results"]
     assert result["roots"] == []
     assert "no influence" in result["reason"]
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        {"target": [0.15, 0.4]},
+        {"k": ..., "k_range": [8e5, 1.25e6]},
+        {"contact": "ball", "target": [0.25]},
+        {"unknown": "Fz", "y0": 2e-6, "target": 0.2, "contact": "ball"},
+        {"unknown": "v0", "v0": ..., "y0": 0.0},
+    ],
+)
+def test_a_solution_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> None:
+    question = {name: x for name, x in {**SOLVE, **case}.items() if x is not ...}
+    answer = answered(client, "solve-for", question)
+    unknown, target = question.pop("unknown"), question.pop("target")
+    own = mumacro.solve_for(surrogate, unknown, target, **question).to_dict()
+    for k, end in zip(question.get("k_range", ()), own.get("ends", ()), strict=True):
+        end["k"] = k
+    beside = {"quantity", "table", "api_version", *({"model"} if unknown == "Fz" else ())}
+    assert answer.keys() == {*own, *beside}
+    assert {name: answer[name] for name in own} == own
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        {},
+        {"f": 2e4, "omega": ...},
+        {"along": "Fz", "v0": 0.01, "start": 1.0, "stop": 20.0, "contact": "ball"},
+    ],
+)
+def test_a_law_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> None:
+    question = {name: x for name, x in {**LAW, **case}.items() if x is not ...}
+    answer = answered(client, "law", question)
+    own = mumacro.law(surrogate, question.pop("along", "v0"), **question).to_dict()
+    assert {*own} <= answer.keys()
+    for name, column in own.items():
+        assert answer[name] == (close(column, rel=1e-14) if name == "mu_macro" else column)
 
 
 def test_both_ends_of_an_interval_of_k_are_solved_for(client: Any) -> None:
