@@ -325,8 +325,9 @@ def write_rows(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
     opening, rows = b'{"results":[', {-1: b"null"}  # by source code: a row with places for numbers
     for answer in answers:
         codes = answer.source_code.tolist()
-        for code in {*codes} - rows.keys():
-            rows[code] = _row_of(answer, codes.index(code))
+        if new := {*codes} - rows.keys():
+            columns = {path: answer[path] if path in TEXTS else None for path in answer.paths}
+            rows |= {code: _row_of(columns, codes.index(code)) for code in new}
         numbers = [answer[path] for path in answer.paths if path not in TEXTS]
         legal = np.column_stack(numbers)[answer.source_code >= 0].ravel()
         text = b",".join(map(rows.__getitem__, codes))
@@ -335,9 +336,9 @@ def write_rows(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
     yield b"]"
 
 
-def _row_of(answer: Answer[Any], index: int) -> bytes:
+def _row_of(columns: Mapping[str, Any], index: int) -> bytes:
     """The row of a case as text, with a place for each number: the words follow from the source."""
-    words = {path: answer[path][index] if path in TEXTS else "\0" for path in answer.paths}
+    words = {path: "\0" if column is None else column[index] for path, column in columns.items()}
     return dump(nested(words)).replace(b"%", b"%%").replace(dump("\0"), b"%b")
 
 
