@@ -116,9 +116,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         # it would ask for a provider of OpenTelemetry at every request
         telemetry={"tracing": False, "metrics": False, "logs": False},
     )
-    for router in (*ROUTERS, page.router):
-        # include_router would look for the route of every request twice (docs/decisions.md)
-        app.router.routes.extend(router.routes)
+    # include_router would look for the route of every request twice (docs/decisions.md); ours are
+    # looked for before FastAPI's own
+    app.router.routes[:0] = [route for one in (*ROUTERS, page.router) for route in one.routes]
     opened = {*HEALTH_PATHS, *page.OPEN}
     if settings.guide is not None:
         app.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)

@@ -251,10 +251,11 @@ class DirectRoute(APIRoute):
         self.app = request_response(self.get_route_handler())
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        """Whether a request is for this route; most are told apart by their path alone."""
-        if path_in(scope) != self.path:
+        """Whether a request is for this route, and in another method only."""
+        if path_in(scope) != self.path or scope["type"] != "http":
             return Match.NONE, {}
-        return super().matches(scope)
+        match = Match.FULL if scope["method"] in (self.methods or ()) else Match.PARTIAL
+        return match, {"endpoint": self.endpoint, "path_params": {}, "route": self}
 
     def get_route_handler(self) -> Handler:
         """Take the place of FastAPI's handler."""

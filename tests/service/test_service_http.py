@@ -11,6 +11,7 @@ from urllib.parse import urljoin
 
 import pytest
 from fastapi import APIRouter, Depends, Request
+from starlette.websockets import WebSocketDisconnect
 
 from mumacro.inputs.fields import FIELDS, SI
 from service.models.inputs import EXAMPLE
@@ -499,3 +500,10 @@ def test_pages_of_other_hosts_are_answered_only_where_a_setting_allows_them(star
             "/v1/mu-macro", headers={**preflight, "Origin": "https://other.example"}
         )
         assert "access-control-allow-origin" not in refused.headers
+
+
+@pytest.mark.parametrize("path", ["/v1/mu-macro", "/v1/mu-macro/batch", "/v1/law", "/nowhere"])
+def test_a_websocket_is_closed_and_harms_nobody(client: Any, path: str) -> None:
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect(path):
+        pass
+    assert client.get("/livez").status_code == 200
