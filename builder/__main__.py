@@ -29,22 +29,17 @@ class _Bar:
     finished stage."""
 
     def __init__(self, stages: int) -> None:
-        self.stages, self.done, self.start = stages, 0, time.monotonic()
+        self.stages, self.finished, self.start = stages, 0, time.monotonic()
 
-    def __call__(self, text: str, done: bool) -> None:
-        self.done += done
-        bar = ("#" * round(30 * self.done / self.stages)).ljust(30, ".")
-        line = (
-            f"{bar} {self.done:2d}/{self.stages} {time.monotonic() - self.start:6.0f} s  {text:<32}"
-        )
+    def __call__(self, stage: str, is_finished: bool) -> None:
+        self.finished += is_finished
+        bar = ("#" * round(30 * self.finished / self.stages)).ljust(30, ".")
+        seconds = time.monotonic() - self.start
+        line = f"{bar} {self.finished:2d}/{self.stages} {seconds:6.0f} s  {stage:<32}"
         if sys.stderr.isatty():
-            print(
-                f"\r{line}",
-                end="\n" if self.done == self.stages else "",
-                file=sys.stderr,
-                flush=True,
-            )
-        elif done:
+            end = "\n" if self.finished == self.stages else ""
+            print(f"\r{line}", end=end, file=sys.stderr, flush=True)
+        elif is_finished:
             print(line.rstrip(), file=sys.stderr)
 
 
@@ -181,72 +176,99 @@ def _whole(low: int, high: float = math.inf) -> Callable[[str], int]:
     return number
 
 
+def _build_arguments(parser: OneLineParser) -> None:
+    parser.add_argument("--out", type=Path, required=True, help="the netCDF file to write")
+    text = (
+        "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: "
+        "%(default)s"
+    )
+    parser.add_argument("--tolerance", type=float, default=1e-8, help=text)
+    _workers_argument(parser)
+
+
+def _solve_arguments(parser: OneLineParser) -> None:
+    parser.add_argument(
+        "--v", type=float, required=True, help="dimensionless speed v~, from 1e-60 to 1e10"
+    )
+    parser.add_argument(
+        "--y", type=float, required=True, help="dimensionless amplitude y~, from 1e-15 to 1e14"
+    )
+
+
+def _verify_arguments(parser: OneLineParser) -> None:
+    parser.add_argument("table", type=Path, help="a table file")
+    text = "fresh solves to compare with; default: %(default)s"
+    parser.add_argument("--points", type=_whole(100, 10_000_000), default=20_000, help=text)
+    parser.add_argument(
+        "--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s"
+    )
+    text = "store the errors in the table's attributes, as a build does with --seed 2018"
+    parser.add_argument("--write", action="store_true", help=text)
+    _workers_argument(parser)
+
+
+def _export_arguments(parser: OneLineParser) -> None:
+    parser.add_argument(
+        "path", nargs="?", metavar="TABLE", help="a table file, the same as --table"
+    )
+    text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"
+    parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
+    parser.add_argument("--format", required=True, help="c, csv, fmu or fmu3")
+    text = (
+        "the file to write; for c a header .h or a folder for three files; default: here, by "
+        "the name of the table"
+    )
+    parser.add_argument("--out", type=Path, help=text)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _figures_arguments(parser: OneLineParser) -> None:
+    text = "the folder to write to; it is made where it is missing"
+    parser.add_argument("--out", type=Path, required=True, help=text)
+    text = "the table that lines come from; default: the tightest"
+    parser.add_argument("--table", type=Path, help=text)
+
+
+def _workers_argument(parser: OneLineParser) -> None:
+    text = "threads; default: %(default)s"
+    parser.add_argument("--workers", type=_whole(1, 1024), default=processors(), help=text)
+
+
+#: each command, what adds its arguments to a parser, and its help
+_COMMANDS: tuple[
+    tuple[Callable[[Namespace], int | str], Callable[[OneLineParser], None], str], ...
+] = (
+    (_build, _build_arguments, "Build a table; it appears whole or not at all."),
+    (
+        _solve,
+        _solve_arguments,
+        "Solve the full model once and print the steady cycle as JSON.",
+    ),
+    (
+        _verify,
+        _verify_arguments,
+        "Compare a table with fresh solves; exit code 1 when it misses its own tolerance.",
+    ),
+    (_export, _export_arguments, "Write a table for other tools; print what was written."),
+    (
+        _figures,
+        _figures_arguments,
+        "Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG.",
+    ),
+)
+
+
 def _parser(prog: str) -> OneLineParser:
     text = "exit codes: 0 done, 1 no result or a tolerance missed, 2 wrong arguments"
     parser = OneLineParser(
         prog=prog, description="Build, verify, query and export tables offline.", epilog=text
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-
-    def command(run: Callable[[Namespace], int | str], text: str) -> OneLineParser:
-        name = run.__name__.strip("_")
+    for command, add_arguments, text in _COMMANDS:
+        name = command.__name__.strip("_")
         subparser = commands.add_parser(name, help=text, description=text)
-        subparser.set_defaults(run=run, title=subparser.prog)
-        return subparser
-
-    workers: dict[str, Any] = {
-        "default": processors(),
-        "type": _whole(1, 1024),
-        "help": "threads; default: %(default)s",
-    }
-    one = command(_build, "Build a table; it appears whole or not at all.")
-    one.add_argument("--out", type=Path, required=True, help="the netCDF file to write")
-    text = (
-        "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: "
-        "%(default)s"
-    )
-    one.add_argument("--tolerance", type=float, default=1e-8, help=text)
-    one.add_argument("--workers", **workers)
-    one = command(_solve, "Solve the full model once and print the steady cycle as JSON.")
-    one.add_argument(
-        "--v", type=float, required=True, help="dimensionless speed v~, from 1e-60 to 1e10"
-    )
-    one.add_argument(
-        "--y", type=float, required=True, help="dimensionless amplitude y~, from 1e-15 to 1e14"
-    )
-    one = command(
-        _verify, "Compare a table with fresh solves; exit code 1 when it misses its own tolerance."
-    )
-    one.add_argument("table", type=Path, help="a table file")
-    text = "fresh solves to compare with; default: %(default)s"
-    one.add_argument("--points", type=_whole(100, 10_000_000), default=20_000, help=text)
-    one.add_argument(
-        "--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s"
-    )
-    text = "store the errors in the table's attributes, as a build does with --seed 2018"
-    one.add_argument("--write", action="store_true", help=text)
-    one.add_argument("--workers", **workers)
-    one = command(_export, "Write a table for other tools; print what was written.")
-    one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")
-    text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"
-    one.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
-    one.add_argument("--format", required=True, help="c, csv, fmu or fmu3")
-    text = (
-        "the file to write; for c a header .h or a folder for three files; default: here, by "
-        "the name of the table"
-    )
-    one.add_argument("--out", type=Path, help=text)
-    one.add_argument("--json", action="store_true", help="print JSON")
-    one = command(_figures, "Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG.")
-    one.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        help="the folder to write to; it is made where it is missing",
-    )
-    one.add_argument(
-        "--table", type=Path, help="the table that lines come from; default: the tightest"
-    )
+        subparser.set_defaults(run=command, title=subparser.prog)
+        add_arguments(subparser)
     return parser
 
 

@@ -119,30 +119,22 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     # include_router would look for the route of every request twice (docs/decisions.md); ours are
     # looked for before FastAPI's own
     app.router.routes[:0] = [route for one in (*ROUTERS, page.router) for route in one.routes]
-    opened = {*HEALTH_PATHS, *page.OPEN}
+    open_paths = {*HEALTH_PATHS, *page.OPEN}
     if settings.guide is not None:
         app.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)
         app.mount("/guide", GuidePages(settings.guide))
-        opened.add("/guide")
-    methods: dict[str, set[str]] = {}
-    for route in app.routes:
-        methods.setdefault(getattr(route, "path", ""), set()).update(
-            getattr(route, "methods", None) or ()
-        )
+        open_paths.add("/guide")
     state = app.state
-    state.methods = {
-        path: ", ".join(sorted(allowed | ({"HEAD"} if "GET" in allowed else set())))
-        for path, allowed in methods.items()
-    }
+    state.methods = _methods_of_paths(app)
     state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
-    state.metrics = Metrics({*methods, *page.OPEN})
+    state.metrics = Metrics({*state.methods, *page.OPEN})
     state.observer = Observer(state.metrics)
     keys = settings.keys()
     app.openapi = lambda: _described(app, closed=bool(keys))  # type: ignore[method-assign]
     # the last one is the outermost
     app.add_middleware(HeadAsGet)
     if keys:
-        app.add_middleware(Keys, keys=keys, open_paths=opened)
+        app.add_middleware(Keys, keys=keys, open_paths=open_paths)
     app.add_middleware(ClearHead)
     app.add_middleware(ConnectionLimit)
     app.add_middleware(Failures)
@@ -164,6 +156,17 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             expose_headers=["ETag", "X-Request-ID", "Retry-After"],
         )
     return app
+
+
+def _methods_of_paths(app: FastAPI) -> dict[str, str]:
+    """Path -> the methods that it is answered for, as in the header Allow."""
+    methods: dict[str, set[str]] = {}
+    for route in app.routes:
+        of_path = methods.setdefault(getattr(route, "path", ""), set())
+        of_path.update(getattr(route, "methods", None) or ())
+        if "GET" in of_path:
+            of_path.add("HEAD")
+    return {path: ", ".join(sorted(of_path)) for path, of_path in methods.items()}
 
 
 #: models that are described by name only

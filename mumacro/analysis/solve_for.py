@@ -232,25 +232,24 @@ def solve_for(
     """
     kind = kind_of(contact, direction)
     name, (unknown, per) = unknown, field_of(unknown)
-    ends_given = None if within is None else _ends(name, within)
+    ends = None if within is None else _ends(name, within)
     if per != 1.0:
         fixed_inputs(without_interval(case)[0], name, kind)  # messages name what was asked for
         solution = solve_for(
             surrogate,
             unknown,
             target,
-            within=None if ends_given is None else (per * ends_given[0], per * ends_given[1]),
+            within=None if ends is None else (per * ends[0], per * ends[1]),
             contact=contact,
             direction=direction,
             stiffness_exponent=stiffness_exponent,
             **case,
         )
         solution = _in_unit(solution, name, per)
-        if ends_given is None:
+        if ends is None:
             return solution
-        low, high = ends_given
+        low, high = ends
         return replace(solution, reach=replace(solution.reach, low=low, high=high))
-    within = ends_given
     inputs, interval = without_interval(case, unknown)
     if interval:
         softest, middle, stiffest = (
@@ -258,7 +257,7 @@ def solve_for(
                 surrogate,
                 unknown,
                 target,
-                within=within,
+                within=ends,
                 contact=contact,
                 direction=direction,
                 stiffness_exponent=stiffness_exponent,
@@ -269,17 +268,26 @@ def solve_for(
         return replace(middle, ends=(softest, stiffest))
     inputs, stiffening = stiffening_of(inputs, unknown, kind, stiffness_exponent)
     curve = InputCurve(surrogate, fixed_inputs(inputs, unknown, kind), unknown, kind, stiffening)
+    return _solution_over(curve, _levels(target), ends)
+
+
+def _levels(target: Numbers) -> Array:
+    """The targets, (n,); InputError for one that mu_macro cannot be."""
     levels = real("target", target).ravel()
     bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:
-        raise InputError(
-            "target",
-            float(levels[bad[0]]),
-            "finite and >= 0",
-            int(bad[0]) if np.ndim(target) else None,
-        )
+        index = int(bad[0]) if np.ndim(target) else None
+        raise InputError("target", float(levels[bad[0]]), "finite and >= 0", index)
+    return levels
+
+
+def _solution_over(
+    curve: InputCurve, levels: Array, within: tuple[float, float] | None
+) -> Solution:
+    """The roots of each level on a curve, in a range or in the default one."""
+    unknown = curve.unknown
     low, high = _default_range(curve, levels) if within is None else _checked_range(curve, within)
-    folds = unknown in ("k", "Fz") and direction == "across"
+    folds = unknown in ("k", "Fz") and curve.kind.names["direction"] == "across"
     x = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
     answer = curve.answer(x)
     mu, noise = answer.mu_macro, 2.0 * answer.error_bound
@@ -297,13 +305,13 @@ def solve_for(
     constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
     if within is None and unknown in EVERYWHERE and not constant:
         reach = _without_limit(curve, reach)
+    targets = levels.tolist()
     candidates = _roots(curve, [] if constant else branches, levels)
-    roots = (
-        tuple(of_level) if reach.holds(level) else ()
-        for level, of_level in zip(levels.tolist(), candidates, strict=True)
+    roots = tuple(
+        tuple(of_target) if reach.holds(target) else ()
+        for target, of_target in zip(targets, candidates, strict=True)
     )
-    targets = tuple(levels.tolist())
-    return Solution(unknown, targets, tuple(roots), reach, constant, stiffening=curve.stiffening)
+    return Solution(unknown, tuple(targets), roots, reach, constant, stiffening=curve.stiffening)
 
 
 def _in_unit(solution: Solution, unknown: str, per: float) -> Solution:

@@ -40,7 +40,7 @@ exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments,
 """
 
 
-def _spooled(folder: Path) -> Path:
+def _standard_input(folder: Path) -> Path:
     """Standard input as a file, in the format that it begins like."""
     path = folder / "standard-input"
     with path.open("w+b") as stream:
@@ -53,9 +53,28 @@ def _spooled(folder: Path) -> Path:
     return path.rename(f"{path}{kind}{packing}")
 
 
-def main(words: Sequence[str]) -> int:
-    """Run ``mumacro eval``; return the exit code; what is wrong is an error for
-    :func:`mumacro.cli.common.run`."""
+class _Bar(Progress):
+    """The share of the rows that are evaluated, on a terminal."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.description}"),
+            TimeRemainingColumn(),
+            console=console,
+            disable=not console.is_terminal,
+        )
+        self._rows = self.add_task("", total=1.0)
+
+    def show(self, share: float, rows: int, rejected: int) -> None:
+        """So many rows are read, and so many of these rejected."""
+        description = f"{rows:,} rows, {rejected:,} rejected"
+        self.update(self._rows, completed=share, description=description)
+
+
+def _parser() -> OneLineParser:
+    """The arguments of the command."""
     parser = OneLineParser(
         prog="mumacro eval",
         description="Evaluate every case of files: Parquet, NDJSON, text (.csv, .tsv, .txt, ...), "
@@ -83,45 +102,41 @@ def main(words: Sequence[str]) -> int:
     )
     add_include(parser)
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
-    arguments = parser.parse_intermixed_args(words)
-    surrogate = open_table(arguments.table)
-    options = {
-        name: getattr(arguments, name) for name in ("rigid", "contact", "direction", "force")
-    }
+    return parser
+
+
+def main(words: Sequence[str]) -> int:
+    """Run ``mumacro eval``; return the exit code; what is wrong is an error for
+    :func:`mumacro.cli.common.run`."""
+    options = _parser().parse_intermixed_args(words)
+    surrogate = open_table(options.table)
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
-    bars = (
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.description}"),
-        TimeRemainingColumn(),
-    )
-    bar = Progress(*bars, console=console, disable=not console.is_terminal)
-    task = bar.add_task("", total=1.0)
-
-    def progress(share: float, rows: int, rejected: int) -> None:
-        bar.update(task, completed=share, description=f"{rows:,} rows, {rejected:,} rejected")
-
     try:
         with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
-            cases = [_spooled(Path(folder)) if name == "-" else name for name in arguments.cases]
-            out = arguments.out
+            files = [
+                _standard_input(Path(folder)) if name == "-" else name for name in options.cases
+            ]
+            out = options.out
             if out == "-":
-                ending = "ndjson" if find_files(cases)[1] == "ndjson" else "csv"
+                ending = "ndjson" if find_files(files)[1] == "ndjson" else "csv"
                 out = f"{folder}/standard-output.{ending}"
-            with bar:
+            with _Bar(console) as bar:
                 outcome = evaluate_files(
-                    cases,
+                    files,
                     out,
                     surrogate,
-                    dialect=dialect_in(arguments),
-                    include=included(arguments),
-                    progress=progress,
+                    rigid=options.rigid,
+                    contact=options.contact,
+                    direction=options.direction,
+                    force=options.force,
+                    dialect=dialect_in(options),
+                    include=included(options),
+                    progress=bar.show,
                     say=lambda text: console.print(f"mumacro eval: {text}"),
-                    **options,
                 )
             counts = f"{outcome.answered:,} of {outcome.rows:,} rows evaluated with {surrogate.id}"
             remarks = "".join(map(_remark, outcome.remarks))
-            if arguments.out == "-":
+            if options.out == "-":
                 with outcome.out.open("rb") as stream:
                     shutil.copyfileobj(stream, sys.stdout.buffer)
                 sys.stderr.write(

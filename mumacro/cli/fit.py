@@ -12,7 +12,14 @@ from mumacro.analysis.fit import fit
 from mumacro.analysis.fitted import Fit
 from mumacro.analysis.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
 from mumacro.cli import common
-from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, open_table
+from mumacro.cli.common import (
+    ImpossibleError,
+    OneLineParser,
+    UsageError,
+    as_json,
+    in_columns,
+    open_table,
+)
 from mumacro.errors import InputError
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.fields import unit_of
@@ -35,8 +42,8 @@ examples:
 """
 
 
-def run(words: Sequence[str]) -> str:
-    """``mumacro fit``."""
+def _parser() -> OneLineParser:
+    """The arguments of the command."""
     first = "points", {"help": "a table as text, or .xlsx; - is standard input"}
     description = "k and mu0 of a contact from measured friction."
     parser = common.question("fit", description, _COLUMNS, "the other inputs", "*", first)
@@ -48,7 +55,12 @@ def run(words: Sequence[str]) -> str:
     )
     parser.add_argument("--plot", dest="out", type=Path, metavar="FILE", help="the same as --out")
     common.add_format(parser)
-    options = parser.parse_intermixed_args(words)
+    return parser
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro fit``."""
+    options = _parser().parse_intermixed_args(words)
     unknown, more = (
         [x for x in options.unknown or () if ("=" in x) == has_value] for has_value in (False, True)
     )
@@ -62,11 +74,11 @@ def run(words: Sequence[str]) -> str:
         raise ImpossibleError(f"{options.points}: {error}") from None
     points: dict[str, Any] = {**table.columns}
     unknown = unknown or unknowns_beside(points)
-    there = [*unknown, *(name for name in points if name in kind.columns)]
+    in_table = [name for name in points if name in kind.columns]
     case = common.read_case(
         [*options.words, *more],
         kind,
-        there,
+        [*unknown, *in_table],
         one_k="one k is needed; or leave it out, and it is fitted",
     )
     surrogate = open_table(options.table)

@@ -1,13 +1,22 @@
 """``mumacro law``: mu_macro over a range of one input."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mumacro.analysis.approximations import approximations
 from mumacro.analysis.law import law as friction_law
 from mumacro.cli import common
-from mumacro.cli.common import CURVE, Unit, UsageError, as_json, in_columns, open_table, read_case
+from mumacro.cli.common import (
+    CURVE,
+    OneLineParser,
+    Unit,
+    UsageError,
+    as_json,
+    in_columns,
+    open_table,
+    read_case,
+)
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.reading import read_one
 from mumacro.shown import known, tidy_zeros
@@ -16,8 +25,8 @@ from mumacro.validity import load_rows
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
 
 
-def run(words: Sequence[str]) -> str:
-    """``mumacro law``."""
+def _parser() -> OneLineParser:
+    """The arguments of the command."""
     description = (
         "mu_macro over a range of one input, with the static value and the border of "
         "continuous sliding."
@@ -34,11 +43,15 @@ def run(words: Sequence[str]) -> str:
         "--approximations", action="store_true", help="also the approximations of the article"
     )
     common.add_exponent(parser)
-    options = parser.parse_intermixed_args(words)
+    return parser
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro law``."""
+    options = _parser().parse_intermixed_args(words)
     (along, *ends), kind = options.along, common.kind_in(options)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
-    unit = unit_of(along)
     case = read_case(options.words, kind, **common.without_or_load(along))
     start, stop = common.read_values(((along, end) for end in ends), read_one)
     is_picture = options.out is not None and options.out.suffix != ".csv"
@@ -57,56 +70,53 @@ def run(words: Sequence[str]) -> str:
     )
     model = load_rows(along, law.case, options.contact, law.stiffening)
     columns = law.columns | (approximations(surrogate, law) if options.approximations else {})
-    by_unit = {along: unit, "k": unit_of("k")}
-    border = [{along: c.value, "mu_macro": c.mu_macro} for c in law.border]
     if options.json:
-        return as_json(
-            {
-                "along": along,
-                "unit": unit,
-                **columns,
-                "border": border,
-                **({"model": model} if model else {}),
-                "table": common.about(surrogate),
-            }
-        )
-    headed = {
-        f"{name} [{by_unit[name]}]" if name in by_unit else name: column
-        for name, column in columns.items()
-    }
+        members = {
+            "along": along,
+            "unit": unit_of(along),
+            **columns,
+            "border": [{along: c.value, "mu_macro": c.mu_macro} for c in law.border],
+            **({"model": model} if model else {}),
+            "table": common.about(surrogate),
+        }
+        return as_json(members)
     middle = float(law.values[law.values.size // 2])
     count = common.count_for(options, surrogate, {**case, along: middle}, kind)
     units = common.units_in(options.words, **{along: ends})
-    swept = Unit.of(along, middle, units, options.digits)
+    unit = Unit.of(along, middle, units, options.digits)
     of_k = ", for the geometric middle of k" if law.band else ""
-    marks = [
-        f"{c.name} at {along} = {swept.shown(c.value, count, options.digits)} {swept.name}{of_k}"
+    notes = [
+        f"{c.name} at {along} = {unit.shown(c.value, count, options.digits)} {unit.name}{of_k}"
         for c in law.border
     ]
-    marks += common.model_lines(model)
+    notes += common.model_lines(model)
     if options.out is not None:
-        return "\n".join(
-            [
-                common.write_result(options.out, headed, law.plot),
-                *marks,
-            ]
-        )
-    del columns["source"]
-    of_column = {along: swept}
+        heads = [f"{name} [{unit_of(name)}]" if name in (along, "k") else name for name in columns]
+        in_si = dict(zip(heads, columns.values(), strict=True))
+        return "\n".join([common.write_result(options.out, in_si, law.plot), *notes])
+    column_units = {along: unit}
     if law.stiffening is not None:
-        of_column["k"] = Unit.of("k", float(law.inputs["k"].max()), units, options.digits)
-    shown = {
-        of_column[name].head(name) if name in of_column else name: [
-            _shown(x, name, of_column.get(name), count, options.digits, error)
-            for x, error in zip(column, law.answer.error_bound, strict=True)
+        column_units["k"] = Unit.of("k", float(law.inputs["k"].max()), units, options.digits)
+    table = _table(columns, column_units, count, options.digits)
+    return "\n".join([common.case_line(case, units, kind), table, *notes])
+
+
+def _table(
+    columns: Mapping[str, Any], units: Mapping[str, Unit], count: int, digits: int | None
+) -> str:
+    """The columns of a law as text, those with a unit in it; ``source`` is left out."""
+    cells = {
+        units[name].head(name) if name in units else name: [
+            _cell(x, name, units.get(name), count, digits, error)
+            for x, error in zip(column, columns["error_bound"], strict=True)
         ]
         for name, column in columns.items()
+        if name != "source"
     }
-    table = in_columns([[*shown], *zip(*shown.values(), strict=True)])
-    return "\n".join([common.case_line(case, units, kind), table, *marks])
+    return in_columns([[*cells], *zip(*cells.values(), strict=True)])
 
 
-def _shown(
+def _cell(
     value: Any, name: str, unit: Unit | None, count: int, digits: int | None, error: float
 ) -> str:
     """A cell: a text, or a number with the digits that are known."""

@@ -5,13 +5,15 @@ import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mumacro.analysis.law import Law
 from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.solve_for import Solution, solve_for
+from mumacro.analysis.solve_for import Root, Solution, solve_for
 from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.cli import common, motion, solve_motion
 from mumacro.cli.common import (
     CURVE,
     ImpossibleError,
+    OneLineParser,
     Unit,
     UsageError,
     as_json,
@@ -20,11 +22,12 @@ from mumacro.cli.common import (
     open_table,
     read_case,
 )
-from mumacro.inputs.fields import NAMES, unit_of
+from mumacro.inputs.fields import NAMES
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import read_one
 from mumacro.shown import tidy_zeros
+from mumacro.surrogate import Surrogate
 from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
@@ -48,8 +51,8 @@ def _unknown(text: str) -> str:
     raise argparse.ArgumentTypeError(f"{text!r} is no input: {advice}")
 
 
-def run(words: Sequence[str]) -> str:
-    """``mumacro solve-for``."""
+def _parser() -> OneLineParser:
+    """The arguments of the command."""
     description = "Every value of one input at which mu_macro is the target."
     epilog = (
         f"{common.ABOUT_INPUTS}\nexample, the amplitude [m] that halves the friction:\n"
@@ -76,11 +79,15 @@ def run(words: Sequence[str]) -> str:
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     common.add_exponent(parser)
     motion.add_parts(parser)
-    options = parser.parse_intermixed_args(words)
+    return parser
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro solve-for``."""
+    options = _parser().parse_intermixed_args(words)
     if solve_motion.is_motion(options):
         return solve_motion.run(options, options.between)
-    unknown, unit = options.unknown, unit_of(options.unknown)
-    kind = common.kind_in(options)
+    unknown, kind = options.unknown, common.kind_in(options)
     if unknown not in kind.columns:
         raise UsageError(
             f"{unknown} does not belong to --direction {options.direction}: "
@@ -93,103 +100,110 @@ def run(words: Sequence[str]) -> str:
     between = [(unknown, text) for text in options.between or ()]
     ends = common.read_values(between, read_one)
     surrogate = open_table(options.table)
+    fixed = {"stiffness_exponent": options.stiffness_exponent, **kind.names, **case}
     solution = solve_for(
-        surrogate,
-        unknown,
-        target,
-        within=(ends[0], ends[1]) if ends else None,
-        stiffness_exponent=options.stiffness_exponent,
-        **kind.names,
-        **case,
+        surrogate, unknown, target, within=(ends[0], ends[1]) if ends else None, **fixed
     )
-    model = load_rows(unknown, common.middle_of(case), options.contact, solution.stiffening)
-    two = solution.ends
-    if not solution.roots[0] and not (two and any(end.roots[0] for end in two)):
+    solutions = _solutions_by_k(solution, case)
+    rows = [(k, root) for k, one in solutions.items() for root in one.roots[0]]
+    if not rows:
         raise ImpossibleError(solution.reason() + _hint(options, case, solution))
-    places = {common.middle_of(case).get("k"): solution}
-    if two:
-        places = dict(sorted({**places, **dict(zip(case["k_range"], two, strict=True))}.items()))
-    roots = [
-        (
-            *((k,) if two else ()),
-            r.value,
-            r.low,
-            r.high,
-            r.mu_macro,
-            r.regime,
-        )
-        for k, one in places.items()
-        for r in one.roots[0]
-    ]
-    names = (*(("k",) if two else ()), unknown, "low", "high", "mu_macro", "regime")
+    model = load_rows(unknown, common.middle_of(case), options.contact, solution.stiffening)
     if options.json:
-        rows = [dict(zip(names, root, strict=True)) for root in roots]
-        return as_json(
-            {
-                "unknown": unknown,
-                "unit": unit,
-                "target": target,
-                "roots": rows,
-                **({"model": model} if model else {}),
-                "table": common.about(surrogate),
-            }
-        )
+        members = {
+            "unknown": unknown,
+            "unit": solution.unit,
+            "target": target,
+            "roots": [_root_members(solution, k, root) for k, root in rows],
+            **({"model": model} if model else {}),
+            "table": common.about(surrogate),
+        }
+        return as_json(members)
     if options.out is not None:
-        heads = [
-            *(["k [N/m]"] if two else []),
-            f"{unknown} [{unit}]",
-            "between",
-            "and",
-            "mu_macro [-]",
-            "regime",
-        ]
-        at = [root.value for one in places.values() for root in one.roots[0]]
-        # a decade around the roots; what is at 0 is shown up to 1
-        low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
-        curve = friction_law(
-            surrogate,
-            unknown,
-            start=low,
-            stop=high,
-            points=CURVE,
-            scale="log" if low > 0.0 else "linear",
-            refine=True,
-            stiffness_exponent=options.stiffness_exponent,
-            **kind.names,
-            **case,
-        )
-        columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
-        return common.write_result(
-            options.out,
-            columns,
-            lambda axes: curve.plot(axes, roots=at, target=target),
-        )
-    at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
-    count = common.count_for(options, surrogate, {**case, unknown: at_one}, kind)
+        heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
+        in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
+        columns = dict(zip(heads, zip(*in_si, strict=True), strict=True))
+        low, high = ends or _around([root.value for _, root in rows])
+
+        def draw(axes: Any) -> Any:
+            law = _law_over(surrogate, unknown, low, high, fixed)
+            return law.plot(axes, roots=[root.value for _, root in rows], target=target)
+
+        return common.write_result(options.out, columns, draw)
     units = common.units_in(options.words, **{unknown: options.between or ()})
-    of_root = Unit.of(unknown, at_one, units, options.digits)
-    of_k = Unit.of("k", roots[-1][0], units, options.digits) if two else None
-    table = [
-        [
-            *([of_k.head("k")] if of_k else []),
-            of_root.head(unknown),
-            "between",
-            "and",
-            "mu_macro [-]",
-            "regime",
-        ]
-    ]
-    for *k, value, low, high, mu, regime in roots:
-        cells = [tidy_zeros(of_k.shown(k[0], 6, options.digits))] if of_k else []
-        cells += [of_root.shown(x, count, options.digits) for x in (value, low, high)]
-        table.append([*cells, f"{mu:.{count}g}", regime])
-    none = [
+    first_root = rows[0][1].value
+    count = common.count_for(options, surrogate, {**case, unknown: first_root}, kind)
+    unit = Unit.of(unknown, first_root, units, options.digits)
+    k_unit = Unit.of("k", rows[-1][0], units, options.digits) if solution.ends else None
+    table = _table(unknown, rows, unit, k_unit, count, options.digits)
+    without = [
         f"no {unknown} gives that for k = {k:.6g} N/m"
-        for k, one in places.items()
+        for k, one in solutions.items()
         if not one.roots[0]
     ]
     line = common.case_line(case, units, kind)
-    return "\n".join([line, in_columns(table), *none, *common.model_lines(model)])
+    return "\n".join([line, table, *without, *common.model_lines(model)])
+
+
+def _solutions_by_k(solution: Solution, case: Mapping[str, Any]) -> dict[Any, Solution]:
+    """The solution, of an interval of k also those of its ends, by k [N/m], ascending."""
+    middle = common.middle_of(case).get("k")
+    if solution.ends is None:
+        return {middle: solution}
+    low, high = case["k_range"]
+    return {low: solution.ends[0], middle: solution, high: solution.ends[1]}
+
+
+def _root_members(solution: Solution, k: float, root: Root) -> dict[str, Any]:
+    """A root in JSON, its value under the name of the unknown; with its k where that is an
+    interval."""
+    members = root._asdict()
+    at = {"k": k} if solution.ends else {}
+    return {**at, solution.unknown: members.pop("value"), **members}
+
+
+def _heads(unknown: str, k: str | None) -> list[str]:
+    """The heads of the columns of roots, from those of the unknown and, of an interval, of k."""
+    return [*([k] if k else []), unknown, "between", "and", "mu_macro [-]", "regime"]
+
+
+def _law_over(
+    surrogate: Surrogate, unknown: str, low: float, high: float, fixed: Mapping[str, Any]
+) -> Law:
+    """The law over the unknown for a picture."""
+    return friction_law(
+        surrogate,
+        unknown,
+        start=low,
+        stop=high,
+        points=CURVE,
+        scale="log" if low > 0.0 else "linear",
+        refine=True,
+        **fixed,
+    )
+
+
+def _around(roots: Sequence[float]) -> tuple[float, float]:
+    """The range of a picture: a decade around the roots; what is at 0 is shown up to 1."""
+    least, most = min(roots), max(roots)
+    return 0.1 * least or 1e-6 * (most or 1.0), 10.0 * most or 1.0
+
+
+def _table(
+    unknown: str,
+    rows: Sequence[tuple[Any, Root]],
+    unit: Unit,
+    k_unit: Unit | None,
+    count: int,
+    digits: int | None,
+) -> str:
+    """The roots as text, with their k where that is an interval."""
+    table = [_heads(unit.head(unknown), k_unit.head("k") if k_unit else None)]
+    for k, root in rows:
+        of_k = [tidy_zeros(k_unit.shown(k, 6, digits))] if k_unit else []
+        values = [unit.shown(x, count, digits) for x in (root.value, root.low, root.high)]
+        table.append([*of_k, *values, f"{root.mu_macro:.{count}g}", root.regime])
+    return in_columns(table)
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: Solution) -> str:
