@@ -5,7 +5,9 @@
 Points are spread evenly in ln v~ and ln y~ over 1e-3 to 1e3, in random order.
 """
 
-from tests.support.measuring import ROOT, best_of, main, markdown, progress, quantity  # isort: split
+from tests.support.measuring import ROOT, best_of, main, markdown, progress, quantity
+
+# isort: split
 
 import ctypes
 import shutil

@@ -6,7 +6,9 @@ Motions are random: up to three harmonics of 1 to 5 along and across, up to two 
 from 1e-3 to 10 of the amplitude or of mu0 Fz / k, every tenth at rest.
 """
 
-from tests.support.measuring import IMAGES, best_of, main, markdown, quantity, sections  # isort: split
+from tests.support.measuring import IMAGES, best_of, main, markdown, quantity, sections
+
+# isort: split
 
 import functools
 import itertools

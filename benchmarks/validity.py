@@ -3,7 +3,9 @@
 python benchmarks/validity.py [--write]
 """
 
-from tests.support.measuring import FINEST, IMAGES, main, markdown, quantity, sections  # isort: split
+from tests.support.measuring import FINEST, IMAGES, main, markdown, quantity, sections
+
+# isort: split
 
 import math
 from typing import Any
