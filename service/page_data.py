@@ -101,6 +101,7 @@ def names(guide: bool) -> dict[str, Any]:
             "meaning": INPUTS[name].meaning,
             "offered": offered,
             "range": slider,
+            "usual": INPUTS[name].usual,
             "note": note,
             "units": _scales(UNITS_OF[LIKE.get(name, name)]),
         }
@@ -125,6 +126,7 @@ def names(guide: bool) -> dict[str, Any]:
         "choices": _CHOICES,
         "impossible": {" ".join(kind): reason for kind, reason in reasons.items() if reason},
         "outputs": {" ".join(kind): _outputs_of(kind) for kind in kinds if not reasons[kind]},
+        "lacks": {" ".join(kind): _lacks(kind) for kind in kinds if not reasons[kind]},
         "regimes": {name: name.replace("_", " ") for name in REGIMES},
         "geometries": geometries,
         "arguments": arguments,
@@ -140,8 +142,17 @@ def _outputs_of(kind: tuple[str, str]) -> list[str]:
     return [
         name
         for name in ("groups", "limits", "gradient", "stick_fraction", "power", "settling")
-        if not OUTPUTS[name].lacks.keys() & {*kind}
+        if name not in _lacks(kind)
     ]
+
+
+def _lacks(kind: tuple[str, str]) -> dict[str, str]:
+    """The outputs that a kind has not, each with the reason."""
+    return {
+        name: next(reason for word, reason in output.lacks.items() if word in kind)
+        for name, output in OUTPUTS.items()
+        if output.lacks.keys() & {*kind}
+    }
 
 
 @lru_cache(maxsize=2 * len(CONTACTS) * len(DIRECTIONS))  # computed once for each table

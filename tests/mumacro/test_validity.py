@@ -77,7 +77,7 @@ def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
 
 def test_slip_path_tilt_and_heat_have_their_sizes(surrogate: Surrogate) -> None:
     result = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
-    way = 1e-6 * float(re.findall(r"foot slips ([\d.]+) um a", result["Coulomb friction"][0])[0])
+    way = 1e-6 * float(re.findall(r"contact slips ([\d.]+) um a", result["Coulomb friction"][0])[0])
     # the foot follows the motion but for l0 = 0.23 um at each turn
     assert way == close(4.0 * 5e-6, rel=0.1)
     assert result["Coulomb friction"][1] == close(0.01 * math.log(100.0) / 0.3, rel=1e-12)

@@ -303,7 +303,11 @@ def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) ->
     page.click("#fit-button")
     assert inaccessible(page, repository) == {}
     page.click("#tab-motion")
-    page.click("#motion-form button")
+    page.click("#motion-target-form button")
+    assert inaccessible(page, repository) == {}
+    page.click("[data-meanings=values]")
+    assert inaccessible(page, repository) == {}
+    page.click("#meanings button")
     page.click("#assumes")
     assert inaccessible(page, repository) == {}
     page.click("#assumptions button")

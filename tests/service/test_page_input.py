@@ -197,7 +197,7 @@ def test_a_step_of_a_drag_draws_the_point_and_its_end_the_rest(open_page: Any) -
         "window.drawn = 0; new MutationObserver(() => { window.drawn += 1; })"
         ".observe(document.querySelector('#map'), { childList: true });"
     )
-    copied = page.value("#copied")
+    copied = page.value("#copy-text")
     place = "return document.querySelector('#map .point').getAttribute('transform');"
     page.drag_begins("#map", 0.5, 0.6)
     places = {page.run(place)}
@@ -207,10 +207,10 @@ def test_a_step_of_a_drag_draws_the_point_and_its_end_the_rest(open_page: Any) -
         places.add(page.run(place))
     assert len(places) == 5
     assert page.run("return window.drawn;") == 0  # the map below the point stays
-    assert page.value("#copied") == copied
+    assert page.value("#copy-text") == copied
     page.drag_ends()
     amplitude = page.value("#field-y0").replace(" ", "")
-    assert f"y0={amplitude} " in page.value("#copied")
+    assert f"y0={amplitude} " in page.value("#copy-text")
     law = page.find("#law").get_attribute("aria-label")
     again = open_page("#" + page.address(), width=1280, height=800)
     assert again.find("#law").get_attribute("aria-label") == law
@@ -301,7 +301,7 @@ def test_every_copy_of_a_case_gives_the_number_of_the_page(
 
     def copied(name: str) -> str:
         page.click(f"[data-copy={name}]")
-        return str(page.value("#copied"))
+        return str(page.value("#copy-text"))
 
     def output(*words: str, text: str | None = None) -> str:
         done = subprocess.run(
@@ -317,6 +317,86 @@ def test_every_copy_of_a_case_gives_the_number_of_the_page(
     assert float(re.findall(r'"mu_macro":([^,\s]+)', curl)[0]) == close(number, rel=1e-8)
     link = open_page("#" + copied("link").partition("#")[2])
     assert link.number() == number
+
+
+MOTIONS = [
+    "",
+    "&y=2 um&normal=3 N @ 45 deg",
+    "&contact=ball&direction=along&x=2um, 3:0.4um@90deg",
+    "&k=1.2 ± 0.1 N/um&mu0=0.3 ± 10 %&x=1.5 um",
+]
+
+
+@pytest.mark.parametrize("address", MOTIONS)
+def test_every_copy_of_a_motion_gives_the_number_of_the_page(
+    open_page: Any, repository: Path, address: str
+) -> None:
+    page = open_page(f"#panel=motion{address}")
+    number = page.number("#motion-values dd")
+
+    def copied(name: str) -> str:
+        page.click(f"#motion-copy-row [data-copy={name}]")
+        return str(page.value("#motion-copy-text"))
+
+    def output(*words: str, text: str | None = None) -> str:
+        done = subprocess.run(
+            words, input=text, cwd=repository, capture_output=True, text=True, check=True
+        )
+        return done.stdout
+
+    python = float(output(sys.executable, "-", text=copied("python")))
+    digits = len(page.text("#motion-values dd").partition(".")[2])
+    assert number == round(python, digits)  # which are those within its error
+    command = output(sys.executable, "-m", *shlex.split(copied("command")), "--json")
+    assert float(re.findall(r'"mu_macro": ([^,\s]+)', command)[0]) == close(python, rel=1e-9)
+    curl = output(*shlex.split(copied("curl")))
+    assert float(re.findall(r'"mu_macro":([^,\s]+)', curl)[0]) == close(python, rel=1e-9)
+    link = open_page("#" + copied("link").partition("#")[2])
+    assert link.number("#motion-values dd") == number
+    # a motion has no deviation, and says so
+    assert ("±" in address) is ("deviation (±)" in page.text("#motion-doubt"))
+
+
+def test_a_motion_is_in_the_address_and_the_history(open_page: Any) -> None:
+    page = open_page()
+    page.click("#tab-motion")
+    steps = page.run("return history.length;")
+    page.type("#motion-y", "2 um")
+    first = page.number("#motion-values dd")
+    page.type("#motion-y", "3 um @ 30 deg")
+    page.choose("#motion-unknown", "k")
+    assert page.run("return history.length;") == steps + 3
+    assert "y=3+um+%40+30+deg" in page.address()
+    assert "panel=motion" in page.address()
+    assert "3 µm at 30°" in page.text("#motion-note-y")
+    back(page, -2)
+    assert page.value("#motion-y") == "2 um"
+    assert page.value("#motion-unknown") == "v0"
+    assert page.number("#motion-values dd") == first
+    back(page)
+    assert page.value("#motion-y") == ""
+    assert page.find("#part-motion").is_displayed()
+    back(page, 3)
+    assert (page.value("#motion-y"), page.value("#motion-unknown")) == ("3 um @ 30 deg", "k")
+
+
+def test_what_has_no_number_has_no_copy_but_its_link(open_page: Any) -> None:
+    page = open_page("#panel=motion")
+    rows = {"copy": "mu0=0.3", "motion-copy": "--x 1µm@90deg"}
+    for row, words in rows.items():
+        assert words in page.value(f"#{row}-text")
+        assert page.texts(f"#{row}-row :disabled") == []
+    page.type("#field-mu0", "wet")
+    for row in rows:
+        assert page.texts(f"#{row}-row :disabled") == ["curl", "Python", "Command"]
+        assert page.value(f"#{row}-text").startswith("Not available: ")
+        assert "µ₀" in page.value(f"#{row}-text")
+    page.click("[data-copy=link]")
+    assert "mu0=wet" in page.value("#copy-text")
+    page.type("#field-mu0", "0.3")
+    page.type("#motion-x", "much")  # which is no part of the case
+    assert page.texts("#copy-row :disabled") == []
+    assert page.texts("#motion-copy-row :disabled") == ["curl", "Python", "Command"]
 
 
 # --- while there is no answer ---------------------------------------------------------------------

@@ -433,25 +433,101 @@ def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
     page = open_page()
     page.click("#tab-motion")
     page.type("#motion-y", "2 um")
-    page.click("#motion-form button:last-of-type")
-    motion = mumacro.motion(mu0=0.3, Fz=10.0, k=1e6, f=20e3, v0=0.01, x=(1e-6, 90.0), y=2e-6)
-    shown = page.shown()
+    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
+    motion = mumacro.motion(**case, x=(1e-6, 90.0), y=2e-6)
+    shown = dict(zip(page.texts("#motion-values dt"), page.texts("#motion-values dd"), strict=True))
     assert float(shown["µ"]) == close(motion.mu_macro, rel=1e-5, abs=1e-6)
     assert shown["sticks"] == f"{100 * motion.stick_fraction:.3g} %"
     assert len(page.texts("#forces .curve")) == 3
     assert len(page.texts("#path .curve")) == 1
     page.type("#motion-y", "2 parsec")
-    page.click("#motion-form button:last-of-type")
     assert page.find("#motion-y").get_attribute("aria-invalid") == "true"
     assert page.is_old("#motion-values")
+    page.type("#motion-y", "2")  # metres, which is doubted
+    assert "metres?" in page.text("#motion-note-y")
     page.type("#motion-y", "2 um")
     page.choose("#motion-unknown", "v0")
-    page.type("#motion-target-form [name=target]", "0.2", commit=False)
+    page.type("#motion-target", "0.2", commit=False)
     page.click("#motion-target-form button")
     root = page.wait_for("#motion-roots", r"v₀ = (\S+) (\S?)m/s")
     speed = float(root[1]) * {"": 1.0, "m": 1e-3, "µ": 1e-6}[root[2]]
-    there = mumacro.motion(mu0=0.3, Fz=10.0, k=1e6, f=20e3, v0=speed, x=(1e-6, 90.0), y=2e-6)
+    there = mumacro.motion(**{**case, "v0": speed}, x=(1e-6, 90.0), y=2e-6)
     assert there.mu_macro == close(0.2, abs=1e-4)
+    page.click("#motion-roots button")
+    assert page.number("#motion-values dd") == close(0.2, abs=1e-5)
+    # and over a part of the motion: its other half stays
+    page.choose("#motion-unknown", "x.amplitude")
+    assert page.is_old("#motion-roots")
+    page.type("#motion-target", "0.15")
+    page.wait_for("#motion-roots", "amplitude along = ")
+    assert not page.is_old("#motion-roots")
+    page.click("#motion-roots button")
+    assert page.value("#motion-x").endswith(" @ 90 deg")
+    assert page.number("#motion-values dd") == close(0.15, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["spring", "ball", "rigid"])
+def test_what_is_assumed_and_what_slips_is_that_of_the_contact(open_page: Any, kind: str) -> None:
+    page = open_page(f"#contact={kind}&panel=motion&k=1 N/um" if kind != "rigid" else "#k=rigid")
+    page.click("#assumes")
+    words = page.find("#assumptions").text + page.find("#rows").text
+    assert ("foot" in words) is (kind == "spring")
+    assert ("one spring" in words) is (kind == "spring")
+    page.click("#assumptions button")
+    if kind == "rigid":
+        return
+    page.click("[data-meanings=motion-values]")
+    assert ("foot" in page.find("#meanings").text) is (kind == "spring")
+    page.click("#meanings button")
+
+
+NONE = {
+    "#direction=along": ["settles in"],
+    "#direction=normal": ["peak y₀ω", "shaker power", "power saved", "settles in"],
+    "#direction=along&k=rigid": ["sticks", "shaker power", "settles in"],
+    "#k=rigid": ["shaker power"],
+    "#f=0": [],
+    "#y0=0&v0=0": [],
+}
+
+
+@pytest.mark.parametrize("address", NONE)
+def test_a_number_that_is_missing_has_its_reason_beside_it(open_page: Any, address: str) -> None:
+    page = open_page(address)
+    missing = {name: text for name, text in page.shown().items() if text.startswith("–")}
+    assert [*missing] == NONE[address]
+    assert all(re.search(r"\w+ \w+", text) for text in missing.values())
+    # and in the meanings, which the keyboard reaches
+    page.press("[data-meanings=values]", "ENTER")
+    told = page.find("#meanings").text
+    assert told.count("None: ") == len(missing)
+    assert "from this speed on the contact slides all the time" in told
+    page.press("#meanings button", "ENTER")
+    assert not page.find("#meanings").is_displayed()
+    page.click("#tab-bars")
+    bars = page.texts("#bars td:last-child")
+    assert all(re.search(r"\d|rigid|kink", text) for text in bars)
+
+
+def test_the_numbers_are_one_stop_of_the_tab_key(open_page: Any) -> None:
+    page = open_page()
+    stops = page.run(
+        "return [...document.querySelectorAll('#part-values *')]"
+        ".filter((one) => one.tabIndex >= 0).map((one) => one.textContent);"
+    )
+    assert stops == ["Meanings"]
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_a_field_shows_the_whole_of_a_usual_text(open_page: Any, width: int) -> None:
+    texts = ("1.25±0.12 N/µm", "1.25 ± 0.12 N/µm", "0.8..1.2 N/µm", "912.345 N/mm")
+    for text in texts:
+        page = open_page(f"#k={text}", width=width, height=800)
+        inner, outer = page.run(
+            "const one = document.querySelector('#field-k');"
+            "return [one.scrollWidth, one.clientWidth];"
+        )
+        assert inner <= outer, text
 
 
 # --- downloads and print --------------------------------------------------------------------------

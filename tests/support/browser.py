@@ -174,7 +174,7 @@ class Page:
         return float(self.text(selector))
 
     def shown(self) -> Any:
-        return dict(zip(self.texts("dt"), self.texts("dd"), strict=True))
+        return dict(zip(self.texts("#values dt"), self.texts("#values dd"), strict=True))
 
     def value(self, selector: str) -> Any:
         return self.find(selector).get_property("value")

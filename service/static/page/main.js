@@ -1,16 +1,17 @@
 // The page: one state, the question that follows from it, and the cards that show the answer.
 import { Channel } from "./ask.js";
 import { $, afterPicture, write } from "./dom.js";
-import { copyPanel } from "./copy.js";
+import { copies, textsOf } from "./copy.js";
 import { fitPanel } from "./fit.js";
 import { inputsPanel } from "./inputs.js";
 import { lawPanel } from "./law.js";
 import { mapPanel, textAt } from "./map.js";
+import { meaningsDialog } from "./meanings.js";
 import { motionPanel } from "./motion.js";
 import { numberPanel } from "./number.js";
 import { getPreloaded, post } from "./service.js";
 import { sidePanel, tabs } from "./side.js";
-import { Store, caseOf, fromAddress, startState, useStart } from "./state.js";
+import { Store, caseOf, fromAddress, kindOf, startState, useStart } from "./state.js";
 import { stiffnessPanel } from "./stiffness.js";
 import { about } from "./words.js";
 
@@ -27,10 +28,9 @@ let asked = null; // the state of the last question
 
 /** The question of a state: the texts as they are typed, and all outputs that its kind has. */
 function questionOf(state) {
-  const body = caseOf(state);
   return {
-    ...body,
-    include: ["inputs", "model", ...about.outputs[`${body.contact} ${body.direction}`]],
+    ...caseOf(state),
+    include: ["inputs", "model", ...about.outputs[kindOf(state)]],
   };
 }
 
@@ -85,10 +85,12 @@ function showRest(old) {
   panels.law(state, answer, panels.map(answer, target?.mu_ratio), target, old);
   panels.side(answer);
   if (store.dragged) return;
-  panels.copy();
+  const settled = answer?.state === state;
+  panels.copy(textsOf(state), settled ? null : (trouble?.text ?? "there is no number yet."));
+  panels.tab(state.panel);
   panels.stiffness();
   panels.fit(answer);
-  panels.motion(answer);
+  panels.motion(answer, settled || trouble !== null);
   for (const name of ["along", "scale", "from", "to", "exponent"]) $(name).value = state[name];
   $("digits").checked = state.digits === "all";
   $("exponent-field").hidden = state.along !== "Fz" && state.unknown !== "Fz";
@@ -97,7 +99,7 @@ function showRest(old) {
 }
 
 function otherPanels() {
-  tabs("panel-tabs");
+  meaningsDialog();
   for (const [name, { symbol }] of Object.entries(about.inputs))
     $("along").append(new Option(symbol, name));
   return {
@@ -107,10 +109,11 @@ function otherPanels() {
       target = mark;
       show();
     }),
-    copy: copyPanel(store),
+    copy: copies("copy"),
+    tab: tabs("panel-tabs", (panel) => store.look({ panel })),
     stiffness: stiffnessPanel(store, moved),
     fit: fitPanel(store, moved, (address) => store.change(fromAddress(`#${address}`).state)),
-    motion: motionPanel(store),
+    motion: motionPanel(store, moved),
   };
 }
 

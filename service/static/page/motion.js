@@ -1,19 +1,19 @@
 // The panel "any motion": oscillations in x, y and the load at once, one steady cycle, and which
 // value of an input gives a wanted mean friction.
 import { Channel } from "./ask.js";
-import { $ } from "./dom.js";
+import { copies, motionTexts } from "./copy.js";
+import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
+import { list } from "./meanings.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
-import { exactCase } from "./state.js";
-import { digitsWithin, friction, prefixed, prose, show, typeset } from "./words.js";
+import { PARTS, motionOf, uncertainOf } from "./state.js";
+import { about, digitsWithin, friction, inUnit, prefixed, prose, show, typeset } from "./words.js";
 const { extent } = globalThis.d3;
 
-const PARTS = {
-  x: ["along the drag", "1 µm @ 90 deg"],
-  y: ["across it", ""],
-  normal: ["of the load", ""],
-};
+const MEANINGS = { x: "along the drag", y: "across it", normal: "of the load" };
+/** The input whose units an oscillation has. */
+const LIKE = { x: "y0", y: "y0", normal: "Fz_amplitude" };
 const UNKNOWNS = {
   v0: "v₀",
   k: "k",
@@ -25,121 +25,184 @@ const UNKNOWNS = {
   "normal.amplitude": "amplitude of the load",
   "normal.phase": "phase of the load",
 };
-const UNITS = { v0: "m/s", k: "N/m", f: "Hz", phase: "°" };
+/** What slips, in the words of the contact. */
+const SLIPS = {
+  spring: "way that the foot of the spring slips in a period",
+  ball: "way that the contact of the ball slips in a period, in the mean",
+  rigid: "way that the contact slips in a period",
+};
+const BEYOND = "too large to be written";
 
-export function motionPanel(store) {
-  const typed = Object.fromEntries(Object.entries(PARTS).map(([name, [, text]]) => [name, text]));
+export function motionPanel(store, moved) {
   let faults = new Map();
-  let answer, motion, solved, asked;
+  let refused = null;
+  let answer, motion, asked, latest, solved, solvedFor, targetRefused;
   const forces = new Plot($("forces"), paintForces);
   const path = new Plot($("path"), paintPath);
+  const copied = copies("motion-copy");
 
-  /** The motion that is asked: the inputs of the form but y0, and the three oscillations. */
-  function question(without = []) {
-    const left = ["y0", "Fz_amplitude", ...without];
-    const { direction: _, ...body } = exactCase(store.state, answer, left);
-    const parts = Object.entries(typed).filter(([, text]) => text.trim());
-    return { ...body, ...Object.fromEntries(parts) };
+  const question = () => ({ ...motionOf(store.state, answer), include: ["inputs"], cycle: true });
+  function targetQuestion() {
+    const { motion_unknown: unknown, motion_target: target } = store.state;
+    const left = unknown.includes(".") ? [] : [unknown];
+    return { ...motionOf(store.state, answer, left), unknown, target };
   }
-  const report = (status) => (reason, _, reply) => {
-    $(status).textContent = reason ? prose(reason) : "";
-    faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
-    draw();
-  };
   const motions = new Channel(
     (body) => post("v1/motion", body),
     (reply, body) => {
       [motion, asked] = [reply, JSON.stringify(body)];
+      forces.redraw();
+      path.redraw();
       draw();
     },
-    report("motion-status"),
+    (reason, _, reply) => {
+      refused = reason;
+      faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
+      draw();
+    },
   );
   const targets = new Channel(
     (body) => post("v1/solve-for", body),
-    (reply) => {
-      solved = reply;
+    (reply, body) => {
+      [solved, solvedFor] = [reply, JSON.stringify(body)];
       draw();
     },
-    report("motion-target-status"),
+    (reason) => {
+      targetRefused = reason;
+      draw();
+    },
   );
 
+  /** What was understood of an oscillation: its terms. */
+  function understood(name) {
+    const one = motion?.inputs[name];
+    if (!one || one.text !== store.state[name].trim()) return "amplitude, and @ phase in degrees";
+    const term = ({ harmonic, amplitude, phase }) =>
+      `${harmonic > 1 ? `${harmonic}: ` : ""}${inUnit(LIKE[name], amplitude)} at ${show(phase)}°`;
+    return one.harmonics.map(term).join(", ");
+  }
+
+  /** A doubt about an oscillation that is larger than what contacts have. */
+  function doubted(name) {
+    const one = motion?.inputs[name];
+    const most = about.inputs[LIKE[name]].usual[1];
+    const { amplitude } = one?.harmonics.find((term) => term.amplitude > most) ?? {};
+    return amplitude && name !== "normal" && one.text === store.state[name].trim()
+      ? `${inUnit(LIKE[name], amplitude, "m")}: is it in metres?`
+      : null;
+  }
+
   function field(name) {
-    const [meaning] = PARTS[name];
     const fault = faults.get(name);
-    return html`<div class="field ${fault ? "bad" : ""}">
+    const doubt = doubted(name);
+    return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
       <label for=${`motion-${name}`}
-        >${typeset(name === "normal" ? "ΔFz" : name)} <span class="label">${meaning}</span></label
+        >${typeset(name === "normal" ? "ΔFz" : name)}
+        <span class="label">${MEANINGS[name]}</span></label
       >
       <input
         id=${`motion-${name}`}
+        name=${name}
         spellcheck="false"
         aria-invalid=${String(fault !== undefined)}
         aria-describedby=${`motion-note-${name}`}
         placeholder="none"
-        .value=${typed[name]}
-        @change=${({ target }) => {
-          typed[name] = target.value;
-          draw();
-        }}
+        .value=${store.state[name]}
       />
-      <p id=${`motion-note-${name}`} class="note">
-        ${fault ?? "amplitude, and @ phase in degrees"}
+      <p id=${`motion-note-${name}`} class="note" title=${fault ?? doubt ?? understood(name)}>
+        ${fault ?? doubt ?? understood(name)}
       </p>
     </div>`;
   }
 
   function numbers() {
-    if (!motion) return nothing;
     const { error_estimate: error } = motion;
     const known = (mu) =>
       Math.abs(mu) <= error ? "0" : friction(mu, Math.min(digitsWithin(mu, error), 6));
-    const rows = [
+    list("motion-values", [
       ["µ", "mean force along the drag, over Fz", known(motion.mu_macro)],
       ["µ across", "mean force across it, over Fz", known(motion.mu_lateral)],
-      ["± error", "estimate, of both", show(error, 2)],
+      ["± error", "estimate of the numerical error, of both", show(error, 2)],
       ["sticks", "share of the period", `${show(100 * motion.stick_fraction, 3)} %`],
-      ["slip path", "of the foot in a period", prefixed(motion.slip_path, "m", 3)],
-      ["shaker power", "mean, along and across", prefixed(motion.power, "W", 3)],
+      ["slip path", SLIPS[motion.contact], amount(motion.slip_path, "m"), BEYOND],
+      ["shaker power", "mean, along and across", amount(motion.power, "W"), BEYOND],
       [
         "settles in",
         "periods until a small disturbance has fallen to 1 %",
-        show(motion.periods ?? Infinity, 3),
+        motion.periods === null ? "∞: nothing slips" : show(motion.periods, 3),
       ],
-    ];
-    return rows.map(
-      ([name, meaning, value]) =>
-        html`<div>
-          <dt title=${meaning} tabindex="0">${name}</dt>
-          <dd>${value}</dd>
-        </div>`,
-    );
+    ]);
+  }
+  const amount = (value, unit) => (value === null ? null : prefixed(value, unit, 3));
+
+  /** The text of an unknown at a value [SI], and what the state becomes with it. */
+  function found(unknown, value) {
+    const [part, member] = unknown.split(".");
+    if (!member) return { text: inUnit(unknown, value, undefined, 6), use: { [unknown]: value } };
+    const [amplitude, phase] = store.state[part].split("@").map((one) => one.trim());
+    const text =
+      member === "phase" ? `${show(value, 6)} deg` : inUnit(LIKE[part], value, undefined, 6);
+    const whole = member === "phase" ? [amplitude, text] : [text, phase];
+    return { text, more: { [part]: whole.filter(Boolean).join(" @ ") } };
   }
 
   function roots() {
     if (!solved) return nothing;
     const { unknown, results, reachable } = solved;
-    const [{ roots: found = [], reason }] = results;
-    const last = unknown.split(".").at(-1);
-    const unit = UNITS[unknown] ?? UNITS[last] ?? (unknown.startsWith("normal") ? "N" : "m");
-    const text = (value) => (unit === "°" ? `${show(value)}°` : prefixed(value, unit, 5));
-    const line = ({ value }) => html`<li><b>${UNKNOWNS[unknown]} = ${text(value)}</b></li>`;
+    const [{ roots: all = [], reason }] = results;
+    const line = ({ value }) => {
+      const { text, use = {}, more = {} } = found(unknown, value);
+      const words = `${UNKNOWNS[unknown]} = ${text}`;
+      return html`<li>
+        <b>${words}</b>
+        <button
+          class="use"
+          type="button"
+          aria-label=${`Use ${words}`}
+          @click=${() => moved(use, 12, more)}
+        >
+          Use
+        </button>
+      </li>`;
+    };
     const range = reachable
       ? `; here it can be ${show(reachable.min)} to ${show(reachable.max)}`
       : "";
-    return found.length
-      ? found.map(line)
+    return all.length
+      ? all.map(line)
       : html`<li>${prose(reason ?? `No value gives that${range}.`)}</li>`;
   }
 
+  /** Deviations of the inputs, which a motion has not. */
+  function withoutDeviations() {
+    const body = motionOf(store.state, answer);
+    const names = uncertainOf(store.state, answer, body);
+    if (!names.length) return "";
+    const symbols = names.map((name) => about.inputs[name].symbol).join(", ");
+    return `Computed without the deviation (±) of ${symbols}: a motion carries none.`;
+  }
+
   function draw() {
+    const { state } = store;
     render(Object.keys(PARTS).map(field), $("motion-fields"));
-    render(numbers(), $("motion-values"));
+    if (motion) numbers();
     render(roots(), $("motion-roots"));
-    const old = motion && JSON.stringify({ ...question(), cycle: true }) !== asked;
+    write("motion-status", refused ? prose(refused) : "");
+    write("motion-doubt", withoutDeviations());
+    $("motion-unknown").value = state.motion_unknown;
+    $("motion-target").value = state.motion_target;
+    const old = motion && JSON.stringify(question()) !== asked;
     for (const part of ["motion-values", "forces", "path"])
       $(part).classList.toggle("old", Boolean(old));
-    forces.redraw();
-    path.redraw();
+    const other = Boolean(solved && JSON.stringify(targetQuestion()) !== solvedFor);
+    $("motion-roots").classList.toggle("old", other);
+    write(
+      "motion-target-status",
+      targetRefused ? prose(targetRefused) : other ? "This was asked with other values." : "",
+    );
+    $("motion-target-status").classList.toggle("bad", Boolean(targetRefused));
+    const why = refused ?? (old || !motion ? "the motion is not computed yet." : null);
+    copied(motionTexts(state, answer), why);
   }
 
   function padded(values) {
@@ -208,22 +271,31 @@ export function motionPanel(store) {
     );
   }
 
-  $("motion-form").addEventListener("submit", (event) => {
-    event.preventDefault();
-    motions.push({ ...question(), cycle: true });
-  });
+  $("motion-form").addEventListener("submit", (event) => event.preventDefault());
+  for (const form of ["motion-form", "motion-target-form"])
+    $(form).addEventListener("change", ({ target: { name, value } }) =>
+      store.change({ [name]: value }),
+    );
   $("motion-target-form").addEventListener("submit", (event) => {
     event.preventDefault();
-    const { unknown, target } = Object.fromEntries(new FormData($("motion-target-form")));
-    const [part, member] = unknown.split(".");
-    targets.push({ ...question(member ? [] : [part]), unknown, target });
+    store.change(Object.fromEntries(new FormData($("motion-target-form"))));
+    targets.push(targetQuestion());
   });
   render(
     Object.entries(UNKNOWNS).map(([name, words]) => html`<option value=${name}>${words}</option>`),
     $("motion-unknown"),
   );
-  return (latest) => {
-    answer = latest;
+
+  /** Computes the motion of a state whose case is answered or refused, while its panel is open. */
+  return (reply, settled) => {
+    answer = reply;
+    if (store.state.panel !== "motion") return;
+    const body = question();
+    const words = JSON.stringify(body);
+    if (settled && words !== latest) {
+      latest = words;
+      motions.push(body);
+    }
     draw();
   };
 }

@@ -99,13 +99,17 @@ export function numberPanel(store) {
     write("regime", inWords(answer.regime));
     write("spread", spread(answer, rows));
     write("doubt", warning ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}` : "");
+    const { contact } = answer.state;
+    for (const part of document.querySelectorAll("[data-of]"))
+      part.hidden = part.dataset.of !== contact;
     const lines = rows.filter(({ row }) => !BESIDE.includes(row));
+    const heading = (row) => (row === "one spring" && contact === "ball" ? "a ball" : row);
     const words = (text) => sentence(text, answer.inputs);
     const line = ({ row, text }) =>
-      html`<li title=${words(text)}><b>${row}:</b> ${words(text)}</li>`;
+      html`<li title=${words(text)}><b>${heading(row)}:</b> ${words(text)}</li>`;
     render(lines.slice(0, SHOWN).map(line), $("rows"));
     render(
-      rows.map(({ row, text }) => html`<p><b>${row}.</b> ${words(text)}</p>`),
+      rows.map(({ row, text }) => html`<p><b>${heading(row)}.</b> ${words(text)}</p>`),
       $("all-rows"),
     );
   };

@@ -3,21 +3,29 @@
 import { Channel } from "./ask.js";
 import { $, write } from "./dom.js";
 import { html, render, svg } from "../lib/lit-html.js";
+import { list } from "./meanings.js";
 import { post } from "./service.js";
-import { caseAround, inputsOf } from "./state.js";
+import { caseAround, inputsOf, kindOf } from "./state.js";
 import { about, friction, inUnit, inWords, numberOf, prefixed, show, typeset } from "./words.js";
 
-/** Tabs: buttons that show one of several parts. */
-export function tabs(id) {
+/**
+ * Tabs: buttons "tab-name" that show one of several parts; `chosen(name)` hears which, and the
+ * returned function chooses one by its name.
+ */
+export function tabs(id, chosen = () => {}) {
   const buttons = [...$(id).querySelectorAll("[role=tab]")];
   function choose(button, focus = false) {
-    for (const one of buttons) {
-      const chosen = one === button;
-      one.setAttribute("aria-selected", String(chosen));
-      one.tabIndex = chosen ? 0 : -1;
-      $(one.getAttribute("aria-controls")).hidden = !chosen;
-    }
+    turn(button);
     if (focus) button.focus();
+    chosen(button.id.replace("tab-", ""));
+  }
+  function turn(button) {
+    for (const one of buttons) {
+      const selected = one === button;
+      one.setAttribute("aria-selected", String(selected));
+      one.tabIndex = selected ? 0 : -1;
+      $(one.getAttribute("aria-controls")).hidden = !selected;
+    }
   }
   buttons.forEach((button, i) => {
     button.addEventListener("click", () => choose(button));
@@ -26,16 +34,29 @@ export function tabs(id) {
       if (way) choose(buttons.at((i + way) % buttons.length), true);
     });
   });
-  choose(buttons[0]);
+  turn(buttons[0]);
+  return (name) => turn(buttons.find((one) => one.id === `tab-${name}`));
 }
 
-/** The other numbers of a case: [name, explanation, value]. */
+/** The other numbers of a case, as `list` takes them. */
 function numbers(answer, all) {
-  const { groups = {}, limits = {}, power, settling, stick_fraction: stick, inputs } = answer;
+  const {
+    groups = {},
+    limits = {},
+    power,
+    settling,
+    stick_fraction: stick,
+    inputs,
+    state,
+  } = answer;
   const digits = all ? 10 : 4;
+  const lacks = about.lacks[kindOf(state)];
+  const without = (name, words) =>
+    lacks[name] ? [words, lacks[name]] : ["rigid contact", "it is not given for a rigid contact"];
   const amplitude = inputs.y0?.value;
-  const peak = amplitude === undefined ? null : amplitude * 2 * Math.PI * inputs.f.value;
-  const rows = [
+  const amount = (value, unit, some = digits) =>
+    value === null || value === undefined ? null : prefixed(value, unit, some);
+  return [
     ["µ/µ₀", "share of the friction that remains", show(answer.mu_ratio, digits)],
     ["static µ", "µ where v₀ goes to 0", show(limits.mu_static, digits)],
     [
@@ -43,26 +64,36 @@ function numbers(answer, all) {
       "from this speed on the contact slides all the time",
       prefixed(limits.v0_crit, "m/s"),
     ],
-    ["peak y₀ω", "largest speed of the oscillation", prefixed(peak, "m/s")],
+    [
+      "peak y₀ω",
+      "largest speed of the oscillation",
+      amount(amplitude && amplitude * 2 * Math.PI * inputs.f.value, "m/s", 4),
+      "load shaken",
+      "the load is shaken, not the body",
+    ],
     [
       "sticks",
       "share of the period in which the contact sticks",
-      stick === undefined || stick === null ? "–" : `${show(100 * stick, digits)} %`,
+      stick === undefined || stick === null ? null : `${show(100 * stick, digits)} %`,
+      ...without("stick_fraction", "not modelled"),
     ],
     [
       "shaker power",
       "mean power that the oscillation takes",
-      prefixed(power?.oscillation, "W", digits),
+      amount(power?.oscillation, "W"),
+      ...without("power", "not modelled"),
     ],
     [
       "power saved",
       "what the drive needs less than without oscillation: (µ₀ − µ) Fz v₀",
-      prefixed(power?.saved, "W", digits),
+      amount(power?.saved, "W"),
+      ...without("power", "not modelled"),
     ],
     [
       "settles in",
       "periods until a small disturbance has fallen to 1 %",
-      settling === undefined ? "–" : `${show(settling.periods ?? Infinity, 3)} periods`,
+      settling === undefined ? null : `${show(settling.periods ?? Infinity, 3)} periods`,
+      ...without("settling", "across only"),
     ],
     ["ṽ", "v₀/(l₀ω), dimensionless speed", show(groups.v_tilde ?? Infinity, digits)],
     [
@@ -77,8 +108,11 @@ function numbers(answer, all) {
     ],
     ["error ≤", "bound of the numerical error of µ", show(answer.error_bound, 2)],
   ];
-  return rows;
 }
+
+const signed = (share) => `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`;
+/** Why an input has no sensitivity. */
+const none = (name) => (name === "k" ? "rigid" : "kink at 0");
 
 /** Per cent that µ changes when an input grows by 1 %, and its deviation's share. */
 function bars({ gradient, mu_macro: mu, inputs }) {
@@ -110,9 +144,7 @@ function bars({ gradient, mu_macro: mu, inputs }) {
                 <path d="M50 0v10" />`}
             </svg>
           </td>
-          <td>
-            ${share === null ? "–" : `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`}
-          </td>
+          <td>${share === null ? `– ${none(name)}` : signed(share)}</td>
         </tr>`;
       })}
     </tbody>
@@ -210,17 +242,7 @@ export function sidePanel(store, moved, found) {
     $("quantity").value = store.state.quantity;
     $("target").value = store.state.target;
     if (!answer) return;
-    const rows = numbers(answer, store.state.digits === "all");
-    render(
-      rows.map(
-        ([name, meaning, value]) =>
-          html`<div>
-            <dt title=${meaning} tabindex="0">${name}</dt>
-            <dd>${value}</dd>
-          </div>`,
-      ),
-      $("values"),
-    );
+    list("values", numbers(answer, store.state.digits === "all"));
     write(
       "origin",
       `Block ${answer.source} of the table ${answer.table.id}, ` +

@@ -21,9 +21,23 @@ const CHOICES = {
   digits: ["few", "all"],
   unknown: ["y0", "mu0", "Fz", "k", "Fz_amplitude", "f", "v0"],
   quantity: ["mu_ratio", "mu_macro"],
+  panel: ["stiffness", "fit", "motion"],
+  motion_unknown: [
+    "v0",
+    "k",
+    "f",
+    "x.amplitude",
+    "x.phase",
+    "y.amplitude",
+    "y.phase",
+    "normal.amplitude",
+    "normal.phase",
+  ],
 };
+/** The oscillations of any motion, as texts. */
+export const PARTS = { x: "1 µm @ 90 deg", y: "", normal: "" };
 /** Texts beside the inputs; an empty one is left to the service. */
-const TEXTS = { from: "", to: "", exponent: "", target: "0.5" };
+const TEXTS = { from: "", to: "", exponent: "", target: "0.5", ...PARTS, motion_target: "0" };
 
 /** The inputs of the usual case, by name, as the service gives them. */
 let usual = {};
@@ -64,6 +78,10 @@ export function fromAddress(hash) {
   return { state: allowed(state), unknown };
 }
 
+/** The contact and the direction of a state, as one word each. */
+export const kindOf = ({ contact, direction }) =>
+  `${contact === "ball" ? "ball" : "spring"} ${direction}`;
+
 /** k as it is asked: a rigid contact has none. */
 export const stiffnessOf = (state) => (state.contact === "rigid" ? "rigid" : state.k);
 
@@ -78,16 +96,28 @@ export function caseOf(state, without = []) {
   };
 }
 
+/** The inputs with a deviation, of those in a question. */
+export const uncertainOf = (state, answer, question) =>
+  Object.keys(question).filter(
+    (name) => answer?.inputs[name]?.std && answer.state[name] === state[name],
+  );
+
 /**
  * The inputs without deviations, for questions that have none (laws, targets, fits, motions):
  * the value that the service understood stands in place of a text with a deviation.
  */
 export function exactCase(state, answer, without = []) {
   const question = caseOf(state, without);
-  for (const [name, { std, value }] of Object.entries(answer?.inputs ?? {})) {
-    if (std && name in question) question[name] = value;
-  }
+  for (const name of uncertainOf(state, answer, question))
+    question[name] = answer.inputs[name].value;
   return question;
+}
+
+/** Any motion: the case without y0 and direction, and the oscillations that are given. */
+export function motionOf(state, answer, without = []) {
+  const { direction: _, ...body } = exactCase(state, answer, ["y0", "Fz_amplitude", ...without]);
+  const parts = Object.keys(PARTS).filter((name) => state[name].trim());
+  return { ...body, ...Object.fromEntries(parts.map((name) => [name, state[name]])) };
 }
 
 /**
@@ -127,6 +157,13 @@ export class Store {
   change(part) {
     this.state = allowed({ ...this.state, ...part });
     if (!this.dragged) this.remember();
+    this.follow();
+  }
+
+  /** Changes what is looked at: the address holds it, and it is no entry of its own. */
+  look(part) {
+    this.state = { ...this.state, ...part };
+    history.replaceState(null, "", toAddress(this.state));
     this.follow();
   }
 
