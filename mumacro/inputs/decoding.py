@@ -200,7 +200,7 @@ class Text:
         ends = before.count(b"\n") + before.count(b"\r") - before.count(b"\r\n")
         byte = f"byte 0x{data[error.start]:02x} in line {self._lines + 1 + ends}"
         name = NAMES.get(self.encoding, self.encoding)
-        raise TextError(f"{byte} is not {name}: save the file as UTF-8, or give --encoding")
+        raise TextError(f"{byte} is not {name}: save the file as UTF-8, or give its encoding")
 
 
 def _with_start(pieces: Iterable[bytes]) -> Iterator[bytes]:

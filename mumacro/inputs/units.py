@@ -471,7 +471,7 @@ def bound_of_unit(quantity: str, number: float, unit: str) -> str:
         return "the value itself: the reference of a level in dB is not known"
     key = canonical(text)
     if quantity == "stiffness" and key in QUANTITIES["pressure"].units:
-        return "a force over a length: mumacro stiffness computes it from a modulus and the bodies"
+        return "a force over a length: k from materials computes it from a modulus and the bodies"
     if quantity == "force" and key in _MASS:
         newtons = number * _MASS[key] * _GRAVITY
         return (

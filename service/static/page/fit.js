@@ -1,14 +1,15 @@
 // The panel "k from measured points": a table pasted or dropped, what the service read of it, and
 // the fit with its residuals.
 import { Channel } from "./ask.js";
-import { $ } from "./dom.js";
+import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
 import { exactCase } from "./state.js";
-import { about, inUnit, prose, show, toSI, toUnit, unitFor } from "./words.js";
+import { about, inPrint, inUnit, prose, show, toSI, toUnit, unitFor } from "./words.js";
 const { area } = globalThis.d3;
 
+const SIX = 6; // digits of a fitted value, at most
 const ROWS = 6; // of the table that was read, which are shown
 /** What a fit takes from the table beside the inputs. */
 const MEASURED = ["mu_macro", "std"];
@@ -41,8 +42,9 @@ export function fitPanel(store, moved, openCase) {
     const like = MEASURED.includes(name) ? "mu0" : name;
     return unit ? table.columns[name].map((one) => toSI(like, one, unit)) : table.columns[name];
   };
+  /** A reason stands in the words of the service: it names columns as they are typed. */
   const say = (text, bad = false) => {
-    $("fit-status").textContent = text ? prose(text) : "";
+    write("fit-status", text ?? "");
     $("fit-status").classList.toggle("bad", bad);
   };
 
@@ -79,7 +81,7 @@ export function fitPanel(store, moved, openCase) {
   const fits = new Channel(
     (body) => post("v1/fit", body),
     (reply, body) => {
-      fit = { ...reply, question: body, unknowns: body.unknowns };
+      fit = { ...reply, question: body };
       say("");
       draw();
     },
@@ -94,23 +96,58 @@ export function fitPanel(store, moved, openCase) {
     } else readings.push({ ...question(), read_only: true });
   };
 
-  /** A value of k or µ₀ as text; k may be rigid, a bound infinite (null). */
-  const text = (name, value, digits = 4, like = value) =>
-    value === null || value === "rigid"
-      ? (value ?? "∞")
-      : inUnit(name, value, unitFor(name, typeof like === "number" ? like : value), digits);
+  /**
+   * Values of k or µ₀ as texts, all in one unit and with so many decimals that two digits of their
+   * distances are seen; k may be rigid.
+   */
+  function together(name, all) {
+    const numbers = all.filter((one) => typeof one === "number");
+    const [least, most] = [Math.min(...numbers), Math.max(...numbers)];
+    const unit = unitOf(name);
+    const width = toUnit(name, most - least, unit) || toUnit(name, most, unit) / 1000 || 1;
+    const sharp = 2 - Math.ceil(Math.log10(width));
+    const whole = SIX - 1 - Math.floor(Math.log10(toUnit(name, most, unit) || 1));
+    const places = Math.max(Math.min(sharp, whole), 0);
+    const words = unit === "-" ? "" : ` ${inPrint(unit)}`;
+    const text = (one) =>
+      typeof one === "number"
+        ? toUnit(name, one, unit).toFixed(places) + words
+        : one === null
+          ? "∞"
+          : one;
+    return all.map(text);
+  }
+  /** The unit of a fitted value in this card: that of the best one. */
+  function unitOf(name) {
+    const [low, high] = fit.interval[name];
+    const known = [fit.values[name], low, high].find((one) => typeof one === "number" && one > 0);
+    return unitFor(name, known ?? 1);
+  }
+  /** A warning, with its stiffnesses in the unit of this card. */
+  const warning = (words) =>
+    prose(
+      words
+        .replace(/([\d.]+(?:e[+-]?\d+)?) N\/m\b/g, (_, k) => inUnit("k", Number(k), unitOf("k"), 3))
+        .replace(
+          /\bk = ([\d.]+(?:e[+-]?\d+)?)/g,
+          (_, k) => `k = ${inUnit("k", Number(k), unitOf("k"))}`,
+        ),
+    );
 
   function result() {
     if (!fit) return nothing;
     const { values, std, interval, solutions, warnings, reduced_chi2: scatter } = fit;
     const names = Object.keys(values).filter((name) => values[name] !== null);
-    const equals = (name, one) => `${about.inputs[name].symbol} = ${text(name, one[name])}`;
+    const symbol = (name) => about.inputs[name].symbol;
     const best = names.map((name) => {
-      const spread =
-        std[name] === null ? "not determined" : `± ${text(name, std[name], 2, values[name])}`;
-      const ends = interval[name].map((end) => text(name, end, 4, values[name]));
-      return `${equals(name, values)} ${spread} (95 %: ${ends.join(" to ")})`;
+      const [value, low, high] = together(name, [values[name], ...interval[name]]);
+      const known = std[name] === null ? ", not determined" : "";
+      const [number, unit] = low.split(" ");
+      const from = unit && high.endsWith(` ${unit}`) ? number : low;
+      return `${symbol(name)} = ${value}${known} (95 %: ${from} to ${high})`;
     });
+    const equals = (name, one) =>
+      `${symbol(name)} = ${together(name, [one[name], values[name]])[0]}`;
     const use = (one) => () => {
       const numbers = Object.entries(one).filter(
         ([name, value]) => names.includes(name) && typeof value === "number",
@@ -135,7 +172,7 @@ export function fitPanel(store, moved, openCase) {
       fit.question && table?.columns.std && scatter !== null
         ? html`<li>reduced χ² = ${show(scatter, 3)}</li>`
         : nothing,
-      ...warnings.map((words) => html`<li class="doubt">${prose(words)}</li>`),
+      ...warnings.map((words) => html`<li class="doubt">${warning(words)}</li>`),
     ];
   }
 

@@ -112,7 +112,9 @@ function otherPanels() {
     copy: copies("copy"),
     tab: tabs("panel-tabs", (panel) => store.look({ panel })),
     stiffness: stiffnessPanel(store, moved),
-    fit: fitPanel(store, moved, (address) => store.change(fromAddress(`#${address}`).state)),
+    fit: fitPanel(store, moved, (address) =>
+      store.change(fromAddress(`#${address}&panel=fit`).state),
+    ),
     motion: motionPanel(store, moved),
   };
 }
@@ -132,7 +134,9 @@ function start(names) {
     : "";
 }
 
-$("reset").addEventListener("click", () => store.change(startState()));
+$("reset").addEventListener("click", () =>
+  store.change({ ...startState(), panel: store.state.panel }),
+);
 $("notice-close").addEventListener("click", () => {
   $("notice").hidden = true;
 });

@@ -87,9 +87,12 @@ export function around(k) {
   return `${low.split(" ")[0]}..${high}`;
 }
 
-/** A sentence of the service in the page's signs. */
+/** A sentence of the service in the page's signs, and a stiffness in it in the page's units. */
 export const prose = (text) =>
   text
+    .replace(/(\d[\d.]*(?:e[+-]?\d+)?) N\/m\b(?!\w)/g, (_, k) =>
+      inUnit("k", Number(k), undefined, 3),
+    )
     .replaceAll("mu_macro", "µ")
     .replaceAll("mu0", "µ₀")
     .replace(/\b([yvl])0\b/g, "$1₀")
