@@ -464,7 +464,7 @@ def beside(
             value, bound, code = truth.quantity(table, name, v, y)
             sliding = REGIME_OF_SOURCE[code] == CONTINUOUS
             yield name, ratios(value, bound, solved[name], truth.noise(name, v, y, solved, sliding))
-    for name, slopes, unsure in true_slopes(table, truth, truth.sloped, v, y):
+    for name, slopes, unsure in true_slopes(table, truth, truth.slope_names, v, y):
         rows = truth.slopes(table, name, v, y)
         keep = with_slopes(table, QUANTITIES[QUANTITY_NAMES.index(name)], v, y)
         pair = ratios(rows[1:3], rows[3:5], slopes, unsure)

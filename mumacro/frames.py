@@ -190,20 +190,20 @@ def _plain(values: Mapping[str, Any], index: Any) -> dict[str, Any]:
 def _labelled(answer: Answer[Any], label: Callable[[Any, str], Any]) -> LabelledAnswer:
     """An answer of arrays with labels."""
     mu_macro, mu_ratio, bound, code = (label(getattr(answer, name), name) for name in _ALWAYS)
-    labelled = LabelledAnswer(mu_macro, mu_ratio, bound, code, cases=answer.cases)
+    result = LabelledAnswer(mu_macro, mu_ratio, bound, code, cases=answer.cases)
     if answer._groups is not None:
         v, y, length = map(label, answer._groups, GROUPS)
-        labelled._groups = v, y, length
+        result._groups = v, y, length
     for name in BAND:
         if hasattr(answer, name):
-            setattr(labelled, name, label(getattr(answer, name), name))
+            setattr(result, name, label(getattr(answer, name), name))
     for name in ("gradient", "gradient_bound"):
         if (slopes := getattr(answer, name)) is not None:
             of_field = {field: label(x, f"{name}.{field}") for field, x in slopes.items()}
-            setattr(labelled, name, of_field)
-    labelled.outputs = {path: label(x, path) for path, x in answer.outputs.items()}
-    labelled.remarks_on_outputs = answer.remarks_on_outputs
-    return labelled
+            setattr(result, name, of_field)
+    result.outputs = {path: label(x, path) for path, x in answer.outputs.items()}
+    result.remarks_on_outputs = answer.remarks_on_outputs
+    return result
 
 
 def _of_chunks(
@@ -212,7 +212,7 @@ def _of_chunks(
     """A function of arrays, applied to DataArrays or Dask arrays, chunk by chunk; the names of all
     results are known before."""
     arguments = {name: x for name, x in values.items() if library_of(x) or np.ndim(x)}
-    fixed = {name: x for name, x in values.items() if name not in arguments}
+    constants = {name: x for name, x in values.items() if name not in arguments}
     deviations = any(name in DEVIATIONS for name in values)
     outputs = tuple(OUTPUTS[x] for x in OUTPUTS if x in include or (x == "std" and deviations))
     direction = values.get("direction", "across")
@@ -226,7 +226,7 @@ def _of_chunks(
     remarks: list[Remark] = []
 
     def chunk(*columns: Any) -> list[Any]:
-        inputs = {**fixed, **dict(zip(arguments, columns, strict=True))}
+        inputs = {**constants, **dict(zip(arguments, columns, strict=True))}
         cases = Cases.of(inputs, strict=strict)
         answer = surrogate.answer(cases, chosen(include, cases))
         for remark in answer.remarks:

@@ -199,8 +199,8 @@ def _with_unit(si: str, *values: float) -> str:
     """Numbers in an SI unit, in the one that suits the last of them."""
     unit, scale = suited(si, values[-1])
     numbers = " to ".join(f"{scale.of_si(value):.4g}" for value in values)
-    shown = unit.replace("um", "µm").replace("uN", "µN").removeprefix("-")
-    return f"{numbers} {shown}".rstrip()
+    unit_text = unit.replace("um", "µm").replace("uN", "µN").removeprefix("-")
+    return f"{numbers} {unit_text}".rstrip()
 
 
 def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, float]]) -> str:
@@ -315,11 +315,11 @@ def plot_law(
             x, *band, color="C0", alpha=0.2, lw=0.0, label="for every $k$ of the interval"
         )
     ax.plot(x, mu_static, ":", color=ink, alpha=0.7, label=r"static limit, $v_0 \to 0$")
-    labelled = set[str]()
+    legend_names = set[str]()
     for value, name in borders:
-        label = None if name in labelled else name
+        label = None if name in legend_names else name
         ax.axvline(value, ls=_LINES[name], lw=1.2, color=BORDER, label=label)
-        labelled.add(name)
+        legend_names.add(name)
     if target is not None:
         ax.axhline(target, lw=0.8, color=ink, label=f"target {target:.6g}")
         ax.plot([*roots], [target] * len([*roots]), "o", color=ink, mec="white")
@@ -424,8 +424,8 @@ def band_colours() -> list[str]:
     middles = 0.5 * (np.array([0.0, *LEVELS]) + np.array([*LEVELS, 1.0]))
     table = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in COLOURS])
     even = np.linspace(0.0, 1.0, len(COLOURS))
-    mixed = np.stack([np.interp(middles, even, column) for column in table.T], axis=1)
-    return ["#" + "".join(f"{round(x):02x}" for x in one) for one in mixed.tolist()]
+    channels = np.stack([np.interp(middles, even, column) for column in table.T], axis=1)
+    return ["#" + "".join(f"{round(x):02x}" for x in one) for one in channels.tolist()]
 
 
 def heights(ratio: Array, level: float) -> Array:
@@ -451,7 +451,7 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
     across = np.linspace(0.0, 1.0, ratio.shape[1])
     words = [(u + aside, w) for u, w in AREAS for aside in (-0.12, 0.0, 0.12)]  # a name is wide
     lines = {level: heights(ratio, level) for level in LEVELS}
-    placed: list[tuple[float, float, float]] = []
+    places: list[tuple[float, float, float]] = []
     for level in LABELLED:
         inside = (np.minimum(across, 1.0 - across) > _SIDE) & (
             np.abs(lines[level] - 0.5) < 0.5 - _SIDE
@@ -463,11 +463,11 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
         apart = np.min([_distances(x, y, across, line) for line in others], axis=0)
         # the border is drawn thicker than a line, and a number beside it is hard to read
         apart = np.minimum(apart, _TO_BORDER * _distances(x, y, across, border))
-        for u, w in [*words, *(at[1:] for at in placed)]:
+        for u, w in [*words, *(at[1:] for at in places)]:
             apart = np.minimum(apart, 0.5 * np.hypot(x - u, y - w))
         best = int(apart.argmax())
-        placed.append((level, float(x[best]), float(y[best])))
-    return placed
+        places.append((level, float(x[best]), float(y[best])))
+    return places
 
 
 def _distances(x: Array, y: Array, across: Array, line: Array) -> Array:
@@ -501,7 +501,7 @@ def plot_map(
     """
     ax, normal = axes_for(ax), direction == "normal"
     v, y = speeds(ratio.shape[1]), amplitudes(len(ratio), normal)
-    coloured, lines = bands(ax, v, y, ratio)
+    filled_areas, lines = bands(ax, v, y, ratio)
     halo = [_loaded("patheffects").withStroke(linewidth=2.5, foreground="white")]
     ax.plot(
         v_crit,
@@ -517,7 +517,7 @@ def plot_map(
     speed = r"$\tilde v = v_0 k / (\mu_0 F_z \omega)$"
     ax.set_xlabel(f"dimensionless speed {speed}\nfaster sliding $\\longrightarrow$")
     ax.set_ylabel(f"{_AMPLITUDES[direction]}\nlarger amplitude $\\longrightarrow$")
-    bar = ax.figure.colorbar(coloured, ax=ax, ticks=[0.0, *LEVELS, 1.0], format="%g", pad=0.02)
+    bar = ax.figure.colorbar(filled_areas, ax=ax, ticks=[0.0, *LEVELS, 1.0], format="%g", pad=0.02)
     bar.set_label(r"$\mu_\mathrm{macro} / \mu_0$ [-]")
     bar.ax.tick_params(labelsize="small")
     if marks is not None:
@@ -526,8 +526,10 @@ def plot_map(
         ax.plot(*point, "o", color=INK, ms=10.0, mec="white", mew=2.0, zorder=5)
     head(ax, title)
     ax.figure.draw_without_rendering()  # labels are turned along the lines as they are then
-    shown = np.interp(np.log(v), np.log(np.maximum(v_crit, 1e-300)), np.linspace(0.0, 1.0, len(y)))
-    places = label_places(ratio, shown)
+    border_heights = np.interp(
+        np.log(v), np.log(np.maximum(v_crit, 1e-300)), np.linspace(0.0, 1.0, len(y))
+    )
+    places = label_places(ratio, border_heights)
     manual = [place(u, w, normal) for _, u, w in places]
     for text in ax.clabel(
         lines, levels=LABELLED, manual=manual, fmt="%g", fontsize=9.0, inline_spacing=3, colors=INK

@@ -116,8 +116,8 @@ def _table(columns: Mapping[str, Any]) -> list[list[str]]:
     places = np.arange(size) if size <= 2 * _ENDS else np.r_[0:_ENDS, size - _ENDS : size]
     indices = zip(*np.unravel_index(places, shape), strict=True) if shape else [()]
     names = [", ".join(map(str, map(int, index))) for index in indices]
-    picked = [[cell(x) for x in np.ravel(array)[places].tolist()] for array in arrays]
-    rows = [list(row) for row in zip(names, *picked, strict=True)]
+    texts = [[cell(x) for x in np.ravel(array)[places].tolist()] for array in arrays]
+    rows = [list(row) for row in zip(names, *texts, strict=True)]
     if size > 2 * _ENDS:
         rows.insert(_ENDS, ["..."] * (1 + len(arrays)))
     return [["", *columns], *rows]

@@ -179,7 +179,7 @@ class Observer:
         """The headers of every answer."""
         return (b"x-request-id", scope["request_id"].encode()), NOSNIFF
 
-    def answered(self, scope: Scope, status: int, seconds: float) -> None:
+    def record(self, scope: Scope, status: int, seconds: float) -> None:
         """Count an answer, and log it."""
         path, method = path_in(scope), scope["method"]
         self._metrics.request(path, method, status, seconds)
@@ -217,7 +217,7 @@ class Observe:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        started, status, state = time.perf_counter(), _GONE, scope.get("state", {})
+        start, status, state = time.perf_counter(), _GONE, scope.get("state", {})
         self._observer.name(scope)
         marks = self._observer.marks(scope)
         if any(name in _OF_PROXIES for name, _ in scope["headers"]):
@@ -241,5 +241,5 @@ class Observe:
                     raise  # another server ends it
                 state["abort"]()
         finally:
-            seconds = time.perf_counter() - started
-            self._observer.answered(scope, state.get("refused", status), seconds)
+            seconds = time.perf_counter() - start
+            self._observer.record(scope, state.get("refused", status), seconds)

@@ -298,9 +298,9 @@ def path_in(scope: Scope) -> str:
 def _of_fastapi(error: RequestValidationError, scope: Scope) -> RequestError:
     """What FastAPI refuses: a body, or a query, that is not as its endpoint declares it."""
     dependant = scope["route"].dependant
-    declared = (dependant.body_params or dependant.query_params)[0].field_info.annotation
+    model = (dependant.body_params or dependant.query_params)[0].field_info.annotation
     errors = [{**fault, "loc": _place(fault["loc"][1:], error.body)} for fault in error.errors()]
-    return refused(faults_of(errors, names_of(declared)), **_understood(error.body))
+    return refused(faults_of(errors, names_of(model)), **_understood(error.body))
 
 
 def _place(path: tuple[str | int, ...], body: Any) -> tuple[str | int, ...]:
@@ -319,9 +319,9 @@ def _place(path: tuple[str | int, ...], body: Any) -> tuple[str | int, ...]:
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:
     """What Starlette refuses: no such path, method or part of a file."""
     if error.status_code == 405:  # Starlette names the methods of one route of the path
-        allowed = scope["app"].state.methods.get(path_in(scope), "GET, HEAD")
-        detail = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
-        return RequestError(ProblemKind.METHOD_NOT_ALLOWED, detail, headers={"Allow": allowed})
+        methods = scope["app"].state.methods.get(path_in(scope), "GET, HEAD")
+        detail = f"{scope['method'][:20]} is not allowed here; allowed: {methods}"
+        return RequestError(ProblemKind.METHOD_NOT_ALLOWED, detail, headers={"Allow": methods})
     kinds = (ProblemKind.MALFORMED_BODY, ProblemKind.NOT_FOUND, ProblemKind.RANGE_NOT_SATISFIABLE)
     kind = next((one for one in kinds if one.status == error.status_code), ProblemKind.UNEXPECTED)
     detail = _no_such_path(scope) if kind is ProblemKind.NOT_FOUND else error.detail

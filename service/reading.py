@@ -260,8 +260,8 @@ class DirectRoute(APIRoute):
     def get_route_handler(self) -> Handler:
         """Take the place of FastAPI's handler."""
         in_body = bool(self.dependant.body_params)
-        declared = (self.dependant.body_params or self.dependant.query_params)[0]
-        model: Any = declared.field_info.annotation
+        parameter = (self.dependant.body_params or self.dependant.query_params)[0]
+        model: Any = parameter.field_info.annotation
         answer: Any = self.endpoint
 
         async def of_body(request: Request) -> Response:

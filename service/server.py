@@ -87,8 +87,8 @@ class Connection(HttpToolsProtocol):
     _in_head = _second = False
     _refusal: RequestError | None = None
 
-    def __init__(self, *arguments: Any, **named: Any) -> None:
-        super().__init__(*arguments, **named)
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
         self._settings = self.app_state["settings"]
         self._observer: Observer = self.app_state["observer"]
         self.headers, self.url = [], b""
@@ -143,7 +143,7 @@ class Connection(HttpToolsProtocol):
         path = self.url.partition(b"?")[0][:_MOST_SHOWN].decode("latin-1")
         scope: Any = {**self.scope, "path": path, "method": method}
         self._observer.name(scope)
-        self._observer.answered(scope, status, self.loop.time() - self._begun)
+        self._observer.record(scope, status, self.loop.time() - self._begun)
         return scope
 
     def abort(self) -> None:

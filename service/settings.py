@@ -178,11 +178,11 @@ class Settings(BaseSettings):
         }
 
 
-def load_settings(**chosen: Any) -> Settings:
-    """The settings of the environment; ``chosen`` wins.  SettingsError names all that is bad, in
+def load_settings(**overrides: Any) -> Settings:
+    """The settings of the environment; ``overrides`` win.  SettingsError names all that is bad, in
     one line."""
     try:
-        return Settings(**chosen)
+        return Settings(**overrides)
     except ValidationError as error:
         lines: dict[str, str] = {}
         for problem in error.errors(include_url=False):

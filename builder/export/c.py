@@ -57,12 +57,12 @@ def header_text(table: Table) -> str:
 def files(table: Table) -> dict[str, str]:
     """The texts of ``mumacro.h``, ``mumacro.c`` and ``mumacro_table.c``; the first two are the same
     for all tables."""
-    included: set[str] = set()
+    file_names: set[str] = set()
     return {
         "mumacro.h": _BANNER.format("What mumacro.c defines") + _file("mumacro.h"),
         "mumacro.c": _BANNER.format("The evaluation")
         + '#include "mumacro.h"\n\n'
-        + join_includes("kernel.c", included)
+        + join_includes("kernel.c", file_names)
         + _DECLARATION
         + _file("interface.c"),
         "mumacro_table.c": _BANNER.format("The table")
@@ -101,16 +101,16 @@ def write_c(table: Table, out: Path) -> list[Path]:
     return list(texts)
 
 
-def join_includes(name: str, included: set[str]) -> str:
+def join_includes(name: str, file_names: set[str]) -> str:
     """A file of the kernel with those that it includes, each once."""
-    included.add(name)
+    file_names.add(name)
     lines = []
     for line in _file(name).splitlines(keepends=True):
         match = re.fullmatch(r'#include "(.+)"\n', line)
         if match is None:
             lines.append(line)
-        elif match[1] not in included:
-            lines.append("\n" + join_includes(match[1], included))
+        elif match[1] not in file_names:
+            lines.append("\n" + join_includes(match[1], file_names))
     return "".join(lines)
 
 

@@ -85,7 +85,7 @@ def error_estimate(mu: float, deficit: float) -> float:
 def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
     """Continuous orbit over sigma in [-pi/2, pi/2], eq. (11); ``w`` and ``out`` as in
     :func:`.slip.slip`; a status."""
-    th, half, done = math.atan(v * y / (1.0 + v * v)), 0.5 * math.pi, False
+    th, half, is_last = math.atan(v * y / (1.0 + v * v)), 0.5 * math.pi, False
     for _ in range(60):
         chart = 1 if th > 0.75 else 0
         x = th - chart * half
@@ -96,7 +96,7 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
         # residual th_end + th_start, formed in the mirrored chart so that small angles keep their
         # digits
         res = rechart(x_end, chart_end, -chart) + x
-        if done:
+        if is_last:
             return OK
         step = res / (1.0 + math.exp(-out[slip_phase.PATH]))
         th -= step
@@ -104,7 +104,7 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
         if abs(step) < 1e-8 * scale or (
             out[slip_phase.PATH] > slip_phase.FORGOTTEN and abs(step) < 0.05
         ):
-            done = True
+            is_last = True
         if out[slip_phase.PATH] > slip_phase.FORGOTTEN:
             # the initial state decays within half a period: one more pass starts on the orbit
             th = -(x_end + chart_end * half)

@@ -129,7 +129,7 @@ def build_table(
     out: Path,
     tolerance: float,
     sweep: Sweep,
-    progress: Progress = lambda _text, _done: None,
+    progress: Progress = lambda _stage, _is_finished: None,
 ) -> Surrogate:
     """Build the table for ``tolerance`` (largest absolute error of mu~), verify it and write it to
     ``out``.
@@ -276,7 +276,7 @@ def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> li
             slopes = np.zeros(2)
             if name in largest.cells:
                 errors = CELL_SAFETY * largest.cells[name]
-                if name not in contact.sloped:
+                if name not in contact.slope_names:
                     # they bound values: a rough quadrature can make the finer interpolant worse
                     # than the table, and some points of cells are in another block
                     errors[:, 0] = np.minimum(errors[:, 0], SAFETY * value)
@@ -291,7 +291,7 @@ def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> li
 
 def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:
     """The attributes of a contact that state what a report of :func:`.verify.verify` found."""
-    spread = report["distribution"]
+    distribution = report["distribution"]
     # few and flat: each attribute costs about a hundred bytes, and HDF5 keeps more than eight of a
     # group in a structure of its own, of several kilobytes
     return {
@@ -299,12 +299,12 @@ def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:
         "verified_max_rel_error": report["max_rel_error"],
         "verified_points": np.int32(report["points"]),
         "verified_quantiles": np.array(QUANTILES),
-        "verified_quantities": " ".join(spread),
+        "verified_quantities": " ".join(distribution),
         "verified_error_quantiles": np.concatenate(
-            [part["error_quantiles"] for part in spread.values()]
+            [part["error_quantiles"] for part in distribution.values()]
         ),
         "verified_bound_over_error": np.concatenate(
-            [part["bound_over_error"] for part in spread.values()]
+            [part["bound_over_error"] for part in distribution.values()]
         ),
     }
 

@@ -53,9 +53,9 @@ class SolvedContact(NamedTuple):
     solve: Solve
     noise: Noise
     #: the part of it that bounds allow for beside the errors that a table states
-    allowed: Noise
+    noise_in_bounds: Noise
     #: quantities whose slopes a table gives
-    sloped: tuple[str, ...]
+    slope_names: tuple[str, ...]
     #: whether it is integrated over springs: the error of a quadrature is no rounding of the nodes,
     #: and its mu~ has its digits in 1 - mu~ where it is next to 1
     quadrature: bool
@@ -138,8 +138,8 @@ def spring(sweep: Sweep) -> SolvedContact:
         SPRING,
         solve,
         noise=solver_noise,
-        allowed=solver_noise,
-        sloped=atlas.QUANTITY_NAMES,
+        noise_in_bounds=solver_noise,
+        slope_names=atlas.QUANTITY_NAMES,
         quadrature=False,
         least_tolerance=FINE,
         border=sweep,
@@ -160,8 +160,8 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> SolvedC
         BALL,
         solve,
         noise=_ball_noise,
-        allowed=_no_noise,
-        sloped=("mu_ratio",),
+        noise_in_bounds=_no_noise,
+        slope_names=("mu_ratio",),
         quadrature=True,
         least_tolerance=BALL_TOLERANCE,
     )

@@ -137,7 +137,7 @@ def _value_errors(
         # what the bound allows anyway: half of rounding, and what the border's error does, of which
         # it states twice
         noise = (
-            contact.allowed(name, v, y, solution, chart.regime == CONTINUOUS)
+            contact.noise_in_bounds(name, v, y, solution, chart.regime == CONTINUOUS)
             + beside
             - 0.5 * rounding
         )
@@ -272,7 +272,7 @@ def cell_errors(
             for coefficients in _truths(contact, exact[name], noise[name]):
                 largest = _largest(contact, index, block, name, coefficients)
                 errors[name] = np.maximum(errors.get(name, 0.0), largest)
-            if name not in contact.sloped:
+            if name not in contact.slope_names:
                 errors[name][:, 1:] = 0.0
     return errors
 

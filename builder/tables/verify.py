@@ -114,7 +114,7 @@ class Neighbours:
         return slope, noise
 
 
-class _Compared(NamedTuple):
+class _Comparison(NamedTuple):
     """Errors, which are beyond the solver's own for all but mu~, the same relative to the value,
     bounds, bounds over errors, sources.
 
@@ -126,12 +126,12 @@ class _Compared(NamedTuple):
     relative: Array
     bound: Array
     over: Array
-    missed: NDArray[np.bool_]
+    misses: NDArray[np.bool_]
     source: NDArray[np.int8]
 
 
 def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
-    """What :class:`_Compared` has as ``over``."""
+    """What :class:`_Comparison` has as ``over``."""
     with np.errstate(all="ignore"):
         return np.where(difference > noise, (bound + noise) / difference, np.nan)
 
@@ -143,7 +143,7 @@ def _values(
     v: Array,
     y: Array,
     solution: dict[str, Array],
-) -> _Compared:
+) -> _Comparison:
     value, bound, source = contact.quantity(surrogate, name, v, y)
     truth = solution[name]
     noise = contact.noise(name, v, y, solution, REGIME_OF_SOURCE[source] == CONTINUOUS)
@@ -152,12 +152,12 @@ def _values(
     if name != "mu_ratio":
         error = np.maximum(error - noise, 0.0)
     scale = np.where(truth == 0.0, 1.0, truth)
-    return _Compared(error, error / scale, bound, over, misses, source)
+    return _Comparison(error, error / scale, bound, over, misses, source)
 
 
 def _slopes(
     surrogate: Surrogate, contact: SolvedContact, around: Neighbours, name: str
-) -> _Compared:
+) -> _Comparison:
     """The logarithmic slopes, both of each point."""
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
     source = contact.quantity(surrogate, "mu_ratio", v, y)[2]
@@ -169,22 +169,22 @@ def _slopes(
     if not QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border:
         keep = np.abs(v / around.crit - 1.0) > BESIDE_BORDER
     off, bound, over = (x[:, keep].ravel() for x in (off, bound, over))
-    return _Compared(off, off, bound, over, off > bound, np.tile(source[keep], 2))
+    return _Comparison(off, off, bound, over, off > bound, np.tile(source[keep], 2))
 
 
-def _summary(comparison: _Compared, at: Any = slice(None)) -> dict[str, Any]:
+def _summary(comparison: _Comparison, at: Any = slice(None)) -> dict[str, Any]:
     return {
         "points": int(comparison.error[at].size),
         "max_abs_error": float(comparison.error[at].max()),
         "max_rel_error": float(comparison.relative[at].max()),
         "max_bound": float(comparison.bound[at].max()),
-        "not_covered": int(np.count_nonzero(comparison.missed[at])),
+        "not_covered": int(np.count_nonzero(comparison.misses[at])),
     }
 
 
-def _report(parts: list[_Compared]) -> dict[str, Any]:
+def _report(parts: list[_Comparison]) -> dict[str, Any]:
     """All together, and by source."""
-    whole = _Compared(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    whole = _Comparison(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     names = sorted((SOURCES[code], code) for code in np.unique(whole.source))
     return {
         **_summary(whole),
@@ -205,7 +205,7 @@ def distribution(error: Array, over: Array) -> dict[str, list[float]]:
 
 
 def _distributions(
-    values: dict[str, list[_Compared]], slopes: list[_Compared], border: _Compared | None
+    values: dict[str, list[_Comparison]], slopes: list[_Comparison], border: _Comparison | None
 ) -> dict[str, dict[str, list[float]]]:
     """By quantity, then of the slopes of mu~ along ln v~ and ln y~, and of v~crit, relative."""
     columns = {}
@@ -223,7 +223,7 @@ def _distributions(
     return {name: distribution(error, over) for name, (error, over) in columns.items()}
 
 
-def _border_compared(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Compared:
+def _border_comparison(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Comparison:
     """Errors of v~crit, all relative."""
     error = border_errors(surrogate.border, sweep, rng, BORDER_POINTS)
     bound, noise = (
@@ -231,7 +231,7 @@ def _border_compared(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generato
         np.full_like(error, SOLVER_NOISE),
     )
     off = np.maximum(error - noise, 0.0)
-    return _Compared(
+    return _Comparison(
         off,
         off,
         bound,
@@ -284,10 +284,10 @@ def verify(
     border = None
     if contact.border is not None:
         rng = np.random.default_rng([seed, len(cases)])
-        border = _border_compared(surrogate, contact.border, rng)
-    sloped = [name for name in names if name in contact.sloped]
-    values: dict[str, list[_Compared]] = {name: [] for name in names}
-    slopes: dict[str, list[_Compared]] = {name: [] for name in sloped}
+        border = _border_comparison(surrogate, contact.border, rng)
+    slope_names = [name for name in names if name in contact.slope_names]
+    values: dict[str, list[_Comparison]] = {name: [] for name in names}
+    slopes: dict[str, list[_Comparison]] = {name: [] for name in slope_names}
     for i, (share, draw) in enumerate(cases.values()):
         v, y = draw(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
         v, y = contact.as_asked(v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)])
@@ -295,7 +295,7 @@ def verify(
         around = Neighbours(surrogate, contact, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
         for name in names:
             values[name].append(_values(surrogate, contact, name, v, y, solution))
-        for name in sloped:
+        for name in slope_names:
             slopes[name].append(_slopes(surrogate, contact, around, name))
     return {
         **_report(values["mu_ratio"]),

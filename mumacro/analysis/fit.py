@@ -104,7 +104,7 @@ class _Minimum(NamedTuple):
 class _Problem(Measured):
     """The search for the unknowns at which the model fits the points best."""
 
-    def _profile(self, allowed: Callable[[float], float]) -> Profile:
+    def _profile(self, limit_of: Callable[[float], float]) -> Profile:
         """Over k, over mu0 of a known k, or over k/mu0 with the best mu0; the last place of k is
         rigid."""
         has_factor = len(self.unknowns) == 2
@@ -122,7 +122,7 @@ class _Problem(Measured):
         nodes = int(np.clip((high - low) / math.log(10.0) * _PER_DECADE, 16, _MOST_NODES))
         s = np.linspace(low, high, nodes)
         rigid = [math.inf] if along == "k" else []
-        return Profile(model, self.weight * self.mu, has_factor, np.append(s, rigid), allowed)
+        return Profile(model, self.weight * self.mu, has_factor, np.append(s, rigid), limit_of)
 
     def _ends_of_mu0(self) -> tuple[float, float]:
         """Logarithms of a small and a large mu0, for a known k."""

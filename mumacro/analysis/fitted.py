@@ -218,11 +218,11 @@ class Fit:
         """Points ``here``, and the fit over the values ``fine`` of an input beside the others."""
         mu, deviation = self.predict(**{along: fine}, **others)
         bars = self.points[STD][here] if STD in self.points else None
-        x, measured, residuals = (
+        x, friction, residuals = (
             column[here] for column in (self.points[along], self.points["mu_macro"], self.residuals)
         )
         band = self._width() * deviation
-        return plotting.Curve(label, x, measured, bars, residuals, fine, mu, band)
+        return plotting.Curve(label, x, friction, bars, residuals, fine, mu, band)
 
     def _title(self) -> str:
         return f"{', '.join(self._value_texts())}; {self.contact}, {self.direction}"
@@ -260,8 +260,8 @@ class Fit:
 
     def to_frame(self) -> Any:
         """The points as a DataFrame of pandas, with mu_macro of the fit and the residuals."""
-        fitted = self.points["mu_macro"] - self.residuals
-        return frame_of({**self.points, "fitted": fitted, "residual": self.residuals})
+        friction = self.points["mu_macro"] - self.residuals
+        return frame_of({**self.points, "fitted": friction, "residual": self.residuals})
 
 
 def _fine(x: Array) -> Array:

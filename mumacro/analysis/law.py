@@ -220,8 +220,8 @@ def law(
     if along not in QUANTITY_OF:
         raise InputError("along", along, f"one of {', '.join(NAMES)}, {AMPLITUDE}")
     if values is None:
-        ends_given = (_end(along, "start", start), _end(along, "stop", stop))
-        axis = sweep_values(along, *ends_given, points, scale)
+        range_ends = (_end(along, "start", start), _end(along, "stop", stop))
+        axis = sweep_values(along, *range_ends, points, scale)
     elif start is None and stop is None:
         axis = _ascending(along, values)
     else:
@@ -230,22 +230,22 @@ def law(
     kind, x = kind_of(contact, direction), per * axis
     middle_case, ends = without_interval(case, name)
     middle_case, stiffening = stiffening_of(middle_case, name, kind, stiffness_exponent)
-    fixed = fixed_inputs(middle_case, along, kind)
-    curve = InputCurve(surrogate, fixed, name, kind, stiffening)
+    inputs = fixed_inputs(middle_case, along, kind)
+    curve = InputCurve(surrogate, inputs, name, kind, stiffening)
     ends_of_range = float(x[0]), float(x[-1])
     border = border_crossings(
-        surrogate, name, fixed, *ends_of_range, **kind.names, stiffening=stiffening
+        surrogate, name, inputs, *ends_of_range, **kind.names, stiffening=stiffening
     )
     if refine:
         x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
         axis = x / per
     answer = curve.answer(x, groups=True, strict=True)
     if ends:
-        interval = {**{name: value for name, value in fixed.items() if name != "k"}, **ends}
+        interval = {**{name: value for name, value in inputs.items() if name != "k"}, **ends}
         band_curve = InputCurve(surrogate, interval, name, kind, stiffening)
         answer = band_curve.answer(x, groups=True, strict=True)
     at_rest = curve.answer(x, v0=0.0) if name != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
     k_range = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
     marks = tuple(replace(crossing, value=crossing.value / per) for crossing in border)
-    return Law(along, axis, answer, mu_static, marks, fixed, kind, curve.stiffening, k_range)
+    return Law(along, axis, answer, mu_static, marks, inputs, kind, curve.stiffening, k_range)

@@ -70,10 +70,10 @@ class Profile:
         measured: Array,
         has_factor: bool,
         s: Array,
-        allowed: Callable[[float], float],
+        limit_of: Callable[[float], float],
     ) -> None:
         self._model, self._measured, self._has_factor = model, measured, has_factor
-        self._allowed = allowed
+        self._limit_of = limit_of
         self.at = self.samples(s)
         self._refine()
         self._insert(self._minima())
@@ -82,7 +82,7 @@ class Profile:
     @property
     def limit(self) -> float:
         """The chi2 up to which a contact is allowed."""
-        return self._allowed(float(self.at.chi2.min()))
+        return self._limit_of(float(self.at.chi2.min()))
 
     def samples(self, s: Array, slopes: bool = True) -> Samples:
         """The curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""

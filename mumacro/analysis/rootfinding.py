@@ -98,10 +98,12 @@ class Branch:
                 )
                 x[i] = np.where(accepted, proposal, _middle(a[i], b[i]))
                 last[i] = np.where(accepted, step, np.log(x[i] / trial))
-            met = steep & (np.abs(f) <= 2.0 * _ROUNDING * np.abs(level[i]))
-            closed = np.nextafter(a[i], np.inf) >= b[i]
-            roots[i] = np.where(met, trial, np.where(np.abs(fa[i]) < np.abs(fb[i]), a[i], b[i]))
-            i = i[~(met | closed)]
+            at_level = steep & (np.abs(f) <= 2.0 * _ROUNDING * np.abs(level[i]))
+            at_neighbours = np.nextafter(a[i], np.inf) >= b[i]
+            roots[i] = np.where(
+                at_level, trial, np.where(np.abs(fa[i]) < np.abs(fb[i]), a[i], b[i])
+            )
+            i = i[~(at_level | at_neighbours)]
         return roots
 
 

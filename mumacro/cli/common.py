@@ -330,15 +330,15 @@ def _faults_of_names(
     case: Mapping[str, Any], kind: Kind, without: Sequence[str], whole: bool
 ) -> list[str]:
     frequencies = {"f", "omega"}
-    excluded = {*without} | (frequencies if frequencies & {*without} else set())
+    unknowns = {*without} | (frequencies if frequencies & {*without} else set())
     faults = [
         f"leave {name} out of the case: this command varies or computes it"
         for name in case
-        if name in excluded
+        if name in unknowns
     ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
-    complete = case.keys() | excluded | (frequencies if frequencies & case.keys() else set())
+    complete = case.keys() | unknowns | (frequencies if frequencies & case.keys() else set())
     hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
     absent = [
         hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in complete
@@ -464,13 +464,13 @@ def number_of(name: str, advice: str = "") -> Callable[[str], float]:
     return number
 
 
-def read_values(pairs: Iterable[tuple[str, str]], read: Callable[[str, str], Any]) -> list[Any]:
+def read_values(pairs: Iterable[tuple[str, str]], reader: Callable[[str, str], Any]) -> list[Any]:
     """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
     are none."""
     values, faults = [], []
     for name, text in pairs:
         try:
-            values.append(read(name, text))
+            values.append(reader(name, text))
         except InputError as error:
             faults.append(str(error))
     if faults:
@@ -501,11 +501,11 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
     """Rows of cells as text in columns."""
     columns = list(zip_longest(*rows, fillvalue=""))
     widths = [max(map(len, column)) for column in columns]
-    padded = (
+    cells_of_rows = (
         [cell.ljust(width) for cell in column]
         for column, width in zip(columns, widths, strict=True)
     )
-    return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
+    return "\n".join("  ".join(row).rstrip() for row in zip(*cells_of_rows, strict=True))
 
 
 def model_lines(rows: Sequence[Row]) -> list[str]:

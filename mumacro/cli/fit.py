@@ -111,12 +111,12 @@ def run(words: Sequence[str]) -> str:
     return _text(result, options.digits)
 
 
-def _text(result: Fit, shown: int | None) -> str:
+def _text(result: Fit, digit_count: int | None) -> str:
     """Values with standard deviations and intervals, the scatter, other solutions, warnings."""
     rows: list[Sequence[str]] = []
     for name, value in result.values.items():
         off, (low, high) = result.std[name], result.interval[name]
-        form = f".{shown or digits(off / value if 0.0 < value < math.inf else 0.0)}g"
+        form = f".{digit_count or digits(off / value if 0.0 < value < math.inf else 0.0)}g"
         number = "rigid" if math.isinf(value) else f"{value:{form}}"
         rows.append(
             (

@@ -100,9 +100,9 @@ def run(words: Sequence[str]) -> str:
     between = [(unknown, text) for text in options.between or ()]
     ends = common.read_values(between, read_one)
     surrogate = open_table(options.table)
-    fixed = {"stiffness_exponent": options.stiffness_exponent, **kind.names, **case}
+    others = {"stiffness_exponent": options.stiffness_exponent, **kind.names, **case}
     solution = solve_for(
-        surrogate, unknown, target, within=(ends[0], ends[1]) if ends else None, **fixed
+        surrogate, unknown, target, within=(ends[0], ends[1]) if ends else None, **others
     )
     solutions = _solutions_by_k(solution, case)
     rows = [(k, root) for k, one in solutions.items() for root in one.roots[0]]
@@ -126,7 +126,7 @@ def run(words: Sequence[str]) -> str:
         low, high = ends or _around([root.value for _, root in rows])
 
         def draw(axes: Any) -> Any:
-            law = _law_over(surrogate, unknown, low, high, fixed)
+            law = _law_over(surrogate, unknown, low, high, others)
             return law.plot(axes, roots=[root.value for _, root in rows], target=target)
 
         return common.write_result(options.out, columns, draw)
@@ -168,7 +168,7 @@ def _heads(unknown: str, k: str | None) -> list[str]:
 
 
 def _law_over(
-    surrogate: Surrogate, unknown: str, low: float, high: float, fixed: Mapping[str, Any]
+    surrogate: Surrogate, unknown: str, low: float, high: float, others: Mapping[str, Any]
 ) -> Law:
     """The law over the unknown for a picture."""
     return friction_law(
@@ -179,7 +179,7 @@ def _law_over(
         points=CURVE,
         scale="log" if low > 0.0 else "linear",
         refine=True,
-        **fixed,
+        **others,
     )
 
 

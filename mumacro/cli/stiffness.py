@@ -10,8 +10,8 @@ from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_o
 
 def _example(geometry: str) -> str:
     """A command that answers."""
-    required = (*GEOMETRIES[geometry].arguments, *BODIES[:2])
-    options = (f"--{name} {ARGUMENTS[name].example}" for name in required)
+    names = (*GEOMETRIES[geometry].arguments, *BODIES[:2])
+    options = (f"--{name} {ARGUMENTS[name].example}" for name in names)
     return " ".join(("mumacro stiffness", geometry, *options))
 
 
@@ -36,10 +36,13 @@ def run(words: Sequence[str]) -> str:
             epilog=f"example:\n  {_example(name)}",
         )
         for argument in (*geometry.arguments, *BODIES):
-            about, needed = ARGUMENTS[argument], argument in (*geometry.arguments, *BODIES[:2])
+            about, is_required = ARGUMENTS[argument], argument in (*geometry.arguments, *BODIES[:2])
             unit, choices = f" [{about.unit}]" if about.unit else "", about.choices or None
             part.add_argument(
-                f"--{argument}", required=needed, choices=choices, help=f"{about.meaning}{unit}"
+                f"--{argument}",
+                required=is_required,
+                choices=choices,
+                help=f"{about.meaning}{unit}",
             )
         common.add_form(part)
     options = parser.parse_args(words)

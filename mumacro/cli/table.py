@@ -48,13 +48,15 @@ def run(words: Sequence[str]) -> str:
 
 def _errors(surrogate: Surrogate) -> Iterator[str]:
     """How the verified errors are distributed, as text; nothing for a table without that."""
-    spread = surrogate.error_distribution
-    if spread:
+    distribution = surrogate.error_distribution
+    if distribution:
         heads = [
-            f"{100.0 * float(x):g} %" if x[0].isdigit() else x for x in next(iter(spread.values()))
+            f"{100.0 * float(x):g} %" if x[0].isdigit() else x
+            for x in next(iter(distribution.values()))
         ]
         rows = [
-            (name, *(f"{value:.2g}" for value in part.values())) for name, part in spread.items()
+            (name, *(f"{value:.2g}" for value in part.values()))
+            for name, part in distribution.items()
         ]
         text = (
             "Errors that a share of the verified points does not exceed; then how many\n"

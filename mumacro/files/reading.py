@@ -44,9 +44,9 @@ LONGEST = 64 * 2**20  # bytes of a line, at most
 def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:
     """The format by a name's ending, empty for another ending, and whether it is compressed."""
     name = path.name.lower()
-    compressed = name.endswith(".gz")
+    is_compressed = name.endswith(".gz")
     file_format = formats.get(ending_of(path), "")
-    return "" if compressed and file_format == "parquet" else file_format, compressed
+    return "" if is_compressed and file_format == "parquet" else file_format, is_compressed
 
 
 def ending_of(path: Path) -> str:
@@ -215,11 +215,11 @@ class NdjsonSource:
         """The blocks of a file, of the columns ``names``."""
         path, at = self.files[file], 0
 
-        def seen(place: int) -> None:
+        def report_place(place: int) -> None:
             nonlocal at
             at = place
 
-        size, lines = max(path.stat().st_size, 1), _lines(path, seen)
+        size, lines = max(path.stat().st_size, 1), _lines(path, report_place)
         while some := [*islice(lines, ROWS)]:
             numbers, texts = zip(*some, strict=True)
             objects, faults = zip(*map(_object, texts), strict=True)
@@ -242,12 +242,12 @@ class NdjsonSource:
 
 
 def _lines(
-    path: Path, seen: Callable[[int], None] = lambda _at: None
+    path: Path, report_place: Callable[[int], None] = lambda _at: None
 ) -> Iterator[tuple[int, bytes]]:
     """The lines of a file that are not empty, and their numbers."""
     rest, number = b"", 0
     try:
-        for piece in chain(file_pieces(path, seen), [b"\n"]):
+        for piece in chain(file_pieces(path, report_place), [b"\n"]):
             *lines, rest = (rest + piece).split(b"\n")
             for line in lines:
                 number += 1

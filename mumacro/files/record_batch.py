@@ -40,7 +40,7 @@ REJECTS = pa.schema(
 )
 
 
-def added_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
+def answer_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
     """The Arrow fields of the columns that :func:`answer` adds."""
     words = pa.dictionary(pa.int8(), pa.string())
     return [
@@ -101,30 +101,30 @@ def answer(
     """
     columns = find_columns(batch.schema.names, rigid, include, kind_of(contact, direction))
     result = answer_columns(batch, surrogate or Surrogate.open(), columns)
-    schema = pa.schema([*batch.schema, *added_fields(columns.added)], batch.schema.metadata)
-    answers = pa.RecordBatch.from_arrays([*batch.columns, *result.added], schema=schema)
+    schema = pa.schema([*batch.schema, *answer_fields(columns.answer_names)], batch.schema.metadata)
+    answers = pa.RecordBatch.from_arrays([*batch.columns, *result.columns], schema=schema)
     return answers, pa.RecordBatch.from_pylist(
         [dict(zip(REJECTS.names, row, strict=True)) for row in result.rejects], REJECTS
     )
 
 
 class Columns(NamedTuple):
-    """Which columns of a table of cases mean what, and what is added to them."""
+    """Which columns of a table of cases mean what, and what answers are written beside them."""
 
     #: by input, or ``std_k`` and so on: the heading, and the scale of its unit
     headings: dict[str, tuple[str, Scale]]
     words: dict[str, str]  #: heading of the column of contacts, of directions
     kind: Kind  #: of all cases, where there is no column of it
     include: tuple[str, ...]
-    added: list[str]  #: names of the columns that are added
+    answer_names: list[str]  #: names of the columns with answers
 
 
-class Answered(NamedTuple):
+class AnswerColumns(NamedTuple):
     """What :func:`answer_columns` gives."""
 
-    added: list[pa.Array]
+    columns: list[pa.Array]
     rejects: list[tuple[int, str, str | None, str]]  #: rows of ``REJECTS``
-    own: dict[str, Array]  #: the inputs in the units of the table, by heading
+    inputs: dict[str, Array]  #: the inputs in the units of the table, by heading
     remarks: list[Remark]
 
 
@@ -135,7 +135,7 @@ def find_columns(
     kind: Kind = SPRING,
     where: str = "",
 ) -> Columns:
-    """What the columns of these names mean, and the names of those that are added.
+    """What the columns of these names mean, and the names of those with answers.
 
     FilesError names, after ``where``, all columns that stand twice in the heading, would be written
     twice, have an unknown unit, or are missing; for a missing one it lists the columns of the file,
@@ -167,26 +167,28 @@ def find_columns(
         faults.append(f"there are both k and {end[0]}; leave one out")
     ends = ENDS if heads.keys() & {*ENDS} else () if rigid else ("k",)
     fields = ALL_FIELDS if "direction" in words else kind.fields
-    required = [name for field in fields for name in (ends if field == "k" else (field,))]
+    necessary = [name for field in fields for name in (ends if field == "k" else (field,))]
     if "direction" in words:  # each case has one of both amplitudes
         spare = {"y0", AMPLITUDE} - heads.keys()
-        required = [name for name in required if name not in spare or spare == {"y0", AMPLITUDE}]
+        necessary = [name for name in necessary if name not in spare or spare == {"y0", AMPLITUDE}]
     faults += _absent(
-        [name for name in required if name not in heads and (name != "omega" or "f" not in heads)],
+        [name for name in necessary if name not in heads and (name != "omega" or "f" not in heads)],
         names,
     )
     deviations = any(column in heads for column in DEVIATIONS)
     output_names = {*names_in(include)} | ({"std"} if deviations else set())
     outputs = [output for name, output in OUTPUTS.items() if name in output_names]
     band = BAND if ends == ENDS else ()
-    added = [DEFAULT[0], *band, *DEFAULT[1:], *paths_of(outputs, fields)]
+    answer_names = [DEFAULT[0], *band, *DEFAULT[1:], *paths_of(outputs, fields)]
     faults += [
-        f"the column {name!r} would be written twice; rename it" for name in added if name in names
+        f"the column {name!r} would be written twice; rename it"
+        for name in answer_names
+        if name in names
     ]
     if faults:
         raise FilesError(where + "; ".join(faults))
     headings = {name: (names[heads[name][0]], heads[name][1]) for name in like if name in heads}
-    return Columns(headings, words, kind, tuple(include), added)
+    return Columns(headings, words, kind, tuple(include), answer_names)
 
 
 def names_of_columns(rigid: bool = False) -> ColumnNames:
@@ -214,7 +216,7 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
 
 def answer_columns(
     batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs | None = None
-) -> Answered:
+) -> AnswerColumns:
     """The answers to a batch; ``signs`` are those of numbers as text."""
     by_heading: dict[str, Array] = {}
     values: dict[str, Any] = {} if {"k", *ENDS} & columns.headings.keys() else {"k": math.inf}
@@ -227,27 +229,29 @@ def answer_columns(
     values |= {name: _words(batch.column(heading)) for name, heading in columns.words.items()}
     cases = Cases.of(values)
     result = surrogate.answer(cases, chosen(columns.include, cases))
-    rejected = result.source_code < 0
-    mask = rejected if rejected.any() else None
-    source_code = np.where(rejected, 0, result.source_code).astype(np.int8)
+    is_rejected = result.source_code < 0
+    mask = is_rejected if is_rejected.any() else None
+    source_code = np.where(is_rejected, 0, result.source_code).astype(np.int8)
     arrays = {
         "regime": _dictionary(REGIME_OF_SOURCE[source_code], REGIMES, mask),
         "source": _dictionary(source_code, SOURCES, mask),
     }
-    for path in columns.added:
+    for path in columns.answer_names:
         if path not in TEXTS:
             column = result[path]
             # what there is not is null
             absent = np.isnan(column) if path in result.outputs else mask
             arrays[path] = pa.array(column, mask=absent)
     rejects = []
-    for i in np.flatnonzero(rejected).tolist():
+    for i in np.flatnonzero(is_rejected).tolist():
         name, reason = _field_and_reason(cases.reason(i))
         heading = columns.words.get(name) or columns.headings[name][0]
         cell = batch.column(heading)[i].as_py()
         reason = faults.get(name, {}).get(i, reason)
         rejects.append((i, name, None if cell is None else str(cell), reason))
-    return Answered([arrays[path] for path in columns.added], rejects, by_heading, result.remarks)
+    return AnswerColumns(
+        [arrays[path] for path in columns.answer_names], rejects, by_heading, result.remarks
+    )
 
 
 def _words(column: pa.Array) -> Any:

@@ -15,8 +15,8 @@ from mumacro.files import reading
 from mumacro.files.errors import FilesError
 from mumacro.files.record_batch import (
     REJECTS,
-    added_fields,
     answer_columns,
+    answer_fields,
     find_columns,
     names_of_columns,
 )
@@ -127,7 +127,7 @@ class _Run:
         say: Callable[[str], None],
     ) -> None:
         self.files, input_format = reading.find_files(cases, say)
-        output_format, compressed = reading.format_of(out)
+        output_format, is_compressed = reading.format_of(out)
         if not output_format or out.is_dir():
             raise FilesError(f"{out}: must be the name of a file that ends in {reading.ENDINGS}")
         self.out, self.rejects = out, out.with_name(f"{out.name}.rejects.csv")
@@ -136,7 +136,7 @@ class _Run:
                 raise FilesError(
                     f"{output}: is an input, and would be overwritten; give another -o"
                 )
-        self.begun = [_state_of(path) for path in self.files]
+        self.states_at_start = [_state_of(path) for path in self.files]
         self.verbatim = input_format == output_format != "parquet"
         self.source: reading.ParquetSource | reading.TextSource | reading.NdjsonSource
         where = f"{self.files[0]}: "
@@ -157,7 +157,9 @@ class _Run:
             reading.ending_of(out), self.source.sep, self.source.decimal, dialect
         )
         input_headings = [heading for heading, _ in headings.values()]
-        self.output = Output(output_format, compressed, sep, decimal, headings.get("k", (None,))[0])
+        self.output = Output(
+            output_format, is_compressed, sep, decimal, headings.get("k", (None,))[0]
+        )
         if isinstance(self.source, reading.TextSource):
             self.source.write_with(sep)
             self.source.describe(say)
@@ -167,9 +169,12 @@ class _Run:
             else field
             for field in self.source.schema
         ]
-        needed = [*input_headings, *self.columns.words.values()]
-        self.columns_read = needed if self.verbatim else self.source.schema.names
-        fields = [*([] if self.verbatim else input_fields), *added_fields(self.columns.added)]
+        case_headings = [*input_headings, *self.columns.words.values()]
+        self.columns_read = case_headings if self.verbatim else self.source.schema.names
+        fields = [
+            *([] if self.verbatim else input_fields),
+            *answer_fields(self.columns.answer_names),
+        ]
         self.schema = pa.schema(fields, self.source.schema.metadata)
 
     def go(self, force: bool, progress: Callable[[float, int, int], None]) -> Summary:
@@ -226,7 +231,7 @@ class _Run:
         self._refuse_changed()
 
     def _refuse_changed(self) -> None:
-        for path, beginning in zip(self.files, self.begun, strict=True):
+        for path, beginning in zip(self.files, self.states_at_start, strict=True):
             if _state_of(path) != beginning:
                 raise FilesError(
                     f"{path}: changed while it was read; give the command again"
@@ -234,7 +239,7 @@ class _Run:
 
     def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
-        added, rejects, by_heading, remarks = answer_columns(
+        answers, rejects, by_heading, remarks = answer_columns(
             block.batch, self.surrogate, self.columns, block.signs
         )
         for remark in remarks:
@@ -248,13 +253,13 @@ class _Run:
             )
         ]
         batch, texts = (
-            pa.RecordBatch.from_arrays([*columns, *added], schema=self.schema),
+            pa.RecordBatch.from_arrays([*columns, *answers], schema=self.schema),
             block.texts,
         )
         if faults:
-            accepted = np.ones(len(batch), np.bool_)
-            accepted[[*faults]] = False
-            batch, texts = batch.filter(pa.array(accepted)), [*compress(texts, accepted)]
+            keep = np.ones(len(batch), np.bool_)
+            keep[[*faults]] = False
+            batch, texts = batch.filter(pa.array(keep)), [*compress(texts, keep)]
         file = [self.files[state.file]] * (len(self.files) > 1)
         reject_lines = csv_lines([*file, block.lines[i], *reason] for i, reason in faults.items())
         n, rejected = len(block.batch), state.rejected + len(faults)

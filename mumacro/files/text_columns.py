@@ -55,17 +55,17 @@ def _as_written_by_programs(text: pa.Array, name: str, signs: Signs) -> pa.Array
     small = pc.utf8_lower(text)
     text = pc.if_else(pc.is_in(small, pa.array(sorted(GAPS))), None, text)
     if signs.decimal == ",":
-        grouped = pc.match_substring_regex(text, _THOUSANDS % (r"\.", ","))
+        has_thousands = pc.match_substring_regex(text, _THOUSANDS % (r"\.", ","))
         if signs.thousands not in (None, "."):
-            grouped = pc.and_(grouped, False)
-        text = pc.if_else(grouped, pc.replace_substring(text, ".", ""), text)
+            has_thousands = pc.and_(has_thousands, False)
+        text = pc.if_else(has_thousands, pc.replace_substring(text, ".", ""), text)
         # a point that is left is no decimal point
         has_point = pc.match_substring(text, ".")
         with_point = pc.replace_substring(pc.replace_substring(text, ".", "?"), ",", ".")
         text = pc.if_else(has_point, pc.replace_substring(text, ".", "?"), with_point)
     elif signs.decimal == "." and signs.thousands in (None, ","):
-        grouped = pc.match_substring_regex(text, _THOUSANDS % (",", r"\."))
-        text = pc.if_else(grouped, pc.replace_substring(text, ",", ""), text)
+        has_thousands = pc.match_substring_regex(text, _THOUSANDS % (",", r"\."))
+        text = pc.if_else(has_thousands, pc.replace_substring(text, ",", ""), text)
     text = pc.replace_substring_regex(text, _FORTRAN, r"\1e\2")
     if name in ("k", "k_low", "k_high"):
         text = pc.if_else(pc.equal(small, RIGID), "rigid", text)

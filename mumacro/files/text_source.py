@@ -120,12 +120,12 @@ class TextTable:
         ``lines`` or ``cells``, too."""
         size, at = max(self.path.stat().st_size, 1), 0
 
-        def seen(place: int) -> None:
+        def report_place(place: int) -> None:
             nonlocal at
             at = place
 
         try:
-            pieces, dialect = source_of(self.path, self.dialect, seen)
+            pieces, dialect = source_of(self.path, self.dialect, report_place)
             text = Text(pieces, dialect.encoding)
             for piece in text:
                 if (before := self.layout.first - piece.first) > 0:
@@ -249,7 +249,7 @@ class _Lines:
 def _columns(text: str, sep: str, count: int, places: Sequence[int]) -> dict[int, pa.Array] | None:
     """The columns at some places of lines without quotes; None where a line has more or fewer
     cells than ``count``."""
-    data, needed = text.encode(), [str(i) for i in places if i < count]
+    data, names = text.encode(), [str(i) for i in places if i < count]
     try:
         table = pa.csv.read_csv(
             pa.BufferReader(data),
@@ -259,14 +259,14 @@ def _columns(text: str, sep: str, count: int, places: Sequence[int]) -> dict[int
             pa.csv.ParseOptions(delimiter=sep, quote_char=False, ignore_empty_lines=False),
             pa.csv.ConvertOptions(
                 check_utf8=False,
-                column_types=dict.fromkeys(needed, pa.string()),
+                column_types=dict.fromkeys(names, pa.string()),
                 strings_can_be_null=False,
-                include_columns=needed,
+                include_columns=names,
             ),
         )
     except pa.ArrowInvalid:
         return None
-    return {int(name): table.column(name).combine_chunks() for name in needed}
+    return {int(name): table.column(name).combine_chunks() for name in names}
 
 
 def _is_blank(column: pa.Array) -> bool:

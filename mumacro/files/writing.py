@@ -34,15 +34,15 @@ def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[s
 
 
 class Output(NamedTuple):
-    """How rows are written: ``text``, ``ndjson`` or ``parquet``; text ``compressed`` (.gz) piece by
-    piece.
+    """How rows are written: ``text``, ``ndjson`` or ``parquet``; text piece by piece,
+    ``is_compressed`` as .gz.
 
     ``sep`` and ``decimal`` are those of a table as text; in the column ``stiffness`` infinity is
     written as ``rigid``.
     """
 
     format: str
-    compressed: bool
+    is_compressed: bool
     sep: str
     decimal: str
     stiffness: str | None
@@ -51,7 +51,7 @@ class Output(NamedTuple):
         """A piece of text as it is in the file."""
         data = text.encode("utf-8", "surrogateescape")
         # without name and time, so that the same text gives the same bytes
-        return gzip.compress(data, 6, mtime=0) if self.compressed else data
+        return gzip.compress(data, 6, mtime=0) if self.is_compressed else data
 
     def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> Any:
         """Rows as they are written, for Parquet the batch itself; where ``texts`` has the unchanged

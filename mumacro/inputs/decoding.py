@@ -89,14 +89,16 @@ def encoding_of(name: str) -> str:
     return codec
 
 
-def file_pieces(path: Path, seen: Callable[[int], None] = lambda _at: None) -> Iterator[bytes]:
-    """The bytes of a file in pieces, also of a compressed one (.gz); ``seen`` is told how far the
-    file is read.  TextError where a compressed one is damaged."""
+def file_pieces(
+    path: Path, report_place: Callable[[int], None] = lambda _at: None
+) -> Iterator[bytes]:
+    """The bytes of a file in pieces, also of a compressed one (.gz); ``report_place`` is told how
+    far the file is read.  TextError where a compressed one is damaged."""
     try:
         with path.open("rb") as raw:
             stream: Any = gzip.GzipFile(fileobj=raw) if path.name.lower().endswith(".gz") else raw
             while data := stream.read(PIECE):
-                seen(raw.tell())
+                report_place(raw.tell())
                 yield data
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise TextError(f"the compressed file is damaged ({error})") from None
@@ -113,7 +115,7 @@ class Text:
     """
 
     def __init__(self, pieces: Iterable[bytes], encoding: str | None = None) -> None:
-        self._given = None if encoding is None else encoding_of(encoding)
+        self._codec_of_caller = None if encoding is None else encoding_of(encoding)
         self.encoding = ""  #: as Python calls it; known from the first piece on
         self._bytes = _with_start(pieces)
         self._lines = 0  # that are whole
@@ -175,20 +177,22 @@ class Text:
         for begin, what in _OTHERS:
             if data.startswith(begin):
                 raise TextError(f"it {what}")
-        marked = next((name for mark, name in _MARKS if data.startswith(mark)), None)
-        self.encoding = self._given or marked or _of_zeros(data[:_START]) or "utf-8"
-        if marked and self.encoding in (
-            marked.removesuffix("-sig"),
-            f"{marked}-le",
-            f"{marked}-be",
+        codec_of_mark = next((name for mark, name in _MARKS if data.startswith(mark)), None)
+        self.encoding = (
+            self._codec_of_caller or codec_of_mark or _of_zeros(data[:_START]) or "utf-8"
+        )
+        if codec_of_mark and self.encoding in (
+            codec_of_mark.removesuffix("-sig"),
+            f"{codec_of_mark}-le",
+            f"{codec_of_mark}-be",
         ):
-            self.encoding = marked
+            self.encoding = codec_of_mark
         return codecs.getincrementaldecoder(self.encoding)("strict")
 
     def _in_windows_1252(self, error: UnicodeDecodeError, final: bool) -> str:
         """The text of bytes that are not UTF-8, if they may be Windows-1252."""
         data = error.object
-        unknown = self._given is None and self.encoding == "utf-8"
+        unknown = self._codec_of_caller is None and self.encoding == "utf-8"
         if unknown and self._ascii and data[: error.start].isascii():
             self.encoding = "cp1252"
             self._decoder = codecs.getincrementaldecoder("cp1252")("strict")

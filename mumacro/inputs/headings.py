@@ -127,8 +127,8 @@ def unit_in_si(name: str) -> str:
 
 def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
     """The head that probably stands for an input, and the heading that it should have."""
-    for loosely, compared in ((False, heads), (True, heads[:_COMPARED])):
-        for head in compared:
+    for loosely, candidates in ((False, heads), (True, heads[:_COMPARED])):
+        for head in candidates:
             field = meant_by(head, loosely=loosely)
             if field and field in (name, {"omega": "f"}.get(name)):
                 column = f"{field} [{_unit_of(head, field) or unit_in_si(field)}]"

@@ -34,13 +34,13 @@ def tidy(text: str) -> str:
     text = text.replace("**", "^")
     if text.isascii():
         return " ".join(text.split())
-    raised, out = False, []
+    in_superscript, out = False, []
     for sign in text:
         if sign in _SUPERSCRIPTS:
-            out.append("" if raised else "^")
-            raised = True
+            out.append("" if in_superscript else "^")
+            in_superscript = True
         else:
-            raised = False
+            in_superscript = False
         out.append(_plain(sign))
     return " ".join("".join(out).translate(_SIGNS).split())
 

@@ -372,9 +372,9 @@ def _without_mask(value: Any) -> Any:
     else:
         return value
     gap, dtype = (math.nan, np.float64) if plain.dtype.kind in _REAL else (None, object)
-    filled = np.array(plain, dtype)
-    filled[mask] = gap
-    return filled if filled.ndim else filled.item()
+    array = np.array(plain, dtype)
+    array[mask] = gap
+    return array if array.ndim else array.item()
 
 
 def _other_number(name: str, value: Any) -> float:

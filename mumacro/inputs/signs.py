@@ -43,10 +43,10 @@ def evidence(cell: str) -> tuple[Decimal, bool]:
     other: Decimal = "," if sign == "." else "."
     if sign not in digits:
         return "", False
-    grouped = not match[2] and _GROUPED.fullmatch(digits)
+    has_thousands = not match[2] and _GROUPED.fullmatch(digits)
     if digits.count(sign) > 1:
-        return (other, True) if grouped else ("", False)
-    return sign, not grouped or other in digits or match[3] is not None
+        return (other, True) if has_thousands else ("", False)
+    return sign, not has_thousands or other in digits or match[3] is not None
 
 
 class Signs:
@@ -61,12 +61,11 @@ class Signs:
         self, decimal: str | None, thousands: str | None, sep: str = "", dashes: str = "--"
     ) -> None:
         self.decimal, self.thousands = decimal or "", thousands
-        self.given = bool(decimal)
         if not decimal and thousands in (".", ","):
-            self.decimal, self.given = "," if thousands == "." else ".", True
+            self.decimal = "," if thousands == "." else "."
         if self.decimal and self.decimal == thousands:
-            both = f"{dashes}decimal and {dashes}thousands"
-            raise TextError(f"{both} are both {thousands!r}; give one of them")
+            options = f"{dashes}decimal and {dashes}thousands"
+            raise TextError(f"{options} are both {thousands!r}; give one of them")
         self._sep, self._dashes = sep, dashes
         self.grouped = ""  #: the sign between thousands, once a number has shown it
         self._cells: dict[tuple[Decimal, bool], Cell] = {}
@@ -76,24 +75,24 @@ class Signs:
 
         TextError where they contradict each other, or may be read in two ways.
         """
-        seen = self._cells
+        cells_by_sign = self._cells
         for cell in cells:
             if "." in cell.text or "," in cell.text:
                 sign, sure = evidence(cell.text)
                 sure = sure or self.thousands is not None  # which is neither of the two here
                 if sign:
-                    seen.setdefault((sign, sure), cell)
+                    cells_by_sign.setdefault((sign, sure), cell)
         if not self.decimal:
-            surely = [sign for sign in (".", ",") if (sign, True) in seen]
+            surely = [sign for sign in (".", ",") if (sign, True) in cells_by_sign]
             if len(surely) == 2:
-                raise self._contradiction(seen[".", True], seen[",", True])
-            if not surely and self._sep == "," and (".", False) in seen:
+                raise self._contradiction(cells_by_sign[".", True], cells_by_sign[",", True])
+            if not surely and self._sep == "," and (".", False) in cells_by_sign:
                 surely = ["."]
-            if not surely and seen:
-                raise self._ambiguity(*seen.values())
+            if not surely and cells_by_sign:
+                raise self._ambiguity(*cells_by_sign.values())
             self.decimal = surely[0] if surely else ""
         other: Decimal = "," if self.decimal == "." else "."
-        if self.decimal and (other, False) in seen:
+        if self.decimal and (other, False) in cells_by_sign:
             self.grouped = other
 
     def _contradiction(self, point: Cell, comma: Cell) -> TextError:

@@ -80,7 +80,7 @@ class ColumnNames(NamedTuple):
     """The columns of a table that mean something."""
 
     like: Mapping[str, str]  #: by name, the input whose units it has
-    needed: Sequence[Sequence[str]]  #: of each, one name must be there
+    required_groups: Sequence[Sequence[str]]  #: of each, one name must be there
 
 
 class Layout(NamedTuple):
@@ -241,7 +241,9 @@ def _heads_in(
 ) -> Iterator[_Head]:
     """The lines that name all that is needed."""
     for i in range(skip, min(len(lines), _LOOKED_AT)):
-        names_all = all(any(name in lines[i] for name in names) for names in column_names.needed)
+        names_all = all(
+            any(name in lines[i] for name in names) for names in column_names.required_groups
+        )
         # of an odd number of quotes a cell goes on in the next line
         if not names_all and lines[i].count('"') % 2 == 0:
             continue
@@ -249,7 +251,7 @@ def _heads_in(
         for sep in seps:
             cells = _split(_uncommented(text), sep)
             there = {split_unit(heading(cell, column_names.like))[0] for cell in cells}
-            if all(there.intersection(names) for names in column_names.needed):
+            if all(there.intersection(names) for names in column_names.required_groups):
                 yield _Head(i, end, sep, cells)
 
 
@@ -407,7 +409,7 @@ def may_be_head(text: str, layout: Layout, column_names: ColumnNames) -> bool:
     """Whether a text has all names that a head needs, or begins another segment of LabVIEW."""
     if layout.labview and _END_OF_HEADER in text:
         return True
-    return all(any(name in text for name in names) for names in column_names.needed)
+    return all(any(name in text for name in names) for names in column_names.required_groups)
 
 
 def records(
@@ -450,7 +452,7 @@ def _repeats_head(line: int, text: str, layout: Layout, column_names: ColumnName
     names = [split_unit(head)[0] for head in heads]
     if text.startswith(_END_OF_HEADER):
         raise TextError(f"line {line} begins another segment: {_APART}")
-    if not all(any(name in names for name in group) for group in column_names.needed):
+    if not all(any(name in names for name in group) for group in column_names.required_groups):
         return False
     if names[: len(layout.heads)] == [split_unit(head)[0] for head in layout.heads]:
         return True
@@ -556,18 +558,18 @@ def _in_unit(values: Array, scale: Scale) -> Array:
 
 
 def source_of(
-    source: Path | bytes, dialect: Dialect, seen: Callable[[int], None] = lambda _at: None
+    source: Path | bytes, dialect: Dialect, report_place: Callable[[int], None] = lambda _at: None
 ) -> tuple[Iterator[bytes], Dialect]:
     """The pieces of a table's bytes, of a workbook those of its first sheet, and how it is written.
 
-    ``seen`` is told how far a file is read.
+    ``report_place`` is told how far a file is read.
     """
     if isinstance(source, bytes):
         begin, pieces = source[:4], iter([source])
     else:
         with source.open("rb") as stream:
             begin = stream.read(4)
-        pieces = file_pieces(source, seen)
+        pieces = file_pieces(source, report_place)
     if begin != BEGIN:
         return pieces, dialect
     sheet = sheet_of(source) if isinstance(source, bytes) else _sheet_in(source)
@@ -598,7 +600,9 @@ def read_table(
     text = Text(pieces, dialect.encoding)
     layout, lines = begin(text, column_names, dialect)
     columns, faults = find_heads(layout.heads, column_names.like)
-    missing = [group[0] for group in column_names.needed if not columns.keys() & set(group)]
+    missing = [
+        group[0] for group in column_names.required_groups if not columns.keys() & set(group)
+    ]
     if missing:
         one = len(missing) == 1
         faults.append(

@@ -211,8 +211,8 @@ def write_table(table: Table, path: str | Path) -> str:
     import tempfile  # only writing needs it: reading a table starts sooner without
 
     path = Path(path)
-    stated = table.contacts["spring"].attributes
-    table.attributes |= {name: stated[name] for name in _STATED}
+    spring_attributes = table.contacts["spring"].attributes
+    table.attributes |= {name: spring_attributes[name] for name in _STATED}
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
     try:
@@ -294,7 +294,7 @@ def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
         )
 
 
-def _stated(group: hdf5.Group) -> dict[str, Any]:
+def _contact_attributes(group: hdf5.Group) -> dict[str, Any]:
     """What a table states of a contact; what the program uses is checked."""
     for name in _STATED:
         if not group.numbers(name, 1)[0] > 0.0:
@@ -365,7 +365,7 @@ def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
 
 
 def _contact(group: hdf5.Group, name: str, quantities: list[str]) -> TabulatedContact:
-    contact = TabulatedContact(name, [], _stated(group))
+    contact = TabulatedContact(name, [], _contact_attributes(group))
     contact.blocks += (
         _block(group.group(chart.name), chart, quantities) for chart in contact.charts
     )

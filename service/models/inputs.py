@@ -160,10 +160,10 @@ def _of_interval(value: Any) -> Any:
     """Both ends of an interval, numbers or texts, or a text such as 0.8..1.2 N/um, as they came."""
     if isinstance(value, str):
         try:
-            typed = read("k_range", value)
+            interval = read("k_range", value)
         except InputError as error:
             raise fault(reason_of(error.bound)) from None
-        if typed.low is None:
+        if interval.low is None:
             raise fault(f"must be {BOUND}")
         return value
     if not isinstance(value, list) or len(value) != 2:

@@ -58,7 +58,7 @@ def test_slopes_are_those_of_a_tables_own_values(
     for block, v, y in beside_every_seam(table, kind, 1000):
         here = off_the_lines(table, v, y)
         v, y = v[here], y[here]
-        for name, slopes, unsure in true_slopes(table, contact, contact.sloped, v, y):
+        for name, slopes, unsure in true_slopes(table, contact, contact.slope_names, v, y):
             rows = contact.slopes(table, name, v, y)
             off = np.abs(rows[1:3] - slopes) > rows[3:5] + unsure
             quantity = QUANTITIES[QUANTITY_NAMES.index(name)]

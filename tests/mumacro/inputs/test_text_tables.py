@@ -67,7 +67,9 @@ def refused(text: str | bytes, **options: Any) -> TextError:
 def read(text: str | bytes, **options: Any) -> Table:
     data = text if isinstance(text, bytes) else text.encode()
     return read_table(
-        data, ColumnNames(dict(list(POINTS.like.items())[:2]), POINTS.needed), Dialect(**options)
+        data,
+        ColumnNames(dict(list(POINTS.like.items())[:2]), POINTS.required_groups),
+        Dialect(**options),
     )
 
 
