@@ -328,6 +328,14 @@ class Answer(Generic[Number]):
         cases = f"{math.prod(shape)} cases of shape {shape}" if shape else "one case"
         return f"<{type(self).__name__} to {cases}{self._kind_words()}>"
 
+    def _notes(self) -> list[str]:
+        """The remarks in a line each."""
+        return [
+            f"remark: {one['field']}: {one['text']}"
+            + (f" ({one['cases']} cases)" if one["cases"] > 1 else "")
+            for one in self.remarks
+        ]
+
     def _columns(self) -> dict[str, Any]:
         """What is shown, by path."""
         return {path: self[path] for path in self.paths}
@@ -343,13 +351,13 @@ class Answer(Generic[Number]):
     def __repr__(self) -> str:
         if self._is_one():
             pairs = [(path, cell(x)) for path, x in self._columns().items()]
-            return text_of_rows(self._heading(), pairs)
-        return text_of(self._heading(), self._columns())
+            return text_of_rows(self._heading(), pairs, self._notes())
+        return text_of(self._heading(), self._columns(), self._notes())
 
     def _repr_html_(self) -> str:
         """A table for notebooks: of one case what the command prints."""
         if not self._is_one():
-            return html_of(self._heading(), self._columns())
+            return html_of(self._heading(), self._columns(), self._notes())
         rows, notes, error = self._surrogate.in_words(self)
         return html_of_rows("", rows, [*map(" ".join, notes), error])
 

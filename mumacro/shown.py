@@ -146,20 +146,23 @@ def text_of(heading: str, columns: Mapping[str, Any], notes: Iterable[str] = ())
     return _in_lines([*_broken(heading), *lines, *below])
 
 
-def text_of_rows(heading: str, pairs: Iterable[Sequence[str]]) -> str:
-    """A heading, and rows of cells below it, in at most 16 lines of 100 characters."""
+def text_of_rows(heading: str, pairs: Iterable[Sequence[str]], notes: Iterable[str] = ()) -> str:
+    """A heading, and rows of cells and notes below it, in at most 16 lines of 100 characters;
+    notes come before rows that do not fit."""
     table = [*pairs]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = [
         "  " + "  ".join(x.ljust(width) for x, width in zip(row, widths, strict=True)).rstrip()
         for row in table
     ]
-    return _in_lines([heading, *(line[:WIDTH] for line in lines)])
+    below = [part for note in notes for part in _broken(f"  {note}")][: LINES - 2]
+    rows = _in_lines([heading, *(line[:WIDTH] for line in lines)], LINES - len(below))
+    return "\n".join([rows, *below])
 
 
-def _in_lines(lines: list[str]) -> str:
-    if len(lines) > LINES:
-        lines = [*lines[: LINES - 1], f"  ... {len(lines) - LINES + 1} more lines"]
+def _in_lines(lines: list[str], most: int = LINES) -> str:
+    if len(lines) > most:
+        lines = [*lines[: most - 1], f"  ... {len(lines) - most + 1} more lines"]
     return "\n".join(lines)
 
 

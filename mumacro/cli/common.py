@@ -76,6 +76,10 @@ class OneLineParser(argparse.ArgumentParser):
             choices = [word.strip(" '") for word in offer.removesuffix(")").split(",")]
             near = difflib.get_close_matches(choice.strip("'").lower(), choices, n=1)
             message = f"{fault}, did you mean {near[0]}?" if near else message
+        _, unknown, option = message.partition("unrecognized arguments: ")
+        if unknown:
+            near = difflib.get_close_matches(option.split()[0], self._option_string_actions, n=1)
+            message += f", did you mean {near[0]}?" if near else ""
         message = message.replace("the following arguments are required", "missing")
         lines = (self.epilog or "").splitlines()
         example = next((line.strip() for line in lines if line.startswith("  mumacro ")), None)
@@ -299,6 +303,8 @@ def _unknown(name: str, text: str, similar: str | None, kind: Kind) -> str:
     if name == "y0":
         return f"y0 does not belong to --direction normal, whose amplitude is {AMPLITUDE}"
     advice = f"did you mean {similar}?" if similar else f"there are {', '.join(kind.columns)}"
+    if not similar and (options := difflib.get_close_matches(name, KIND, n=1)):
+        advice = f"did you mean the option --{options[0]} {text}?"
     return f"unknown input {name!r}: {advice}"
 
 
@@ -306,13 +312,13 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
     """Name and value of each ``name=value``; a unit may stand apart; other words have no value."""
     pairs: list[tuple[str, str | None]] = []
     text = " ".join(" ".join(words).split())
-    for word in text.replace(" =", "=").replace("= ", "=").split():
+    for word in text.replace(" =", "=").split():
         name, equals, text = word.strip(",;").partition("=")
         last, value = pairs[-1] if pairs else ("", None)
         if equals:
             pairs.append((name, text))
-        elif value is not None and last in INPUTS and not _is_name(word):
-            pairs[-1] = last, f"{value} {word.rstrip(',;')}"
+        elif value is not None and (last in INPUTS or not value) and not _is_name(word):
+            pairs[-1] = last, f"{value} {word.rstrip(',;')}".strip()
         else:
             pairs.append((name, None))
     return pairs

@@ -602,7 +602,7 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
 
 
 def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) -> Value:
-    """``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``(1 ± 0.1) N/um``."""
+    """``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``1 ± 10 % N/um``, ``(1 ± 0.1) N/um``."""
     together = text.startswith("(")
     if together:
         text = text[1:].replace(")", " ", 1)
@@ -611,6 +611,8 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
     deviation, behind = split_number(right.strip())
     if deviation < 0.0 or not math.isfinite(deviation):
         raise InputError(name, raw, "a number and a deviation >= 0")
+    if not unit and quantity != "ratio" and behind.startswith("%"):  # the unit is that of the value
+        unit, behind, together = behind[1:].strip(), "%", False
     relative = canonical(behind) == "%" and canonical(unit) != "%" and not together
     if relative and not unit and quantity == "ratio" and abs(number) > _SURE_RATIO:
         both = f"({number:.12g} ± {deviation:.12g}) %"

@@ -182,6 +182,18 @@ def html_of(surrogate: Surrogate, case: Any, options: Any) -> str:
     return str(surrogate.evaluate(case, **options)._repr_html_())
 
 
+@pytest.mark.parametrize("options", [{}, {"include": ("limits", "gradient", "power", "settling")}])
+@pytest.mark.parametrize("k", [1.0, [1.0, 2.0, 1e6]])
+def test_a_doubt_is_shown_with_the_answer(surrogate: Surrogate, k: Any, options: Any) -> None:
+    case = {"mu0": 0.3, "Fz": 10.0, "k": k, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+    answer = surrogate.evaluate(case, **options)
+    (remark,) = answer.remarks
+    for shown in (repr(answer), answer._repr_html_()):
+        assert remark["text"] in " ".join(shown.split())
+    assert is_short(repr(answer))
+    assert "remark" not in repr(surrogate.evaluate({**case, "k": 1e6}, **options))
+
+
 # --- numbers with the digits that are known -------------------------------------------------------
 
 

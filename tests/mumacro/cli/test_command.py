@@ -91,6 +91,8 @@ WRONG = {
     CASE.replace("k=", "K="): "did you mean k?",
     CASE.replace("k=1e6", "stiffness=1e6"): "did you mean k?",
     CASE + " Fz=11": "Fz is given twice",
+    CASE + " contatc=ball": "did you mean the option --contact ball?",
+    CASE.replace("y0=2e-6 ", "y0= "): "y0 must be a number [m]",
     CASE.replace("k=1e6 ", ""): "missing: k [N/m] (k=rigid for a rigid contact)",
     CASE.replace("f=20690", ""): "missing: omega [rad/s] or f [Hz]",
     CASE + " fast": "v0 must be in metres per second",
@@ -110,6 +112,16 @@ WRONG = {
 @pytest.mark.parametrize("words", WRONG)
 def test_wrong_arguments_get_advice_in_one_line(capsys: Capture, words: str) -> None:
     assert WRONG[words] in output_of(capsys, 2, words)
+
+
+def test_a_value_may_stand_apart_from_its_name(capsys: Capture) -> None:
+    apart = CASE.replace("=", " = ")
+    assert output_of(capsys, 0, apart) == output_of(capsys, 0, CASE)
+
+
+def test_a_misspelt_option_is_told_with_the_right_one(capsys: Capture) -> None:
+    for wrong, right in (("--directoin", "--direction"), ("--diggits=3", "--digits")):
+        assert f"did you mean {right}?" in ended(capsys, 2, CASE, wrong)
 
 
 def test_everything_that_is_wrong_with_a_case_is_told_at_once(capsys: Capture) -> None:

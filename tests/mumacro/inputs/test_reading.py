@@ -72,6 +72,8 @@ def test_a_text_is_read_as_a_person_types_it(name: str, text: str) -> None:
 DEVIATIONS = {
     ("k", "1 ± 0.1 N/um"): (1e6, 1e5),
     ("k", "1N/um+-10%"): (1e6, 1e5),
+    ("k", "1±10%N/um"): (1e6, 1e5),
+    ("k", "(1 ± 10 %) N/um"): (1e6, 1e5),
     ("k", "1 N/um +/- 100 N/mm"): (1e6, 1e5),
     ("k", "(1.00 +/- 0.10) newton / micrometer"): (1e6, 1e5),
     ("mu0", "30 % ± 2 %"): (0.3, 0.02),
