@@ -21,7 +21,7 @@ from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
 
 EXPONENT = "stiffness_exponent"
-ROUGH = 0.5, 1.0  # exponents of rough surfaces (docs/validity.md)
+ROUGH = 0.5, 1.0  # exponents of rough surfaces (docs/how-to/stiffness.md)
 _BOUND = "one number from 0 to 1: 1/3 for a ball, 0.5 to 1 for rough surfaces, 0 for constant k"
 _FAR = 1e300  # stiffnesses and loads beyond it, or below its inverse, are not searched
 
