@@ -264,7 +264,7 @@ def _cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
         text = (
-            f"the foot slips {1e6 * slip_path:.3g} um a period; real friction adapts to a new "
+            f"the contact slips {1e6 * slip_path:.3g} um a period; real friction adapts to a new "
             "speed only after micrometres of slip, and a speed 100 times higher changes mu0 by "
             f"about {100.0 * effect:.2g} %"
         )
