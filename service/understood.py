@@ -7,6 +7,7 @@ from typing import Any
 from fastapi import Request
 
 from mumacro.analysis.motion import PARTS
+from mumacro.contacts.geometries import ARGUMENTS
 from mumacro.errors import InputError
 from mumacro.inputs.fields import INPUTS, QUANTITY_OF, RIGID
 from mumacro.inputs.oscillation import read_oscillation
@@ -39,6 +40,8 @@ def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     of_ends = QUANTITY_OF[along] if isinstance(along, str) and along in INPUTS else ""
     quantities = {name: field.quantity for name, field in INPUTS.items()}
     quantities |= {"start": of_ends, "stop": of_ends, "target": "ratio"}
+    if "geometry" in members:  # of a contact; its modulus may be rigid
+        quantities |= {name: QUANTITY_OF[name] for name in ARGUMENTS if name in QUANTITY_OF}
     inputs: dict[str, dict[str, Any]] = {}
     for name, quantity in quantities.items():
         try:

@@ -5,7 +5,15 @@ from dataclasses import asdict
 
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns
-from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
+from mumacro.contacts.geometries import (
+    ARGUMENTS,
+    BODIES,
+    GEOMETRIES,
+    INSTEAD,
+    contact_of,
+    doubts_of,
+    read_argument,
+)
 
 
 def _example(geometry: str) -> str:
@@ -35,8 +43,9 @@ def run(words: Sequence[str]) -> str:
             description=f"k of {geometry.meaning}.",
             epilog=f"example:\n  {_example(name)}",
         )
-        for argument in (*geometry.arguments, *BODIES):
-            about, is_required = ARGUMENTS[argument], argument in (*geometry.arguments, *BODIES[:2])
+        required = {*geometry.arguments, *BODIES[:2]} - INSTEAD.keys()
+        for argument in geometry.names:
+            about, is_required = ARGUMENTS[argument], argument in required
             unit, choices = f" [{about.unit}]" if about.unit else "", about.choices or None
             part.add_argument(
                 f"--{argument}",
@@ -46,7 +55,7 @@ def run(words: Sequence[str]) -> str:
             )
         common.add_form(part)
     options = parser.parse_args(words)
-    names = (*GEOMETRIES[options.geometry].arguments, *BODIES)
+    names = GEOMETRIES[options.geometry].names
     texts = {name: text for name in names if (text := getattr(options, name)) is not None}
     arguments = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
     contact = contact_of(options.geometry, **arguments)
@@ -57,4 +66,5 @@ def run(words: Sequence[str]) -> str:
     rows = [(name, f"{stiffnesses[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
     rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
-    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in contact.warnings)])
+    doubts = [one["text"] for one in doubts_of(arguments)]
+    return "\n".join([in_columns(rows), *(f"warning: {x}" for x in (*contact.warnings, *doubts))])

@@ -3,11 +3,12 @@
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
+from mumacro.inputs.doubts import UNITS, Remark
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import read_one
 from mumacro.stiffness import (
@@ -38,9 +39,16 @@ class Geometry(NamedTuple):
     meaning: str
     arguments: tuple[str, ...]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every argument that it takes, also one in place of another."""
+        instead = (INSTEAD[name] for name in self.arguments if name in INSTEAD)
+        return (*self.arguments, *instead, *BODIES)
+
 
 ARGUMENTS = {
     "radius": Argument("m", "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)", "5mm"),
+    "diameter": Argument("m", "in place of the radius: twice as much", "10mm"),
     "length": Argument("m", "length of the cylinder", "10mm"),
     "Fz": Argument("N", "normal force", "10N"),
     "oscillation": Argument(
@@ -57,6 +65,10 @@ ARGUMENTS = {
 }
 #: arguments of every geometry; the first two are required
 BODIES = ("E", "nu", "E2", "nu2")
+#: arguments of which one is given in place of the other
+INSTEAD = {"radius": "diameter"}
+#: lengths that bodies usually have [m]
+_USUAL = 1e-6, 0.5
 GEOMETRIES = {
     "ball": Geometry(hertz_ball, "a ball on a flat, or two balls", ("radius", "Fz")),
     "flat": Geometry(
@@ -82,24 +94,58 @@ def contact_of(geometry: str, /, **arguments: Any) -> Contact:
     if geometry not in GEOMETRIES:
         raise InputError("geometry", geometry, f"one of {', '.join(GEOMETRIES)}")
     entry = GEOMETRIES[geometry]
-    names = (*entry.arguments, *BODIES)
+    names = entry.names
     for name, value in arguments.items():
         if name not in names:
             raise InputError(name, value, f"left out: {unknown_name(name, names)}")
         if not ARGUMENTS[name].choices and real(name, value).ndim:
             raise InputError(name, value, "one number")
+    for name, other in INSTEAD.items():
+        if name in arguments and other in arguments:
+            raise InputError(other, arguments[other], f"left out beside {name}")
+    if "diameter" in arguments:
+        return _of_diameter(geometry, **arguments)
     if absent := next(
         (name for name in (*entry.arguments, "E", "nu") if name not in arguments), None
     ):
         unit = ARGUMENTS[absent].unit
-        raise InputError(
-            absent, None, f"given{f' [{unit}]' if unit else ''}: {ARGUMENTS[absent].meaning}"
-        )
+        words = f"{ARGUMENTS[absent].meaning}"
+        if absent in INSTEAD:
+            words += f"; or {INSTEAD[absent]}"
+        raise InputError(absent, None, f"given{f' [{unit}]' if unit else ''}: {words}")
     first = Material(arguments["E"], arguments["nu"])
     second = Material(arguments.get("E2", first.E), arguments.get("nu2", first.nu))
     return entry.function(
         first=first, second=second, **{name: arguments[name] for name in entry.arguments}
     )
+
+
+def _of_diameter(geometry: str, diameter: float, **arguments: Any) -> Contact:
+    """The contact of a ball, pin or cylinder whose diameter is given."""
+    try:
+        return contact_of(geometry, radius=0.5 * diameter, **arguments)
+    except InputError as error:
+        if error.field != "radius":
+            raise
+        raise InputError("diameter", diameter, f"twice a radius that is {error.bound}") from None
+
+
+def doubts_of(arguments: Mapping[str, Any]) -> list[Remark]:
+    """Lengths of a geometry that bodies do not usually have, each with a question.
+
+    >>> [doubt["text"] for doubt in doubts_of({"radius": 5.0})]
+    ['radius = 5 m: is it 5 mm? Usual is 1e-06 to 0.5 m']
+    """
+    least, most = _USUAL
+    remarks: list[Remark] = []
+    for name in ("radius", "diameter", "length"):
+        value = arguments.get(name)
+        if value is None or least <= value <= most:
+            continue
+        question = f"is it {value:.6g} mm?" if value > most else "is it in metres?"
+        text = f"{name} = {value:.6g} m: {question} Usual is {least:g} to {most:g} m"
+        remarks.append({"row": UNITS, "field": name, "cases": 1, "text": text})
+    return remarks
 
 
 def read_argument(name: str, text: str) -> Any:

@@ -109,6 +109,7 @@ QUANTITY_OF = {row.name: row.quantity for row in _ROWS} | {
     "E": "pressure",
     "E2": "pressure",
     "radius": "length",
+    "diameter": "length",
     "length": "length",
     "dx": "length",
     "dy": "length",

@@ -399,6 +399,8 @@ class StiffnessAnswer(BaseModel):
     )
     contact: ContactName
     warnings: list[str] = Field(description="Where the theory behind k is off")
+    remarks: list[Remark] | None = Field(None, description=_REMARKS)
+    inputs: dict[str, Understood] | None = understood_inputs()
     api_version: str
 
 

@@ -36,6 +36,7 @@ from .inputs import (
     Name,
     OtherInputs,
     Strict,
+    either,
     optional,
 )
 from .motion import FORMS, Oscillation
@@ -231,7 +232,8 @@ class StiffnessRequest(Strict):
     )
 
     geometry: _Geometry = Field(description=_GEOMETRIES)
-    radius: Length | None = optional("Radius of the ball, pin or cylinder [m]")
+    radius: Length | None = optional("Radius of the ball, pin or cylinder [m]; or diameter")
+    diameter: Length | None = optional("In place of the radius: twice as much [m]")
     length: Length | None = optional("Length of the cylinder [m]; of: cylinder")
     Fz: Load | None = optional(described("Fz"))
     oscillation: Literal["across", "along"] | None = optional(
@@ -241,6 +243,9 @@ class StiffnessRequest(Strict):
     nu: _Poisson = Field(description="Poisson's ratio of the first body [-]")
     E2: Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
     nu2: _Poisson | None = optional("Of the second body [-]")
+    include: Annotated[list[Literal["inputs"]], Field(max_length=16)] = either(
+        "More to answer: inputs (what was understood of them)"
+    )
 
 
 # --- fit ------------------------------------------------------------------------------------------

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from fastapi import Response
+from fastapi import Request, Response
 
 import mumacro
 from mumacro.analysis.measured_points import read_points, unknowns_beside
-from mumacro.contacts.geometries import contact_of
+from mumacro.contacts.geometries import contact_of, doubts_of
 from mumacro.errors import InputError
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.text_tables import Table
@@ -19,9 +19,10 @@ from .. import API_VERSION
 from ..limits import Working
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
-from ..problems import FieldFault, refuse
+from ..problems import FieldFault, refuse, with_members
 from ..reading import Json, StrictRoute, TableRoute
 from ..tables import Loaded, LoadedTable
+from ..understood import understood_in
 from . import POST_PROBLEMS, router_of
 
 router, _tables = router_of("answers", StrictRoute), router_of("answers", TableRoute)
@@ -33,11 +34,16 @@ _FAULTS = 100  # lines of a table that an answer names
     responses={200: {"model": StiffnessAnswer}, **POST_PROBLEMS},
     summary="The stiffness of a contact from materials and geometry",
 )
-async def post_stiffness(contact: StiffnessRequest) -> Response:
+async def post_stiffness(request: Request, contact: StiffnessRequest) -> Response:
     """Return k, and the contact to ask for with it; the arguments of a geometry in SI."""
-    arguments = contact.model_dump(exclude_none=True, exclude={"geometry"})
-    answer = asdict(contact_of(contact.geometry, **arguments))
-    return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
+    more = await understood_in(request, bool(contact.include))
+    with with_members(**more):
+        arguments = contact.model_dump(exclude_none=True, exclude={"geometry", "include"})
+        answer = asdict(contact_of(contact.geometry, **arguments))
+        if doubts := doubts_of(arguments):
+            answer["remarks"] = doubts
+        answer |= more
+        return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 
 
 @_tables.post(

@@ -11,7 +11,15 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, stiffness
-from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
+from mumacro.contacts.geometries import (
+    ARGUMENTS,
+    BODIES,
+    GEOMETRIES,
+    INSTEAD,
+    contact_of,
+    doubts_of,
+    read_argument,
+)
 from mumacro.stiffness import (
     AXES,
     Contact,
@@ -196,7 +204,7 @@ def test_forgotten_gigapascals_are_told(second: Any, shape: tuple[str, Any]) -> 
 
 def test_the_list_has_the_arguments_of_the_functions() -> None:
     used = {name for geometry in GEOMETRIES.values() for name in geometry.arguments}
-    assert used | {*BODIES} == {*ARGUMENTS}
+    assert used | {*BODIES} == {*ARGUMENTS} - {*INSTEAD.values()}
     for geometry in GEOMETRIES.values():
         named = [
             name
@@ -290,3 +298,25 @@ def test_a_result_can_be_passed_on(surrogate: Surrogate) -> None:
     assert dict(ball) == {"k": ball.k, "contact": "ball"}
     with pytest.raises(KeyError):
         ball["pressure"]
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_a_diameter_is_twice_a_radius(geometry: str) -> None:
+    more = {"length": 5e-3, "oscillation": "along"} if geometry == "cylinder" else {}
+    bodies = {"Fz": 10.0, "E": 210e9, "nu": 0.3, **more}
+    assert contact_of(geometry, diameter=8e-3, **bodies) == contact_of(
+        geometry, radius=4e-3, **bodies
+    )
+    for wrong in (0.0, -1e-3, math.nan, math.inf):
+        with refused("diameter"):
+            contact_of(geometry, diameter=wrong, **bodies)
+    with refused("diameter"):
+        contact_of(geometry, diameter=8e-3, radius=4e-3, **bodies)
+    with pytest.raises(InputError, match="diameter"):  # which is offered
+        contact_of(geometry, **bodies)
+
+
+@pytest.mark.parametrize("name", ["radius", "diameter", "length"])
+def test_lengths_that_bodies_do_not_have_are_doubted(name: str) -> None:
+    for value, doubted in ((1e-9, True), (1e-6, False), (5e-3, False), (0.5, False), (5.0, True)):
+        assert [one["field"] for one in doubts_of({name: value})] == [name] * doubted

@@ -352,9 +352,10 @@ def test_k_from_materials(open_page: Any) -> None:
             "E": "200 GPa",
             "nu": "0.29",
             "E2": "rigid",
+            "include": ["inputs"],
         }
         contact = contact_of("ball", radius=5e-3, Fz=10.0, E=200e9, nu=0.29, E2=np.inf)
-        assert page.text("#stiffness-result").strip().startswith(f"k = {contact.k / 1e6:.4g} MN/m")
+        assert page.text("#stiffness-result").strip().startswith(f"k = {contact.k / 1e6:.4g} N/µm")
         page.click("#stiffness-result button")
         assert page.find("[name=contact][value=ball]").is_selected()
         k = float(page.value("#field-k").removesuffix(" N/µm"))
@@ -365,6 +366,30 @@ def test_k_from_materials(open_page: Any) -> None:
         page.click("#stiffness-form button")
         assert "length" in page.text("#stiffness-status")
         assert page.find("#argument-length").get_attribute("aria-invalid") == "true"
+
+
+def test_a_length_without_a_unit_is_told_and_doubted(open_page: Any) -> None:
+    page = open_page()
+    page.choose("#argument-radius", "5")
+    assert page.text("#about-radius") == "read as 5 m"
+    assert page.find("#argument-E").get_attribute("aria-invalid") == "false"  # not typed yet
+    page.choose("#material-1", "steel")
+    assert "is it 5 mm?" in page.text("#about-radius")
+    assert page.text("#stiffness-result").strip().startswith("k = ")
+    page.type("#argument-radius", "5 mm")
+    assert "read as" not in page.text("#about-radius")  # it says no more than the text
+    assert "doubt" not in page.run(
+        "return document.querySelector('#argument-radius').closest('.field').className;"
+    )
+    k = page.text("#stiffness-result b")
+    # the text stays where the diameter is chosen, and means another ball
+    page.choose("#size", "diameter")
+    assert page.value("#argument-diameter") == "5 mm"
+    assert page.text("#stiffness-result b") != k
+    page.type("#argument-diameter", "10 mm")
+    assert page.text("#stiffness-result b") == k
+    page.type("#argument-diameter", "-1 mm")
+    assert page.find("#argument-diameter").get_attribute("aria-invalid") == "true"
 
 
 def test_the_measured_example_is_read_and_fitted(open_page: Any) -> None:

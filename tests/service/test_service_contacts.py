@@ -160,4 +160,25 @@ def test_the_service_takes_every_geometry_of_the_library(client: Any) -> None:
     schemas = client.get("/openapi.json").json()["components"]["schemas"]
     properties = schemas["StiffnessRequest"]["properties"]
     assert properties["geometry"]["enum"] == [*GEOMETRIES]
-    assert {"geometry", *ARGUMENTS} == properties.keys()
+    assert {"geometry", "include", *ARGUMENTS} == properties.keys()
+
+
+def test_a_diameter_stands_for_the_radius_and_a_large_length_is_doubted(
+    client: Any, problem: Any
+) -> None:
+    body = {"geometry": "ball", "Fz": 10, "E": "210 GPa", "nu": 0.3}
+    plain = client.post("/v1/stiffness", json={**body, "radius": "5 mm"}).json()
+    assert client.post("/v1/stiffness", json={**body, "diameter": "10 mm"}).json() == plain
+    assert not {"remarks", "inputs"} & plain.keys()
+    large = {**body, "diameter": "10", "include": ["inputs"]}
+    answer = client.post("/v1/stiffness", json=large).json()
+    assert "is it 10 mm?" in answer["remarks"][0]["text"]
+    assert answer["remarks"][0]["field"] == "diameter"
+    assert answer["inputs"]["diameter"] == {"text": "10", "value": 10.0, "unit": "m"}
+    assert answer["inputs"]["E"]["value"] == 210e9
+    both = {**body, "radius": "5 mm", "diameter": "10 mm"}
+    refusal = problem(client.post("/v1/stiffness", json=both), 422)
+    assert [one["field"] for one in refusal["errors"]] == ["diameter"]
+    refusal = problem(client.post("/v1/stiffness", json={**large, "diameter": "1 um"}), 422)
+    assert "twice a radius" in refusal["detail"]
+    assert refusal["inputs"]["diameter"]["value"] == 1e-6

@@ -241,7 +241,7 @@ export function fitPanel(store, moved, openCase) {
     const share = residuals.length ? 0.3 : 0; // of the height, for the residuals
     plot.axes({
       x: { domain, log, title: `v₀ [${unit}]` },
-      y: { domain: [(-share / (1 - share)) * top, top], log: false, title: "friction µ" },
+      y: { domain: [(-share / (1 - share)) * top, top], log: false, title: "friction µ", from: 0 },
     });
     const { inside } = plot;
     if (curve) {
@@ -299,7 +299,7 @@ export function fitPanel(store, moved, openCase) {
     plot.text(
       `residuals, ± ${show(worst, 2)} at most`,
       plot.box.x + 6,
-      plot.y(0) + 13,
+      plot.box.y + plot.box.height - 5,
       "note",
       "start",
     );

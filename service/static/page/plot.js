@@ -52,11 +52,14 @@ function decades(scale, most) {
   );
 }
 
-/** An axis of d3 with ticks that suit its length. */
-function ticked(axis, scale, room) {
+/** An axis of d3 with ticks that suit its length, from the least one on. */
+function ticked(axis, scale, room, least = -Infinity) {
   const [from, to] = scale.range();
   const most = Math.max(2, Math.floor(Math.abs(to - from) / room));
-  if (!scale.base) return axis.ticks(most);
+  if (!scale.base) {
+    const values = scale.ticks(most).filter((value) => value >= least);
+    return axis.tickValues(values).tickFormat(scale.tickFormat(most));
+  }
   const whole = decades(scale, most);
   if (whole.length > 1) return axis.tickValues(whole).tickFormat(decade);
   const within = scale.ticks(most).filter((value) => /^[125]e/.test(value.toExponential()));
@@ -107,7 +110,7 @@ export class Plot {
     this.mark(this);
   }
 
-  /** Two axes with titles; `right` pixels are left free beside them. */
+  /** Two axes with titles; `right` pixels are left free beside them, `from` is the lowest tick. */
   axes({ x, y, right = 12 }) {
     const [left, top, foot] = [52, 10, 42];
     const made = ({ domain, log }) =>
@@ -140,7 +143,7 @@ export class Plot {
       .attr("transform", `translate(0 ${box.y + box.height})`);
     const side = root.append("g").attr("class", "axis").attr("transform", `translate(${box.x} 0)`);
     bottom.call(ticked(axisBottom(this.x).tickSizeOuter(0), this.x, 44));
-    side.call(ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 34));
+    side.call(ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 34, y.from));
     const title = (text, place) =>
       root.append("text").attr("class", "title").attr("transform", place).text(text);
     title(x.title, `translate(${box.x + box.width / 2} ${this.height - 8})`);

@@ -1,47 +1,82 @@
 // The panel "k from materials": a geometry, two bodies, and the k that follows.
 import { Channel } from "./ask.js";
-import { $ } from "./dom.js";
+import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { post } from "./service.js";
-import { about, prefixed, prose, typeset } from "./words.js";
+import { about, inUnit, prefixed, prose, typeset } from "./words.js";
 
-const SUCH_AS = { radius: "5 mm", length: "10 mm" };
+const SUCH_AS = { radius: "5 mm", diameter: "10 mm", length: "10 mm" };
+const LENGTHS = Object.keys(SUCH_AS);
+const SIZES = ["radius", "diameter"];
 
 export function stiffnessPanel(store, moved) {
-  const typed = { geometry: "ball" };
+  const typed = { geometry: "ball", size: "radius" }; // a ball has a radius or a diameter
   let faults = new Map();
+  let inputs = {}; // what was understood, by name
   let answer, asked;
+  let whole = false; // whether what is missing is told, too
+  /** The arguments of the geometry that are typed, with the one that is chosen of radius and
+   * diameter. */
+  const names = () =>
+    about.geometries[typed.geometry].arguments
+      .filter((name) => name !== "Fz")
+      .map((name) => (name === "radius" ? typed.size : name));
   const question = () => {
-    const names = about.geometries[typed.geometry].arguments;
-    const filled = names.filter((name) => name !== "Fz" && typed[name]?.trim());
+    const filled = names().filter((name) => typed[name]?.trim());
     return {
       geometry: typed.geometry,
       Fz: store.state.Fz,
       ...Object.fromEntries(filled.map((name) => [name, typed[name]])),
+      include: ["inputs"],
     };
   };
   const channel = new Channel(
     (body) => post("v1/stiffness", body),
     (reply, body) => {
-      [answer, asked, faults] = [reply, JSON.stringify(body), new Map()];
-      $("stiffness-status").textContent = "";
+      [answer, asked, faults, inputs] = [reply, JSON.stringify(body), new Map(), reply.inputs];
+      write("stiffness-status", "");
       draw();
     },
     (reason, _, reply) => {
-      $("stiffness-status").textContent = reason ?? "";
-      faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
+      const all = (reply?.faults ?? []).map(({ field, reason: why }) => [field, why]);
+      // what is not typed yet is missed when k is asked for
+      faults = new Map(all.filter(([field]) => whole || typed[field]?.trim() || field === "Fz"));
+      inputs = reply?.inputs ?? {};
+      write("stiffness-status", reason && (faults.size || !all.length) ? reason : "");
       draw();
     },
   );
+  function ask(all) {
+    whole = all;
+    channel.push(question());
+    draw();
+  }
 
   const change = (name, value) => {
     typed[name] = value;
-    draw();
+    ask(false);
   };
+
+  /** What was understood of an argument, where that says more than its text. */
+  function understood(name) {
+    const { text, value, unit } = inputs[name] ?? {};
+    if (typeof value !== "number" || text !== typed[name]?.trim()) return "";
+    const isLength = LENGTHS.includes(name);
+    if (!isLength && about.arguments[name].unit !== "Pa") return "";
+    const said = isLength ? inUnit("y0", value, unit, 6) : prefixed(value, "Pa", 6);
+    return said.replace(" ", "") === text.replaceAll(" ", "") ? "" : `read as ${said}`;
+  }
+  /** A doubt about an argument as it is typed now. */
+  function doubted(name) {
+    const { text } = answer?.remarks?.find(({ field }) => field === name) ?? {};
+    return text && JSON.stringify(question()) === asked ? text : undefined;
+  }
 
   function field(name) {
     const { unit, meaning, choices } = about.arguments[name];
     const fault = faults.get(name);
+    const doubt = doubted(name);
+    const below = fault ?? doubt ?? (understood(name) || meaning);
     const shared = { id: `argument-${name}` };
     const input = choices.length
       ? html`<select id=${shared.id} @change=${({ target }) => change(name, target.value)}>
@@ -54,15 +89,28 @@ export function stiffnessPanel(store, moved) {
           aria-invalid=${String(fault !== undefined)}
           aria-describedby=${`about-${name}`}
           .value=${typed[name] ?? ""}
+          aria-label=${SIZES.includes(name) ? name : nothing}
           @change=${({ target }) => change(name, target.value)}
         />`;
-    return html`<div class="field ${fault ? "bad" : ""}">
-      <label for=${shared.id}
-        >${typeset(name)} <span class="label">${/\w/.test(unit) ? unit : ""}</span></label
-      >
-      ${input}
-      <p id=${`about-${name}`} class="note">${fault ?? meaning}</p>
+    const title = html`<label for=${shared.id}
+      >${typeset(name)} <span class="label">${/\w/.test(unit) ? unit : ""}</span></label
+    >`;
+    return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
+      ${SIZES.includes(name) ? size(name) : title} ${input}
+      <p id=${`about-${name}`} class="note" title=${below}>${below}</p>
     </div>`;
+  }
+
+  /** The choice of radius or diameter; the text stays as it is typed. */
+  function size(name) {
+    const choose = ({ target }) => {
+      const text = typed[name] ?? "";
+      Object.assign(typed, { size: target.value, [target.value]: text });
+      ask(false);
+    };
+    return html`<select id="size" aria-label="radius or diameter" @change=${choose}>
+      ${SIZES.map((one) => html`<option ?selected=${one === name}>${one}</option>`)}
+    </select>`;
   }
 
   /** A body of a usual material. */
@@ -71,7 +119,7 @@ export function stiffnessPanel(store, moved) {
       const one = about.materials.rows.find(({ name }) => name === target.value);
       if (!one) return;
       Object.assign(typed, { [E]: one.E, [nu]: one.nu });
-      draw();
+      ask(false);
     };
     return html`<div class="field">
       <label for=${`material-${number}`}>body ${number}</label>
@@ -90,7 +138,7 @@ export function stiffnessPanel(store, moved) {
   function result() {
     if (!answer) return nothing;
     const model = answer.contact === "ball" ? "ball (Hertz)" : "one spring";
-    const k = `${prefixed(answer.k, "N/m")}`;
+    const k = inUnit("k", answer.k);
     const use = () => moved({ k: answer.k }, 6, { contact: answer.contact });
     return html`<li class=${JSON.stringify(question()) === asked ? "" : "old"}>
         <span><b>k = ${k}</b> at Fz = ${store.state.Fz}; contact: ${model}</span>
@@ -100,8 +148,10 @@ export function stiffnessPanel(store, moved) {
   }
 
   function draw() {
-    const names = about.geometries[typed.geometry].arguments.filter((name) => name !== "Fz");
-    const of = (list) => names.filter((name) => list.includes(name)).map(field);
+    const of = (list) =>
+      names()
+        .filter((name) => list.includes(name))
+        .map(field);
     render(
       html`<div class="field">
           <label for="geometry">contact of</label>
@@ -115,7 +165,7 @@ export function stiffnessPanel(store, moved) {
           </select>
           <p class="note">Fz is that of the form above.</p>
         </div>
-        ${of(["radius", "length", "oscillation"])} ${materials(1, "E", "nu")} ${of(["E", "nu"])}
+        ${of([...LENGTHS, "oscillation"])} ${materials(1, "E", "nu")} ${of(["E", "nu"])}
         ${materials(2, "E2", "nu2")} ${of(["E2", "nu2"])}`,
       $("stiffness-fields"),
     );
@@ -124,7 +174,7 @@ export function stiffnessPanel(store, moved) {
 
   $("stiffness-form").addEventListener("submit", (event) => {
     event.preventDefault();
-    channel.push(question());
+    ask(true);
   });
   $("stiffness-form").addEventListener("keydown", (event) => {
     if (event.key === "Enter") event.target.dispatchEvent(new Event("change", { bubbles: true }));
