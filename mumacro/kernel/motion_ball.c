@@ -9,10 +9,16 @@ enum {
     MU_MOTION_PANELS = 48, /* a ball with more is given up (tried) */
     MU_MOTION_SCAN = 10, /* springs at which the kind of their cycles is looked at first (tried) */
     MU_KRONROD_POINTS = 15,
+    MU_KRONROD_MIDDLE = MU_KRONROD_POINTS / 2,
     /* coefficients by which roughness is judged: those of the last of the rule's polynomials */
     MU_ROUGH_TERMS = 4,
     /* points at either end of the rule: a kink between two of them is seen by few (tried) */
-    MU_POINTS_AT_END = 4
+    MU_POINTS_AT_END = 4,
+    /* of every so many springs of a panel the steps are halved, to know their errors (tried) */
+    MU_HALVED_EACH = 4,
+    /* levels of halved steps: while the springs before took no more, the others are computed
+     * without, and take the errors of their neighbours (tried: with 0 it takes a third more) */
+    MU_EASY_LEVELS = 1
 };
 /* of the mean limit, that of the middle spring under Hertz's pressure */
 #define MU_MIDDLE_SHARE 1.5
@@ -30,7 +36,7 @@ enum {
 #define MU_OF_SPRINGS 0.5
 
 /* The rule of Kronrod with 15 points: places and weights from the middle outwards. */
-static const double MU_KRONROD[8][2] = {
+static const double MU_KRONROD[MU_KRONROD_MIDDLE + 1][2] = {
     {0.0, 0.209482141084727828012999174891714},
     {0.207784955007898467600689403773245, 0.204432940075298892414161999234649},
     {0.405845151377397166906606412076961, 0.190350578064785409913256402421014},
@@ -43,9 +49,10 @@ static const double MU_KRONROD[8][2] = {
 
 /* Place and weight of point i of 15, from -1 to 1. */
 static double mu_kronrod(int i, double *weight) {
-    const double *point = MU_KRONROD[i < 7 ? 7 - i : i - 7];
+    const int from_middle = i - MU_KRONROD_MIDDLE;
+    const double *point = MU_KRONROD[from_middle < 0 ? -from_middle : from_middle];
     *weight = point[1];
-    return i < 7 ? -point[0] : point[0];
+    return from_middle < 0 ? -point[0] : point[0];
 }
 
 /* Springs of a ball from t = low to high, which may be kinks: the error of their sum, and their
@@ -54,25 +61,26 @@ typedef struct {
     double low, high, error, start[2], end[2];
     double mean[MU_MEANS], decay, of_springs;
     int kinks[2];
-    double at[15];
-    int sticks[15];
+    double at[MU_KRONROD_POINTS];
+    int sticks[MU_KRONROD_POINTS];
 } mu_panel;
 
 /* How rough two functions are at the points of the rule: the size of their four highest
  * coefficients by polynomials that are orthogonal there.  They stay large at kinks, wherever these
  * lie between the points. */
-static double mu_roughness(double values[15][2], double *start, double *end) {
-    double x[15], weight[15], last[15] = {0.0}, p[15], size = 0.0, square = 0.0;
+static double mu_roughness(double values[MU_KRONROD_POINTS][2], double *start, double *end) {
+    double x[MU_KRONROD_POINTS], weight[MU_KRONROD_POINTS];
+    double last[MU_KRONROD_POINTS] = {0.0}, p[MU_KRONROD_POINTS], size = 0.0, square = 0.0;
     /* the first of the polynomials is constant, of the norm 1 on [-1, 1] */
-    double at_end = 0.7071067811865476, before = 0.0, sign = 1.0;
-    for (int i = 0; i < 15; ++i) {
+    double at_end = 0.5 * MU_SQRT2, before = 0.0, sign = 1.0;
+    for (int i = 0; i < MU_KRONROD_POINTS; ++i) {
         x[i] = mu_kronrod(i, &weight[i]);
         p[i] = at_end;
     }
     start[0] = start[1] = end[0] = end[1] = 0.0;
-    for (int degree = 0; degree < 15; ++degree) {
-        double next[15], sum = 0.0, c[2] = {0.0, 0.0}, beyond;
-        for (int i = 0; i < 15; ++i) {
+    for (int degree = 0; degree < MU_KRONROD_POINTS; ++degree) {
+        double next[MU_KRONROD_POINTS], sum = 0.0, c[2] = {0.0, 0.0}, beyond;
+        for (int i = 0; i < MU_KRONROD_POINTS; ++i) {
             c[0] += weight[i] * p[i] * values[i][0];
             c[1] += weight[i] * p[i] * values[i][1];
         }
@@ -81,7 +89,7 @@ static double mu_roughness(double values[15][2], double *start, double *end) {
             end[j] += at_end * c[j];
         }
         if (degree >= MU_KRONROD_POINTS - MU_ROUGH_TERMS) square += c[0] * c[0] + c[1] * c[1];
-        for (int i = 0; i < 15; ++i) {
+        for (int i = 0; i < MU_KRONROD_POINTS; ++i) {
             next[i] = x[i] * p[i] - size * last[i];
             sum += weight[i] * next[i] * next[i];
         }
@@ -90,7 +98,7 @@ static double mu_roughness(double values[15][2], double *start, double *end) {
         before = at_end;
         at_end = beyond / size;
         sign = -sign;
-        for (int i = 0; i < 15; ++i) {
+        for (int i = 0; i < MU_KRONROD_POINTS; ++i) {
             last[i] = p[i];
             p[i] = next[i] / size;
         }
@@ -208,21 +216,27 @@ static double mu_place_in(const mu_panel *panel, double u, double *slope) {
     return panel->low + share * width;
 }
 
-/* The springs of a panel in the order in which they are computed: those with halved steps first, so
- * that the rest lie between known ones. */
-enum { MU_MOTION_HALVED = 4 };
-static const int MU_PANEL_ORDER[15] = {1, 5, 9, 13, 3, 7, 11, 0, 2, 4, 6, 8, 10, 12, 14};
+/* The springs of a panel in the order in which they are computed: first those with halved steps,
+ * MU_HALVED_EACH apart, so that the rest lie between known ones. */
+enum { MU_FIRST_HALVED = 1, MU_LAST_HALVED = 13, MU_HALVED_SPRINGS = 4 };
+static const int MU_PANEL_ORDER[MU_KRONROD_POINTS] = {1, 5, 9, 13, 3, 7, 11, 0,
+                                                      2, 4, 6, 8,  10, 12, 14};
 
 /* The larger error of the springs with halved steps next to spring i. */
 static double mu_error_beside(const double *errors, int i) {
-    const int before = i < 1 ? 1 : 4 * ((i - 1) / 4) + 1, after = before + 4;
-    return i < 1 ? errors[1] : i > 13 ? errors[13] : mu_max(errors[before], errors[after]);
+    int before, after;
+    if (i < MU_FIRST_HALVED) return errors[MU_FIRST_HALVED];
+    if (i > MU_LAST_HALVED) return errors[MU_LAST_HALVED];
+    before = MU_FIRST_HALVED + MU_HALVED_EACH * ((i - MU_FIRST_HALVED) / MU_HALVED_EACH);
+    after = before + MU_HALVED_EACH;
+    return mu_max(errors[before], errors[after]);
 }
 
 static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_low, int kink_high,
                               double tolerance) {
     mu_panel out;
-    double values[15][2], sums[15][2], ends[2], errors[15];
+    double values[MU_KRONROD_POINTS][2], sums[MU_KRONROD_POINTS][2], ends[2];
+    double errors[MU_KRONROD_POINTS];
     int halvings = 0, kinks = 0;
     memset(&out, 0, sizeof out);
     out.low = low;
@@ -230,8 +244,9 @@ static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_l
     out.kinks[0] = kink_low;
     out.kinks[1] = kink_high;
     out.decay = HUGE_VAL;
-    for (int k = 0; k < 15; ++k) {
-        const int i = MU_PANEL_ORDER[k], single = k >= MU_MOTION_HALVED && halvings < 2;
+    for (int k = 0; k < MU_KRONROD_POINTS; ++k) {
+        const int i = MU_PANEL_ORDER[k];
+        const int single = k >= MU_HALVED_SPRINGS && halvings <= MU_EASY_LEVELS;
         double weight, slope;
         const double u = 0.5 + 0.5 * mu_kronrod(i, &weight), t = mu_place_in(&out, u, &slope);
         const double share = mu_share_at(t);
@@ -261,7 +276,7 @@ static mu_panel mu_ball_panel(mu_ball *ball, double low, double high, int kink_l
         out.decay = mu_min(out.decay, spring.decay);
     }
     (void)mu_roughness(values, out.start, out.end);
-    for (int i = 1; i < 15; ++i)
+    for (int i = 1; i < MU_KRONROD_POINTS; ++i)
         kinks += (low == 0.0 || i < MU_POINTS_AT_END || i > MU_KRONROD_POINTS - MU_POINTS_AT_END) &&
                  out.sticks[i] != out.sticks[i - 1];
     /* few of the points see springs at the rim, or close to an end, that behave otherwise than the
@@ -278,7 +293,7 @@ static double mu_panel_error(const mu_panel *panels, int n, int i) {
     for (int j = 0; j < n; ++j) {
         const mu_panel *other = &panels[j];
         if (other->low == one->high)
-            error += (one->high - one->at[14]) *
+            error += (one->high - one->at[MU_KRONROD_POINTS - 1]) *
                      mu_length(one->end[0] - other->start[0], one->end[1] - other->start[1]);
         if (other->high == one->low)
             error += (one->at[0] - one->low) *
@@ -318,8 +333,8 @@ static double mu_division(mu_ball *ball, const mu_panel *panel, double tolerance
     int best = -1;
     *kink = 0;
     double nearest = HUGE_VAL;
-    for (int i = 0; i < 14; ++i) {
-        const double distance = fabs(i - 6.5);
+    for (int i = 0; i + 1 < MU_KRONROD_POINTS; ++i) {
+        const double distance = fabs(i + 0.5 - MU_KRONROD_MIDDLE);
         if (panel->sticks[i] != panel->sticks[i + 1] && distance < nearest)
             best = i, nearest = distance;
     }

@@ -17,7 +17,11 @@ enum {
     MU_MOTION_REST_PERIODS = 500,   /* of the way from rest (tried) */
     MU_MOTION_LEVELS = 6,           /* of halved steps: 2^-6 of a step is 1e-9 of its error */
     MU_MOTION_SLIDING_PERIODS = 12, /* of a search at rest for a cycle that slips (tried) */
-    MU_MOTION_RETRIES = 3           /* with finer steps, where none are found (tried) */
+    MU_MOTION_RETRIES = 3,          /* with finer steps, where none are found (tried) */
+    /* from rest before the cycle that slips is looked for; it decides only the time: 1, 3 and 5
+     * give the same cycles (tried) */
+    MU_MOTION_FIRST_PERIODS = 2,
+    MU_MOTION_TRIALS = 4 /* times the room for steps: a march that tries more often fails (tried) */
 };
 /* Lengths of a step.  The estimate embedded in a step is of order 4, the error of a cycle of order
  * 6: a step may err by the power 2/3 of the tolerance.  Halves of it err by 2^-4 = 0.0625. */
@@ -319,6 +323,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     *march = none;
     march->step = step > 0.0 ? step : MU_STEP_FIRST * sqrt(sqrt(tolerance));
     march->turned = 1.0;
+    /* the stick and the slip before the period are no brief ones */
     march->began = -1.0;
     march->slid = 1.0;
     march->steps = steps;
@@ -343,7 +348,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
             }
             if (march->at.tau > before && steps->n < steps->room)
                 steps->nodes[steps->n++] = march->at.tau;
-            if (steps->n == steps->room || ++count > 4 * steps->room ||
+            if (steps->n == steps->room || ++count > MU_MOTION_TRIALS * steps->room ||
                 !(march->step > MU_STEP_NONE))
                 march->failed = 1;
         }
@@ -494,13 +499,19 @@ static double mu_distance_at_rest(const mu_march *march, const mu_residual *r) {
     return mu_min(MU_MOTION_OF_DISTANCE * mu_max(r->size, step), MU_MOTION_UNKNOWN);
 }
 
-/* The cycle that slips near f of a contact at rest, which is the only one; returns 0 where none is
- * found. */
+/* The cycle that slips near a force of a contact at rest, which is the only one, and its start f;
+ * returns 0 where none is found, and leaves f. */
 static int mu_find_sliding(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
-                           double tolerance, double goal, double *f, mu_steady *cycle) {
+                           double tolerance, double goal, const double *near, double *f,
+                           mu_steady *cycle) {
     const double least = MU_MOTION_SLIDES * goal;
-    *cycle = mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_SLIDING_PERIODS, least, f);
-    return cycle->failed || (cycle->distance <= goal && cycle->mean[MU_MEAN_PATH] > least);
+    double start[2] = {near[0], near[1]};
+    *cycle =
+        mu_find_cycle(m, grid, steps, tolerance, goal, MU_MOTION_SLIDING_PERIODS, least, start);
+    if (!cycle->failed && !(cycle->distance <= goal && cycle->mean[MU_MEAN_PATH] > least)) return 0;
+    f[0] = start[0];
+    f[1] = start[1];
+    return 1;
 }
 
 /* The period of the way from rest that slips most, which has to be halved: the last one hardly
@@ -529,14 +540,14 @@ typedef struct {
     int allowed;
     double share;               /* of Newton's step, the next leap */
     int wait, waited;           /* periods in which Newton's step has to be as expected before it */
-    int leapt, ever;            /* whether the last period began with a leap, any did */
+    int leapt, has_leapt;       /* whether the last period began with a leap, any did */
     double expected[2], length; /* Newton's step after the next period; the way there */
     double back[2];             /* the force to which a leap is taken back */
     double moved;               /* by the last period */
     int phases;                 /* of its slip */
 } mu_leaps;
 
-/* Whether a period slips as the one before, and leaves the step of Newton that was expected. */
+/* Whether a period slips as the one before, and leaves Newton's step as it was expected. */
 static int mu_is_alike(const mu_leaps *leaps, const mu_march *march, const mu_residual *r) {
     return march->phases == leaps->phases &&
            mu_length(r->step[0] - leaps->expected[0], r->step[1] - leaps->expected[1]) <=
@@ -577,7 +588,7 @@ static void mu_leap(mu_leaps *leaps, const mu_march *march, const mu_residual *r
     f[0] += share * r->step[0] - inwards * last[1];
     f[1] += share * r->step[1] + inwards * last[0];
     mu_keep_below(march->at.limit, f);
-    leaps->ever = 1;
+    leaps->has_leapt = 1;
     leaps->expected[0] = (1.0 - share) * r->step[0];
     leaps->expected[1] = (1.0 - share) * r->step[1];
 }
@@ -589,6 +600,24 @@ static void mu_next_period(mu_leaps *leaps, const mu_march *march, const mu_resi
     leaps->expected[0] = r->step[0] - r->moved[0];
     leaps->expected[1] = r->step[1] - r->moved[1];
     leaps->length = leaps->moved;
+}
+
+/* Whether the last period shows that the leap before it went too far. */
+static int mu_is_leap_lost(const mu_leaps *leaps, const mu_march *march, int alike, double goal) {
+    return leaps->leapt && !alike && leaps->length > goal && !march->failed;
+}
+
+/* As mu_distance_at_rest, and what the leaps may have changed. */
+static double mu_distance_after_leaps(const mu_leaps *leaps, const mu_march *march,
+                                      const mu_residual *r) {
+    const double distance = mu_distance_at_rest(march, r);
+    if (!leaps->has_leapt) return distance;
+    return distance + MU_MOTION_AFTER_LEAP * (distance == 0.0 ? leaps->moved : r->size);
+}
+
+static int mu_is_end_of_way(const mu_march *march, double distance, double goal, int period) {
+    return distance <= goal || march->mean[MU_MEAN_PATH] < MU_MOTION_NO_PATH ||
+           period >= MU_MOTION_REST_PERIODS || march->failed;
 }
 
 /* The end of the way from rest, as a cycle. */
@@ -603,14 +632,15 @@ static mu_steady mu_end_of_way(const mu_march *march, double distance,
 }
 
 /* The cycle that a contact without force comes to from rest, period by period, where allowed with
- * leaps along Newton's step.  One that slips is the only one, and is looked for after the second
- * period; of those that stick there are many, and only the way decides between them. */
+ * leaps along Newton's step.  One that slips is the only one, and is looked for after the first
+ * periods; of those that stick there are many, and only the way decides between them. */
 static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu_grid *steps,
                                      double tolerance, double goal, int leaps_allowed, double *f) {
     mu_longest_slip longest = {0.0, 0.0, {0.0, 0.0}};
     mu_leaps leaps = {leaps_allowed, MU_MOTION_LEAP, 1,   0, 0, 0, {0.0, 0.0},
                       0.0,           {0.0, 0.0},     0.0, 0};
     mu_march march;
+    mu_steady sliding;
     f[0] = f[1] = 0.0;
     march.step = 0.0;
     march.steps = steps;
@@ -623,25 +653,17 @@ static mu_steady mu_follow_from_rest(const mu_shaken *m, const mu_grid *grid, mu
         r = mu_residual_of(&march, f, march.at.limit);
         mu_keep_longest(&longest, &march, step, f);
         alike = mu_is_alike(&leaps, &march, &r);
-        if (leaps.leapt && !alike && leaps.length > goal && !march.failed) {
+        if (mu_is_leap_lost(&leaps, &march, alike, goal)) {
             mu_take_back(&leaps, f);
             continue;
         }
         if (leaps.leapt) mu_trust_leaps(&leaps);
-        distance = mu_distance_at_rest(&march, &r);
-        if (leaps.ever) distance += MU_MOTION_AFTER_LEAP * (distance == 0.0 ? leaps.moved : r.size);
-        if (distance <= goal || march.mean[MU_MEAN_PATH] < MU_MOTION_NO_PATH ||
-            period >= MU_MOTION_REST_PERIODS || march.failed)
+        distance = mu_distance_after_leaps(&leaps, &march, &r);
+        if (mu_is_end_of_way(&march, distance, goal, period))
             return mu_end_of_way(&march, distance, &longest);
-        if (period == 2 && leaps.allowed) {
-            double start[2] = {march.f[0], march.f[1]};
-            mu_steady sliding;
-            if (mu_find_sliding(m, grid, steps, tolerance, goal, start, &sliding)) {
-                f[0] = start[0];
-                f[1] = start[1];
-                return sliding;
-            }
-        }
+        if (period == MU_MOTION_FIRST_PERIODS && leaps.allowed &&
+            mu_find_sliding(m, grid, steps, tolerance, goal, march.f, f, &sliding))
+            return sliding;
         leaps.leapt = mu_is_leap_due(&leaps, &march, &r, alike);
         if (leaps.leapt) {
             mu_leap(&leaps, &march, &r, f);
@@ -657,7 +679,7 @@ static mu_steady mu_cycle_near(const mu_shaken *m, const mu_grid *grid, mu_grid 
                                double tolerance, double goal, int near, double *f) {
     mu_steady out;
     if (m->drag > 0.0) return mu_find_dragged(m, grid, steps, tolerance, goal, f);
-    if (near && mu_find_sliding(m, grid, steps, tolerance, goal, f, &out)) return out;
+    if (near && mu_find_sliding(m, grid, steps, tolerance, goal, f, f, &out)) return out;
     out = mu_follow_from_rest(m, grid, steps, tolerance, goal, 1, f);
     if (out.failed || out.distance <= goal || out.mean[MU_MEAN_PATH] > MU_MOTION_NO_PATH)
         return out;
