@@ -113,9 +113,11 @@ def _verify(options: Namespace) -> int:
             )
             for name, contact in table.contacts.items()
         }
-    whole = all(holds(report, table.contacts[name].tolerance) for name, report in reports.items())
-    print(as_json({"tolerance": surrogate.tolerance, "holds": whole, "contacts": reports}))
-    if not whole:
+    all_hold = all(
+        holds(report, table.contacts[name].tolerance) for name, report in reports.items()
+    )
+    print(as_json({"tolerance": surrogate.tolerance, "holds": all_hold, "contacts": reports}))
+    if not all_hold:
         raise ImpossibleError(
             f"{options.table} misses its tolerance of {surrogate.tolerance:g} or a bound"
         )
@@ -125,11 +127,11 @@ def _verify(options: Namespace) -> int:
 
 
 def _export(options: Namespace) -> str:
-    which, kind, out = options.path or options.table, options.format, options.out
+    table, kind, out = options.path or options.table, options.format, options.out
     if kind == "c":  # which needs no further package
         from .export.c import DEFAULT_TOLERANCE, write_c
 
-        surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
+        surrogate = open_table(table or repr(DEFAULT_TOLERANCE))
         paths = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
         return _report(options, {"table": str(surrogate.path), "format": kind, "out": paths})
     from .export.c import ExportError
@@ -139,7 +141,7 @@ def _export(options: Namespace) -> str:
         check_format(kind)
     except ExportError as error:
         raise UsageError(f"--{error}") from None
-    path = open_table(which).path
+    path = open_table(table).path
     out = out or Path(FORMATS[kind][0].format(path.stem))
     if out.is_dir():
         raise UsageError(f"--out {out} is a folder")
@@ -147,11 +149,13 @@ def _export(options: Namespace) -> str:
     return _report(options, {"table": str(path), "format": kind, "out": str(out), "shape": shape})
 
 
-def _report(options: Namespace, about: dict[str, Any]) -> str:
+def _report(options: Namespace, members: dict[str, Any]) -> str:
     """What was written, as JSON or in columns, as ``mumacro table``."""
     if options.json:
-        return as_json(about)
-    texts = {name: x if isinstance(x, str) else " ".join(map(str, x)) for name, x in about.items()}
+        return as_json(members)
+    texts = {
+        name: x if isinstance(x, str) else " ".join(map(str, x)) for name, x in members.items()
+    }
     return in_columns(list(texts.items()))
 
 

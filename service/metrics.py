@@ -88,26 +88,33 @@ class Metrics:
         _reserve()
         disable_created_metrics()  # type: ignore[no-untyped-call]
         self._paths = frozenset(paths)
-        self.registry = own = CollectorRegistry()
+        self.registry = registry = CollectorRegistry()
         requests = Counter(
-            "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own
+            "mumacro_requests",
+            "Finished requests",
+            ["route", "method", "status"],
+            registry=registry,
         )
         meaning = "From the head of a request to the end of its answer"
         seconds = Histogram(
-            "mumacro_request_duration_seconds", meaning, ["route"], buckets=_BUCKETS_S, registry=own
+            "mumacro_request_duration_seconds",
+            meaning,
+            ["route"],
+            buckets=_BUCKETS_S,
+            registry=registry,
         )
         cases = Counter(
-            "mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own
+            "mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=registry
         )
         bad = Counter(
-            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own
+            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=registry
         )
         labels = ["id", "tolerance"]
         self._info = Gauge(
             "mumacro_table_info",
             "Loaded tables",
             labels,
-            registry=own,
+            registry=registry,
             multiprocess_mode="mostrecent",
         )
         # a look-up of labels takes longer than counting

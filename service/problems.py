@@ -426,10 +426,10 @@ async def handle(request: Request, error: Exception) -> ASGIApp:
     """FastAPI's handler of all of them."""
     request_error = meaning(error, request.scope)
     answer = problem_of(request_error, request.scope)
-    late = request_error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)
+    is_slow = request_error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)
     closes = "Connection" in request_error.kind.headers
     has_body = not {"content-length", "transfer-encoding"}.isdisjoint(request.headers)
-    if closes and has_body and not late and "expect" not in request.headers:
+    if closes and has_body and not is_slow and "expect" not in request.headers:
         return _BeforeRest(answer)
     return answer
 

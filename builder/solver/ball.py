@@ -50,7 +50,7 @@ def _rule(points: int) -> tuple[Array, Array]:
 
 def points_for(tolerance: float) -> int:
     """Points on either side with which a quadrature errs by far less than ``tolerance``."""
-    return next((few for least, few in FEWER_POINTS.items() if tolerance >= least), POINTS)
+    return next((points for least, points in FEWER_POINTS.items() if tolerance >= least), POINTS)
 
 
 class Springs:

@@ -235,7 +235,7 @@ def stick_slip(
     if kind == ANGLE_SECTION:
         lo, hi = (_edge(v, y), hi) if chart == 0 else (lo, hi - _edge(v, y))
     z_old, f_old, spread, before = z, math.inf, math.inf, math.inf
-    for it in range(200):
+    for trial in range(200):
         f, status = section(kind, v, y, eta, z, chart, w, out, orbit)
         if status in (slip_phase.NO_SLIP, slip_phase.NO_STICK):
             # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border
@@ -264,7 +264,7 @@ def stick_slip(
             new = z * (0.98 if f > 0.0 else 1.02)
         if not (lo <= new <= hi):
             secant = False
-            new = 0.1 * hi if lo == 0.0 and it < 40 else 0.5 * (lo + hi)
+            new = 0.1 * hi if lo == 0.0 and trial < 40 else 0.5 * (lo + hi)
         if hi - lo <= 4e-16 * hi or new == z:
             return OK
         # only a secant step shows how far the root still is

@@ -66,12 +66,13 @@ def to_step(values: Array, tolerance: float) -> Array:
     return np.asarray(np.ldexp(np.round(np.ldexp(values, bits(tolerance))), -bits(tolerance)))
 
 
-def to_bits(values: Array, digits: int, up: bool = False) -> Array:
-    """``values`` with ``digits`` binary digits each, to the nearest or, with ``up``, away from
-    zero."""
+def to_bits(values: Array, digits: int, away_from_zero: bool = False) -> Array:
+    """``values`` with ``digits`` binary digits each, to the nearest or away from zero."""
     mantissa, exponent = np.frexp(values)
     multiple = np.ldexp(mantissa, digits)
-    whole = np.copysign(np.ceil(np.abs(multiple)), multiple) if up else np.round(multiple)
+    whole = (
+        np.copysign(np.ceil(np.abs(multiple)), multiple) if away_from_zero else np.round(multiple)
+    )
     return np.asarray(np.ldexp(whole, exponent - digits))
 
 
@@ -113,7 +114,9 @@ def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
         to_bits(solution[name], bits(tolerance)) for name in ("mu_ratio", "stick_fraction")
     )
     error = to_bits(
-        solution["error_estimate"] + np.abs(mu - solution["mu_ratio"]), ERROR_BITS, up=True
+        solution["error_estimate"] + np.abs(mu - solution["mu_ratio"]),
+        ERROR_BITS,
+        away_from_zero=True,
     )
     return {
         "v_tilde": v,
@@ -202,17 +205,17 @@ def add_contact(
         progress(f"{name} {chart.name}", True)
     table.contacts[name] = entry
     for attempt in range(ATTEMPTS):
-        late = _state_errors(Surrogate(table, out), contact, attempt)
-        if not late or attempt == ATTEMPTS - 1:
+        misses = _state_errors(Surrogate(table, out), contact, attempt)
+        if not misses or attempt == ATTEMPTS - 1:
             break
-        for i in late:
+        for i in misses:
             targets[i] /= 3.0
             entry.blocks[i] = build(i)
     progress(f"{name}: errors", True)
     report = verify(Surrogate(table, out), contact, FINAL_POINTS)
     progress(f"{name}: fresh solves", True)
     if not holds(report, tolerance):
-        raise _missed(report, tolerance)
+        raise _miss(report, tolerance)
     entry.attributes |= verified_attributes(report)
     return targets
 
@@ -256,7 +259,7 @@ def springs_for(table: Table, workers: int) -> Springs:
     return Springs(fine)
 
 
-def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
+def _miss(report: dict[str, Any], tolerance: float) -> BuildError:
     misses = {what: count for what, count in uncovered(report).items() if count}
     return BuildError(
         f"verified error {report['max_abs_error']:.2e} absolute, {report['max_rel_error']:.2e} "
@@ -268,7 +271,7 @@ def _missed(report: dict[str, Any], tolerance: float) -> BuildError:
 def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> list[int]:
     """Measure the errors of the blocks of a contact and write them into the table; the blocks that
     miss its tolerance."""
-    late, entry = [], contact.of(surrogate)
+    misses, entry = [], contact.of(surrogate)
     tolerance = entry.tolerance
     for i, largest in enumerate(block_errors(surrogate, contact, BLOCK_POINTS, seed)):
         block = entry.blocks[i]
@@ -280,13 +283,13 @@ def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> li
                     # they bound values: a rough quadrature can make the finer interpolant worse
                     # than the table, and some points of cells are in another block
                     errors[:, 0] = np.minimum(errors[:, 0], SAFETY * value)
-                errors = to_bits(errors, ERROR_BITS, up=True)
+                errors = to_bits(errors, ERROR_BITS, away_from_zero=True)
                 block.cell_errors[name], slopes = errors, errors.max(axis=0)[1:]
             block.errors[name] = np.array([SAFETY * value, *slopes])
         block.max_abs_error, block.max_rel_error = largest.absolute, largest.relative
         if largest.absolute > 0.8 * tolerance or largest.relative > 0.8 * ABS_TO_REL * tolerance:
-            late.append(i)
-    return late
+            misses.append(i)
+    return misses
 
 
 def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:

@@ -57,9 +57,9 @@ SEAMS = (atlas.Y_STICK_LO, atlas.Y_CONT, atlas.Y_MID, atlas.Y_HIGH, atlas.Y_TAIL
 def _near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
     y, v = log_uniform(rng, 1e-3, 1e6, n), log_uniform(rng, 1e-6, 1e4, n)
     off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
-    which = rng.integers(0, 4, n)
-    y = np.where(which < 2, rng.choice(SEAMS, n) * off, y)
-    cut, fast = which == 2, which == 3
+    place = rng.integers(0, 4, n)
+    y = np.where(place < 2, rng.choice(SEAMS, n) * off, y)
+    cut, fast = place == 2, place == 3
     y[cut] = rng.uniform(atlas.Y_STICK_LO, atlas.Y_STICK_HI, int(cut.sum()))
     v[cut] = s.v_tilde_crit(y[cut]) * atlas.SIGMA_CUT**2 * off[cut]
     y[fast] = log_uniform(rng, atlas.Y_CONT, 1e6, int(fast.sum()))
@@ -82,11 +82,11 @@ def _border(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Arra
 
 def _tails(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     """Large amplitude at every speed, large speed at every amplitude, small amplitude."""
-    which = rng.integers(0, 3, n)
+    place = rng.integers(0, 3, n)
     v, y = log_uniform(rng, 1e-6, 1e8, n), log_uniform(rng, 1e5, 1e12, n)
-    v = np.where(which == 1, log_uniform(rng, 1e3, 1e8, n), v)
-    y = np.where(which == 1, log_uniform(rng, 1e-3, 1e8, n), y)
-    return v, np.where(which == 2, log_uniform(rng, 1e-9, 1e-3, n), y)
+    v = np.where(place == 1, log_uniform(rng, 1e3, 1e8, n), v)
+    y = np.where(place == 1, log_uniform(rng, 1e-3, 1e8, n), y)
+    return v, np.where(place == 2, log_uniform(rng, 1e-9, 1e-3, n), y)
 
 
 _CASES: dict[str, tuple[float, Draw]] = {
@@ -144,9 +144,9 @@ _BALL_SEAMS = (atlas.Y_STICK_LO, STEEPEST_Y, atlas.Y_MID, atlas.Y_HIGH, atlas.Y_
 def _near_ball_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
     y, v = log_uniform(rng, 1e-3, 1e6, n), log_uniform(rng, 1e-6, 1e4, n)
     off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
-    which = rng.integers(0, 8, n)
-    y = np.where(which < 2, rng.choice(_BALL_SEAMS, n) * off, y)
-    cut, fast, ray, slow, border, ridge = (which == i for i in range(2, 8))
+    place = rng.integers(0, 8, n)
+    y = np.where(place < 2, rng.choice(_BALL_SEAMS, n) * off, y)
+    cut, fast, ray, slow, border, ridge = (place == i for i in range(2, 8))
     y[cut] = rng.uniform(atlas.Y_STICK_LO, STEEPEST_Y, int(cut.sum()))
     v[cut] = s.v_tilde_crit(y[cut]) * atlas.SIGMA_CUT**2 * off[cut]
     y[fast] = log_uniform(rng, STEEPEST_Y, 1e6, int(fast.sum()))
@@ -172,12 +172,12 @@ def _ring(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]
     crit, top = s.v_tilde_crit(y), STEEPEST * y
     within = crit * (top / crit) ** rng.random(n)
     off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 0.1, n)
-    which = rng.integers(0, 3, n)
-    return np.where(which == 0, within, np.where(which == 1, crit, top) * off), y
+    place = rng.integers(0, 3, n)
+    return np.where(place == 0, within, np.where(place == 1, crit, top) * off), y
 
 
 _BALL_CASES: dict[str, tuple[float, Draw]] = {
-    **{name: (share, how) for name, (share, how) in _CASES.items() if name != "seams"},
+    **{name: (share, draw) for name, (share, draw) in _CASES.items() if name != "seams"},
     "random": (0.22, _CASES["random"][1]),
     "ring": (0.08, _ring),
     "seams": (0.10, _near_ball_seams),

@@ -95,7 +95,8 @@ def block_errors(
     """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
     neighbour."""
     stating = tuple(
-        _stating(surrogate, contact, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0))
+        _stating(surrogate, contact, error, of_border)
+        for error, of_border in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0))
     )
     errors_of_blocks = []
     for index, block in enumerate(contact.of(surrogate).blocks):
@@ -174,18 +175,18 @@ def finer(shape: tuple[int, int]) -> tuple[int, int]:
     return a, b
 
 
-class _Along:
+class _CellPoints:
     """The points of all cells along one axis, (cells, POINTS); none below the low end of the block.
 
-    ``wide``: the width that the points of a cell cover; zero where the block never reads it.
+    ``widths``: those that the points of the cells cover; zero where the block never reads it.
     """
 
     def __init__(self, axis: Axis, cells: int, nodes: int) -> None:
         start, stop = axis.span
         edges = start + (stop - start) * np.arange(cells + 1) / cells
         low = np.clip(edges[:-1], axis.to_evaluation(np.array([axis.low])), edges[1:])
-        self.wide = edges[1:] - low
-        self.x = low[:, None] + 0.5 * (1.0 + _AT) * self.wide[:, None]
+        self.widths = edges[1:] - low
+        self.x = low[:, None] + 0.5 * (1.0 + _AT) * self.widths[:, None]
         local = 2.0 * (self.x - edges[:-1, None]) * cells / (stop - start) - 1.0
         self.powers = local[..., None] ** np.arange(WIDTH - 1, -1, -1)
         self.shares, at_border = (
@@ -193,25 +194,25 @@ class _Along:
         )
         self.share_at_border = at_border[-1]
         at = np.clip(axis.to_file(self.x.ravel()), axis.low, axis.high)
-        self.follow = interpolation_matrix(
+        self.from_exact = interpolation_matrix(
             nodes, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
         )
-        scale = np.divide(2.0, self.wide, out=np.zeros(cells), where=self.wide > 0.0)
+        scale = np.divide(2.0, self.widths, out=np.zeros(cells), where=self.widths > 0.0)
         self.to_derivative = scale[:, None, None] * _TO_DERIVATIVE
 
 
 def _difference(
     chart: Chart, block: Block, values: Array, exact: Array
-) -> tuple[Array, _Along, _Along]:
+) -> tuple[Array, _CellPoints, _CellPoints]:
     """Cells through node ``values`` minus the interpolant with coefficients ``exact``, (cells a,
     POINTS, cells b, POINTS)."""
     a, b = (
-        _Along(axis, n, m)
+        _CellPoints(axis, n, m)
         for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
     )
     cells = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
     interpolant = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, cells, b.powers, optimize=True)
-    return interpolant - (a.follow @ exact @ b.follow.T).reshape(interpolant.shape), a, b
+    return interpolant - (a.from_exact @ exact @ b.from_exact.T).reshape(interpolant.shape), a, b
 
 
 #: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to
@@ -237,7 +238,7 @@ def _without_noise(exact: Array, noise: Array) -> Array:
     return c
 
 
-def _without_edge(off: Array, b: _Along, axis: Axis, cells: int) -> None:
+def _without_edge(off: Array, b: _CellPoints, axis: Axis, cells: int) -> None:
     """Errors along b of the last cells below the border as evaluation has them, see
     ``mumacro/kernel/points.c``.
 

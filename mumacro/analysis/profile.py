@@ -172,12 +172,12 @@ class Profile:
         return self._zeros(np.flatnonzero(turns), lambda at: at.tilt, 1e-13, slopes=True)
 
     def _zeros(
-        self, chords: Places, of: Callable[[Samples], Array], tolerance: float, slopes: bool
+        self, chords: Places, quantity: Callable[[Samples], Array], tolerance: float, slopes: bool
     ) -> Array:
         """Places in the chords at which a quantity passes through zero."""
         from scipy.optimize import brentq
 
-        s, f = self.at.s.tolist(), of(self.at).tolist()
+        s, f = self.at.s.tolist(), quantity(self.at).tolist()
 
         def zero(i: int) -> float:
             samples = {
@@ -188,7 +188,7 @@ class Profile:
             def value(place: float) -> float:
                 if place in samples:
                     return float(samples[place])
-                return float(of(self.samples(np.array([place]), slopes))[0])
+                return float(quantity(self.samples(np.array([place]), slopes))[0])
 
             return float(brentq(value, s[i], s[i + 1], xtol=tolerance, rtol=1e-14))
 

@@ -484,21 +484,21 @@ def read_values(pairs: Iterable[tuple[str, str]], reader: Callable[[str, str], A
     return values
 
 
-def open_table(which: str | None) -> Surrogate:
+def open_table(table: str | None) -> Surrogate:
     """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled
     one."""
     try:
-        return Surrogate.open(None if which is None else float(which))
+        return Surrogate.open(None if table is None else float(table))
     except ValueError:
-        if which is None or not re.search(r"[^\d.eE+-]", which):
+        if table is None or not re.search(r"[^\d.eE+-]", table):
             raise
-        return Surrogate.open(Path(which))
+        return Surrogate.open(Path(table))
 
 
 # --- results --------------------------------------------------------------------------------------
 
 
-def about(surrogate: Surrogate) -> dict[str, Any]:
+def table_members(surrogate: Surrogate) -> dict[str, Any]:
     """What names a table in JSON."""
     return {"id": surrogate.id, "tolerance": surrogate.tolerance}
 

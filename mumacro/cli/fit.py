@@ -107,7 +107,7 @@ def run(words: Sequence[str]) -> str:
             + _text(result, options.digits)
         )
     if options.json:
-        return as_json({**result.to_dict(), "table": common.about(surrogate)})
+        return as_json({**result.to_dict(), "table": common.table_members(surrogate)})
     return _text(result, options.digits)
 
 

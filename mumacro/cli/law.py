@@ -77,7 +77,7 @@ def run(words: Sequence[str]) -> str:
             **columns,
             "border": [{along: c.value, "mu_macro": c.mu_macro} for c in law.border],
             **({"model": model} if model else {}),
-            "table": common.about(surrogate),
+            "table": common.table_members(surrogate),
         }
         return as_json(members)
     middle = float(law.values[law.values.size // 2])

@@ -42,7 +42,7 @@ def run(words: Sequence[str], description: str) -> str:
         if arguments.model:
             result["model"] = model_rows(surrogate, middle, **kind.names)
         result |= dict(kind.names.items() - SPRING.names.items())
-        return as_json({**result, "table": common.about(surrogate)})
+        return as_json({**result, "table": common.table_members(surrogate)})
     rows, notes, error = words_of_one_case(
         answer, arguments.digits, common.units_in(arguments.words)
     )

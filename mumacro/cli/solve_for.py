@@ -116,7 +116,7 @@ def run(words: Sequence[str]) -> str:
             "target": target,
             "roots": [_root_members(solution, k, root) for k, root in rows],
             **({"model": model} if model else {}),
-            "table": common.about(surrogate),
+            "table": common.table_members(surrogate),
         }
         return as_json(members)
     if options.out is not None:

@@ -44,14 +44,14 @@ def run(words: Sequence[str]) -> str:
             epilog=f"example:\n  {_example(name)}",
         )
         required = {*geometry.arguments, *BODIES[:2]} - INSTEAD.keys()
-        for argument in geometry.names:
-            about, is_required = ARGUMENTS[argument], argument in required
-            unit, choices = f" [{about.unit}]" if about.unit else "", about.choices or None
+        for argument_name in geometry.names:
+            argument = ARGUMENTS[argument_name]
+            unit = f" [{argument.unit}]" if argument.unit else ""
             part.add_argument(
-                f"--{argument}",
-                required=is_required,
-                choices=choices,
-                help=f"{about.meaning}{unit}",
+                f"--{argument_name}",
+                required=argument_name in required,
+                choices=argument.choices or None,
+                help=f"{argument.meaning}{unit}",
             )
         common.add_form(part)
     options = parser.parse_args(words)

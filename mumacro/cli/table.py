@@ -28,8 +28,8 @@ def run(words: Sequence[str]) -> str:
     )
     properties = {name: surrogate.attributes.get(name) for name in names}
     properties["checksum"] = properties.pop("content_sha256")
-    about = {
-        **common.about(surrogate),
+    members = {
+        **common.table_members(surrogate),
         "path": str(surrogate.path),
         **properties,
         "bytes": surrogate.path.stat().st_size,
@@ -37,10 +37,10 @@ def run(words: Sequence[str]) -> str:
     bundled = [str(path) for path in bundled_tables()]
     if options.json:
         errors = surrogate.error_distribution
-        return as_json({**about, "error_distribution": errors, "bundled": bundled})
+        return as_json({**members, "error_distribution": errors, "bundled": bundled})
     rows = [
         (name, f"{value:.3g}" if isinstance(value, float) else str(value))
-        for name, value in about.items()
+        for name, value in members.items()
     ]
     text = in_columns([*rows, *zip_longest(["bundled"], bundled, fillvalue="")])
     return "\n\n".join([text, *_errors(surrogate)])

@@ -10,17 +10,18 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Data
 
 DRIVEN_NODES = 28
-# Gauss's rule in t, where xi(t) has a slope proportional to t (1 - t): a function of xi that ends
-# in a square root is smooth in t
-_P = _Q = 2
 
 
 def piece_rule(nodes: int) -> Array:
-    """Points (nodes, 2): the share of the radius beyond a node, and its weight."""
+    """Points (nodes, 2): the share of the radius beyond a node, and its weight.
+
+    Gauss's rule in t, where xi(t) has a slope proportional to t (1 - t): a function of xi that ends
+    in a square root is smooth in t.
+    """
     x, weight = np.polynomial.legendre.leggauss(nodes)
     t = 0.5 * (1.0 + x)
     # the share beyond is a polynomial in 1 - t, exact where it is small
-    slope = Polynomial([0.0, 1.0]) ** (_Q - 1) * Polynomial([1.0, -1.0]) ** (_P - 1)
+    slope = Polynomial([0.0, 1.0, -1.0])
     beyond = slope.integ() / slope.integ()(1.0)
     return np.ascontiguousarray(
         np.stack([beyond(1.0 - t), 0.5 * weight * beyond.deriv()(1.0 - t)], axis=1)

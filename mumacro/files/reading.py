@@ -220,8 +220,8 @@ class NdjsonSource:
             at = place
 
         size, lines = max(path.stat().st_size, 1), _lines(path, report_place)
-        while some := [*islice(lines, ROWS)]:
-            numbers, texts = zip(*some, strict=True)
+        while numbered_lines := [*islice(lines, ROWS)]:
+            numbers, texts = zip(*numbered_lines, strict=True)
             objects, faults = zip(*map(_object, texts), strict=True)
             new = {name for record in objects for name in record} - {*self.schema.names}
             if new and not self.verbatim:

@@ -97,7 +97,7 @@ def evaluate_files(
     try:
         kind = kind_of(contact, direction)
         run = _Run(cases, Path(out), surrogate, rigid, include, dialect, kind, say)
-        return run.go(force, progress)
+        return run.evaluate(force, progress)
     except (
         pa.ArrowException
     ) as error:  # no Parquet, or columns that are unlike or of a type that text cannot hold
@@ -177,7 +177,7 @@ class _Run:
         ]
         self.schema = pa.schema(fields, self.source.schema.metadata)
 
-    def go(self, force: bool, progress: Callable[[float, int, int], None]) -> Summary:
+    def evaluate(self, force: bool, progress: Callable[[float, int, int], None]) -> Summary:
         """Evaluate piece by piece, and put the files into place."""
         for path in (self.out, self.rejects):
             if path.exists() and not force:

@@ -93,10 +93,10 @@ class TextTable:
         """Find the decimal sign in the first rows that tell it."""
         places, _ = find_heads(self.layout.heads, self.column_names.like)
         rows = islice(records(lines, self.layout, self.column_names), _LOOKED_AT)
-        while some := [*islice(rows, _AT_ONCE)]:
+        while block := [*islice(rows, _AT_ONCE)]:
             self.signs.see(
                 Cell(row.line, name, row.cells[i])
-                for row in some
+                for row in block
                 if row.fault is None
                 for name, (i, _) in places.items()
             )

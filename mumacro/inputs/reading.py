@@ -615,8 +615,8 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
         unit, behind, together = behind[1:].strip(), "%", False
     relative = canonical(behind) == "%" and canonical(unit) != "%" and not together
     if relative and not unit and quantity == "ratio" and abs(number) > _SURE_RATIO:
-        both = f"({number:.12g} ± {deviation:.12g}) %"
-        bound = f"clear: it may be {both}; write that, or the deviation without %"
+        in_percent = f"({number:.12g} ± {deviation:.12g}) %"
+        bound = f"clear: it may be {in_percent}; write that, or the deviation without %"
         raise InputError(name, raw, bound)
     own_unit = unit_in(quantity, unit if relative else unit or behind) or None
     if relative:

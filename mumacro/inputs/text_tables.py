@@ -250,8 +250,8 @@ def _heads_in(
         text, end = _whole(lines, i)
         for sep in seps:
             cells = _split(_uncommented(text), sep)
-            there = {split_unit(heading(cell, column_names.like))[0] for cell in cells}
-            if all(there.intersection(names) for names in column_names.required_groups):
+            names_in_line = {split_unit(heading(cell, column_names.like))[0] for cell in cells}
+            if all(names_in_line.intersection(names) for names in column_names.required_groups):
                 yield _Head(i, end, sep, cells)
 
 

@@ -412,9 +412,9 @@ def unit_in(quantity: str, unit: str) -> str:
     ('um', 'umpp', 'mm/s')
     """
     if quantity == "length" and (match := _PEAK.fullmatch(unit.strip(" []()"))) is not None:
-        own = canonical(match[1])
-        if own in QUANTITIES[quantity].units:
-            return own
+        of_length = canonical(match[1])
+        if of_length in QUANTITIES[quantity].units:
+            return of_length
     return canonical(unit)
 
 

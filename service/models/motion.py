@@ -217,8 +217,8 @@ class MotionRequest(Strict):
     def case(self) -> dict[str, Any]:
         """The arguments of ``mumacro.motion`` that are given."""
         values = self.__dict__
-        own = ("cycle", "include")
-        return {name: x for name, x in values.items() if name not in own and x is not None}
+        of_answer = ("cycle", "include")
+        return {name: x for name, x in values.items() if name not in of_answer and x is not None}
 
 
 class CycleColumns(BaseModel):

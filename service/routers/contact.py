@@ -90,14 +90,14 @@ def _fitted(
 ) -> dict[str, Any]:
     words: Any = measured.kind.names
     unknowns: Sequence[str] = measured.unknowns
-    about: dict[str, Any] = {}
+    reading: dict[str, Any] = {}
     if points is not None:
-        if both := sorted(columns.keys() & points.columns.keys()):
-            raise InputError(both[0], None, "given once: it is a column of the points")
+        if in_common := sorted(columns.keys() & points.columns.keys()):
+            raise InputError(in_common[0], None, "given once: it is a column of the points")
         columns = {**points.columns, **columns}
         if "unknowns" not in measured.model_fields_set:
             unknowns = unknowns_beside(columns)
-        about = {"read_as": points.read_as, "skipped_lines": points.skipped}
+        reading = {"read_as": points.read_as, "skipped_lines": points.skipped}
     try:
         with warnings.catch_warnings():  # they are in the answer
             warnings.simplefilter("ignore")
@@ -107,7 +107,7 @@ def _fitted(
             raise
         reason = f"line {points.lines[error.index]}: {error.field} must be {error.bound}"
         refuse([FieldFault.of("points", reason, error.value)])
-    return {**fit.to_dict(), **about, **table.signature}
+    return {**fit.to_dict(), **reading, **table.signature}
 
 
 router.routes.extend(_tables.routes)

@@ -475,7 +475,7 @@ def test_steps_are_powers_of_two_within_the_tolerance(values: Array, tolerance: 
 
 @pytest.mark.parametrize("digits", [3, 22, 48])
 def test_digits_are_kept_at_every_size(values: Array, digits: int) -> None:
-    near, above = to_bits(values, digits), to_bits(values, digits, up=True)
+    near, above = to_bits(values, digits), to_bits(values, digits, away_from_zero=True)
     size = np.abs(values)
     assert np.all(np.abs(near - values) <= 2.0**-digits * size)
     assert np.all((np.abs(above) >= size) & (np.abs(above) <= size * (1.0 + 2.0 ** (1 - digits))))
