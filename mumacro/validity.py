@@ -228,8 +228,8 @@ def _stiffness(
         text = f"{margin} more or less of k changes mu_macro by {change}: give k_range, or fit k"
     elif y > HARDLY:
         text = (
-            f"y~ = {y:.3g}, above {HARDLY:g}: k off by {margin} moves mu_macro by {change}; "
-            "measured points hardly determine k"
+            f"y~ = {y:.3g}, above {HARDLY:g}: {margin} more or less of k changes mu_macro by "
+            f"{change}; measured points hardly determine k"
         )
     else:
         return None
@@ -271,8 +271,8 @@ def _cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
         rows.append({"row": "Coulomb friction", "text": text, "effect": effect})
     if watts > _WATTS:
         text = (
-            f"the contact turns {watts:.2g} W into heat, over a slip path of "
-            f"{slip_path * frequency:.2g} m/s"
+            f"the contact turns {watts:.2g} W into heat and slips "
+            f"{slip_path * frequency:.2g} m per second"
         )
         rows.append({"row": "no wear, no heating", "text": text, "effect": None})
     return rows
