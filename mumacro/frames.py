@@ -83,9 +83,9 @@ class LabelledAnswer(IntervalAnswer[Any]):
             return super().plot(ax)
         values = self._values
         if self._library == "xarray":
-            labelled = {name: x for name, x in values.items() if library_of(x)}
-            arrays = importlib.import_module("xarray").broadcast(*labelled.values())
-            values = {**values, **dict(zip(labelled, arrays, strict=True))}
+            with_labels = {name: x for name, x in values.items() if library_of(x)}
+            arrays = importlib.import_module("xarray").broadcast(*with_labels.values())
+            values = {**values, **dict(zip(with_labels, arrays, strict=True))}
         plain = {name: np.asarray(x) if np.ndim(x) else x for name, x in values.items()}
         return self._surrogate.evaluate(plain).plot(ax)
 

@@ -685,8 +685,13 @@ def plot_cycle(
     )
     path.update_datalim(tips)
     path.margins(0.08)
-    shown = unit.replace("um", "µm")
-    path.set(xlabel=f"$x$ [{shown}]", ylabel=f"$y$ [{shown}]", aspect="equal", adjustable="datalim")
+    unit_text = unit.replace("um", "µm")
+    path.set(
+        xlabel=f"$x$ [{unit_text}]",
+        ylabel=f"$y$ [{unit_text}]",
+        aspect="equal",
+        adjustable="datalim",
+    )
     path.autoscale_view()
     head(path, "")
     return np.array([forces, path], object)

@@ -86,7 +86,7 @@ def model_rows(
     kind = kind_of(contact, direction)
     answer = surrogate.evaluate(**case, **kind.names)
     mu = answer.mu_macro
-    inputs = _six_inputs(case, kind)
+    inputs = _inputs_of(case, kind)
     six = {"y0": 0.0, **inputs}  # 0 for normal
     swing = six.get("Fz_amplitude", six["y0"])
     if math.isinf(six["k"]) or six["omega"] == 0.0 or swing == 0.0:
@@ -96,10 +96,10 @@ def model_rows(
         doubts = [one for one in answer.remarks if one["row"] == UNITS]
         return [{"row": UNITS, "text": one["text"], "effect": None} for one in doubts]
     rows = [
-        _other_contact(surrogate, case, mu, contact, direction),
-        None if ends else _stiffness(surrogate, case, y, contact, direction),
-        _tilt(six["mu0"], y),
-        *(_cycle(surrogate, six) if direction == "across" else ()),
+        _row_of_other_contact(surrogate, case, mu, contact, direction),
+        None if ends else _row_of_stiffness(surrogate, case, y, contact, direction),
+        _row_of_tilt(six["mu0"], y),
+        *(_rows_of_cycle(surrogate, six) if direction == "across" else ()),
     ]
     return sorted((row for row in rows if row is not None), key=lambda row: ROWS.index(row["row"]))
 
@@ -154,7 +154,7 @@ def k_effect(
         raise InputError("uncertainty", uncertainty, "finite and > 0")
     words = kind_of(contact, direction).names
     middle_case, ends = without_interval(case)
-    k = _six_inputs(middle_case, kind_of(contact, direction))["k"]
+    k = _inputs_of(middle_case, kind_of(contact, direction))["k"]
     if math.isinf(k):
         return 0.0
     if ends:
@@ -183,7 +183,7 @@ def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
     return min(max(math.ceil(-math.log10(uncertainty)) + 1, least), most)
 
 
-def _six_inputs(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
+def _inputs_of(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
     """The six inputs as numbers: omega from f, k infinite for a rigid contact."""
     cases = Cases.of(case, kind)
     if cases.shape:
@@ -192,7 +192,7 @@ def _six_inputs(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
     return {name: float(column) for name, column in cases.columns.items()}
 
 
-def _other_contact(
+def _row_of_other_contact(
     surrogate: Answers, case: Mapping[str, Any], mu: float, contact: str, direction: str
 ) -> Row | None:
     alternative = "ball" if contact == "spring" else "spring"
@@ -219,7 +219,7 @@ def _other_contact(
     return {"row": "one spring", "text": text, "effect": change}
 
 
-def _stiffness(
+def _row_of_stiffness(
     surrogate: Answers, case: Mapping[str, Any], y: float, contact: str, direction: str
 ) -> Row | None:
     effect = k_effect(surrogate, case, contact, direction)
@@ -236,7 +236,7 @@ def _stiffness(
     return {"row": "k is known", "text": text, "effect": effect}
 
 
-def _tilt(mu0: float, y: float) -> Row | None:
+def _row_of_tilt(mu0: float, y: float) -> Row | None:
     effect = _NORMAL * mu0 * _TILT * y
     if not effect >= 0.01:
         return None
@@ -247,7 +247,7 @@ def _tilt(mu0: float, y: float) -> Row | None:
     return {"row": "constant normal force", "text": text, "effect": effect}
 
 
-def _cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
+def _rows_of_cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
     """Rows that follow from the slip path of a period, taken from one spring."""
     cases = Evaluated(surrogate.tabulated, Cases.of(six, SPRING), "groups")
     periods, time, slip, _ = decay(cases)

@@ -130,7 +130,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     state.metrics = Metrics({*state.methods, *page.OPEN})
     state.observer = Observer(state.metrics)
     keys = settings.keys()
-    app.openapi = lambda: _described(app, closed=bool(keys))  # type: ignore[method-assign]
+    app.openapi = lambda: _described(app, has_keys=bool(keys))  # type: ignore[method-assign]
     # the last one is the outermost
     app.add_middleware(HeadAsGet)
     if keys:
@@ -183,7 +183,7 @@ def _without_default(member: dict[str, Any]) -> None:
         member["description"] += f"; left out: {default_text}"
 
 
-def _described(app: FastAPI, closed: bool) -> dict[str, Any]:
+def _described(app: FastAPI, has_keys: bool) -> dict[str, Any]:
     """FastAPI's description, with what it cannot know."""
     if app.openapi_schema:
         return app.openapi_schema
@@ -205,7 +205,7 @@ def _described(app: FastAPI, closed: bool) -> dict[str, Any]:
             usual = {name: x for name, x in parameter["schema"].items() if name == "default"}
             without_null(parameter["schema"])
             parameter["schema"] |= usual
-    if closed:
+    if has_keys:
         document |= {"security": [{name: []} for name in SCHEMES]}
         document["components"]["securitySchemes"] = SCHEMES
     # pydantic names a generic model by its parameter

@@ -93,11 +93,11 @@ class Branch:
                 proposal = np.where(
                     proposal == trial, np.nextafter(trial, np.where(below, np.inf, 0.0)), proposal
                 )
-                accepted = (
+                is_newton = (
                     (proposal > a[i]) & (proposal < b[i]) & (2.0 * np.abs(step) <= np.abs(last[i]))
                 )
-                x[i] = np.where(accepted, proposal, _middle(a[i], b[i]))
-                last[i] = np.where(accepted, step, np.log(x[i] / trial))
+                x[i] = np.where(is_newton, proposal, _middle(a[i], b[i]))
+                last[i] = np.where(is_newton, step, np.log(x[i] / trial))
             at_level = steep & (np.abs(f) <= 2.0 * _ROUNDING * np.abs(level[i]))
             at_neighbours = np.nextafter(a[i], np.inf) >= b[i]
             roots[i] = np.where(

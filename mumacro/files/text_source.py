@@ -108,11 +108,11 @@ class TextTable:
         names = [split_unit(head)[0] for head in block.batch.schema.names]
         for name, column in zip(names, block.batch.columns, strict=True):
             if name in self.column_names.like:
-                signed = pc.match_substring_regex(column, "[.,]")
-                if pc.any(signed).as_py():
+                has_sign = pc.match_substring_regex(column, "[.,]")
+                if pc.any(has_sign).as_py():
                     self.signs.see(
                         Cell(block.lines[i], name, column[i].as_py())
-                        for i in np.flatnonzero(pc.fill_null(signed, False)).tolist()
+                        for i in np.flatnonzero(pc.fill_null(has_sign, False)).tolist()
                     )
 
     def blocks(self, names: Sequence[str], texts: str) -> Iterator[Block]:
@@ -160,8 +160,8 @@ class TextTable:
         if not (count >= width or (layout.without_comments and count == width - 1)):
             return None
         places = {name: i for i, name in enumerate(layout.heads)}
-        needed = [places[name] for name in names]
-        columns = _columns(text, sep, count, [*needed, *range(width, count)])
+        indices = [places[name] for name in names]
+        columns = _columns(text, sep, count, [*indices, *range(width, count)])
         if columns is None or not all(_is_blank(columns[i]) for i in range(width, count)):
             return None
         if count < width:
@@ -170,7 +170,9 @@ class TextTable:
         elif count > width and texts:
             lines = [line.rsplit(sep, count - width)[0] for line in lines]
         rows = [line.split(sep) for line in lines] if texts == "cells" else lines
-        batch = pa.RecordBatch.from_arrays([columns[i] for i in needed], schema=self._schema(names))
+        batch = pa.RecordBatch.from_arrays(
+            [columns[i] for i in indices], schema=self._schema(names)
+        )
         return Block(batch, 0.0, numbers, rows if texts else ())
 
     def _of_cells(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate, __version__
-from mumacro.analysis.approximations import APPROXIMATIONS, BORDERS, borders
+from mumacro.analysis.approximations import APPROXIMATIONS, BORDERS, approximate_borders
 from tests.project.test_benchmarks import tables
 from tests.support import extended
 from tests.support.comparing import close
@@ -80,7 +80,7 @@ def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Sur
                 ends[inner[1] == "up to"] = float(inner[2])
             y = np.geomspace(ends[0], ends[1], 4001)
             y[[0, -1]] = ends
-            off = np.abs(borders(y)[column] / surrogate.v_tilde_crit(y) - 1.0).max()
+            off = np.abs(approximate_borders(y)[column] / surrogate.v_tilde_crit(y) - 1.0).max()
             figure = float(re.findall(r"\d[\d.e-]*", error)[0])  # "12.6 %" is 0.126
             assert (100.0 * off if "%" in error else off) == close(figure, rel=0.03), (
                 f"{column}: {error}"
