@@ -587,6 +587,15 @@ def test_the_numbers_are_one_stop_of_the_tab_key(open_page: Any) -> None:
 
 @pytest.mark.parametrize("width", [1280, 390])
 def test_a_field_shows_the_whole_of_a_usual_text(open_page: Any, width: int) -> None:
+    page = open_page("#direction=normal", width=width, height=800)
+    overlaps = page.run(
+        "return [...document.querySelectorAll('#fields .field')].filter((one) => {"
+        "const ends = [...one.querySelectorAll('.symbol, .label, input')]"
+        ".map((part) => part.getBoundingClientRect());"
+        "return ends.some((part, i) => i && part.left < ends[i - 1].right - 0.5); })"
+        ".map((one) => one.textContent);"
+    )
+    assert overlaps == []
     texts = ("1.25±0.12 N/µm", "1.25 ± 0.12 N/µm", "0.8..1.2 N/µm", "912.345 N/mm")
     for text in texts:
         page = open_page(f"#k={text}", width=width, height=800)

@@ -186,6 +186,7 @@ export function motionPanel(store, moved) {
     const { state } = store;
     render(Object.keys(PARTS).map(field), $("motion-fields"));
     if (motion) numbers();
+    $("motion-meanings").hidden = !motion;
     render(roots(), $("motion-roots"));
     write("motion-status", refused ? prose(refused) : "");
     write("motion-doubt", withoutDeviations());
