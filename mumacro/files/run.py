@@ -114,6 +114,26 @@ class _State(NamedTuple):
     rejects: str = ""
 
 
+_Source = reading.ParquetSource | reading.TextSource | reading.NdjsonSource
+
+
+def _source_of(
+    files: Sequence[Path],
+    file_format: str,
+    folder: str | None,
+    rigid: bool,
+    dialect: Dialect,
+    verbatim: bool,
+) -> _Source:
+    """What reads the cases of files of one format; ``folder`` is that which holds them, if one was
+    named."""
+    if file_format == "parquet":
+        return reading.ParquetSource(files, folder)
+    if file_format == "ndjson":
+        return reading.NdjsonSource(files, verbatim)
+    return reading.TextSource(files, dialect, names_of_columns(rigid), verbatim)
+
+
 class _Run:
     def __init__(
         self,
@@ -138,17 +158,10 @@ class _Run:
                 )
         self.states_at_start = [_state_of(path) for path in self.files]
         self.verbatim = input_format == output_format != "parquet"
-        self.source: reading.ParquetSource | reading.TextSource | reading.NdjsonSource
+        folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
+        self.source = _source_of(self.files, input_format, folder, rigid, dialect, self.verbatim)
         where = f"{self.files[0]}: "
-        if input_format == "parquet":
-            folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
-            self.source = reading.ParquetSource(self.files, folder)
-        elif input_format == "ndjson":
-            self.source = reading.NdjsonSource(self.files, self.verbatim)
-        else:
-            self.source = reading.TextSource(
-                self.files, dialect, names_of_columns(rigid), self.verbatim
-            )
+        if isinstance(self.source, reading.TextSource):
             where = self.source.where
         self.surrogate, self.remarks = surrogate, list[Remark]()
         self.columns = find_columns(self.source.schema.names, rigid, include, kind, where)
