@@ -48,7 +48,9 @@ def test_what_was_understood_stands_below_the_field(open_page: Any) -> None:
     assert "deviation" in page.text("#note-k")
     page.type("#field-k", "1000 N/mm")
     page.type("#field-y0", "2e-6 m")
-    assert page.text("#note-y0")  # "half of peak to peak", or what was read
+    assert page.text("#note-y0") == "read as 0.000002 m"
+    page.type("#field-y0", "2um")  # µ is typed as u
+    assert page.text("#note-y0") == "half of peak to peak"
 
 
 def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surrogate) -> None:

@@ -28,6 +28,9 @@ export function choice(store, name, words, reasons = {}) {
   </fieldset>`;
 }
 
+/** A text without what makes no difference: blanks, u in place of µ. */
+const asTyped = (text) => text.replaceAll(" ", "").replaceAll("µ", "u");
+
 /** What the service understood of the text that is typed, where that says more than the text. */
 function understood(name, typed, { text, value, unit, std, low, high } = {}) {
   if (typeof value !== "number" || (text ?? typed) !== typed) return "";
@@ -35,7 +38,7 @@ function understood(name, typed, { text, value, unit, std, low, high } = {}) {
     return `${inUnit(name, low, unit ?? undefined)} to ${inUnit(name, high, unit ?? undefined)}`;
   const said = inUnit(name, value, unit ?? undefined, 6);
   if (std) return `${said}, deviation ${inUnit(name, std, unit ?? undefined, 3)}`;
-  return text && text.replaceAll(" ", "") !== said.replaceAll(" ", "") ? `read as ${said}` : "";
+  return text && asTyped(text) !== asTyped(said) ? `read as ${said}` : "";
 }
 
 /**
