@@ -20,7 +20,7 @@ from mumacro.closed_forms import BORDER_CONSTANT
 
 from . import slip as slip_phase
 from .compiled import solver_kernel
-from .slip import OK, rechart, slip
+from .slip import FRONT, OK, SIDE, rechart, slip
 from .stick import stick_end
 
 BORDER_SLOPE: float = BORDER_CONSTANT**-0.5  # v~crit / sqrt(y~) for y~ -> infinity
@@ -45,7 +45,7 @@ def _direction(x0: float, chart: int) -> tuple[float, float, float]:
     ``x0``."""
     half = math.sin(0.5 * x0)
     c, s = math.cos(x0), math.sin(x0)
-    return (c, s, 2.0 * half * half) if chart == 0 else (s, c, 1.0 - s)
+    return (c, s, 2.0 * half * half) if chart == FRONT else (s, c, 1.0 - s)
 
 
 @solver_kernel
@@ -82,7 +82,7 @@ def _angle_section(
     near = s0 + d if turn < 0 else s1
     ux = cth + v * d
     uy = 2.0 * y * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d) - sth  # mirrored
-    if chart == 1 and uy > 0.0:
+    if chart == SIDE and uy > 0.0:
         d1 = math.asin(min(ux, 1.0))
         # 2 B = delta1 - delta0 from sin delta1 - sin delta0 = v d, free of cancellation
         b = math.asin(min(1.0, 0.5 * v * d / math.cos(0.5 * (x0 + d1))))
@@ -92,7 +92,7 @@ def _angle_section(
             near,
             turn,
             -(x0 + 2.0 * b),
-            slip_phase.SIDE,
+            SIDE,
             0.5 * math.pi,
             slip_phase.TO_STICK,
             w,
@@ -100,13 +100,11 @@ def _angle_section(
         )
         return out[slip_phase.TURNED] - 2.0 * b, status
     th1 = math.atan2(uy, ux)
-    status = slip(
-        v, y, near, turn, th1, slip_phase.FRONT, 0.5 * math.pi, slip_phase.TO_STICK, w, out
-    )
+    status = slip(v, y, near, turn, th1, FRONT, 0.5 * math.pi, slip_phase.TO_STICK, w, out)
     if status != OK:
         return 0.0, status
     x_end = rechart(out[slip_phase.ANGLE], int(out[slip_phase.CHART]), chart)
-    return (x_end + x0 if chart == 1 else x_end - x0), status
+    return (x_end + x0 if chart == SIDE else x_end - x0), status
 
 
 @solver_kernel
@@ -134,7 +132,7 @@ def _time_section(
         cc = math.cos(s) * math.cos(h)
         gain = 0.5 * v * (math.pi - 2.0 * h)
         b = math.atan(gain / (y * cc))
-        if chart == 0:
+        if chart == FRONT:
             a_ang = math.asin(y * cc / math.cos(b))
             th0 = a_ang + b
             ratio = v * math.cos(th0) / (y * math.sin(th0))
@@ -150,7 +148,7 @@ def _time_section(
         if abs(s0 - old) <= 1e-16 * abs(s0):
             break
     _keep(orbit, math.pi - s0 + s1, s0, s1, th0, chart)
-    start = a_ang - b if chart == 0 else -(a_ang + b)
+    start = a_ang - b if chart == FRONT else -(a_ang + b)
     status = slip(
         v, y, s1, slip_phase.HERE, start, chart, 0.5 * math.pi, slip_phase.TO_STICK, w, out
     )
@@ -175,7 +173,7 @@ def section(
         r, status = _angle_section(v, y, eta, z, chart, w, out, orbit)
         # in chart 0 the residual th_end - th0 falls with th0; delta = pi/2 - th0 turns the sign of
         # z but not of r
-        return (-r if chart == 0 else r), status
+        return (-r if chart == FRONT else r), status
     r, status = _time_section(v, y, eta, -z, chart, w, out, orbit)
     return -r, status
 
@@ -198,8 +196,8 @@ def _choose(v: float, y: float, eta: float, hint: float) -> tuple[int, int, floa
     if ratio < 0.15 and (eta <= 0.0 or (eta < 0.5 * phi * phi and phi < 0.5)):
         return TIME_SECTION, chart, math.sqrt(2.0 * math.pi * v / (y * y * phi))
     if not math.isnan(hint):
-        return ANGLE_SECTION, chart, hint if chart == 0 else 0.5 * math.pi - hint
-    if chart == 0:
+        return ANGLE_SECTION, chart, hint if chart == FRONT else 0.5 * math.pi - hint
+    if chart == FRONT:
         return ANGLE_SECTION, chart, math.asin(min(1.0, y * (1.0 - 0.2 * min(ratio, 1.0))))
     return ANGLE_SECTION, chart, min(math.atan(v / y) + (phi if eta < 0.5 else v / y), 0.7)
 
@@ -233,7 +231,7 @@ def stick_slip(
     near = kind == ANGLE_SECTION and not math.isnan(hint)
     lo, hi = 0.0, 0.5 * math.pi
     if kind == ANGLE_SECTION:
-        lo, hi = (_edge(v, y), hi) if chart == 0 else (lo, hi - _edge(v, y))
+        lo, hi = (_edge(v, y), hi) if chart == FRONT else (lo, hi - _edge(v, y))
     z_old, f_old, spread, before = z, math.inf, math.inf, math.inf
     for trial in range(200):
         f, status = section(kind, v, y, eta, z, chart, w, out, orbit)
@@ -241,7 +239,7 @@ def stick_slip(
             # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border
             # slip misses lam = 0 when th0 is too large, since the half-period map turns the order
             # of orbits round there
-            lo, hi = (lo, z) if kind == ANGLE_SECTION and chart == 0 else (z, hi)
+            lo, hi = (lo, z) if kind == ANGLE_SECTION and chart == FRONT else (z, hi)
             z, f_old = 0.5 * (lo + hi), math.inf
             continue
         if status != OK:

@@ -90,7 +90,7 @@ def _add_integrals(
 ) -> None:
     """Integrals over a Taylor step of length ``h`` [rad] into ``out``; EXCESS only if
     ``excess``."""
-    if chart == 0:
+    if chart == FRONT:
         d = series.integral(w[series.DEFICIT_X], h)
         out[SUM_UX] += h - d
         out[SUM_DEFICIT] += d
@@ -143,7 +143,7 @@ def slip(
         if abs(x) > 0.9:
             # a quarter turn back from chart +-1 leads to 0; further than that leaves the half plane
             # u_x > 0
-            target = (1 if x > 0.0 else -1) if chart == 0 else 0
+            target = (1 if x > 0.0 else -1) if chart == FRONT else 0
             x, chart = rechart(x, chart, target), target
         if turn < 0 and sigma > 0.5 * math.pi:
             sigma, turn = sigma - math.pi, 0
