@@ -19,6 +19,7 @@ from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from mumacro.inputs.units import UNITS_OF
 from service.app import create_app
+from service.routers.page import ASSETS
 from service.settings import Settings
 from tests.support.browser import START
 from tests.support.comparing import close
@@ -133,6 +134,13 @@ def test_the_libraries_are_those_of_their_authors(client: Any, repository: Path)
         head = files[name].decode()[:700]
         needs = set(re.findall(r'require\("(d3-[^"]+)"\)', head))
         assert needs <= {one.removesuffix(".min.js") for one in loaded[:i]}, name
+
+
+def test_every_module_of_the_page_is_preloaded(client: Any) -> None:
+    page = client.get("/").text
+    preloaded = re.findall(r'rel="modulepreload" href="([^"]+)"', page)
+    modules = [f"static/page/{path.name}" for path in ASSETS if path.suffix == ".js"]
+    assert {*preloaded, "static/page/main.js"} == {*modules, "static/lib/lit-html.js"}
 
 
 def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, problem: Any) -> None:
