@@ -97,6 +97,8 @@ def test_a_target_is_reached_and_drawn(open_page: Any, surrogate: Surrogate) -> 
         0.5, abs=1e-5
     )
     assert len(page.texts("#map .target")) == 1
+    page.click("#tab-motion")  # what is looked at is no other case
+    assert len(page.texts("#map .target")) == 1
     page.click("#solve-result button")
     assert (page.shown()["µ/µ₀"], page.shown()["shaker power"]) == ("0.5", f"{match[2]} mW")
     page.type("#field-Fz", "12 N")  # the root was that of another case
