@@ -18,6 +18,7 @@ from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import contact_of
 from service.routers.page import ASSETS
 from tests.support.browser import RECORDED, START
+from tests.support.cases import Case
 from tests.support.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -502,7 +503,7 @@ def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
     page = open_page()
     page.click("#tab-motion")
     page.type("#motion-y", "2 um")
-    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
+    case: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
     motion = mumacro.motion(**case, x=(1e-6, 90.0), y=2e-6)
     shown = dict(zip(page.texts("#motion-values dt"), page.texts("#motion-values dd"), strict=True))
     assert float(shown["µ"]) == close(motion.mu_macro, rel=1e-5, abs=1e-6)
