@@ -603,15 +603,17 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
 
 def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) -> Value:
     """``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``1 ± 10 % N/um``, ``(1 ± 0.1) N/um``."""
-    together = text.startswith("(")
+    together, outside = text.startswith("("), ""
     if together:
-        text = text[1:].replace(")", " ", 1)
+        inside, _, outside = text[1:].partition(")")
+        text = f"{inside} {outside}"
     left, _, right = text.partition(mark)
     number, unit = split_number(left.strip())
     deviation, behind = split_number(right.strip())
     if deviation < 0.0 or not math.isfinite(deviation):
         raise InputError(name, raw, "a number and a deviation >= 0")
-    if not unit and quantity != "ratio" and behind.startswith("%"):  # the unit is that of the value
+    of_both = outside.lstrip().startswith("%")  # of the value, too
+    if not unit and quantity != "ratio" and behind.startswith("%") and not of_both:
         unit, behind, together = behind[1:].strip(), "%", False
     relative = canonical(behind) == "%" and canonical(unit) != "%" and not together
     if relative and not unit and quantity == "ratio" and abs(number) > _SURE_RATIO:
