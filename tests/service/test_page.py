@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import os
+import posixpath
 import re
 import shutil
 import subprocess
@@ -19,7 +20,6 @@ from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs.kind import CONTACTS, DIRECTIONS
 from mumacro.inputs.units import UNITS_OF
 from service.app import create_app
-from service.routers.page import ASSETS
 from service.settings import Settings
 from tests.support.browser import START
 from tests.support.comparing import close
@@ -127,8 +127,9 @@ def test_the_libraries_are_those_of_their_authors(client: Any, repository: Path)
     assert {name: hashlib.sha256(data).hexdigest() for name, data in files.items()} == listed
     assert sum(map(len, files.values())) <= 180_000
     # in an order in which each finds what it needs
-    page = client.get("/").text
-    loaded = re.findall(r'src="static/lib/([^"]+)"', page)
+    script = client.get("/static/page/d3.js").text
+    names = re.findall(r'^  "(.+)",$', script, re.MULTILINE)
+    loaded = [f"d3-{name}.min.js" for name in names]
     assert {*loaded, "lit-html.js"} == files.keys()
     for i, name in enumerate(loaded):
         head = files[name].decode()[:700]
@@ -136,11 +137,15 @@ def test_the_libraries_are_those_of_their_authors(client: Any, repository: Path)
         assert needs <= {one.removesuffix(".min.js") for one in loaded[:i]}, name
 
 
-def test_every_module_of_the_page_is_preloaded(client: Any) -> None:
+def test_the_page_begins_with_the_files_of_the_number(client: Any) -> None:
     page = client.get("/").text
-    preloaded = re.findall(r'rel="modulepreload" href="([^"]+)"', page)
-    modules = [f"static/page/{path.name}" for path in ASSETS if path.suffix == ".js"]
-    assert {*preloaded, "static/page/main.js"} == {*modules, "static/lib/lit-html.js"}
+    begun = re.findall(r'(?:rel="modulepreload" href|src)="([^"]+)"', page)
+    needed = ["static/page/main.js"]
+    for path in needed:
+        names = re.findall(r'from "(.+)";$', client.get(f"/{path}").text, re.MULTILINE)
+        paths = [posixpath.normpath(f"static/page/{name}") for name in names]
+        needed += [path for path in dict.fromkeys(paths) if path not in needed]
+    assert sorted(begun) == sorted(needed)
 
 
 def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, problem: Any) -> None:

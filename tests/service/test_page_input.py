@@ -471,6 +471,24 @@ def test_the_start_is_calm_while_the_service_is_not_ready(
         assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
 
 
+def test_a_file_that_is_not_loaded_is_told_and_the_number_stays(
+    open_page: Any, surrogate: Surrogate
+) -> None:
+    blocked = {"urls": ["*/d3-shape.min.js"]}
+    open_page.browser.execute_cdp_cmd("Network.enable", {})
+    open_page.browser.execute_cdp_cmd("Network.setBlockedURLs", blocked)
+    try:
+        page = open_page(wait=False)
+        page.wait_for("#status", "^The map and the law were not loaded: reload the page.$")
+        assert page.is_red("#status")
+        assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
+    finally:
+        open_page.browser.execute_cdp_cmd("Network.setBlockedURLs", {"urls": []})
+    page = open_page()
+    assert page.text("#status") == ""
+    assert len(page.texts("#law .curve")) == 1
+
+
 def test_no_message_moves_the_page(open_page: Any) -> None:
     page = open_page(width=1280, height=800)
     places = (

@@ -1,13 +1,15 @@
 // The panel "k from measured points": a table pasted or dropped, what the service read of it, and
 // the fit with its residuals.
 import { Channel } from "./ask.js";
+import d3 from "./d3.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
 import { exactCase } from "./state.js";
 import { about, inPrint, inUnit, prose, show, toSI, toUnit, unitFor } from "./words.js";
-const { area } = globalThis.d3;
+
+const { area } = d3;
 
 const SIX = 6; // digits of a fitted value, at most
 const ROWS = 6; // of the table that was read, which are shown

@@ -1,11 +1,13 @@
 // The friction law: µ over one input, with the map's colours behind it.
 import { Channel } from "./ask.js";
+import d3 from "./d3.js";
 import { $, attribute, write } from "./dom.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf } from "./state.js";
 import { about, inPrint, inUnit, inWords, numberOf, show, toSI, toUnit, unitFor } from "./words.js";
-const { area, bisectCenter } = globalThis.d3;
+
+const { area, bisectCenter } = d3;
 
 const POINTS = 241;
 const EXTREMES = [1e-300, 1e300]; // of a range

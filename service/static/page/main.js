@@ -1,24 +1,17 @@
 // The page: one state, the question that follows from it, and the cards that show the answer.
 import { Channel } from "./ask.js";
-import { $, afterPicture, write } from "./dom.js";
-import { copies, textsOf } from "./copy.js";
-import { fitPanel } from "./fit.js";
+import { $, afterPicture, markBusy } from "./dom.js";
 import { inputsPanel } from "./inputs.js";
-import { lawPanel } from "./law.js";
-import { mapPanel, textAt } from "./map.js";
-import { meaningsDialog } from "./meanings.js";
-import { motionPanel } from "./motion.js";
 import { numberPanel } from "./number.js";
 import { getPreloaded, post } from "./service.js";
-import { sidePanel, tabs } from "./side.js";
-import { Store, caseOf, fromAddress, kindOf, startState, useStart } from "./state.js";
-import { stiffnessPanel } from "./stiffness.js";
-import { about } from "./words.js";
+import { Store, caseOf, kindOf, startState, useStart } from "./state.js";
+import { about, textAt } from "./words.js";
 
 let answer = null; // the last one, with the state that it belongs to
 let trouble = null; // why there is no newer one: { text, calm, faults by input }
 let target = null; // the friction that is asked for, as a line in the plots
 let panels;
+let loading = false; // the other cards
 
 const store = new Store(() => {
   ask();
@@ -76,50 +69,34 @@ function show() {
   const old = answer !== null && answer.state !== store.state && trouble !== null;
   panels.inputs(answer, trouble?.faults ?? new Map());
   panels.number(answer, trouble, old);
-  panels.map?.(answer, target?.mu_ratio);
-  afterPicture(() => showRest(old));
+  panels.others?.point(answer, target);
+  afterPicture(() => {
+    if (panels.others) panels.others.rest(answer, trouble, target, old);
+    else if (answer || trouble) loadOthers();
+  });
 }
 
-/** While something is dragged, what does not belong to the case alone waits for the end of it. */
-function showRest(old) {
-  if (!answer && !trouble) return; // the first number comes before the other cards
-  if (!panels.map) Object.assign(panels, otherPanels());
-  const { state } = store;
-  panels.law(state, answer, panels.map(answer, target?.mu_ratio), target, old);
-  panels.side(answer);
-  if (store.dragged) return;
-  const settled = answer?.state === state;
-  panels.copy(textsOf(state), settled ? null : (trouble?.text ?? "there is no number yet."));
-  panels.tab(state.panel);
-  panels.stiffness();
-  panels.fit(answer);
-  panels.motion(answer, settled || trouble !== null);
-  for (const name of ["along", "scale", "from", "to", "exponent"]) $(name).value = state[name];
-  $("digits").checked = state.digits === "all";
-  $("exponent-field").hidden = state.along !== "Fz" && state.unknown !== "Fz";
-  write("print-case", location.href);
-  write("print-date", new Date().toISOString().slice(0, 10));
+/** Loads the other cards once, so that the number waits for none of their files. */
+async function loadOthers() {
+  if (loading) return;
+  loading = true;
+  markBusy(loadOthers, true);
+  try {
+    const [{ cards }] = await Promise.all([import("./cards.js"), import("./d3.js")]);
+    panels.others = cards(store, moved, aim, show);
+  } catch {
+    loading = false; // the next answer tries it again
+    trouble = { text: "The map and the law were not loaded: reload the page.", faults: new Map() };
+  }
+  if (panels.others) show();
+  else panels.number(answer, trouble, false);
+  markBusy(loadOthers, false);
 }
 
-function otherPanels() {
-  meaningsDialog();
-  for (const [name, { symbol }] of Object.entries(about.inputs))
-    $("along").append(new Option(symbol, name));
-  return {
-    map: mapPanel(store, moved, () => show()),
-    law: lawPanel(store, moved),
-    side: sidePanel(store, moved, (mark) => {
-      target = mark;
-      show();
-    }),
-    copy: copies("copy"),
-    tab: tabs("panel-tabs", (panel) => store.look({ panel })),
-    stiffness: stiffnessPanel(store, moved),
-    fit: fitPanel(store, moved, (address) =>
-      store.change(fromAddress(`#${address}&panel=fit`).state),
-    ),
-    motion: motionPanel(store, moved),
-  };
+/** Takes the friction that is asked for. */
+function aim(mark) {
+  target = mark;
+  show();
 }
 
 function start(names) {
@@ -143,13 +120,6 @@ $("reset").addEventListener("click", () =>
 $("notice-close").addEventListener("click", () => {
   $("notice").hidden = true;
 });
-for (const name of ["along", "scale", "from", "to", "exponent"])
-  $(name).addEventListener("change", ({ target: { value } }) =>
-    store.change(name === "along" ? { along: value, from: "", to: "" } : { [name]: value }),
-  );
-$("digits").addEventListener("change", ({ target: { checked } }) =>
-  store.change({ digits: checked ? "all" : "few" }),
-);
 $("print").addEventListener("click", () => window.print());
 new Channel(
   () => getPreloaded("static/page/names.json"),

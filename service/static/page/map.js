@@ -1,24 +1,13 @@
 // The map: µ/µ₀ over ṽ and ỹ with the user's point, which can be dragged.
 import { Channel } from "./ask.js";
+import d3 from "./d3.js";
 import { $, attribute, write } from "./dom.js";
 import { caseOf, inputsOf } from "./state.js";
 import { Plot } from "./plot.js";
 import { get } from "./service.js";
-import { about, inUnit, inWords, show, toUnit, unitFor } from "./words.js";
-const { contours } = globalThis.d3;
+import { about, inWords, show } from "./words.js";
 
-/** The text of an input at a value [SI], in the unit and with the relative deviation it had. */
-export function textAt(answer, name, value, digits = 4) {
-  const { unit, std, value: before } = answer.inputs[name] ?? {};
-  const number = unit ? Math.abs(toUnit(name, value, unit)) : NaN; // how it would read
-  const text = inUnit(
-    name,
-    value,
-    number >= 1e-3 && number < 1e5 ? unit : unitFor(name, value),
-    digits,
-  );
-  return std ? `${text} ± ${show((100 * std) / before, 3)} %` : text;
-}
+const { contours } = d3;
 
 /** The relative deviation of a product of powers of inputs; 0 where none has one. */
 function deviationOf(inputs, names) {

@@ -2,6 +2,7 @@
 // value of an input gives a wanted mean friction.
 import { Channel } from "./ask.js";
 import { copies, motionTexts } from "./copy.js";
+import d3 from "./d3.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
@@ -9,7 +10,8 @@ import { Plot } from "./plot.js";
 import { post } from "./service.js";
 import { PARTS, motionOf, uncertainOf } from "./state.js";
 import { about, digitsWithin, friction, inUnit, prefixed, prose, show, typeset } from "./words.js";
-const { extent } = globalThis.d3;
+
+const { extent } = d3;
 
 const MEANINGS = { x: "along the drag", y: "across it", normal: "of the load" };
 /** The input whose units an oscillation has. */

@@ -1,6 +1,8 @@
 // What the plots share: a frame of two axes that follows its size, dragging, arrow keys, pictures
 // for download.  Scales, axes, shapes and dragging are those of d3.
-const { axisBottom, axisLeft, drag, scaleLinear, scaleLog, select, line } = globalThis.d3;
+import d3 from "./d3.js";
+
+const { axisBottom, axisLeft, drag, scaleLinear, scaleLog, select, line } = d3;
 
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };

@@ -1,6 +1,5 @@
 // Numbers and names for people: the one place where the page writes a value.
 import { html } from "../lib/lit-html.js";
-const { format } = globalThis.d3;
 
 /** What the service says of inputs, contacts and geometries (names.json). */
 export const about = {};
@@ -22,7 +21,9 @@ export function prefixed(value, unit, digits = 4) {
     return `${show(value)} ${unit}`;
   const magnitude = Math.abs(value);
   if (magnitude < 1e-24 || magnitude >= 1e27) return `${show(value, digits)} ${unit}`;
-  const [, number, prefix] = format(`.${digits}~s`)(value).match(/^(.*\d)(\D?)$/);
+  const [, number, prefix] = globalThis.d3
+    .format(`.${digits}~s`)(value)
+    .match(/^(.*\d)(\D?)$/);
   return `${number.replace("-", "−")} ${prefix}${unit}`;
 }
 
@@ -58,6 +59,19 @@ export const numberOf = (one) => (typeof one?.value === "number" ? one.value : u
 export function inUnit(name, value, unit = unitFor(name, value), digits = 4) {
   const number = Number(toUnit(name, value, unit).toPrecision(digits));
   return unit === "-" ? String(number) : `${number} ${inPrint(unit)}`;
+}
+
+/** The text of an input at a value [SI], in the unit and with the relative deviation it had. */
+export function textAt(answer, name, value, digits = 4) {
+  const { unit, std, value: before } = answer.inputs[name] ?? {};
+  const number = unit ? Math.abs(toUnit(name, value, unit)) : NaN; // how it would read
+  const text = inUnit(
+    name,
+    value,
+    number >= 1e-3 && number < 1e5 ? unit : unitFor(name, value),
+    digits,
+  );
+  return std ? `${text} ± ${show((100 * std) / before, 3)} %` : text;
 }
 
 /** A friction coefficient with so many digits, trailing zeros kept. */
