@@ -6,6 +6,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,12 +26,14 @@ SLICES = st.sampled_from([1, 7, 64, 256 * 1024])
 
 
 def plain(value: Any) -> Any:
-    """Arrays as lists, integers as floats, NaN as a text, which is equal to itself."""
+    """Arrays as lists, integers as floats; truth values and NaN as texts, which equal no number."""
+    if isinstance(value, bool):
+        return str(value)
     if isinstance(value, (list, np.ndarray)):
         return [*map(plain, value)]
     if isinstance(value, float) and math.isnan(value):
         return "NaN"
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 10**300:
+    if isinstance(value, int) and abs(value) < 10**300:
         return float(value)
     return value
 
@@ -58,6 +61,27 @@ def test_columns_are_read_as_json_reads_them(
 def test_rows_are_read_as_json_reads_them(rows: list[Any], spaces: Any, step: int) -> None:
     expected = {name: [float(row[name]) for row in rows] for name in CASE}
     assert outcome(json.dumps(rows, separators=spaces), step) == expected
+
+
+@given(ROWS, st.sampled_from([*CASE]), st.one_of(st.booleans(), VALUES), SLICES)
+def test_no_value_of_rows_becomes_another(
+    rows: list[Any], name: str, value: Any, step: int
+) -> None:
+    rows[-1][name] = value
+    read = outcome(json.dumps(rows), step)
+    if read is not None:
+        assert read[name][-1] in (plain(value), "NaN")
+
+
+@pytest.mark.parametrize("value", ["false", "true", '"3"'])
+def test_no_escape_in_a_name_hides_a_value_that_is_no_number(value: str) -> None:
+    """The l of false stands where one is missing in Fz_amplitude."""
+    case = {name: 1.0 for name in CASE if name != "y0"}
+    text = json.dumps([{**case, "Fz_amplitude": 0.5}] * 3)
+    text = text.replace("Fz_amplitude", "Fz_amp\\u006citude").replace("0.5", value)
+    body = forms.read(bytearray(text.encode()), 10, {"direction": "normal"})
+    read = body.members["Fz_amplitude"]
+    assert plain(read) in ([plain(json.loads(value))] * 3, ["NaN"] * 3)
 
 
 @given(st.one_of(OBJECTS, ROWS), SLICES, st.data())
