@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any
 from urllib.parse import parse_qsl
 
-import jiter
 import orjson
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
@@ -56,6 +55,31 @@ _DECODER = json.JSONDecoder(
 )
 
 
+def loads(text: bytes) -> Any:
+    """A JSON text as Python objects.
+
+    ValueError where a name may be given twice: in an object of fewer members than its text has
+    colons.
+    """
+    value = orjson.loads(text)
+    if b"{" in text and _members_in(value) != text.count(b":"):
+        raise ValueError("a name is given twice, or a text has a colon")
+    return value
+
+
+def _members_in(value: Any) -> int:
+    """The number of members of all objects in a value."""
+    number, values = 0, [value]
+    while values:
+        one = values.pop()
+        if isinstance(one, dict):
+            number += len(one)
+            values.extend(one.values())
+        elif isinstance(one, list):
+            values.extend(one)
+    return number
+
+
 def decode(text: bytes, large: bool = False) -> Any:
     """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later.
 
@@ -67,8 +91,8 @@ def decode(text: bytes, large: bool = False) -> Any:
         if large:
             return _DECODER.decode(text.decode())
         try:
-            value = jiter.from_json(text, catch_duplicate_keys=True)
-        except ValueError:  # _DECODER gives the reason
+            value = loads(text)
+        except ValueError:  # _DECODER gives the reason, or reads what the other does not
             value = _DECODER.decode(text.decode())
         if text.count(b":") > _MOST_MEMBERS:
             _few_members(value)
