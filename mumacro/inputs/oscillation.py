@@ -1,7 +1,8 @@
 """One oscillation of a motion, of any form, read as harmonics: a number, a text such as
 ``2um@90deg``, a pair, mappings, or a list of harmonics."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -79,17 +80,40 @@ def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
         amplitude, at, phase = rest.partition("@")
         if ":" in before or "@" in phase or not amplitude.strip() or (at and not phase.strip()):
             raise InputError(name, text, _FORM)
-        if "," in amplitude and not at:
-            amplitude_text = amplitude.partition(",")[0].strip()
-            try:
-                _amplitude(name, amplitude)
-            except InputError as error:
-                behind = amplitude.partition(",")[2].strip()
-                remedy = f"did you mean {amplitude_text}@{behind}deg?"
-                bound = f"an amplitude, and its phase behind @: {remedy}"
-                raise InputError(name, text, bound) from error
+        if not at and (meant := _with_phase(name, amplitude)):
+            bound = f"an amplitude, and its phase behind @: did you mean {meant}?"
+            raise InputError(name, text, bound)
         parts.append((before.strip() if colon else 1, amplitude, phase if at else 0.0))
     return parts
+
+
+# a comma between digits is a decimal sign
+_BETWEEN = re.compile(r"[\s;∠]+|,(?!\d)|(?<!\d),")
+_WORDS = ("phase", "at", "and")
+
+
+def _with_phase(name: str, text: str) -> str | None:
+    """What is meant by an amplitude and a phase that no @ separates; None where there is none.
+
+    >>> _with_phase("x", "0.5 um, phase 90 deg"), _with_phase("x", "0.5 um")
+    ('0.5um@90deg', None)
+    """
+    if _reads(_amplitude, name, text):  # also with a decimal comma
+        return None
+    words = [word for word in _BETWEEN.split(text) if word and word not in _WORDS]
+    for number in (1, 2):  # words of the phase
+        amplitude, phase = "".join(words[:-number]), "".join(words[-number:])
+        if amplitude and _reads(_amplitude, name, amplitude) and _reads(_phase, name, phase):
+            return f"{amplitude}@{phase}{'deg' if phase[-1].isdigit() else ''}"
+    return None
+
+
+def _reads(read_part: Callable[[str, Any], Any], name: str, text: str) -> bool:
+    try:
+        read_part(name, text)
+    except InputError:
+        return False
+    return True
 
 
 def _of_mapping(name: str, value: Mapping[str, Any]) -> tuple[Any, Any, Any]:
