@@ -2,8 +2,8 @@
 case and for many.
 
 A value outside its usual range (:attr:`mumacro.inputs.fields.Field.usual`) is answered and remarked
-on, never refused; so is a contact whose length l0 = mu0 Fz / k, or whose groups v~ and y~, no
-contact has.  A rigid contact is answered with what it assumes.
+on, never refused; so is a contact whose length l0 = mu0 Fz / k, whose groups v~ and y~ or whose
+peak speed y0 omega no contact has.  A rigid contact is answered with what it assumes.
 """
 
 import math
@@ -18,7 +18,11 @@ from mumacro.kernel.arrays import Array, Bools
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
 LONGEST = 1e-2  # l0 [m]; no contact has more
 FURTHEST = 1e4  # v~ and y~; no contact has more
-_LARGE = {"k": 1e9, "y0": 1e-4, "v0": 1.0}  # shaken contacts have less
+# y0 omega [m/s]: a resonant bar of titanium yields at about 40, stress over density and speed of
+# sound
+FASTEST = 100.0
+# shaken contacts have less
+_LARGE = {"k": 1e9, "y0": 1e-4, "v0": 1.0, "omega": 1e6}
 _SMALL_LOAD = 1e-2  # [N]
 _USUAL = {name: INPUTS[name].usual for name in ("mu0", "Fz", "k", "y0", "omega", "v0")}
 _USUAL["Fz_amplitude"] = INPUTS["Fz_amplitude"].usual
@@ -98,6 +102,7 @@ def _usual(columns: Mapping[str, Any]) -> bool:
         and 0.0 < y0 <= 2e-2
         and y0 >= 1e-12
         and _USUAL["omega"][0] <= omega <= _USUAL["omega"][1]
+        and y0 * omega <= FASTEST
         and 0.0 <= v0 <= 300.0
         and (
             k == math.inf
@@ -121,13 +126,15 @@ def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
 
 
 def _groups_out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """l0, y~ and v~, and where no contact has them; of legal contacts alone."""
+    """l0, y~, v~ and the peak speed, and where no contact has them; of legal contacts alone."""
     length = six["mu0"] * six["Fz"] / six["k"]
     elastic = (length > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0)
     moves = _oscillates(six) & elastic
     yield "l0", np.asarray((length > LONGEST) & elastic)
     yield "y~", np.asarray((six["y0"] / length > FURTHEST) & moves)
     yield "v~", np.asarray((six["v0"] / six["omega"] / length > FURTHEST) & moves)
+    speed = six["y0"] * six["omega"]
+    yield "y0 omega", np.asarray((speed > FASTEST) & np.isfinite(speed))
 
 
 def _oscillates(six: Mapping[str, Array]) -> Bools:
@@ -140,14 +147,20 @@ def _sentence(what: str, case: Mapping[str, float], frequency: bool) -> tuple[st
     if what == "l0":
         return "k", f"l0 = mu0 Fz / k = {length:.3g} m, above 1 cm: is {_value('k', case)}?"
     if what == "y~":
-        name = _largest(case, "y0")
+        name = _stiff_or(case, "y0")
         group = case["y0"] / length
         return name, f"y~ = y0 k / (mu0 Fz) = {group:.3g}, {_CONTACTS}: is {_value(name, case)}?"
     if what == "v~":
-        name = _largest(case, "v0")
+        name = _stiff_or(case, "v0")
         group = case["v0"] / case["omega"] / length
         formula = "v~ = v0 k / (mu0 Fz omega)"
         return name, f"{formula} = {group:.3g}, {_CONTACTS}: is {_value(name, case)}?"
+    if what == "y0 omega":
+        name, speed = _largest(case, "y0", "omega"), case["y0"] * case["omega"]
+        if name == "omega" and frequency:
+            name, case = "f", {"f": case["omega"] / RAD_PER_CYCLE}
+        formula = f"the peak speed y0 omega = {speed:.3g} m/s, above {FASTEST:g} m/s"
+        return name, f"{formula}: is {_value(name, case)}?"
     value, name = case[what], what
     if what == "omega" and frequency:
         value, name = value / RAD_PER_CYCLE, "f"
@@ -166,11 +179,16 @@ def _value(name: str, case: Mapping[str, float]) -> str:
     return f"{name} = {case[name]:.6g} in {INPUTS[name].unit}"
 
 
-def _largest(case: Mapping[str, float], other: str) -> str:
+def _largest(case: Mapping[str, float], *names: str) -> str:
+    """The input, of these, which is furthest above what contacts have."""
+    return max(names, key=lambda name: case[name] / _LARGE[name])
+
+
+def _stiff_or(case: Mapping[str, float], other: str) -> str:
     """The input, of those that make a group large, which is furthest from what contacts have."""
-    excess = {name: case[name] / _LARGE[name] for name in (other, "k")}
-    excess["Fz"] = _SMALL_LOAD / case["Fz"]
-    return max(excess, key=lambda name: excess[name])
+    name = _largest(case, other, "k")
+    lightness = _SMALL_LOAD / case["Fz"]
+    return "Fz" if lightness > case[name] / _LARGE[name] else name
 
 
 def _of_rigid(stiffness: float, cases: int = 1) -> Remark:

@@ -129,11 +129,24 @@ def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
     """The head that probably stands for an input, and the heading that it should have."""
     for loosely, candidates in ((False, heads), (True, heads[:_COMPARED])):
         for head in candidates:
-            field = meant_by(head, loosely=loosely)
-            if field and field in (name, {"omega": "f"}.get(name)):
+            if field := _stands_for(head, name, loosely):
                 column = f"{field} [{_unit_of(head, field) or unit_in_si(field)}]"
                 return head, column + (_HALVED if _is_whole(head, field) else "")
     return None
+
+
+def _stands_for(head: str, name: str, loosely: bool) -> str | None:
+    """The input as which a head probably stands for a column that is missing: omega also as f, and
+    mu_macro as what people call friction.
+
+    >>> _stands_for("freq", "omega", False), _stands_for("COF", "mu_macro", False)
+    ('f', 'mu_macro')
+    """
+    field = meant_by(head, loosely=loosely)
+    if name == "mu_macro":
+        friction = field == "mu0" or "macro" in head.lower()
+        return name if friction and split_unit(head)[0] not in INPUTS else None
+    return field if field in (name, {"omega": "f"}.get(name)) else None
 
 
 _HALVED = ", with half of each value: it is peak to peak"

@@ -277,6 +277,8 @@ def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> No
     shown = [again.value(f"#{field}") for field in ("field-Fz", "along", "field-v0", "from")]
     assert shown == ["12.5 N", "y0", "0.01m/s", "1e-7 m"]
     assert not again.find("#notice").is_displayed()
+    again.click("#tab-bars")
+    assert open_page("#" + again.address()).find("#part-bars").is_displayed()
     bad = open_page("#mu0=-1&k=rigid&bad=1")
     assert "bad=1" in bad.text("#notice-text")
     assert bad.find("#field-mu0").get_attribute("aria-invalid") == "true"

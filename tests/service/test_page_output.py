@@ -487,6 +487,8 @@ def test_a_column_that_is_missing_is_named_as_it_is_typed(open_page: Any) -> Non
     page.choose("#points", "v0\tmu_macro\n1\twet\n")
     assert "mu_macro" in page.text("#fit-status")
     assert not re.search("[₀µ]", page.text("#fit-status"))
+    assert page.text("#fit-status").startswith("line 2: ")
+    assert not page.find("#fit-caption").is_displayed()  # there is nothing to save
 
 
 def test_a_remedy_is_one_of_the_page(open_page: Any) -> None:

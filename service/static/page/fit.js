@@ -45,8 +45,9 @@ export function fitPanel(store, moved, openCase) {
     return unit ? table.columns[name].map((one) => toSI(like, one, unit)) : table.columns[name];
   };
   /** A reason stands in the words of the service: it names columns as they are typed. */
+  /** A reason of the service; that it is about the points is seen. */
   const say = (text, bad = false) => {
-    write("fit-status", text ?? "");
+    write("fit-status", (text ?? "").replace(/^points(_base64)?: /, ""));
     $("fit-status").classList.toggle("bad", bad);
   };
 
@@ -213,6 +214,7 @@ export function fitPanel(store, moved, openCase) {
   function draw() {
     render(readTable(), $("points-read"));
     $("fit-button").disabled = !table;
+    $("fit-caption").hidden = !fit;
     render(result(), $("fit-lines"));
     const old = fit && JSON.stringify(question()) !== JSON.stringify(fit.question);
     $("fit-lines").classList.toggle("old", Boolean(old));

@@ -115,7 +115,7 @@ function start(names) {
 }
 
 $("reset").addEventListener("click", () =>
-  store.change({ ...startState(), panel: store.state.panel }),
+  store.change({ ...startState(), panel: store.state.panel, side: store.state.side }),
 );
 $("notice-close").addEventListener("click", () => {
   $("notice").hidden = true;

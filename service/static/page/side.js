@@ -229,10 +229,11 @@ export function sidePanel(store, moved, found) {
   $("solve-form").addEventListener("change", ({ target: { name, value } }) =>
     store.change({ [name]: value }),
   );
-  tabs("side-tabs");
+  const tab = tabs("side-tabs", (side) => store.look({ side }));
 
   return (latest) => {
     answer = latest;
+    tab(store.state.side);
     const names = inputsOf(store.state);
     const option = (name) =>
       html`<option value=${name} ?selected=${store.state.unknown === name}>

@@ -21,6 +21,7 @@ const CHOICES = {
   digits: ["few", "all"],
   unknown: ["y0", "mu0", "Fz", "k", "Fz_amplitude", "f", "v0"],
   quantity: ["mu_ratio", "mu_macro"],
+  side: ["values", "bars", "target"],
   panel: ["stiffness", "fit", "motion"],
   motion_unknown: [
     "v0",

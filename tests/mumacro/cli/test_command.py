@@ -464,6 +464,10 @@ def test_a_fit_goes_into_csv_with_warnings(capsys: Capture, tmp_path: Path, meas
             1,
             ["no column v0; 'speed' is similar: rename that column to v0 [m/s]"],
         ),
+        *(
+            (f"v0,{head}\n1,0.2\n", RIG, 1, [f"'{head}' is similar: rename that column to {new}"])
+            for head, new in (("µ", "mu_macro [-]"), ("COF [%]", "mu_macro [%]"))
+        ),
         ("v0 [s],mu_macro\n1,0.2\n", RIG, 1, ["'v0 [s]' has a unit that v0 cannot have"]),
         ("v0,v0 [mm/s],mu_macro\n1,1,0.2\n", RIG, 1, ["v0 is there twice"]),
         (
