@@ -26,7 +26,8 @@ def test_a_typed_value_applies_on_commit(open_page: Any, surrogate: Surrogate) -
         assert page.number() == page.rounded(surrogate.evaluate(**{**START, **changed}).mu_macro)
 
     page.type("#field-y0", "2.9", commit=False)
-    expect()  # not while it is typed
+    expect()  # not while it is typed, which is told
+    assert "Enter" in page.text("#note-y0")
     page.find("#field-Fz").click()  # but on leaving the field; a plain number keeps its unit
     page.settle()
     expect(y0=2.9e-6)
@@ -38,6 +39,7 @@ def test_a_typed_value_applies_on_commit(open_page: Any, surrogate: Surrogate) -
     ):
         page.type(f"#field-{field}", typed)
         assert page.value(f"#field-{field}") == shown
+        assert "Enter" not in page.text(f"#note-{field}")
         expect(**changed)
 
 
@@ -48,7 +50,9 @@ def test_what_was_understood_stands_below_the_field(open_page: Any) -> None:
     assert "deviation" in page.text("#note-k")
     page.type("#field-k", "1000 N/mm")
     page.type("#field-y0", "2e-6 m")
-    assert page.text("#note-y0") == "read as 0.000002 m"
+    assert page.text("#note-y0") == "read as 2\u00a0µm"
+    page.type("#field-f", "20000")  # in the field of 20 kHz
+    assert page.text("#note-f") == "read as 20 MHz"
     page.type("#field-y0", "2um")  # µ is typed as u
     assert page.text("#note-y0") == "half of peak to peak"
 
@@ -107,6 +111,24 @@ def test_escape_takes_back_what_is_typed(open_page: Any) -> None:
     page.type("#field-Fz", "77 N", commit=False)
     page.press("#field-Fz", "ESCAPE")
     assert page.value("#field-Fz") == "10 N"
+    assert "Enter" not in page.text("#note-Fz")
+
+
+def test_a_refusal_is_read_whole_and_covers_no_field_for_a_click(open_page: Any) -> None:
+    page = open_page(width=1280, height=800)
+    page.type("#field-Fz", "5 apples")
+    inner, outer = page.run(
+        "const one = document.querySelector('#status');return [one.scrollHeight, one.clientHeight];"
+    )
+    assert inner <= outer
+    assert page.text("#law-status") == ""  # it is told once
+    note = page.find("#note-Fz").rect
+    below = page.find("#field-k").rect
+    assert note["y"] + note["height"] > below["y"]  # it is too long for its line
+    page.run("document.elementFromPoint(150, 436).focus();")
+    assert page.run("return document.activeElement.id;") == "field-k"
+    note = page.find("#note-Fz").rect
+    assert note["y"] + note["height"] <= below["y"]
 
 
 def test_a_contact_is_rigid_by_a_choice(open_page: Any, surrogate: Surrogate) -> None:

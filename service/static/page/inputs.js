@@ -3,7 +3,7 @@
 import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
-import { about, inPrint, inUnit, numberOf, prose, typeset } from "./words.js";
+import { about, inPrint, inUnit, numberOf, prose, toUnit, typeset } from "./words.js";
 
 const STEPS = 100; // of a slider, a decade
 
@@ -36,7 +36,9 @@ function understood(name, typed, { text, value, unit, std, low, high } = {}) {
   if (typeof value !== "number" || (text ?? typed) !== typed) return "";
   if (low !== undefined && high !== undefined)
     return `${inUnit(name, low, unit ?? undefined)} to ${inUnit(name, high, unit ?? undefined)}`;
-  const said = inUnit(name, value, unit ?? undefined, 6);
+  const number = Math.abs(toUnit(name, value, unit ?? ""));
+  const reads = number === 0 || (number >= 1e-3 && number < 1e4);
+  const said = inUnit(name, value, reads ? (unit ?? undefined) : undefined, 6);
   if (std) return `${said}, deviation ${inUnit(name, std, unit ?? undefined, 3)}`;
   return text && asTyped(text) !== asTyped(said) ? `read as ${said}` : "";
 }
@@ -56,16 +58,19 @@ export function withUnit(name, text, answer) {
 /** `moved({ name: value [SI] })` takes the value of a slider. */
 export function inputsPanel(store, moved) {
   let answer = null;
+  let known = new Map(); // the faults of the fields
+  let typing = ""; // the field whose text is not taken yet
 
   function field(name, fault, doubt) {
     const { label, symbol, note, range } = about.inputs[name];
     const one = answer?.inputs[name];
     const rigid = name === "k" && store.state.contact === "rigid";
-    const below = fault ?? doubt ?? (understood(name, store.state[name], one) || note);
+    const said = fault ?? doubt ?? (understood(name, store.state[name], one) || note);
+    const below = name === typing ? "Enter takes it, Esc takes it back" : said;
     const number = numberOf(one);
     const value = number > 0 ? Math.log10(number) : range[0];
     return html`
-      <div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
+      <div class="field ${name === typing ? "" : fault ? "bad" : doubt ? "doubt" : ""}">
         <label for=${`field-${name}`} title=${about.inputs[name].meaning}>
           ${typeset(symbol)} <span class="label">${label}</span>
         </label>
@@ -119,16 +124,35 @@ export function inputsPanel(store, moved) {
     write("chosen", `${words[0].toUpperCase()}${words.slice(1)}.`);
   }
 
+  function fields() {
+    const doubts = (name) =>
+      answer?.remarks?.find(({ row, field: one }) => row === "units" && one === name)?.text;
+    const rows = inputsOf(store.state).map((name) => field(name, known.get(name), doubts(name)));
+    render(rows, $("fields"));
+  }
+
+  /** Says below a field that its text is not taken yet. */
+  function typed({ name, value }) {
+    if (!name) return;
+    typing = value === store.state[name] ? "" : name;
+    fields();
+  }
+
+  $("fields").addEventListener("input", ({ target }) => typed(target));
   $("fields").addEventListener("change", ({ target: { name, value } }) => {
-    if (name) store.change({ [name]: withUnit(name, value, answer) });
+    if (!name) return;
+    typing = "";
+    store.change({ [name]: withUnit(name, value, answer) });
   });
   $("fields").addEventListener("keydown", ({ key, target }) => {
-    if (key === "Escape" && target.name) target.value = store.state[target.name];
+    if (key !== "Escape" || !target.name) return;
+    target.value = store.state[target.name];
+    typed(target);
   });
   $("fields").addEventListener("submit", (event) => event.preventDefault());
 
   return (reply, faults) => {
-    answer = reply;
+    [answer, known] = [reply, faults];
     const { contact, direction } = store.state;
     const without = (kind) => about.impossible[kind];
     const reasons = (names, kind) =>
@@ -143,9 +167,6 @@ export function inputsPanel(store, moved) {
       $("choices"),
     );
     sketch();
-    const doubts = (name) =>
-      answer?.remarks?.find(({ row, field: one }) => row === "units" && one === name)?.text;
-    const rows = inputsOf(store.state).map((name) => field(name, faults.get(name), doubts(name)));
-    render(rows, $("fields"));
+    fields();
   };
 }

@@ -53,6 +53,7 @@ export function lawPanel(store, moved) {
   let answer, law, colours, target, latest;
   let pointer = null; // where it is in the plot
   let refused = null;
+  let behind = false; // whether the number belongs to earlier values
   const plot = new Plot($("law"), paint, mark);
   const along = () => law?.along ?? store.state.along;
   /** The unit of the axis: that of the input as it was typed. */
@@ -64,16 +65,22 @@ export function lawPanel(store, moved) {
     (question) => post("v1/law", question),
     (reply, { scale }) => {
       law = { ...reply, scale };
-      write("law-status", "");
       plot.redraw();
       describe();
     },
-    (reason) => {
+    (reason, calm) => {
       refused = reason;
-      write("law-status", reason ?? "");
-      $("law").classList.toggle("old", refused !== null);
+      $("law-status").classList.toggle("bad", reason !== null && !calm);
+      tell();
     },
   );
+
+  /** Why there is no other law; what the number lacks, too, is told beside the number. */
+  function tell() {
+    write("law-status", behind ? "" : (refused ?? ""));
+    attribute("law-status", "title", $("law-status").textContent);
+    $("law").classList.toggle("old", behind || refused !== null);
+  }
 
   function describe() {
     const at = (i) => `${show(law.mu_macro.at(i))} at ${text(law.values.at(i))}`;
@@ -236,7 +243,8 @@ export function lawPanel(store, moved) {
   return (state, reply, scale, wanted, old) => {
     if (reply !== answer || wanted !== target) plot.remark();
     [answer, colours, target] = [reply, scale, wanted];
-    $("law").classList.toggle("old", old || refused !== null);
+    behind = old;
+    tell();
     if (!answer) return;
     const below = [unit(), answer.inputs.mu0.value, colours?.contact, colours?.direction].join();
     if (below !== ground) plot.redraw();

@@ -1,6 +1,6 @@
 // The number: µ_macro, as large as the page has it, with its deviation, its doubt and what it
 // assumes.
-import { $, write } from "./dom.js";
+import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import {
   about,
@@ -72,12 +72,10 @@ export function numberPanel(store) {
     if (target === currentTarget || target.closest("button")) currentTarget.close();
   });
   return (answer, trouble, old) => {
-    write(
-      "status",
-      trouble?.text
-        ? `${prose(trouble.text).replace(/[^.!?]$/, "$&.")}${old ? " The last answer stays." : ""}`
-        : "",
-    );
+    const reason = trouble?.text ? prose(trouble.text).replace(/[^.!?]$/, "$&.") : "";
+    // a refusal needs the room for itself
+    write("status", reason && old && trouble.calm ? `${reason} The last answer stays.` : reason);
+    attribute("status", "title", $("status").textContent);
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
     if (!answer) {
