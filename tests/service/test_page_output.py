@@ -502,7 +502,7 @@ def test_a_remedy_is_one_of_the_page(open_page: Any) -> None:
 
 
 def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
-    page = open_page()
+    page = open_page("#digits=all")
     page.click("#tab-motion")
     page.type("#motion-y", "2 um")
     case: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
@@ -510,6 +510,7 @@ def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
     shown = dict(zip(page.texts("#motion-values dt"), page.texts("#motion-values dd"), strict=True))
     assert float(shown["µ"]) == close(motion.mu_macro, rel=1e-5, abs=1e-6)
     assert shown["sticks"] == f"{100 * motion.stick_fraction:.3g} %"
+    assert float(shown["drag force"].removesuffix(" N")) == page.rounded(10 * motion.mu_macro)
     assert len(page.texts("#forces .curve")) == 3
     assert len(page.texts("#path .curve")) == 1
     page.type("#motion-y", "2 parsec")
@@ -536,6 +537,22 @@ def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
     page.click("#motion-roots button")
     assert page.value("#motion-x").endswith(" @ 90 deg")
     assert page.number("#motion-values dd") == close(0.15, abs=1e-5)
+
+
+@pytest.mark.parametrize("y", ["0.5 um@90", "40 nm"])  # forces that end together, long numbers
+def test_no_text_of_the_plots_of_a_motion_covers_another(open_page: Any, y: str) -> None:
+    case = "contact=ball&Fz=20 N&k=10.6 N/um&f=40 kHz&v0=5 mm/s"
+    page = open_page(f"#panel=motion&x=0.2 um&y={y}&{case}", width=1280, height=800)
+    assert {"Fx", "Fy", "Fz"} <= {*page.texts("#forces text")}
+    covered = page.run(
+        "const all = [...document.querySelectorAll('#path text, #forces text')].map((one) =>"
+        " [one.textContent, one.getBoundingClientRect()]);"
+        "return all.flatMap(([name, a], i) => all.slice(i + 1).filter(([, b]) =>"
+        " Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&"
+        " Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 3)"
+        ".map(([other]) => `${name} and ${other}`));"
+    )
+    assert covered == []
 
 
 @pytest.mark.parametrize("kind", ["spring", "ball", "rigid"])
@@ -630,8 +647,21 @@ def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None
         )
 
 
-def test_it_prints_on_one_page(open_page: Any, tmp_path: Path) -> None:
-    page = open_page("#k=1 ± 0.1 N/um")
+LONG = "mu0=0.3 ± 0.03&Fz=20 ± 0.5 N&k=10.6114 ± 1 N/µm&y0=0.5 ± 0.05 µm&f=40 kHz&v0=5 mm/s"
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("#k=1 ± 0.1 N/um", []),
+        (f"#{LONG}&contact=ball&direction=along", ["reverse slip", "565"]),
+        (f"#{LONG}&contact=ball&panel=motion&x=0.2 um&y=0.5 um@90", ["Any motion", "drag force"]),
+    ],
+)
+def test_it_prints_on_one_page(
+    open_page: Any, tmp_path: Path, address: str, words: list[str]
+) -> None:
+    page = open_page(address)
     options = {"printBackground": True, "preferCSSPageSize": True}
     data = page.browser.execute_cdp_cmd("Page.printToPDF", options)["data"]
     pdf = base64.b64decode(data)
@@ -642,3 +672,5 @@ def test_it_prints_on_one_page(open_page: Any, tmp_path: Path) -> None:
         assert page.text("#mu") in text
         assert "k=1" in text.replace("+", " ").replace("%20", " ")
         assert "Example" not in text
+        assert all(one in text for one in words)
+        assert ("Any motion" in text) is ("panel=motion" in address)

@@ -34,6 +34,7 @@ const SLIPS = {
   rigid: "way that the contact slips in a period",
 };
 const BEYOND = "too large to be written";
+const LINE = 14; // pixels between two names
 
 export function motionPanel(store, moved) {
   let faults = new Map();
@@ -118,21 +119,24 @@ export function motionPanel(store, moved) {
   }
 
   function numbers() {
-    const { error_estimate: error } = motion;
-    const known = (mu) =>
-      Math.abs(mu) <= error ? "0" : friction(mu, Math.min(digitsWithin(mu, error), 6));
+    const { error_estimate: error, mu_macro: mu, inputs } = motion;
+    const most = store.state.digits === "all" ? 15 : 4;
+    const known = (one) =>
+      Math.abs(one) <= error ? "0" : friction(one, Math.min(digitsWithin(one, error), most));
+    const force = Math.abs(mu) <= error ? 0 : mu * inputs.Fz.value;
     list("motion-values", [
-      ["µ", "mean force along the drag, over Fz", known(motion.mu_macro)],
+      ["µ", "mean force along the drag, over Fz", known(mu)],
+      ["drag force", "mean force along the drag: µ Fz", prefixed(force, "N")],
       ["µ across", "mean force across it, over Fz", known(motion.mu_lateral)],
-      ["± error", "estimate of the numerical error, of both", show(error, 2)],
       ["sticks", "share of the period", `${show(100 * motion.stick_fraction, 3)} %`],
       ["slip path", SLIPS[motion.contact], amount(motion.slip_path, "m"), BEYOND],
       ["shaker power", "mean, along and across", amount(motion.power, "W"), BEYOND],
       [
         "settles in",
         "periods until a small disturbance has fallen to 1 %",
-        motion.periods === null ? "∞: nothing slips" : show(motion.periods, 3),
+        motion.periods === null ? "∞: nothing slips" : `${show(motion.periods, 3)} periods`,
       ],
+      ["error ≈", "estimate of the numerical error of µ and of µ across", show(error, 2)],
     ]);
   }
   const amount = (value, unit) => (value === null ? null : prefixed(value, unit, 3));
@@ -161,7 +165,7 @@ export function motionPanel(store, moved) {
           class="use"
           type="button"
           aria-label=${`Use ${words}`}
-          @click=${() => moved(use, 12, more)}
+          @click=${() => moved(use, 6, more)}
         >
           Use
         </button>
@@ -233,18 +237,17 @@ export function motionPanel(store, moved) {
       ],
       "rule",
     );
-    for (const name of ["Fx", "Fy", "Fz"]) {
+    for (const name of ["Fx", "Fy", "Fz"])
       forces.path(
         phase.map((x, i) => [x, cycle[name][i] ?? NaN]),
         `curve ${name}`,
       );
-      forces.text(
-        name,
-        forces.width - 26,
-        forces.y(cycle[name].at(-1) ?? 0) + 4,
-        `note ${name}`,
-        "start",
-      );
+    // each name beside the end of its curve, a line below the one above it
+    let lowest = -Infinity;
+    const ends = ["Fx", "Fy", "Fz"].map((name) => [name, forces.y(cycle[name].at(-1) ?? 0) + 4]);
+    for (const [name, y] of ends.sort(([, a], [, b]) => a - b)) {
+      lowest = Math.max(y, lowest + LINE);
+      forces.text(name, forces.width - 26, lowest, `note ${name}`, "start");
     }
   }
 
@@ -264,7 +267,7 @@ export function motionPanel(store, moved) {
       x: {
         domain: [middle(along) - wide, middle(along) + wide],
         log: false,
-        title: "x − drag [µm]",
+        title: "x without the drag [µm]",
       },
       y: { domain: [middle(across) - tall, middle(across) + tall], log: false, title: "y [µm]" },
     });

@@ -4,6 +4,7 @@ import d3 from "./d3.js";
 
 const { axisBottom, axisLeft, drag, scaleLinear, scaleLog, select, line } = d3;
 
+const DIGIT = 7; // pixels of a figure beside an axis
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 /** Of an input, by one press of an arrow key; with Shift. */
@@ -114,9 +115,13 @@ export class Plot {
 
   /** Two axes with titles; `right` pixels are left free beside them, `from` is the lowest tick. */
   axes({ x, y, right = 12 }) {
-    const [left, top, foot] = [52, 10, 42];
+    const [top, foot] = [10, 42];
     const made = ({ domain, log }) =>
       (log ? scaleLog() : scaleLinear()).domain(domain).clamp(false);
+    this.y = made(y).range([this.height - foot, top]);
+    const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 34, y.from);
+    const numbers = side.tickValues().map((value) => side.tickFormat()(value).length);
+    const left = 52 + DIGIT * Math.max(0, ...numbers.map((length) => length - 4));
     this.box = {
       x: left,
       y: top,
@@ -124,7 +129,6 @@ export class Plot {
       height: this.height - top - foot,
     };
     this.x = made(x).range([left, this.width - right]);
-    this.y = made(y).range([this.height - foot, top]);
     const root = select(this.svg);
     root.selectAll("*").remove();
     const { box } = this;
@@ -143,9 +147,12 @@ export class Plot {
       .append("g")
       .attr("class", "axis")
       .attr("transform", `translate(0 ${box.y + box.height})`);
-    const side = root.append("g").attr("class", "axis").attr("transform", `translate(${box.x} 0)`);
+    const beside = root
+      .append("g")
+      .attr("class", "axis")
+      .attr("transform", `translate(${box.x} 0)`);
     bottom.call(ticked(axisBottom(this.x).tickSizeOuter(0), this.x, 44));
-    side.call(ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 34, y.from));
+    beside.call(side);
     const title = (text, place) =>
       root.append("text").attr("class", "title").attr("transform", place).text(text);
     title(x.title, `translate(${box.x + box.width / 2} ${this.height - 8})`);
