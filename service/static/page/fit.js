@@ -1,4 +1,4 @@
-// The panel "k from measured points": a table pasted or dropped, what the service read of it, and
+// The panel "k from measured friction": a table pasted or dropped, what the service read of it, and
 // the fit with its residuals.
 import { Channel } from "./ask.js";
 import d3 from "./d3.js";
@@ -44,8 +44,8 @@ export function fitPanel(store, moved, openCase) {
     const like = MEASURED.includes(name) ? "mu0" : name;
     return unit ? table.columns[name].map((one) => toSI(like, one, unit)) : table.columns[name];
   };
-  /** A reason stands in the words of the service: it names columns as they are typed. */
-  /** A reason of the service; that it is about the points is seen. */
+  /** A reason in the words of the service: it names columns as they are typed, and not what has
+   * the points, which is seen. */
   const say = (text, bad = false) => {
     write("fit-status", (text ?? "").replace(/^points(_base64)?: /, ""));
     $("fit-status").classList.toggle("bad", bad);

@@ -5,7 +5,18 @@ import { $, attribute, write } from "./dom.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf } from "./state.js";
-import { about, inPrint, inUnit, inWords, numberOf, show, toSI, toUnit, unitFor } from "./words.js";
+import {
+  about,
+  friction,
+  inPrint,
+  inUnit,
+  inWords,
+  numberOf,
+  show,
+  toSI,
+  toUnit,
+  unitFor,
+} from "./words.js";
 
 const { area, bisectCenter } = d3;
 
@@ -97,7 +108,8 @@ export function lawPanel(store, moved) {
 
   function paint() {
     if (!law || !answer) return;
-    const top = 1.05 * Math.max(...heights(), ...(law.mu_macro_high ?? law.mu_macro)) || 1;
+    const high = answer.mu_macro + (answer.std ?? 0); // of the case
+    const top = 1.05 * Math.max(...heights(), high, ...(law.mu_macro_high ?? law.mu_macro)) || 1;
     const places = shown();
     plot.axes({
       x: { domain: [places[0], places.at(-1)], log: law.scale === "log", title: heading() },
@@ -187,14 +199,16 @@ export function lawPanel(store, moved) {
     if (!place || !plot.box || !plot.holds(place)) {
       const one = numberOf(answer?.inputs[law.along]);
       const words =
-        one === undefined ? "" : `Your case: ${text(one)}: µ = ${show(answer.mu_macro)}`;
+        one === undefined
+          ? ""
+          : `Your case: ${text(one)}: µ\u00a0=\u00a0${friction(answer.mu_macro, 4)}`;
       write("law-read", words);
       return;
     }
     const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));
     write(
       "law-read",
-      `At the pointer: ${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ` +
+      `At the pointer: ${text(law.values[i])}: µ\u00a0=\u00a0${friction(law.mu_macro[i], 4)}, ` +
         inWords(law.regime[i]),
     );
   }
@@ -246,7 +260,8 @@ export function lawPanel(store, moved) {
     behind = old;
     tell();
     if (!answer) return;
-    const below = [unit(), answer.inputs.mu0.value, colours?.contact, colours?.direction].join();
+    const { value: mu0 } = answer.inputs.mu0;
+    const below = [unit(), mu0, answer.std, colours?.contact, colours?.direction].join();
     if (below !== ground) plot.redraw();
     ground = below;
     const question = lawQuestion(state, answer);

@@ -162,7 +162,8 @@ export function mapPanel(store, moved, loaded) {
         ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}: ` +
           `µ/µ₀ = ${show(answer.mu_ratio)}`
         : "";
-      write("map-read", outside() || words);
+      const line = target ? `; dash-dotted\u00a0line:\u00a0${show(target)}` : "";
+      write("map-read", `${outside() || words}${line}`);
       return;
     }
     const [v, y] = [plot.x.invert(at[0]), plot.y.invert(at[1])];

@@ -32,7 +32,9 @@ export function meaningsDialog() {
     button.addEventListener("click", () => {
       const rows = lists.get(button.dataset.meanings) ?? [];
       const line = ([name, meaning, value, why, all = why]) =>
-        html`<p><b>${name}</b>: ${meaning}. ${value ?? `None: ${all}.`}</p>`;
+        value === null
+          ? html`<p><b>${name}</b>: ${meaning}. None: ${all}.</p>`
+          : html`<p><b>${name} ${value}</b>: ${meaning}.</p>`;
       render(rows.map(line), $("meanings-list"));
       dialog.showModal();
     });

@@ -194,7 +194,8 @@ export function motionPanel(store, moved) {
     if (motion) numbers();
     $("motion-meanings").hidden = !motion;
     render(roots(), $("motion-roots"));
-    write("motion-status", refused ? prose(refused) : "");
+    const atFields = faults.size && [...faults.keys()].every((name) => name.split(",")[0] in PARTS);
+    write("motion-status", refused && !atFields ? prose(refused) : "");
     write("motion-doubt", withoutDeviations());
     $("motion-unknown").value = state.motion_unknown;
     $("motion-target").value = state.motion_target;

@@ -58,6 +58,8 @@ function spread(answer, rows) {
   return known ? `${sentence(known.text, inputs)}.` : "";
 }
 
+const capital = (words) => `${words[0].toUpperCase()}${words.slice(1)}`;
+
 /** A remark in the page's signs; an interval of k is shown for this one. */
 function sentence(text, inputs) {
   const k = numberOf(inputs?.k);
@@ -101,13 +103,13 @@ export function numberPanel(store) {
     for (const part of document.querySelectorAll("[data-of]"))
       part.hidden = part.dataset.of !== contact;
     const lines = rows.filter(({ row }) => !BESIDE.includes(row));
-    const heading = (row) => (row === "one spring" && contact === "ball" ? "a ball" : row);
+    const heading = (row) => capital(row === "one spring" && contact === "ball" ? "a ball" : row);
     const words = (text) => sentence(text, answer.inputs);
     const line = ({ row, text }) =>
       html`<li title=${words(text)}><b>${heading(row)}:</b> ${words(text)}</li>`;
     render(lines.slice(0, SHOWN).map(line), $("rows"));
     render(
-      rows.map(({ row, text }) => html`<p><b>${heading(row)}.</b> ${words(text)}</p>`),
+      rows.map(({ row, text }) => html`<p><b>${heading(row)}:</b> ${words(text)}.</p>`),
       $("all-rows"),
     );
   };

@@ -38,6 +38,8 @@ export function tabs(id, chosen = () => {}) {
   return (name) => turn(buttons.find((one) => one.id === `tab-${name}`));
 }
 
+const MOST = 8; // digits that have room beside a unit
+
 /** The other numbers of a case, as `list` takes them. */
 function numbers(answer, all) {
   const {
@@ -49,7 +51,7 @@ function numbers(answer, all) {
     inputs,
     state,
   } = answer;
-  const digits = all ? 10 : 4;
+  const digits = all ? MOST : 4;
   const lacks = about.lacks[kindOf(state)];
   const without = (name, words) =>
     lacks[name] ? [words, lacks[name]] : ["rigid contact", "it is not given for a rigid contact"];
@@ -200,7 +202,7 @@ export function sidePanel(store, moved, found) {
         <button
           class="use"
           aria-label=${`Use ${text}`}
-          @click=${() => moved({ [unknown]: value }, 12)}
+          @click=${() => moved({ [unknown]: value }, 6)}
         >
           Use
         </button>
@@ -244,10 +246,10 @@ export function sidePanel(store, moved, found) {
     $("target").value = store.state.target;
     if (!answer) return;
     list("values", numbers(answer, store.state.digits === "all"));
-    write(
-      "origin",
-      `Block ${answer.source} of the table ${answer.table.id}, ` +
-        `built to ${show(answer.table.tolerance)}.`,
+    const whole = (name) => html`<span class="whole">${name}</span>`;
+    render(
+      html`From the block ${whole(answer.source)} of the table ${whole(answer.table.id)}.`,
+      $("origin"),
     );
     render(bars(answer), $("bars"));
     compare();

@@ -5,8 +5,14 @@ import { html, nothing, render } from "../lib/lit-html.js";
 import { post } from "./service.js";
 import { about, inUnit, prefixed, prose, typeset } from "./words.js";
 
-const SUCH_AS = { radius: "5 mm", diameter: "10 mm", length: "10 mm" };
-const LENGTHS = Object.keys(SUCH_AS);
+const LENGTHS = ["radius", "diameter", "length"];
+const SUCH_AS = {
+  radius: "5 mm",
+  diameter: "10 mm",
+  length: "10 mm",
+  E: "200 GPa",
+  E2: "200 GPa",
+};
 const SIZES = ["radius", "diameter"];
 
 export function stiffnessPanel(store, moved) {
@@ -93,7 +99,8 @@ export function stiffnessPanel(store, moved) {
           @change=${({ target }) => change(name, target.value)}
         />`;
     const title = html`<label for=${shared.id}
-      >${typeset(name)} <span class="label">${/\w/.test(unit) ? unit : ""}</span></label
+      >${typeset(name)}
+      <span class="label">${/\w/.test(unit) && !(name in SUCH_AS) ? unit : ""}</span></label
     >`;
     return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
       ${SIZES.includes(name) ? size(name) : title} ${input}
@@ -121,7 +128,8 @@ export function stiffnessPanel(store, moved) {
       Object.assign(typed, { [E]: one.E, [nu]: one.nu });
       ask(false);
     };
-    return html`<div class="field">
+    const same = number === 2 && !typed.E2?.trim();
+    return html`<div class="field body">
       <label for=${`material-${number}`}>body ${number}</label>
       <select id=${`material-${number}`} @change=${take}>
         <option value="">choose a material, or type E and ν</option>
@@ -129,9 +137,7 @@ export function stiffnessPanel(store, moved) {
           ({ name, E: modulus }) => html`<option value=${name}>${name}, ${modulus}</option>`,
         )}
       </select>
-      <p class="note">
-        ${number === 2 ? "Left out: both are of one material." : about.materials.source}
-      </p>
+      <p class="note">${same ? "Left out: both are of one material." : about.materials.source}</p>
     </div>`;
   }
 
