@@ -51,8 +51,8 @@ def test_what_was_understood_stands_below_the_field(open_page: Any) -> None:
     page.type("#field-k", "1000 N/mm")
     page.type("#field-y0", "2e-6 m")
     assert page.text("#note-y0") == "read as 2\u00a0µm"
-    page.type("#field-f", "20000")  # in the field of 20 kHz
-    assert page.text("#note-f") == "read as 20 MHz"
+    page.type("#field-f", "0.0002")  # in the field of 20 kHz
+    assert page.text("#note-f") == "read as 0.2 Hz"
     page.type("#field-y0", "2um")  # µ is typed as u
     assert page.text("#note-y0") == "half of peak to peak"
 
