@@ -66,6 +66,12 @@ def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surroga
     assert re.search("µ₀ .* k|k .* µ₀", page.text("#spread"))
     assert len(page.texts("#map .deviation")) == 2
     assert len(page.texts("#law .deviation")) == 1
+    # one that is not small is doubted, and its origin still told
+    page.type("#field-Fz", "5 ± 6 N")
+    assert page.texts("#rows .doubt")
+    assert "Fz" in page.text("#spread")
+    assert page.find("#spread").is_displayed()
+    page.type("#field-Fz", "10 N")
     # which a drag keeps
     page.press("#slider-k", "ARROW_RIGHT")
     assert "±" in page.value("#field-k")

@@ -95,6 +95,14 @@ def test_all_digits_are_seen_whole_in_the_room_of_a_few(open_page: Any) -> None:
 def test_a_doubtful_unit_is_told_beside_the_number_and_the_field(open_page: Any) -> None:
     page = open_page("#y0=2")
     assert page.text("#doubt").startswith("Check the units: ")
+    for address in ("#f=20000 kHz", "#mu0=30&digits=all", "#y0=2"):
+        page = open_page(address, width=1280, height=800)
+        inner, outer = page.run(
+            "const one = document.querySelector('#doubt');"
+            "return [one.scrollHeight, one.clientHeight];"
+        )
+        assert 0 < inner <= outer, address
+        assert "omega" not in page.text("#doubt")
     assert "y" in page.text("#note-y0")
     assert "doubt" in page.run(
         "return document.querySelector('#field-y0').closest('.field').className;"

@@ -14,8 +14,10 @@ import {
   withDeviation,
 } from "./words.js";
 
-/** Rows of remarks that have a place of their own beside the number. */
-const BESIDE = ["units", "k is known", "first order"];
+/** Rows of remarks that have a place of their own below the number. */
+const BELOW = ["units", "k is known"];
+/** Rows that doubt the deviation, among what is assumed. */
+const DOUBTS = ["first order", "std"];
 const SHOWN = 3; // lines of assumptions; all of them are one click away
 
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
@@ -89,7 +91,6 @@ export function numberPanel(store) {
     const rows = [...remarks, ...(answer.model ?? []).filter(({ row }) => !said.has(row))];
     const { value, std } = resultOf(answer, store.state.digits === "all");
     const doubt = rows.find(({ row }) => row === "units");
-    const warning = doubt ?? rows.find(({ row }) => row === "first order");
     render(
       html`<output id="mu" for="fields">${value}</output>${
           std ? html`<span id="std"> ± ${std}</span>` : nothing
@@ -98,15 +99,18 @@ export function numberPanel(store) {
     );
     write("regime", inWords(answer.regime));
     write("spread", spread(answer, rows));
-    write("doubt", warning ? `${doubt ? "Check the units: " : ""}${prose(warning.text)}` : "");
+    write("doubt", doubt ? `Check the units: ${prose(doubt.text)}` : "");
     const { contact } = answer.state;
     for (const part of document.querySelectorAll("[data-of]"))
       part.hidden = part.dataset.of !== contact;
-    const lines = rows.filter(({ row }) => !BESIDE.includes(row));
-    const heading = (row) => capital(row === "one spring" && contact === "ball" ? "a ball" : row);
+    const lines = rows.filter(({ row }) => !BELOW.includes(row));
+    const named = { std: "deviation", ...(contact === "ball" && { "one spring": "a ball" }) };
+    const heading = (row) => capital(named[row] ?? row);
     const words = (text) => sentence(text, answer.inputs);
     const line = ({ row, text }) =>
-      html`<li title=${words(text)}><b>${heading(row)}:</b> ${words(text)}</li>`;
+      html`<li class=${DOUBTS.includes(row) ? "doubt" : ""} title=${words(text)}>
+        <b>${heading(row)}:</b> ${words(text)}
+      </li>`;
     render(lines.slice(0, SHOWN).map(line), $("rows"));
     render(
       rows.map(({ row, text }) => html`<p><b>${heading(row)}:</b> ${words(text)}.</p>`),

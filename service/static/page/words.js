@@ -109,6 +109,7 @@ export const prose = (text) =>
     )
     .replaceAll("mu_macro", "µ")
     .replaceAll("mu0", "µ₀")
+    .replace(/\bomega\b/g, "ω")
     .replace(/\b([yvl])0\b/g, "$1₀")
     .replace(/\b([yv])~/g, "$1\u0303")
     .replaceAll(" um ", " µm ")
