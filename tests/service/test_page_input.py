@@ -71,6 +71,8 @@ def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surroga
     assert page.texts("#rows .doubt")
     assert "Fz" in page.text("#spread")
     assert page.find("#spread").is_displayed()
+    bar, law = (page.find(f"#law {part}").rect for part in (".deviation", ".axis .domain"))
+    assert bar["y"] + bar["height"] <= law["y"] + 2  # not below 0
     page.type("#field-Fz", "10 N")
     # which a drag keeps
     page.press("#slider-k", "ARROW_RIGHT")

@@ -156,7 +156,7 @@ export function lawPanel(store, moved) {
     if (here === undefined) return;
     const x = toUnit(law.along, here, unit());
     if (answer.std) {
-      const ends = [answer.mu_macro - answer.std, answer.mu_macro + answer.std];
+      const ends = [Math.max(answer.mu_macro - answer.std, 0), answer.mu_macro + answer.std];
       plot.path(
         ends.map((mu) => [x, mu]),
         "deviation",
