@@ -87,9 +87,9 @@ def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
     return parts
 
 
-# a comma between digits is a decimal sign
-_BETWEEN = re.compile(r"[\s;∠]+|,(?!\d)|(?<!\d),")
-_WORDS = ("phase", "at", "and")
+# a comma between digits is a decimal sign, or else it separates
+_BETWEEN = (re.compile(r"[\s;∠]+|,(?!\d)|(?<!\d),"), re.compile(r"[\s;∠,]+"))
+_WORDS = ("phase", "at", "and", "with")
 
 
 def _with_phase(name: str, text: str) -> str | None:
@@ -100,11 +100,12 @@ def _with_phase(name: str, text: str) -> str | None:
     """
     if _reads(_amplitude, name, text):  # also with a decimal comma
         return None
-    words = [word for word in _BETWEEN.split(text) if word and word not in _WORDS]
-    for number in (1, 2):  # words of the phase
-        amplitude, phase = "".join(words[:-number]), "".join(words[-number:])
-        if amplitude and _reads(_amplitude, name, amplitude) and _reads(_phase, name, phase):
-            return f"{amplitude}@{phase}{'deg' if phase[-1].isdigit() else ''}"
+    for between in _BETWEEN:
+        words = [word for word in between.split(text) if word and word not in _WORDS]
+        for number in (1, 2):  # words of the phase
+            amplitude, phase = "".join(words[:-number]), "".join(words[-number:])
+            if amplitude and _reads(_amplitude, name, amplitude) and _reads(_phase, name, phase):
+                return f"{amplitude}@{phase}{'deg' if phase[-1].isdigit() else ''}"
     return None
 
 

@@ -594,6 +594,8 @@ WRONG: tuple[tuple[dict[str, Any], str, str], ...] = (
     ({"x": "0.5um 90 deg"}, "x", "did you mean 0.5um@90deg?"),
     ({"x": "0,5 um; phase 90"}, "x", "did you mean 0,5um@90deg?"),
     ({"y": "0.5um,1.5rad"}, "y", "did you mean 0.5um@1.5rad?"),
+    ({"y": "0.5 um with 90 degrees"}, "y", "did you mean 0.5um@90degrees?"),
+    ({"y": "2e-6,90"}, "y", "did you mean 2e-6@90deg?"),
     ({"y": None}, "y, amplitude", "real number"),
     ({"normal": 3.0, "contact": "ball"}, "normal", "contact radius"),
     ({"contact": "cube"}, "contact", "spring, ball"),
