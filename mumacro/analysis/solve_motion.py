@@ -472,12 +472,12 @@ class _Scan:
         middles = _between(self.x[i], self.x[i + 1])
         mean, error = self.curve.at(middles)
         off = np.abs(mean - self._cubic(i, middles))
-        nearest = np.min(
-            [
-                np.min(np.abs(side[:, None] - targets), axis=1)
-                for side in (self.mean[i], mean, self.mean[i + 1])
-            ],
-            axis=0,
+        gaps = [np.abs(side[:, None] - targets) for side in (self.mean[i], mean, self.mean[i + 1])]
+        nearest = np.min([np.min(gap, axis=1) for gap in gaps], axis=0)
+        # a target is the mean force within its estimate: halves tell no more, they are one root
+        errors = (self.error[i], error, self.error[i + 1])
+        flat = np.any(
+            np.all([gap <= e[:, None] for gap, e in zip(gaps, errors, strict=True)], axis=0), axis=1
         )
         # an interval that crosses a target is open until the curve in it is smooth
         undecided = ~(nearest > _CLEAR * off + error)
@@ -487,7 +487,8 @@ class _Scan:
             != np.sign(self.mean[i + 1][:, None] - targets),
             axis=1,
         )
-        still = undecided & ~(crossing & smooth & _monotone(self.mean[i], mean, self.mean[i + 1]))
+        monotone = _monotone(self.mean[i], mean, self.mean[i + 1])
+        still = undecided & ~flat & ~(crossing & smooth & monotone)
         order = np.argsort(np.concatenate([self.x, middles]), kind="stable")
         flags = np.zeros(self.x.size + middles.size, dtype=np.bool_)  # of the interval behind each
         flags[i], flags[self.x.size :] = still, still
@@ -525,7 +526,13 @@ class _Scan:
                 for j in np.flatnonzero(np.sign(gap[:-1]) * np.sign(gap[1:]) < 0.0)
             ]
             exact += [(k, float(self.x[j])) for j in np.flatnonzero(gap == 0.0)]
+            flat = np.abs(gap) <= self.error
+            inner = flat[:-2] & flat[1:-1] & flat[2:]
+            # the samples of a range that is one root: within it there is nothing to look for
+            exact += [(k, float(self.x[j])) for j in np.flatnonzero(_spread(inner))]
             for i in self._near(gap):
+                if inner[i - 1]:
+                    continue
                 inside, touching = self._touched(i, gap, k, target)
                 brackets += inside
                 exact += [(k, place) for place in touching]
@@ -673,6 +680,12 @@ def _between(a: Array, b: Array) -> Array:
     """Middles of intervals, in logarithms where these are far from 0."""
     with np.errstate(invalid="ignore"):
         return np.where((a > 0.0) & (b > 1.5 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
+
+
+def _spread(inner: Bools) -> Bools:
+    """Places (n,) that are in a run of three or more, from the middles of every three, (n - 2,)."""
+    padded = np.pad(inner, 2)
+    return np.asarray(padded[:-2] | padded[1:-1] | padded[2:])
 
 
 def _monotone(a: Array, middle: Array, b: Array) -> Bools:
