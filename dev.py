@@ -55,6 +55,7 @@ def environment() -> dict[str, str]:
     }
     env |= {"VIRTUAL_ENV": str(VENV), "PATH": f"{BIN}{os.pathsep}{env.get('PATH', os.defpath)}"}
     return {
+        "MUMACRO_BUILD_CACHE": str(VENV / "kernel"),
         "ZIG_GLOBAL_CACHE_DIR": str(VENV / "zig"),
         "NUMBA_CACHE_DIR": str(VENV / "numba"),
         "PYTHONPYCACHEPREFIX": str(VENV / "bytecode"),

@@ -3,18 +3,22 @@
 
 Without FOLDER both are made in place.  hatchling calls the class below for wheels and editable
 installs.  The compiler is the one that CC names, else cc, clang or gcc, else the package ziglang,
-which then becomes a build dependency.  CFLAGS is not read: other flags give other bits.  Two
-variables change what is made:
+which then becomes a build dependency.  CFLAGS is not read: other flags give other bits.  Three
+variables change what is made, or how:
 
     MUMACRO_BUILD_DEBUG=1             no optimization, with debugger symbols and sanitizers;
                                       needs gcc or clang
     MUMACRO_BUILD_PLATFORM=win_amd64  by zig for one of the platforms in pyproject.toml,
                                       [tool.mumacro.wheels]
+    MUMACRO_BUILD_CACHE=FOLDER        keeps each shared object there, for the next build by the same
+                                      compiler from the same sources
 """
 
 import functools
+import hashlib
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -129,6 +133,18 @@ def declare(folder: Path) -> Path:
     return path
 
 
+def kept(command: list[str], *words: object) -> Path | None:
+    """Where a shared object is kept between builds: its name is the digest of all that decides its
+    bytes."""
+    if not (cache := os.environ.get("MUMACRO_BUILD_CACHE")):
+        return None
+    compiler = subprocess.run([*command, "--version"], capture_output=True, check=True)  # noqa: S603
+    made_from = hashlib.sha256(repr((command, compiler.stdout, FLAGS, *words)).encode())
+    for source in sorted((ROOT / "mumacro" / "kernel").glob("*.[ch]")):
+        made_from.update(repr((source.name, source.read_bytes())).encode())
+    return Path(cache, made_from.hexdigest())
+
+
 def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     """Compile into a folder; return the path of the shared object and its platform."""
     command, platform = choose(platform)
@@ -144,15 +160,23 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     compiling = [
         [f"{sources / file}", *words, "-c", "-o", name] for name, (file, *words) in objects.items()
     ]
+    before = kept(command, platform, objects, libraries)
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        # each list at the same time
-        for words in (compiling, [["-shared", *objects, "-o", name, *libraries]]):
+        lists = [compiling, [["-shared", *objects, "-o", name, *libraries]]]
+        if before and before.is_file():
+            shutil.copyfile(before, Path(place) / name)
+            lists = []
+        for words in lists:  # each at the same time
             jobs = [
                 subprocess.Popen([*command, *FLAGS, *one], cwd=place)  # noqa: S603 - see above
                 for one in words
             ]
             if sum(job.wait() != 0 for job in jobs):  # waits for all
                 sys.exit("The C compiler failed: see above")
+        if before and lists:
+            before.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(Path(place) / name, f"{before}.{os.getpid()}")
+            os.replace(f"{before}.{os.getpid()}", before)
         # A running program keeps the old file: the new one takes its place and is not written into
         # it.
         return (Path(place) / name).replace(folder / name), platform

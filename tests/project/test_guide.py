@@ -287,7 +287,10 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # the tested versions, probably in pip's cache
     pins = folder / "pins.txt"
     pins.write_text("".join(f"{name}=={importlib.metadata.version(name)}\n" for name in CORE))
-    pip(programs, folder / "tree", INSTALLS["bare"], PIP_CONSTRAINT=str(pins))
+    settings = {"PIP_CONSTRAINT": str(pins)}
+    if cache := os.environ.get("MUMACRO_BUILD_CACHE"):  # the same sources, compiled before
+        settings["MUMACRO_BUILD_CACHE"] = cache
+    pip(programs, folder / "tree", INSTALLS["bare"], **settings)
     shutil.rmtree(folder / "tree")
     return programs
 

@@ -152,6 +152,42 @@ def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: P
         assert (b"libasan" in library, b"libubsan" in library) == (debug, debug)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
+def test_a_kernel_is_compiled_once_for_the_same_sources_compiler_and_flags(
+    repository: Path, tmp_path: Path
+) -> None:
+    kernel = shutil.copytree(repository / "mumacro" / "kernel", tmp_path / "mumacro" / "kernel")
+    for name in ("hatch_build.py", "pyproject.toml"):
+        shutil.copy(repository / name, tmp_path)
+    compiler, calls = tmp_path / "cc", tmp_path / "calls"
+    # it writes how often it was called into what it makes
+    compiler.write_text(
+        f"#!/bin/sh\ncase $* in --version) echo one; exit;; esac\necho $* >>{calls}\n"
+        f"while [ $1 != -o ]; do shift; done; wc -l <{calls} >$2\n"
+    )
+    compiler.chmod(0o755)
+
+    def made(**more: str) -> bytes:
+        done = python(
+            tmp_path, BUILD, **{"CC": str(compiler), "MUMACRO_BUILD_CACHE": "kept", **more}
+        )
+        assert done.returncode == 0, done.stderr
+        return (tmp_path / "mumacro" / "_kernel.so").read_bytes()
+
+    first = made()
+    (tmp_path / "mumacro" / "_kernel.so").write_bytes(b"another")
+    assert made() == first
+    assert made(MUMACRO_BUILD_CACHE="empty") != first
+    assert made(MUMACRO_BUILD_DEBUG="1") != first
+    (kernel / "kernel.c").write_text("other")
+    assert made() != first
+    compiler.write_text(compiler.read_text().replace("echo one", "echo two"))
+    shutil.copy(repository / "mumacro" / "kernel" / "kernel.c", kernel)
+    assert made() != first
+    compiler.write_text(compiler.read_text().replace("echo two", "echo one"))
+    assert made() == first
+
+
 def test_dev_py_sees_a_changed_c_source(
     repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
