@@ -1,6 +1,8 @@
 """``python -m builder``: build, verify, query and export tables offline."""
 
+import errno
 import math
+import os
 import sys
 import time
 from argparse import ArgumentTypeError, Namespace
@@ -49,11 +51,14 @@ def _writer() -> None:
 
 
 def _place(out: Path, folder: bool = False) -> None:
-    """Refuse a place for a result whose folder is missing, or a folder in place of a file."""
+    """Refuse a place for a result whose folder is missing or shut, or a folder in place of a
+    file."""
     if not out.parent.is_dir():
         raise UsageError(f"--out {out}: folder {str(out.parent)!r} does not exist")
     if out.is_dir() and not folder:
         raise UsageError(f"--out {out} is a folder")
+    if not os.access(out.parent, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(out.parent))
 
 
 def _build(options: Namespace) -> str:
