@@ -45,8 +45,8 @@ class Installed:
         # the tested versions, probably in pip's cache
         pins = folder / "pins.txt"
         pins.write_text("".join(f"{name}=={importlib.metadata.version(name)}\n" for name in CORE))
-        pip = ("-m", "pip", "--disable-pip-version-check", "install", "-q", "--only-binary=:all:")
-        self.run("python", *pip, "-c", str(pins), str(wheel))
+        pip = ("-m", "pip", "--disable-pip-version-check", "install", "-q", "--no-compile")
+        self.run("python", *pip, "--only-binary=:all:", "-c", str(pins), str(wheel))
 
     def run(self, *words: Any, code: int = 0) -> Any:
         variables = {

