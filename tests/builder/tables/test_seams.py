@@ -72,8 +72,12 @@ def test_tables_are_within_their_bounds_of_the_finest(tolerance: float, kind: Ki
 
 
 @pytest.mark.slow
-def test_a_table_of_an_odd_tolerance_keeps_its_bounds(sweep: Sweep, tmp_path: Path) -> None:
+def test_a_table_of_an_odd_tolerance_keeps_its_bounds(
+    sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its border has a seam beside y~ = 3, where the slope of the border is off by 1e-9."""
+    # the builder's last fresh solves find less than the points below
+    monkeypatch.setattr("builder.tables.build.FINAL_POINTS", 500)
     table = build_table(tmp_path / "odd.nc", 2e-9, sweep)
     for kind in (SPRING, BALL):
         assert_near_the_finest(table, kind, 100_000)

@@ -309,14 +309,14 @@ def test_no_contact_fits_better_and_the_intervals_end_where_chi2_says(
 
 @pytest.mark.slow
 def test_intervals_of_the_set_ups_of_the_benchmark_hold_the_truth() -> None:
-    """In 95 % of 40 set-ups with 20 draws each, by the binomial distribution (99.9 %); in full by
+    """In 95 % of 40 set-ups with 10 draws each, by the binomial distribution (99.9 %); in full by
     benchmarks/fit_coverage.py."""
     from scipy.stats import binom
 
     held = asked = 0
     for index, set_up in enumerate(fit_coverage.SET_UPS):
         clean = fit_coverage.clean_friction(set_up)
-        for draw in range(20):
+        for draw in range(10):
             noise = np.random.default_rng([index, draw]).normal(
                 scale=set_up.spread, size=clean.size
             )

@@ -253,7 +253,11 @@ def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: 
 
 
 @pytest.mark.slow
-def test_the_smallest_table_is_what_the_builder_makes(tmp_path: Path, sweep: Sweep) -> None:
+def test_the_smallest_table_is_what_the_builder_makes(
+    tmp_path: Path, sweep: Sweep, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # fresh solves of the committed table are compared above
+    monkeypatch.setattr("builder.tables.build.FINAL_POINTS", 500)
     again = build_table(tmp_path / "again.nc", 1e-4, sweep)
     for contact, entry in read_table(PATHS[0]).contacts.items():
         for old, new in zip(entry.blocks, again.table.contacts[contact].blocks, strict=True):
