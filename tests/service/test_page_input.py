@@ -122,21 +122,39 @@ def test_escape_takes_back_what_is_typed(open_page: Any) -> None:
     assert "Enter" not in page.text("#note-Fz")
 
 
-def test_a_refusal_is_read_whole_and_covers_no_field_for_a_click(open_page: Any) -> None:
-    page = open_page(width=1280, height=800)
+#: whether all of a text is seen, and the fields that it covers
+WHOLE = (
+    "const one = document.querySelector('{}');"
+    "return one.scrollHeight <= one.clientHeight && one.scrollWidth <= one.clientWidth;"
+)
+COVERED = (
+    "const note = document.querySelector('#note-{0}').getBoundingClientRect();"
+    "return [...document.querySelectorAll('.field')].filter((one) => {{"
+    " const box = one.getBoundingClientRect();"
+    " return !one.querySelector('#note-{0}') && box.left < note.right && note.left < box.right &&"
+    " box.top < note.bottom - 1 && note.top < box.bottom - 1; }}).map((one) => one.textContent);"
+)
+
+
+@pytest.mark.parametrize("width", [360, 768, 1280, 1920])
+def test_a_refusal_is_read_whole_and_covers_no_field(open_page: Any, width: int) -> None:
+    page = open_page(width=width, height=800)
+    for name, text in (("Fz", "5 apples"), ("k", "3 kg"), ("y0", "abc"), ("v0", "1 2 3 4")):
+        page.type(f"#field-{name}", text)  # which keeps the focus
+        assert page.find(f"#field-{name}").get_attribute("aria-invalid") == "true"
+        assert page.run(WHOLE.format(f"#note-{name}")), name
+        assert page.run(COVERED.format(name)) == [], name
+        assert page.text("#law-status") == ""  # it is told once
+        page.press(f"#field-{name}", "ESCAPE")
+        page.click("#reset")
     page.type("#field-Fz", "5 apples")
-    inner, outer = page.run(
-        "const one = document.querySelector('#status');return [one.scrollHeight, one.clientHeight];"
-    )
-    assert inner <= outer
-    assert page.text("#law-status") == ""  # it is told once
-    note = page.find("#note-Fz").rect
-    below = page.find("#field-k").rect
-    assert note["y"] + note["height"] > below["y"]  # it is too long for its line
-    page.run("document.elementFromPoint(150, 436).focus();")
-    assert page.run("return document.activeElement.id;") == "field-k"
-    note = page.find("#note-Fz").rect
-    assert note["y"] + note["height"] <= below["y"]
+    assert page.run(WHOLE.format("#status"))
+    page.type("#argument-length, #argument-radius", "3 parsec")
+    page.click("#stiffness-form button")
+    assert page.run(WHOLE.format("#about-radius"))
+    page.click("#reset")
+    page.type("#field-y0", "2")  # which is doubted
+    assert page.run(COVERED.format("y0")) == []
 
 
 def test_a_contact_is_rigid_by_a_choice(open_page: Any, surrogate: Surrogate) -> None:
@@ -550,3 +568,20 @@ def test_no_message_moves_the_page(open_page: Any) -> None:
     for address in ("#y0=2", "#k=0.8..1.2 N/um", "#k=1 ± 0.1 N/um", "#digits=all", "#v0=1e300"):
         page = open_page(address, width=1280, height=800)
         assert page.run(places) == before, address
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080), (2560, 1440)])
+def test_the_inputs_fill_their_card(open_page: Any, width: int, height: int) -> None:
+    page = open_page(width=width, height=height)
+    card, last = (page.find(one).rect for one in ("#inputs", "#fields .field:last-child"))
+    assert card["y"] + card["height"] - last["y"] - last["height"] <= 12
+    ends = [page.find(one).rect for one in ("#copy", "#map-section", "#side")]
+    assert len({round(one["y"] + one["height"]) for one in ends}) == 1
+
+
+@pytest.mark.parametrize("width", [360, 390])
+def test_the_head_of_a_phone_is_one_row(open_page: Any, width: int) -> None:
+    page = open_page(width=width, height=740)
+    title, links = page.find("h1").rect, page.find("nav").rect
+    assert links["y"] < title["y"] + title["height"]
+    assert links["x"] >= title["x"] + title["width"]

@@ -1,9 +1,12 @@
 // The case, and any motion, as they are taken along: a link, curl, Python, the command.  Each text
 // gives the number of the page.
 import { $, write } from "./dom.js";
+import { html, render } from "../lib/lit-html.js";
 import { PARTS, caseOf, motionOf, toAddress } from "./state.js";
 import { prose } from "./words.js";
 
+/** What is copied, with the word on its button. */
+const BUTTONS = { link: "Link", curl: "curl", python: "Python", command: "Command" };
 const USUAL = { contact: "spring", direction: "across" };
 const asText = (value) => JSON.stringify(value);
 const packed = (value) => String(value).replaceAll(/\s/g, "");
@@ -59,10 +62,12 @@ export function motionTexts(state, answer) {
 }
 
 /**
- * Buttons in the row `id` that copy texts, and the field that shows them.  The returned function
- * takes them; where there is no number, it takes the reason, and the link alone is left.
+ * Makes buttons in the row `id` that copy texts, beside the field that shows them.  The returned
+ * function takes them; where there is no number, it takes the reason, and the link alone is left.
  */
 export function copies(id) {
+  const button = ([name, word]) => html`<button data-copy=${name}>${word}</button>`;
+  render(Object.entries(BUTTONS).map(button), $(`${id}-row`));
   const [buttons, field] = [[...$(`${id}-row`).children], $(`${id}-text`)];
   let texts = {};
   let reason = null;
