@@ -223,10 +223,16 @@ class Answer(Generic[Number]):
     def remarks(self) -> list[Remark]:
         """What is doubtful, one remark for each input or output: ``row``, the kind of doubt;
         ``field``; ``cases``, how many; ``text``.  Empty where nothing is."""
+        return self.remarks_in({})
+
+    def remarks_in(self, units: Mapping[str, str]) -> list[Remark]:
+        """:attr:`remarks`, with a value in the unit that ``units`` has for its input, as it was
+        typed."""
         if self._cases is None:
             return [*self.remarks_on_outputs]
         cases = self.cases
-        return [*doubts(cases.columns, "f" in cases.given), *self.remarks_on_outputs]
+        on_inputs = doubts(cases.columns, "f" in cases.given, {**cases.units, **units})
+        return [*on_inputs, *self.remarks_on_outputs]
 
     # --- other forms ------------------------------------------------------------------------------
 

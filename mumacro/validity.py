@@ -18,6 +18,7 @@ from mumacro.inputs.cases import Cases, without_interval
 from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
 from mumacro.inputs.kind import SPRING, SPRINGS_OF, Kind, kind_of
+from mumacro.inputs.numbers import plain
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.settling import decay
 from mumacro.outputs.tabulated import Tabulated
@@ -223,12 +224,12 @@ def _row_of_stiffness(
     surrogate: Answers, case: Mapping[str, Any], y: float, contact: str, direction: str
 ) -> Row | None:
     effect = k_effect(surrogate, case, contact, direction)
-    margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{100.0 * effect:.2g} %"
+    margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{plain(100.0 * effect, 2)} %"
     if effect >= 1e-3:
         text = f"{margin} more or less of k changes mu_macro by {change}: give k_range, or fit k"
     elif y > HARDLY:
         text = (
-            f"y~ = {y:.3g}, above {HARDLY:g}: {margin} more or less of k changes mu_macro by "
+            f"y~ = {plain(y, 3)}, above {HARDLY:g}: {margin} more or less of k changes mu_macro by "
             f"{change}; measured points hardly determine k"
         )
     else:
@@ -242,7 +243,7 @@ def _row_of_tilt(mu0: float, y: float) -> Row | None:
         return None
     text = (
         f"a surface that is tilted by {_TILT:g} rad changes Fz by "
-        f"{100.0 * min(effect, 1e3):.2g} % within each period"
+        f"{plain(100.0 * min(effect, 1e3), 2)} % within each period"
     )
     return {"row": "constant normal force", "text": text, "effect": effect}
 
@@ -259,20 +260,23 @@ def _rows_of_cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
         text = "nothing slips at rest: this is the largest force that the contact can hold"
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     elif periods > _PERIODS:
-        text = f"creeping: a disturbance falls to 1 % within {periods:.3g} periods, {time:.3g} s"
+        text = (
+            f"creeping: a disturbance falls to 1 % within {plain(periods, 3)} periods, "
+            f"{plain(time, 3)} s"
+        )
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
         text = (
-            f"the contact slips {1e6 * slip_path:.3g} um a period; real friction adapts to a new "
-            "speed only after micrometres of slip, and a speed 100 times higher changes mu0 by "
-            f"about {100.0 * effect:.2g} %"
+            f"the contact slips {plain(1e6 * slip_path, 3)} um a period; real friction adapts to a "
+            "new speed only after micrometres of slip, and a speed 100 times higher changes mu0 by "
+            f"about {plain(100.0 * effect, 2)} %"
         )
         rows.append({"row": "Coulomb friction", "text": text, "effect": effect})
     if watts > _WATTS:
         text = (
-            f"the contact turns {watts:.2g} W into heat and slips "
-            f"{slip_path * frequency:.2g} m per second"
+            f"the contact turns {plain(watts, 2)} W into heat and slips "
+            f"{plain(slip_path * frequency, 2)} m per second"
         )
         rows.append({"row": "no wear, no heating", "text": text, "effect": None})
     return rows

@@ -20,6 +20,8 @@ REGIMES = {
     "each period",
     "reverse_slip": "slips forwards and backwards in each period",
 }
+#: rows of validity.ROWS with another word for a contact
+_CALLED = {("one spring", "ball"): "a ball"}
 _SHOWN = ("std", "std_share", "gradient")  # in rows of their own
 _ROW_OF_K = ("k is known", True)  # the answer for an interval says that already
 
@@ -40,13 +42,24 @@ def of_one_case(
     effect = k_effect(surrogate, asked, *kind.names.values()) if shown is None else 0.0
     rows = _rows_of(answer, kind, shown, digits(effect), units or {})
     notes: Rows = [
-        ("assumes", f"{row['row']}: {in_words(row['text'], case)}")
+        ("assumes", f"{called(row['row'], kind)}: {in_words(row['text'], case)}")
         for row in model_rows(surrogate, asked, **kind.names)
         # a doubtful unit is a remark
         if (row["row"], ends is not None) != _ROW_OF_K and row["row"] != UNITS
     ]
-    notes += [("remark", f"{one['field']}: {one['text']}") for one in answer.remarks]
+    remarks = answer.remarks_in(units or {})
+    notes += [("remark", f"{one['field']}: {one['text']}") for one in remarks]
     return rows, notes, f"numerical error  {answer.error_bound:.2g}"
+
+
+def called(row: str, kind: Kind) -> str:
+    """A row of :data:`mumacro.validity.ROWS` in the words of its contact: a ball is not one spring.
+
+    >>> from mumacro.inputs.kind import SPRING, kind_of
+    >>> called("one spring", SPRING), called("one spring", kind_of("ball", "along"))
+    ('one spring', 'a ball')
+    """
+    return _CALLED.get((row, kind.names["contact"]), row)
 
 
 def _without_k(case: Mapping[str, Any]) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def _shown(value: object) -> object:
     if isinstance(value, float) and not math.isfinite(value):
         return json.dumps(value)
     if isinstance(value, int) and not -(2**63) <= value < 2**64:
-        return "an integer beyond double range"
+        return "an integer of many digits"
     if value is None or isinstance(value, (int, float)):
         return value
     return "an object" if isinstance(value, Mapping) else "a list"

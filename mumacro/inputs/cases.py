@@ -89,6 +89,8 @@ class Cases(NamedTuple):
     codes: Codes | None = None
     #: what messages name as it came in: f, contact and direction, an amplitude of another direction
     given: dict[str, Any] = {}  # noqa: RUF012 - never changed
+    #: units that values carried, by the input as it came in
+    units: dict[str, str] = {}  # noqa: RUF012 - never changed
 
     @classmethod
     def of(
@@ -111,7 +113,7 @@ class Cases(NamedTuple):
             kind, texts = kind_of(**texts), {}
         fields = _fields(texts) if kind is None else kind.fields
         strange = {} if kind is None else _strange_amplitude(values, kind)
-        columns, others, std, ends = _numbers(values, fields)
+        columns, others, std, ends, units = _numbers(values, fields)
         std |= _deviations(values, fields, std)
         others |= strange | texts
         shape = _shape_of(columns, std, others)
@@ -122,7 +124,7 @@ class Cases(NamedTuple):
         if ends is not None:
             ends = _flat_ends(ends, shape, strict)
         codes = codes_of(others, (math.prod(shape),)) if texts else None
-        cases = cls(kind, fields, columns, shape, ends, std, codes, others)
+        cases = cls(kind, fields, columns, shape, ends, std, codes, others, units)
         if std or strange or texts:
             return cases._where_they_agree(values, strict or not shape)
         if strict or not shape:
@@ -546,7 +548,7 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     _strange_amplitude(values, kind, refuse=True)
     for name in values.keys() & {"std", *DEVIATIONS}:
         raise InputError(name, values[name], NO_DEVIATION)
-    columns, _, std, ends = _numbers(values, kind.fields)
+    columns, _, std, ends, _ = _numbers(values, kind.fields)
     for name in std:
         raise InputError(name, values.get(name, values.get("f")), NO_DEVIATION)
     if ends is not None:
@@ -559,10 +561,11 @@ _Numbers = dict[str, float | Array]
 
 def _numbers(
     values: Mapping[str, Any], fields: tuple[str, ...]
-) -> tuple[_Numbers, dict[str, Any], _Numbers, tuple[Any, Any] | None]:
-    """The inputs of these names as numbers or arrays; f, where it was given; deviations and ends
-    that stand in the values themselves."""
+) -> tuple[_Numbers, dict[str, Any], _Numbers, tuple[Any, Any] | None, dict[str, str]]:
+    """The inputs of these names as numbers or arrays; f, where it was given; deviations, ends and
+    units that stand in the values themselves."""
     columns: _Numbers = {}
+    units: dict[str, str] = {}
     std: _Numbers = {}
     others: dict[str, Any] = {}
     ends = ends_in(values)
@@ -581,6 +584,8 @@ def _numbers(
         ):
             quantity = read(source, value)
             value = quantity.si
+            if quantity.unit:
+                units[source] = quantity.unit
             if quantity.std is not None:
                 std[name] = quantity.std * field_of(source)[1]
             if quantity.low is not None:
@@ -589,7 +594,7 @@ def _numbers(
             others["f"] = value
             value = _angular(value)
         columns[name] = value
-    return columns, others, std, ends
+    return columns, others, std, ends, units
 
 
 def _deviations(

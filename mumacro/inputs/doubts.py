@@ -8,11 +8,13 @@ peak speed y0 omega no contact has.  A rigid contact is answered with what it as
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE
+from mumacro.inputs.numbers import plain
+from mumacro.inputs.units import Scale, scale_of
 from mumacro.kernel.arrays import Array, Bools
 
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
@@ -38,7 +40,9 @@ class Remark(TypedDict):
     text: str
 
 
-def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]:
+def remarks(
+    columns: Mapping[str, Any], frequency: bool = False, units: Mapping[str, str] | None = None
+) -> list[Remark]:
     """The remarks on cases, at most one for each input, and one on rigid contacts.
 
     Parameters
@@ -48,6 +52,8 @@ def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]
         not have, such as y0 of one whose normal force oscillates, is left out, or NaN there.
     frequency : bool
         Whether the inputs had ``f`` in place of ``omega``: then that is named.
+    units : mapping
+        The units that were typed, by input: a value is doubted in its own.
 
     Examples
     --------
@@ -57,6 +63,8 @@ def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]
     >>> [remark] = remarks({**case, "k": 1.0})
     >>> remark["field"], remark["text"]
     ('k', 'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 1 in N/m?')
+    >>> remarks({**case, "k": 1.0}, units={"k": "N/mm"})[0]["text"]
+    'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 0.001 N/mm right?'
     """
     if _usual(columns):
         rigid = columns["k"] == math.inf
@@ -65,6 +73,11 @@ def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]
     shape = np.broadcast_shapes(*(column.shape for column in arrays.values()))
     six = dict.fromkeys(_USUAL, np.broadcast_to(math.nan, shape)) | {
         name: np.broadcast_to(column, shape) for name, column in arrays.items()
+    }
+    typed = {
+        name: _Unit(unit, scale)
+        for name, unit in (units or {}).items()
+        if (scale := scale_of(name, unit)) is not None
     }
     by_row: dict[str, Remark] = {}
     has_reason: Bools = np.zeros(shape, np.bool_)
@@ -76,7 +89,7 @@ def remarks(columns: Mapping[str, Any], frequency: bool = False) -> list[Remark]
             has_reason |= new
             first = int(np.flatnonzero(new)[0])
             at = {name: float(column.flat[first]) for name, column in six.items()}
-            name, text = _sentence(field, at, frequency)
+            name, text = _sentence(field, at, frequency, typed)
             if name in by_row:
                 by_row[name]["cases"] += int(np.count_nonzero(new))
             else:
@@ -141,42 +154,65 @@ def _oscillates(six: Mapping[str, Array]) -> Bools:
     return np.asarray(((six["y0"] > 0.0) | (six["Fz_amplitude"] > 0.0)) & (six["omega"] > 0.0))
 
 
-def _sentence(what: str, case: Mapping[str, float], frequency: bool) -> tuple[str, str]:
+def _sentence(
+    what: str, case: Mapping[str, float], frequency: bool, units: Mapping[str, "_Unit"]
+) -> tuple[str, str]:
     """The input that is doubted, and why, of one case."""
     length = case["mu0"] * case["Fz"] / case["k"] if case["k"] else math.inf
     if what == "l0":
-        return "k", f"l0 = mu0 Fz / k = {length:.3g} m, above 1 cm: is {_value('k', case)}?"
+        return "k", f"l0 = mu0 Fz / k = {plain(length, 3)} m, above 1 cm: {_is('k', case, units)}"
     if what == "y~":
         name = _stiff_or(case, "y0")
-        group = case["y0"] / length
-        return name, f"y~ = y0 k / (mu0 Fz) = {group:.3g}, {_CONTACTS}: is {_value(name, case)}?"
+        group = plain(case["y0"] / length, 3)
+        return name, f"y~ = y0 k / (mu0 Fz) = {group}, {_CONTACTS}: {_is(name, case, units)}"
     if what == "v~":
         name = _stiff_or(case, "v0")
-        group = case["v0"] / case["omega"] / length
-        formula = "v~ = v0 k / (mu0 Fz omega)"
-        return name, f"{formula} = {group:.3g}, {_CONTACTS}: is {_value(name, case)}?"
+        group = plain(case["v0"] / case["omega"] / length, 3)
+        formula = f"v~ = v0 k / (mu0 Fz omega) = {group}"
+        return name, f"{formula}, {_CONTACTS}: {_is(name, case, units)}"
     if what == "y0 omega":
         name, speed = _largest(case, "y0", "omega"), case["y0"] * case["omega"]
         if name == "omega" and frequency:
             name, case = "f", {"f": case["omega"] / RAD_PER_CYCLE}
-        formula = f"the peak speed y0 omega = {speed:.3g} m/s, above {FASTEST:g} m/s"
-        return name, f"{formula}: is {_value(name, case)}?"
+        formula = f"the peak speed y0 omega = {plain(speed, 3)} m/s, above {FASTEST:g} m/s"
+        return name, f"{formula}: {_is(name, case, units)}"
     value, name = case[what], what
     if what == "omega" and frequency:
         value, name = value / RAD_PER_CYCLE, "f"
     field = INPUTS[name]
+    if name in units:
+        typed, question = units[name], "is it right"
+    else:
+        typed = _Unit("" if field.unit == "-" else field.unit, Scale())
+        question = f"is it in {field.words}" if typed.name else "is it a number, not per cent"
     least, most = field.usual
-    unit = "" if field.unit == "-" else f" {field.unit}"
-    usual = f"up to {most:g}{unit}" if least == 0.0 else f"{least:g} to {most:g}{unit}"
-    question = f"is it in {field.words}" if unit else "is it a number, not per cent"
-    return name, f"{name} = {value:.6g}{unit}, usual is {usual}: {question}?"
+    usual = f"{typed.number(least)} to {typed.text(most)}" if least else f"up to {typed.text(most)}"
+    return name, f"{name} = {typed.text(value)}, usual is {usual}: {question}?"
 
 
 _CONTACTS = "contacts have 0.01 to 100"
 
 
-def _value(name: str, case: Mapping[str, float]) -> str:
-    return f"{name} = {case[name]:.6g} in {INPUTS[name].unit}"
+def _is(name: str, case: Mapping[str, float], units: Mapping[str, "_Unit"]) -> str:
+    """The question whether a value is right; of a number without a unit, whether it is in SI."""
+    if name in units:
+        return f"is {name} = {units[name].text(case[name])} right?"
+    return f"is {name} = {plain(case[name], 6)} in {INPUTS[name].unit}?"
+
+
+class _Unit(NamedTuple):
+    """A unit that was typed."""
+
+    name: str
+    scale: Scale
+
+    def number(self, value: float) -> str:
+        """A value in SI as a number of this unit."""
+        return plain(self.scale.of_si(value), 6)
+
+    def text(self, value: float) -> str:
+        """The same with the unit."""
+        return f"{self.number(value)} {self.name}".rstrip()
 
 
 def _largest(case: Mapping[str, float], *names: str) -> str:

@@ -1,5 +1,5 @@
 """Numbers as people and instruments write them, read from text: decimal point or comma, thousands
-signs, Fortran's exponent, powers of ten."""
+signs, Fortran's exponent, powers of ten; and as they stand in a sentence."""
 
 import functools
 import re
@@ -19,7 +19,16 @@ _RAISED = re.compile(r"(?<=10)\^[+-]?\d{1,3}", re.ASCII)
 _TEN = re.compile(r"([+-]?)10\^([+-]?\d{1,3})", re.ASCII)
 # digits in groups of three behind one sign
 _GROUPS = re.compile(r"\d{1,3}([.,' ])\d{3}(?:\1\d{3})*", re.ASCII)
-TOO_LARGE = "is beyond double range"
+TOO_LARGE = "is too large, above 1.8e308"
+
+
+def plain(value: float, digits: int) -> str:
+    """A number in a sentence, without a power of ten where that has up to twelve digits.
+
+    >>> plain(20618.6, 3), plain(251.3, 2), plain(0.00103, 3), plain(2e15, 3)
+    ('20600', '250', '0.00103', '2e+15')
+    """
+    return f"{float(f'{value:.{digits}g}'):.12g}"
 
 
 def tidy(text: str) -> str:

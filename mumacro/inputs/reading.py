@@ -38,7 +38,7 @@ _DEVIATIONS = ("±", "+/-", "+-")
 # may be written as the word rigid, as an interval
 _OR_RIGID = ("stiffness", "pressure")
 _INTERVALS = ("k", "k_range")
-_IN_RANGE = "within double range"
+_IN_RANGE = "at most 1.8e308, the largest number there is"
 _GAPS = ("NAType", "NaTType")  # of pandas, by the name of the type
 _ONE_NUMBER = "one number: k alone may be an interval; ask for both ends, one after the other"
 #: where an answer has no deviation of its own

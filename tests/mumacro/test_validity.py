@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate
+from mumacro.cli.one_case import run
 from mumacro.validity import ROWS, digits, k_effect, model_rows
 from tests.support.cases import Case
 from tests.support.comparing import close
@@ -63,6 +64,46 @@ def test_amplitudes_beyond_those_of_contacts_ask_for_the_unit(surrogate: Surroga
     assert "is k = 1e+12 in N/m?" in rows(surrogate, k=1e12)["units"][0]
     assert "is Fz = 1e-05 in N?" in rows(surrogate, Fz=1e-5)["units"][0]
     assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
+
+
+TYPED = {
+    ("f", "20000 kHz"): "is f = 20000 kHz right?",
+    ("k", "0.001 N/mm"): "is k = 0.001 N/mm right?",
+    ("v0", "1000000 mm/s"): "v0 = 1000000 mm/s, usual is up to 300000 mm/s: is it right?",
+    ("mu0", "400 %"): "mu0 = 400 %, usual is 0.1 to 200 %: is it right?",
+    ("f", "2e7"): "is f = 20000000 in Hz?",
+    ("y0", "2"): "y0 = 2 m, usual is 1e-12 to 0.02 m: is it in metres?",
+}
+
+
+@pytest.mark.parametrize(("name", "text"), TYPED)
+def test_a_value_is_doubted_as_it_was_typed(surrogate: Surrogate, name: str, text: str) -> None:
+    [remark] = surrogate.evaluate(**{**CASE, name: text}).remarks
+    assert remark["field"] == name
+    assert remark["text"].endswith(TYPED[name, text])
+    words = main_words(name, text)
+    assert f"{name}: {remark['text']}" in words
+
+
+def main_words(name: str, text: str) -> str:
+    """What the command prints of the case with another input."""
+    case = {**CASE, name: text.replace(" ", "")}
+    return run([" ".join(f"{one}={value}" for one, value in case.items())], "")
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+def test_an_assumption_is_called_by_its_contact(surrogate: Surrogate, contact: str) -> None:
+    words = run([" ".join(f"{name}={x}" for name, x in CASE.items()), "--contact", contact], "")
+    shown = repr(surrogate.evaluate(**CASE, contact=contact)._repr_html_())
+    for text in (words, shown):
+        assert ("one spring: a ball on a flat" in text) is (contact == "spring")
+        assert ("a ball: a flat contact" in text) is (contact == "ball")
+
+
+def test_large_numbers_in_a_sentence_have_no_power_of_ten(surrogate: Surrogate) -> None:
+    told = rows(surrogate, f=20e6)  # 20600 periods
+    assert re.search(r"within \d{5} periods", told["steady cycle"][0])
+    assert "contact turns 3000 W" in rows(surrogate, v0=1e3)["no wear, no heating"][0]
 
 
 def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:

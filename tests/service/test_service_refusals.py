@@ -292,7 +292,7 @@ BEYOND = {
     "-1e999": "-Infinity",
     "-1": -1,
     "-1e-300": -1e-300,
-    "1" + "0" * 400: "an integer beyond double range",
+    "1" + "0" * 400: "an integer of many digits",
     "1" + "0" * 5000: "Infinity",
     "1." + "0" * 5000 + "e999": "Infinity",
 }

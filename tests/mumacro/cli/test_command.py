@@ -105,7 +105,7 @@ WRONG = {
     CASE.replace("0.3", "1,000"): "may be 1000 or 1.0",
     CASE.replace("k=1e6", "k=1±0.1N/um y0=1..2um").replace("y0=2e-6 ", ""): "k alone",
     CASE.replace("0.3", "-0.3"): "mu0 must be finite and > 0, got -0.3",
-    CASE.replace("0.01", "1e999"): "v0 must be one number: it is beyond double range",
+    CASE.replace("0.01", "1e999"): "v0 must be one number: it is too large, above 1.8e308",
 }
 
 

@@ -17,7 +17,7 @@ from tests.support.serving import CASE  # noqa: E402
 
 NAMES = (*CASE,)
 GAP = "is missing; write rigid or a number"
-BEYOND = "is beyond double range"
+BEYOND = "is too large, above 1.8e308"
 
 
 def batch_of(**columns: Any) -> Any:

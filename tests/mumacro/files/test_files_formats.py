@@ -257,7 +257,7 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
         (7, "", "has 7 cells, the head has 6"),
         (8, "k", MISSING_K),
         (12, "k", MISSING_K),
-        (13, "k", "is beyond double range"),
+        (13, "k", "is too large, above 1.8e308"),
         (14, "omega", "must be finite and >= 0"),
     ]
 
@@ -310,7 +310,7 @@ def test_bad_lines_of_ndjson_land_in_the_side_file(
     assert reasons[15] == ("", "is no JSON object: NaN is not in it; write null")
     assert reasons[7][0] == "v0"
     assert [reasons[i] for i in (8, 9)] == [
-        (name, "is beyond double range") for name in ("Fz", "k")
+        (name, "is too large, above 1.8e308") for name in ("Fz", "k")
     ]
     assert reasons[13] == ("v0", "is missing")
     assert reasons[14] == ("", "is no JSON object: repeats the key 'mu0'")
