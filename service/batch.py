@@ -14,8 +14,9 @@ import numpy as np
 
 from mumacro.answer import Answer, add
 from mumacro.errors import InputError
-from mumacro.inputs.cases import Cases, named
+from mumacro.inputs.cases import DEVIATIONS, Cases, named
 from mumacro.inputs.doubts import Remark
+from mumacro.inputs.reading import Value
 from mumacro.kernel.arrays import Codes
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost
@@ -64,20 +65,21 @@ class Batch:
         }
         if any(length > max_batch for length in lengths.values()):
             raise too_large(max_batch)
-        std = {name: x for name, x in body.members.items() if name.startswith("std_")}
-        members = {name: x for name, x in body.members.items() if name not in std}
-        model = of_members(CaseColumns, body_and_query(members, options))
+        model = of_members(CaseColumns, body_and_query(body.members, options))
         if beside := model.beside:
             raise InputError("include", beside[0], f"without {beside[0]}, which is for one case")
-        values, reasons = model.columns | std, dict(body.reasons)
+        values, reasons = model.columns, dict(body.reasons)
+        if body.std:
+            values = {name: x for name, x in values.items() if name not in DEVIATIONS}
+            values |= body.std
         # the first bad input of a case, in the order of the inputs, is told
         for name, column in [*values.items()]:
             if isinstance(column, Column):
-                del values[name]
-                values |= column.parts(name)
+                values[name] = column.value
                 for i, reason in column.reasons.items():
                     reasons.setdefault(i, (name, reason))
-        lengths = {name: len(x) for name, x in values.items() if isinstance(x, np.ndarray)}
+        arrays = {name: x.si if isinstance(x, Value) else x for name, x in values.items()}
+        lengths = {name: len(x) for name, x in arrays.items() if isinstance(x, np.ndarray)}
         if len({*lengths.values()}) > 1:
             size = next(iter(lengths.values()))
             text = ", ".join(f"{name}: {length}" for name, length in lengths.items())

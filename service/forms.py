@@ -23,6 +23,8 @@ from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
 from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.kind import CONTACTS, DIRECTIONS, kind_of
+from mumacro.inputs.reading import Value
 
 from .models.inputs import MAX_REASONS
 from .models.options import Case, CaseColumns
@@ -47,6 +49,8 @@ class Body(NamedTuple):
     #: why cases could not be read, by their index; they have a NaN
     reasons: Mapping[int, Reason] = MappingProxyType({})
     rows: bool = False
+    #: deviations of rows, those of the query among them, as the library names them
+    std: Mapping[str, Any] = MappingProxyType({})
 
 
 def too_large(max_batch: int) -> RequestError:
@@ -60,7 +64,7 @@ def too_large(max_batch: int) -> RequestError:
 
 def read(text: bytearray, max_batch: int, words: Mapping[str, Any]) -> Body:
     """The cases and the options of a body: an object of columns, or a list of rows; ``words`` are
-    contact and direction, where the query gives them for all rows."""
+    contact, direction and deviations, where the query gives them for all rows."""
     try:
         if _OPENS_LIST.match(text):
             return Body(_columns_of(text, max_batch, words), rows=True)
@@ -276,14 +280,17 @@ def _names_of_case(rows: list[Any], words: Mapping[str, Any]) -> tuple[str, ...]
     return tuple(names)
 
 
+_USUAL = {"contact": CONTACTS[0], "direction": DIRECTIONS[0]}
+
+
 def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     """Rows one by one: each is checked as one case, and a bad one gets its first reason."""
     columns: dict[str, Any] = {name: np.full(len(rows), np.nan) for name in (*ALL_FIELDS, *ENDS)}
-    columns |= {f"std_{name}": np.zeros(len(rows)) for name in ALL_FIELDS}
-    usual = {"contact": "spring", "direction": "across", **words}
+    columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
+    usual = {name: words.get(name, word) for name, word in _USUAL.items()}
     columns |= {name: np.full(len(rows), word, object) for name, word in usual.items()}
     reasons: dict[int, Reason] = {}
-    used = {*ALL_FIELDS}
+    used = set[str]()
     for i, row in enumerate(rows):
         try:
             values = _row(row).values
@@ -295,23 +302,20 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
                 reasons[i] = _first(error)
             continue
         k = one.columns["k"]
-        ends: Any = one.ends or ((k,), (k,))
+        ends: Any = one.ends or ((k,), (k,))  # a number, or rigid, is an interval of itself
         filled = {name: end[0] for name, end in zip(ENDS, ends, strict=True)} | one.columns
         filled |= {f"std_{name}": x for name, x in one.std.items()}
         filled |= {name: values[name] for name in KIND if name in values}
         for name, value in filled.items():
             columns[name][i] = value
         used |= {name for name in filled if name not in ENDS} | ({*ENDS} if one.ends else set())
-    return Body(_only(columns, used), reasons, rows=True)
-
-
-def _only(columns: dict[str, Any], used: set[str]) -> dict[str, Any]:
-    """The columns that some row has used: k or its ends, both amplitudes only beside directions."""
-    unused = {"k"} if {*ENDS} <= used else {*ENDS}
-    unused |= ({*DEVIATIONS, *KIND}) - used
-    if "direction" not in used:
-        unused.add("Fz_amplitude")
-    return {name: column for name, column in columns.items() if name not in unused}
+    if {*ENDS} <= used:
+        columns["k"] = Value(columns["k"], None, *(columns[name] for name in ENDS))
+    # both amplitudes only beside a column of directions
+    fields = ALL_FIELDS if "direction" in used else kind_of(direction=usual["direction"]).fields
+    members = {name: columns[name] for name in (*fields, *(name for name in KIND if name in used))}
+    std = {name: columns[name] for name in DEVIATIONS if name in used}
+    return Body(members, reasons, True, std)
 
 
 def _row(row: Any) -> Case:

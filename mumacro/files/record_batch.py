@@ -21,7 +21,7 @@ from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import GAP, LIKE, SI, refusal
 from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
 from mumacro.inputs.k_range import ENDS
-from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
+from mumacro.inputs.kind import AMPLITUDE, AMPLITUDES, SPRING, UNREADABLE, Kind, kind_of
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
 from mumacro.inputs.text_tables import ColumnNames
@@ -225,6 +225,10 @@ def answer_columns(
         by_heading[heading], values[name], faults[name] = numbers(
             batch.column(heading), name, signs or Signs(".", None), scale
         )
+    for name in AMPLITUDES:  # an empty cell is a gap, one that cannot be read is none
+        if unread := [*faults.get(name, ())]:
+            values[name] = values[name].copy()
+            values[name][unread] = UNREADABLE
     values |= columns.kind.names
     values |= {name: _words(batch.column(heading)) for name, heading in columns.words.items()}
     cases = Cases.of(values)

@@ -17,6 +17,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.fields import (
     BOUNDS,
     FIELDS,
+    LIFTS_OFF,
     POSITIVE,
     RAD_PER_CYCLE,
     STIFFNESS,
@@ -27,10 +28,10 @@ from mumacro.inputs.fields import (
 from mumacro.inputs.k_range import BOUND, ENDS
 from mumacro.inputs.kind import (
     AMPLITUDE,
+    AMPLITUDES,
     CONTACTS,
     DIRECTIONS,
     KINDS,
-    LIFTS_OFF,
     SPRING,
     Kind,
     code_of,
@@ -55,7 +56,6 @@ class Absent(enum.Enum):
 ABSENT: Final = Absent.ABSENT
 _UNLABELLED = NUMBERS | {np.ndarray, list, tuple, type(None), dict, str}
 _FLOAT = np.dtype(np.float64)
-_AMPLITUDES = ("y0", AMPLITUDE)
 #: the fields where the direction is a column
 ALL_FIELDS = (*FIELDS[:4], AMPLITUDE, *FIELDS[4:])
 KIND = ("contact", "direction")
@@ -67,6 +67,9 @@ COLUMNS = (*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS)
 #: what a mapping may hold, too: options of one call
 OPTIONS = ("k_range", "std", "include", "gradient", "groups", "illegal")
 EXACT = "finite and >= 0, 0 where the input is exact"  # the bound of a deviation
+# what stands for one number alone, without a deviation of its own
+A_DEVIATION = "one number: the deviation itself"
+AN_END = "one number: an end of the interval"
 
 
 class Cases(NamedTuple):
@@ -111,8 +114,9 @@ class Cases(NamedTuple):
         texts = {} if kind is not None else _texts(values)
         if kind is None and not any(isinstance(text, np.ndarray) for text in texts.values()):
             kind, texts = kind_of(**texts), {}
-        fields = _fields(texts) if kind is None else kind.fields
-        strange = {} if kind is None else _strange_amplitude(values, kind)
+        of_direction = _of_direction(texts) if kind is None else kind
+        fields = ALL_FIELDS if of_direction is None else of_direction.fields
+        strange = _strange_amplitude(values, of_direction)
         columns, others, std, ends, units = _numbers(values, fields)
         std |= _deviations(values, fields, std)
         others |= strange | texts
@@ -200,7 +204,7 @@ class Cases(NamedTuple):
         ends = self.ends and tuple(float(end[index]) for end in self.ends)
         try:
             kind = self.kind or kind_of(others["contact"], others["direction"])
-            for name in _AMPLITUDES:
+            for name in AMPLITUDES:
                 if np.broadcast_to(self._strange(name), max(self.size, 1))[index]:
                     raise _no_such_amplitude(name, float({**columns, **others}[name]), kind)
             if ends and math.isnan(columns["k"]):
@@ -232,15 +236,15 @@ class Cases(NamedTuple):
         """The same, with NaN in v0 where contact, direction, amplitudes and deviations do not go
         together; where ``refuse``, InputError for the first case that is not legal."""
         bad = np.zeros(self.size if self.shape else 1, np.bool_)
-        for name in _AMPLITUDES:
+        for name in AMPLITUDES:
             if name not in self.columns and self.codes is not None and self._has(name).any():
                 raise _missing(
-                    values, tuple(x for x in self.fields if x not in _AMPLITUDES or x == name)
+                    values, tuple(x for x in self.fields if x not in AMPLITUDES or x == name)
                 )
             bad |= self._strange(name)
         for name, deviation in self.std.items():
             legal = (np.asarray(deviation) >= 0.0) & (np.asarray(deviation) < math.inf)
-            bad |= ~legal if name not in _AMPLITUDES else ~legal & self._has(name)
+            bad |= ~legal if name not in AMPLITUDES else ~legal & self._has(name)
         if self.codes is not None:
             bad |= self.codes < 0
         if refuse:
@@ -335,7 +339,7 @@ def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
     present = {*values}
     if present & {*ENDS, "k_range"}:
         present.add("k")
-    for pair in (("omega", "f"), _AMPLITUDES):
+    for pair in (("omega", "f"), AMPLITUDES):
         if present & {*pair}:
             present |= {*pair}
     if present >= {*ALL_FIELDS}:
@@ -435,7 +439,7 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
             raise InputError(name, case[name], bound)
     for name in case.keys() & {"std", *DEVIATIONS}:
         raise InputError(name, case[name], NO_DEVIATION)
-    for name in case.keys() - {*kind.columns, *_AMPLITUDES, "k_range", *ENDS}:
+    for name in case.keys() - {*kind.columns, *AMPLITUDES, "k_range", *ENDS}:
         bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
         raise InputError(name, case[name], bound)
     inputs = {
@@ -491,7 +495,11 @@ def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:
     if values.keys().isdisjoint(("k_range", *ENDS)):
         return None
     values = as_ends(values)
-    low, high = (read(name, values[name]).si for name in ENDS)
+    of_ends = [read(name, values[name]) for name in ENDS]
+    for name, end in zip(ENDS, of_ends, strict=True):
+        if end.std is not None:
+            raise InputError(name, values[name], AN_END)
+    low, high = (end.si for end in of_ends)
     try:
         legal = is_interval(low, high)
     except ValueError as error:
@@ -575,7 +583,7 @@ def _numbers(
             columns[name] = middle(*ends)
             continue
         if source not in values:
-            if name in _AMPLITUDES and fields is ALL_FIELDS:
+            if name in AMPLITUDES and fields is ALL_FIELDS:
                 continue
             raise _missing(values, fields)
         value = values[source]
@@ -614,7 +622,7 @@ def _deviations(
             raise InputError(column, value, bound)
         deviation = read(name, value)
         if deviation.std is not None or deviation.low is not None:
-            raise InputError(column, value, "one number: the deviation itself")
+            raise InputError(column, value, A_DEVIATION)
         std[field] = per * deviation.si
     return std
 
@@ -626,7 +634,7 @@ def _strange_amplitude(
     it has a value.  InputError for one value of all cases."""
     if kind is None:
         return {}
-    name = _AMPLITUDES[not kind.normal]
+    name = AMPLITUDES[not kind.normal]
     if name not in values:
         return {}
     value = values[name]
@@ -641,7 +649,7 @@ def _strange_amplitude(
 def _no_such_amplitude(name: str, value: Any, kind: Kind) -> InputError:
     bound = (
         f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is "
-        f"{_AMPLITUDES[kind.normal]}"
+        f"{AMPLITUDES[kind.normal]}"
     )
     return InputError(name, value, bound)
 
@@ -658,10 +666,10 @@ def _texts(values: Mapping[str, Any]) -> dict[str, Any]:
     return texts
 
 
-def _fields(texts: Mapping[str, Any]) -> tuple[str, ...]:
-    """The inputs of cases whose contact or direction is a column."""
+def _of_direction(texts: Mapping[str, Any]) -> Kind | None:
+    """One spring in the direction of all cases; None where the direction is a column."""
     direction = texts["direction"]
-    return kind_of(direction=direction).fields if isinstance(direction, str) else ALL_FIELDS
+    return kind_of(direction=direction) if isinstance(direction, str) else None
 
 
 def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> tuple[Array, Array]:

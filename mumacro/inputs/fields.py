@@ -20,6 +20,7 @@ GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in 
 STIFFNESS = 'a number > 0 [N/m], or for a rigid contact "rigid" or math.inf'
 MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
 NOT_NEGATIVE, ABOVE_ZERO = "finite and >= 0", "finite and > 0"
+LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of Fz_amplitude in a case
 
 
 class Field(NamedTuple):
@@ -177,6 +178,8 @@ def refusal(name: str, value: float) -> str:
     >>> refusal("v0", -1.0), refusal("k", math.nan)
     ('must be finite and >= 0', 'is missing; write rigid or a number')
     """
+    if name == "Fz_amplitude":
+        return f"must be {LIFTS_OFF}"
     if name == "k":
         return GAP if math.isnan(value) else "must be finite and > 0, or rigid"
     if name == "f":

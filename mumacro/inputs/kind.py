@@ -8,6 +8,7 @@ Fz_amplitude cos(omega t).  The formulas are in ``kernel/contact.c`` and ``kerne
 here are the names.
 """
 
+import math
 from typing import Any, Literal, NamedTuple
 
 from mumacro.errors import InputError
@@ -34,13 +35,15 @@ SPRINGS_OF: dict[str, Springs] = {
     "ball": Springs("a ball (Hertz) with the initial stiffness k", 1.0 / 3.0, 1.5),
 }
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
+AMPLITUDES = ("y0", AMPLITUDE)
+#: in a column of amplitudes a value that cannot be read: no gap, and legal in no direction
+UNREADABLE = -math.inf
 # by code of the direction
 _FIELDS = (
     FIELDS,
     FIELDS,
     tuple(AMPLITUDE if name == "y0" else name for name in FIELDS),
 )
-LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of that amplitude
 
 
 class Kind(NamedTuple):

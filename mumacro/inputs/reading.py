@@ -81,7 +81,8 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
     name : str
         Of the input, for messages; :data:`mumacro.inputs.fields.QUANTITY_OF` has what it measures.
     value : number, str, quantity, array_like
-        A number is in SI, a phase in degrees.  An array of numbers is not copied.
+        A number is in SI, a phase in degrees.  An array of numbers is not copied.  A
+        :class:`Value` has been read before.
     quantity : str
         What it measures, for a name that is not in the list.
 
@@ -105,6 +106,8 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
         return Value(_double(name, value))
     if of_type is np.ndarray and value.dtype.kind in _REAL:
         return Value(_doubles(name, value))
+    if of_type is Value:  # read before
+        return value  # type: ignore[no-any-return]
     quantity = quantity or QUANTITY_OF.get(name, "ratio")
     if of_type is str:
         return _of_text(name, quantity, value)
@@ -159,11 +162,11 @@ def reason_of(bound: str) -> str:
 def no_number(name: str, value: object) -> str:
     """Why a value that is neither a number nor a text is refused in JSON.
 
-    >>> no_number("k", None), no_number("y0", True)
-    ('is missing; write rigid or a number', 'must be a number')
+    >>> no_number("k", None), no_number("v0", None), no_number("y0", True)
+    ('is missing; write rigid or a number', 'is required', 'must be a number')
     """
-    if name == "k" and value is None:
-        return GAP
+    if value is None:
+        return GAP if name == "k" else "is required"
     return "must be a number, not a text" if isinstance(value, str) else "must be a number"
 
 

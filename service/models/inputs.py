@@ -22,12 +22,11 @@ from pydantic import (
 from pydantic_core import InitErrorDetails
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import DEVIATIONS, EXACT
+from mumacro.inputs.cases import A_DEVIATION, AN_END, DEVIATIONS, EXACT
 from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, described, refusal
-from mumacro.inputs.k_range import BOUND
-from mumacro.inputs.kind import CONTACTS, DIRECTIONS
+from mumacro.inputs.k_range import BOUND, ENDS
+from mumacro.inputs.kind import AMPLITUDES, CONTACTS, DIRECTIONS, UNREADABLE
 from mumacro.inputs.reading import Value, no_number, read, reason_of
-from mumacro.kernel.arrays import Array
 
 from .values import (
     PLAIN_TEXT,
@@ -169,9 +168,7 @@ def _of_interval(value: Any) -> Any:
     if not isinstance(value, list) or len(value) != 2:
         raise fault(f"must be {BOUND}")
     for i, end in enumerate(value):
-        one, reason = entry("k_low", end)
-        if reason is None and (one.low is not None or one.std is not None):
-            reason = "must be one number: an end of the interval"
+        _, reason = entry("k_low", end)
         if reason is not None:
             one_fault = InitErrorDetails(type=fault(reason), loc=(i,), input=end)
             raise ValidationError.from_exception_data("k_range", [one_fault])
@@ -258,27 +255,18 @@ def _given(model: BaseModel) -> dict[str, Any]:
 
 
 class Column(NamedTuple):
-    """One input of many cases: NaN where there is no number, and why, by the index of the case;
-    deviations and ends of intervals where entries have some."""
+    """One input of many cases: numbers, NaN where there is none, with deviations and ends of
+    intervals where entries have some; and why there is none, by the index of the case."""
 
-    values: Array
+    value: Value
     reasons: Mapping[int, str]
-    std: Array | None = None
-    low: Array | None = None
-    high: Array | None = None
-
-    def parts(self, name: str) -> dict[str, Array]:
-        """The columns that the library takes."""
-        std = {} if self.std is None else {f"std_{name}": self.std}
-        if self.low is None or self.high is None:
-            return {name: self.values, **std}
-        return {"k_low": self.low, "k_high": self.high, **std}
 
 
 _LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in BOUNDS}
 _LEAST |= dict.fromkeys(DEVIATIONS, 0.0)
 _MOST = dict.fromkeys(_LEAST, sys.float_info.max) | {"f": MOST_HZ}
 _NUMBERS = frozenset((float, int))
+_ONE_NUMBER = dict.fromkeys(ENDS, AN_END) | dict.fromkeys(DEVIATIONS, A_DEVIATION)
 
 
 def entry(name: str, value: object) -> tuple[Value, str | None]:
@@ -288,6 +276,8 @@ def entry(name: str, value: object) -> tuple[Value, str | None]:
             one = read(name.removeprefix("std_"), value)
         except InputError as error:
             return _NO_VALUE, reason_of(error.bound)
+        if (of := _ONE_NUMBER.get(name)) and (one.std is not None or one.low is not None):
+            return _NO_VALUE, reason_of(of)
         if name == "k" and one.si == math.inf:
             return one, None
     elif type(value) in _NUMBERS:
@@ -295,8 +285,6 @@ def entry(name: str, value: object) -> tuple[Value, str | None]:
             one = Value(float(value))  # type: ignore[arg-type]
         except OverflowError:
             one = Value(math.inf)
-    elif value is None and name != "k":
-        return _NO_VALUE, "is required"
     else:
         return _NO_VALUE, no_number(name, value)
     if _LEAST[name] <= one.si <= _MOST[name]:
@@ -315,10 +303,12 @@ def column(name: str, values: Sequence[Any]) -> Column:
         except OverflowError:
             array = np.array([math.inf])
         if np.isfinite(array).all():
-            return Column(array, {})
+            return Column(Value(array), {})
     read_values, reasons = [], dict[int, str]()
     for i, value in enumerate(values):
         one, reason = entry(name, value)
+        if reason is not None and name in AMPLITUDES and value is not None:
+            one = Value(UNREADABLE)  # null is a gap: another direction has no such amplitude
         read_values.append(one)
         if reason is not None and len(reasons) < MAX_REASONS:
             reasons[i] = reason
@@ -329,7 +319,10 @@ def column(name: str, values: Sequence[Any]) -> Column:
     if any(one.low is not None for one in read_values):  # a number is an interval of itself
         low = np.array([one.si if one.low is None else one.low for one in read_values])
         high = np.array([one.si if one.high is None else one.high for one in read_values])
-    return Column(si, reasons, std, low, high)
+    return Column(Value(si, std, low, high), reasons)
+
+
+_ALWAYS = ("mu0", "Fz", "k", "v0")  # where null is refused
 
 
 def cells(name: str, value: Any) -> float | str | Column | None:
@@ -337,8 +330,10 @@ def cells(name: str, value: Any) -> float | str | Column | None:
     if isinstance(value, list):
         return column(name, value)
     if isinstance(value, np.ndarray):  # finite numbers
+        return Column(Value(value), {})
+    if isinstance(value, Value):  # of rows
         return Column(value, {})
-    if value is None and name != "k":
+    if value is None and name not in _ALWAYS:
         return None
     one, reason = entry(name, value)
     if reason is not None:

@@ -101,6 +101,7 @@ class _Answer(Response):
     def _batch(self, text: bytearray) -> Batch:
         state, options = self._state, self._options
         words = {name: x for name, x in options.members.items() if name in KIND}
+        words |= options.deviations
         body = read(text, self._most, words)
         text.clear()
         return Batch.of(body, options, state.tables, self._most, count=state.metrics.cases)

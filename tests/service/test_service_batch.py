@@ -1,10 +1,13 @@
 """Batches over HTTP: bad cases among good ones, order, gaps, and what only rows have."""
 
 import json
+import math
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mumacro import Surrogate
 from tests.support.cases import Case
@@ -186,3 +189,142 @@ def test_a_name_that_is_given_twice_in_a_row_is_refused(client: Any, case: Case)
         "/v1/mu-macro/batch", content=text, headers={"Content-Type": "application/json"}
     )
     assert reply.status_code == 422
+
+
+def of_one(client: Any, row: Case, **query: Any) -> Any:
+    """What a case alone is answered: its values, or the faults of its problem document."""
+    response = client.post("/v1/mu-macro", json={**row, **query})
+    answer = response.json()
+    if response.status_code != 200:
+        return {(one["field"], one["reason"]) for one in answer["errors"]}
+    return {name: answer[name] for name in (*VALUES, "mu_macro_low", "std") if name in answer}
+
+
+SPRING = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 2e4, "v0": 0.01}
+LIFTED = {**SPRING, "direction": "normal", "y0": None, "Fz_amplitude": 3.0}
+STIFFNESSES = st.sampled_from(
+    [
+        {"k": "rigid"},
+        {"k": "0.8..1.2 N/um"},
+        {"k_range": [8e5, 1.2e6]},
+        {"k_low": "0.8 N/um", "k_high": 1.2e6},
+        {"k": None},
+        {"k_low": "1 ± 0.1 N/um", "k_high": 2e6},
+        {"k": 1e6, "contact": "ball"},
+    ]
+)
+OTHERS = st.sampled_from(
+    [
+        {"k": 1e6, **more}
+        for more in (
+            {},
+            {"mu0": None},
+            {"v0": "1e400 m/s"},
+            {"y0": "-2 um"},
+            {"f": 10**400},
+            {"Fz_amplitude": "three"},
+            {"Fz_amplitude": 3.0},
+            {"contact": "ball", "Fz_amplitude": 3.0},
+            {"contact": "ball", "Fz_amplitude": "three"},
+            {"direction": "along"},
+        )
+    ]
+)
+CASES = st.builds(
+    lambda case, more: {**case, **more}, st.sampled_from([SPRING, LIFTED]), STIFFNESSES | OTHERS
+)
+
+
+@settings(max_examples=60)
+@given(rows=st.lists(CASES, min_size=1, max_size=5))
+def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows: Any) -> None:
+    answer = client.post(BATCH, json=rows).json()
+    faults = {fault["index"]: (fault["field"], fault["reason"]) for fault in answer["errors"]}
+    for i, (row, result) in enumerate(zip(rows, answer["results"], strict=True)):
+        alone = of_one(client, row)
+        if isinstance(alone, set):
+            assert result is None
+            assert faults[i] in alone
+        else:  # a number is an interval of itself beside others
+            assert alone == {name: result[name] for name in alone}
+            assert result.get("mu_macro_low", result["mu_macro"]) <= result["mu_macro"]
+
+
+def test_a_rigid_contact_stands_beside_an_interval_in_every_form(client: Any) -> None:
+    k = ["rigid", "0.8..1.2 N/um", 1e6]
+    columns = client.post(BATCH, json={**SPRING, "k": k}).json()
+    rows = client.post(BATCH, json=[{**SPRING, "k": one} for one in k]).json()
+    for name in ("mu_macro", "mu_macro_low", "mu_macro_high"):
+        assert columns[name] == [row[name] for row in rows["results"]]
+    assert columns["errors"] == rows["errors"] == []
+    assert columns["mu_macro"][0] == of_one(client, {**SPRING, "k": "rigid"})["mu_macro"]
+
+
+@pytest.mark.parametrize("number", [1e400, -1, math.nan, "x", "2 um", 3])
+def test_an_amplitude_of_another_direction_is_left_out_or_null(client: Any, number: Any) -> None:
+    """What cannot be read is no gap."""
+    amplitudes = [None, number]
+    columns = {**SPRING, "k": 1e6, "v0": [0.01, 0.01], "Fz_amplitude": amplitudes}
+    rows = [{**SPRING, "k": 1e6, "Fz_amplitude": one} for one in amplitudes]
+    for body in (columns, rows):
+        (fault,) = client.post(BATCH, content=json.dumps(body)).json()["errors"]
+        assert (fault["index"], fault["field"]) == (1, "Fz_amplitude")
+
+
+@pytest.mark.parametrize(
+    ("columns", "field"),
+    [
+        ({"mu0": ["0.3 ± 0.01", 0.3], "std": {"mu0": 0.05}}, "mu0"),
+        ({"k": ["0.8..1.2 N/um", 1e6], "k_low": [1e5, 1e5], "k_high": [2e5, 2e5]}, "k"),
+        ({"v0": [0.01, 0.1], "std_mu0": 0.05}, "std_mu0"),
+        ({"v0": [0.01, 0.1], "std_nothing": 0.05}, "std_nothing"),
+    ],
+)
+def test_no_column_is_dropped_for_another(
+    client: Any, problem: Any, columns: Any, field: str
+) -> None:
+    body = {**SPRING, "k": 1e6, **columns}
+    (fault,) = problem(client.post(BATCH, json=body), 422)["errors"]
+    assert fault["field"] == field
+
+
+@pytest.mark.parametrize("name", ["k_low", "std_k"])
+def test_an_end_or_a_deviation_has_no_deviation(client: Any, name: str) -> None:
+    values = ["1 ± 0.1 N/um", "1 N/um"]
+    column = {"k_low": values, "k_high": "2 N/um"} if name == "k_low" else {"k": 1e6}
+    std = {"std": {"k": values}} if name == "std_k" else {}
+    (fault,) = client.post(BATCH, json={**SPRING, **column, **std}).json()["errors"]
+    assert (fault["index"], fault["field"]) == (0, name)
+    assert fault["reason"].startswith("must be one number: ")
+
+
+def test_a_query_holds_for_rows_in_whichever_way_they_are_read(client: Any) -> None:
+    """A null, or a row of other members, makes a list of rows be read one by one."""
+    normal = {**LIFTED, "k": 1e6}
+    del normal["direction"], normal["y0"]
+    for rows in ([normal, normal], [normal, {**normal, "y0": None}]):
+        answer = client.post(BATCH, params={"direction": "normal"}, json=rows).json()
+        alone = of_one(client, normal, direction="normal")
+        assert [row["mu_macro"] for row in answer["results"]] == [alone["mu_macro"]] * 2
+    plain = {**SPRING, "k": 1e6}
+    of_mu0, of_k = {**plain, "std": {"mu0": 0.01}}, {**plain, "std": {"k": 2e5}}
+    answer = client.post(BATCH, params={"std_k": 1e5}, json=[plain, of_mu0, of_k]).json()
+    both = of_one(client, {**plain, "std": {"mu0": 0.01, "k": 1e5}})
+    alone = of_one(client, {**plain, "std": {"k": 1e5}})
+    assert [row and row["std"] for row in answer["results"]] == [alone["std"], both["std"], None]
+    (fault,) = answer["errors"]
+    assert (fault["field"], "given in the query" in fault["reason"]) == ("std_k", True)
+
+
+@pytest.mark.parametrize("name", ["mu0", "Fz", "v0"])
+def test_a_null_is_refused_in_the_same_words_everywhere(
+    client: Any, problem: Any, name: str
+) -> None:
+    case = {**SPRING, "k": 1e6, name: None}
+    words = {(name, "is required")}
+    assert of_one(client, case) == words
+    (alone,) = problem(client.post(BATCH, json=case), 422)["errors"]
+    faults = [alone]
+    for body in ([case], {**case, name: [None, 0.1]}):
+        faults += client.post(BATCH, json=body).json()["errors"]
+    assert {(fault["field"], fault["reason"]) for fault in faults} == words

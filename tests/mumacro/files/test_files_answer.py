@@ -196,6 +196,18 @@ def test_ends_of_k_and_amplitudes_are_refused(
         assert low < middle < high or (low == middle == high and "1" in columns.values())
 
 
+@pytest.mark.parametrize("cell", ["x", "2 um", "1e400", "3"])
+def test_an_amplitude_of_another_direction_is_an_empty_cell(
+    surrogate: Surrogate, cell: str
+) -> None:
+    """What cannot be read is no gap."""
+    columns = {name: [value] * 2 for name, value in CASE.items()} | {"Fz_amplitude": ["", cell]}
+    _, rejects = answer(batch_of(**columns), surrogate)
+    assert [(one["row"], one["field"], one["value"]) for one in rejects.to_pylist()] == [
+        (1, "Fz_amplitude", cell)
+    ]
+
+
 def test_units_in_brackets_are_converted_exactly(surrogate: Surrogate) -> None:
     columns = {
         "mu0": [0.3],
