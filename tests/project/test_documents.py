@@ -56,6 +56,15 @@ def test_links_within_the_project_lead_somewhere(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_row_of_a_table_has_the_cells_of_its_head(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for rows in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE):
+        cells = {row: len(re.findall(r"(?<!\\)\|", row)) for row in rows.splitlines()}
+        head = next(iter(cells.values()))
+        assert [row for row, number in cells.items() if number != head] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_github_strikes_nothing_through_and_eats_nothing(page: Path) -> None:
     text = CODE.sub("", page.read_text("utf-8"))
     assert re.findall(r".*~.*", text) == [], "a tilde outside of code and formulas"
