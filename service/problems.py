@@ -340,11 +340,11 @@ def _no_such_path(scope: Scope) -> str:
     guide = scope["app"].state.settings.guide
     if guide is None and (path == "/guide" or path.startswith("/guide/")):
         return _NO_GUIDE
-    paths = [each for each in scope["app"].state.methods if "{" not in each]
-    # a path without its version, such as /mu-macro, is nearer to /v1/mu-macro than it looks
-    for candidate in (path, f"/v{API_VERSION}{path}"):
-        for near in get_close_matches(candidate, paths, n=1, cutoff=0.8):
-            return f"no such path; did you mean {near}? /docs describes all of them"
+    version = f"/v{API_VERSION}"  # in which paths that have nothing else in common agree
+    methods = scope["app"].state.methods
+    paths = {each.removeprefix(version): each for each in methods if "{" not in each}
+    for near in get_close_matches(path.removeprefix(version), paths, n=1, cutoff=0.8):
+        return f"no such path; did you mean {paths[near]}? /docs describes all of them"
     return "no such path; /docs describes all of them"
 
 

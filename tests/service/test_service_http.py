@@ -97,6 +97,13 @@ def test_an_unknown_path_names_the_nearest(client: Any, problem: Any, path: str,
     )
 
 
+def test_two_paths_are_not_near_for_their_version(started: Any, problem: Any) -> None:
+    with started() as client:
+        client.app.state.methods["/v1/power"] = "GET"
+        assert problem(client.get("/powr"), 404)["detail"].startswith("no such path; did you mean")
+        assert "did you mean" not in problem(client.get("/nowhere"), 404)["detail"]
+
+
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
 def test_a_wrong_method_is_answered_with_the_right_ones(
