@@ -15,12 +15,13 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from http.client import HTTPException
 
+from mumacro.outputs import OUTPUTS
 from tests.support.measuring import main, markdown, sections
 from tests.support.serving import CASE, Server, asking, connect, head, serving
 
 # the defaults; a few connections are left
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20
-EVERYTHING = ["groups", "limits", "gradient", "stick_fraction", "power", "settling"]
+EVERYTHING = [name for name in OUTPUTS if name != "std"]
 
 
 def hold_connections(

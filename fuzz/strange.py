@@ -22,6 +22,7 @@ from urllib.parse import quote, urlencode
 import orjson
 
 from mumacro.contacts.geometries import GEOMETRIES
+from mumacro.outputs import OUTPUTS
 from mumacro.stiffness import AXES
 from tests.support.measuring import ROOT, main, markdown, progress, sections
 from tests.support.serving import CASE, Server, serving
@@ -56,7 +57,7 @@ def case(chance: random.Random) -> dict[str, float]:
 
 
 CONTACTS, DIRECTIONS = ("spring", "ball"), ("across", "along", "normal")
-INCLUDED = ("groups", "gradient", "power", "stick_fraction", "std", "settling", "border")
+INCLUDED = (*OUTPUTS, "border")
 
 
 def document(chance: random.Random) -> tuple[str, Any]:

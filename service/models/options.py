@@ -33,9 +33,8 @@ if TYPE_CHECKING:
 else:
     Include = Literal[(*OUTPUTS, *_BESIDE)]
 _INCLUDE = (
-    "More to compute: groups (v~, y~, l0), limits (of the friction law), gradient, std (standard "
-    "deviation), stick_fraction, power, settling; for one case model (what it leaves out here); "
-    "not for a batch inputs (what was understood of them)"
+    f"More to compute: {', '.join(OUTPUTS)}; for one case model (what it leaves out here); not for "
+    "a batch inputs (what was understood of them)"
 )
 _CONTACT = "One spring of stiffness k, or a ball on a flat (Hertz) whose stiffness before slip is k"
 _DIRECTION = (

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from mumacro import Surrogate
+from mumacro.outputs import OUTPUTS
 from tests.support.serving import CASE
 
 Row = dict[str, Any]
@@ -130,7 +131,7 @@ def test_the_service_answers_in_every_format_what_the_library_does(
     assert {tuple(row) for row in rows} == {(*COLUMNS, "error")}
 
 
-INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "std"]
+INCLUDED = [*OUTPUTS]
 
 
 def flat(document: Row, path: str = "") -> Row:
