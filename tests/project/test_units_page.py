@@ -1,7 +1,9 @@
-"""The page of units is the table of units, that of outputs the list of outputs."""
+"""The page of units is the table of units; that of outputs has every output, and so has the help of
+``evaluate``."""
 
 from collections.abc import Iterable
 
+from mumacro import Surrogate
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.units import QUANTITIES
 from mumacro.outputs import OUTPUTS
@@ -56,6 +58,7 @@ def test_the_page_has_the_usual_ranges() -> None:
 
 def test_the_page_of_outputs_has_every_output() -> None:
     page = (ROOT / "docs" / "outputs.md").read_text("utf-8")
+    assert ", ".join(OUTPUTS) in " ".join(str(Surrogate.evaluate.__doc__).split())
     for name, output in OUTPUTS.items():
         assert f"| `{name}` |" in page
         tops = {path.partition(".")[0] for path in output.members}

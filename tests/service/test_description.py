@@ -1,10 +1,15 @@
-"""The description agrees with the service: where null is accepted, and what may be left out."""
+"""The description agrees with the service: where null is accepted, and what may be left out.  It is
+complete, and the documents name all of its paths."""
 
+import json
+import re
 from typing import Any
 
 import pytest
 
 from mumacro.inputs.fields import INPUTS, described
+from mumacro.outputs import OUTPUTS
+from tests.support.places import ROOT
 from tests.support.serving import CASE
 
 LAW = {name: x for name, x in CASE.items() if name != "v0"} | {
@@ -82,6 +87,36 @@ def test_members_that_may_be_left_out_have_no_default_in_the_description(
     contact = schemas["CaseRequest"]["properties"]["contact"]
     assert contact["description"].endswith("left out: spring")
     assert "contact" not in schemas["CaseRequest"]["required"]
+
+
+def _members(schemas: dict[str, Any], name: str) -> set[str]:
+    """The paths of the members of an object."""
+    found: set[str] = set()
+    for member, schema in schemas[name]["properties"].items():
+        found.add(member)
+        for one in (schema, *schema.get("anyOf", ())):
+            part = one.get("$ref", "").rpartition("/")[2]
+            found |= {f"{member}.{path}" for path in (_members(schemas, part) if part else ())}
+    return found
+
+
+@pytest.mark.parametrize("answer", ["CaseAnswer", "Result", "ColumnsAnswer", "LawAnswer", "Root"])
+def test_every_value_of_every_output_is_described(schemas: dict[str, Any], answer: str) -> None:
+    paths = {path for output in OUTPUTS.values() for path in output.members}
+    assert paths - _members(schemas, answer) == set()
+
+
+def test_every_body_of_the_description_is_asked_here(client: Any) -> None:
+    paths = client.get("/openapi.json").json()["paths"].values()
+    bodies = json.dumps([path["post"]["requestBody"] for path in paths if "post" in path])
+    assert {*re.findall(r"#/components/schemas/(\w+)", bodies)} == BODIES.keys()
+
+
+def test_every_path_is_in_the_documents(client: Any) -> None:
+    pages = ("http.md", "operations.md")
+    text = "".join((ROOT / "docs" / page).read_text("utf-8") for page in pages)
+    paths = client.get("/openapi.json").json()["paths"]
+    assert [path for path in paths if not re.search(rf"{re.escape(path)}(?![\w./-])", text)] == []
 
 
 def test_no_parameter_of_a_query_is_null(client: Any) -> None:
