@@ -9,6 +9,7 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from annotated_types import Ge, Le
 
 from service.__main__ import main
 from service.settings import Settings, SettingsError, load_settings
@@ -125,12 +126,20 @@ def test_the_manual_and_the_settings_agree(repository: Path) -> None:
     names = {f"MUMACRO_{name.upper()}" for name in Settings.model_fields}
     assert set(BAD) == names
     text = (repository / "docs" / "operations.md").read_text()
-    defaults = dict(re.findall(r"^\| `(MUMACRO_\w+)` \| (.*?) \| ", text, re.MULTILINE))
+    rows = re.findall(r"^\| `(MUMACRO_\w+)` \| (.*?) \| (.*?) \| ", text, re.MULTILINE)
+    defaults = {name: default for name, default, _ in rows}
+    allowed = {name: cell for name, _, cell in rows}
     assert defaults.keys() == names
     for name, field in Settings.model_fields.items():
         value = ",".join(field.default) if isinstance(field.default, tuple) else field.default
         default = "none" if value in (None, "") else f"`{value}`"
-        assert field.default_factory or defaults[f"MUMACRO_{name.upper()}"] == default
+        variable = f"MUMACRO_{name.upper()}"
+        assert field.default_factory or defaults[variable] == default
+        if field.annotation is int:
+            bounds = {type(bound): bound for bound in field.metadata}
+            least, most = bounds[Ge].ge, bounds[Le].le
+            assert allowed[variable] == f"{least} to {most}"
+            assert {str(least - 1), str(most + 1)} <= {*BAD[variable]}, variable
     assert load_settings().tables == (repository / "tables",)
 
 
