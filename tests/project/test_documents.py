@@ -253,6 +253,20 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
     assert bare == {"attributes", "blocks", "inputs"}
 
 
+def test_the_floors_of_contributing_are_those_that_are_checked() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    (floors,) = (
+        contract["layers"]
+        for contract in project["tool"]["importlinter"]["contracts"]
+        if contract["type"] == "layers"
+    )
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    heads = re.findall(r"^    (mumacro/[^\s,]+(?:, [^\s,]+)*)", text, re.MULTILINE)
+    told = re.findall(r"\w+(?=/|\.py)", " ".join(heads).replace("mumacro/", ""))
+    checked = [name for floor in floors for name in floor.split(" | ")]
+    assert told == [name for name in checked if name not in ("__main__", "version")]
+
+
 def test_metadata_agrees_with_the_package() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
