@@ -544,24 +544,28 @@ class _Scan:
         return tuple(map(self._unique, candidates, targets.tolist()))
 
     def _unique(self, roots: list[MotionRoot], target: float) -> tuple[MotionRoot, ...]:
-        """Roots of one target, ascending, each once; a range in which the mean force is the target
-        within its estimate, such as that of continuous sliding, is one root."""
+        """Roots of one target, ascending, each once.
+
+        Roots whose widths overlap cannot be told apart and are one; so is a range in which the mean
+        force is the target within its estimate, such as that of continuous sliding.
+        """
         unique: list[MotionRoot] = []
         flat = np.abs(self.mean - target) <= self.error
         for root in sorted(roots):
-            if unique and root.low > unique[-1].high:
+            if unique and (root.low <= unique[-1].high or self._joined(unique[-1], root, flat)):
                 last = unique[-1]
-                first, end = map(int, np.searchsorted(self.x, (last.value, root.value)))
-                # the samples between both, or else around them
-                near = slice(first, end) if first < end else slice(max(first - 1, 0), end + 1)
-                if flat[near].all():
-                    unique[-1] = last._replace(high=max(last.high, root.high))
-                    continue
-            if not unique or root.low > unique[-1].high:
+                unique[-1] = last._replace(high=max(last.high, root.high))
+            else:
                 unique.append(root)
         if self._is_whole_turn and len(unique) > 1 and unique[-1].high - 360.0 >= unique[0].low:
             unique.pop()  # 360 degrees are 0
         return tuple(unique)
+
+    def _joined(self, root: MotionRoot, following: MotionRoot, flat: Bools) -> bool:
+        """Whether all samples between two roots, or else those around them, are ``flat``."""
+        first, end = map(int, np.searchsorted(self.x, (root.value, following.value)))
+        near = slice(first, end) if first < end else slice(max(first - 1, 0), end + 1)
+        return bool(flat[near].all())
 
     @property
     def _is_whole_turn(self) -> bool:

@@ -168,3 +168,25 @@ def test_a_range_in_which_the_mean_is_the_target_is_one_root() -> None:
     beside = mumacro.solve_motion("v0", np.linspace(-0.2, 0.4, 31), **case, normal=(8.0, -90.0))
     assert [len(roots) for roots in beside.roots[24:27]] == [1, 1, 0]
     assert beside.samples[0].size < 1000
+
+
+def test_the_width_of_a_flat_root_holds_all_places_where_the_mean_crosses_the_target() -> None:
+    """On a stiff contact mu_macro hardly changes with k: it comes within its estimate of this
+    target at 46 N/m, and crosses it at 398 N/m."""
+    case: dict[str, Any] = {
+        "mu0": 0.3,
+        "Fz": 1.0 / 0.3,
+        "f": 0.5 / math.pi,
+        "v0": 1.3733873377118634,
+        "x": (0.2641164538616952, 69.51471276643943),
+        "y": (0.5583226423845976, 311.3349616995049),
+        "normal": (1.4567703249872974, 172.28669302959773),
+    }
+    target = 0.28897534219814974
+    k = np.geomspace(300.0, 500.0, 50)
+    mean, _ = Curve("k", "mu_macro", case).at(k)
+    crossings = k[:-1][np.diff(np.sign(mean - target)) != 0.0]
+    assert crossings.size
+    roots = mumacro.solve_motion("k", target, **case).roots[0]
+    for place in crossings:
+        assert any(root.low <= place <= root.high for root in roots)
