@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Generic
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,33 @@ DEFAULT = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 TEXTS = ("regime", "source")
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)[_REGIME_CODES]
+
+
+class PlainCase(NamedTuple):
+    """One case in plain numbers, as it came; of :class:`Cases` what its answer needs."""
+
+    kind: Kind
+    six: tuple[float, ...]
+    with_f: bool
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The six inputs by name."""
+        return dict(zip(self.kind.fields, map(float, self.six), strict=True))
+
+    @property
+    def given(self) -> dict[str, float]:
+        """f, where it was given."""
+        return {"f": self.six[4] / RAD_PER_CYCLE} if self.with_f else {}
+
+    @property
+    def units(self) -> dict[str, str]:
+        """None: the numbers came without."""
+        return {}
+
+    def as_cases(self) -> Cases:
+        """The same in the one form of all cases."""
+        return Cases(self.kind, self.kind.fields, self.columns, (), given=self.given)
 
 
 class Answer(Generic[Number]):
@@ -108,8 +135,7 @@ class Answer(Generic[Number]):
         self.error_bound = error_bound
         self.source_code = source_code
         self._groups = groups
-        #: the cases; of one in plain numbers its kind, its six inputs, and whether f was given
-        self._cases: Cases | tuple[Kind, tuple[float, ...], bool] | None = cases
+        self._cases: Cases | PlainCase | None = cases
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
         self.outputs: Mapping[str, Any] = _NOTHING
@@ -209,15 +235,9 @@ class Answer(Generic[Number]):
     @property
     def cases(self) -> Cases:
         """The cases that were evaluated."""
-        cases = self._cases
-        if isinstance(cases, Cases):  # a tuple, too
-            return cases
-        if cases is None:
+        if self._cases is None:
             raise AttributeError("these labelled cases are not kept")
-        kind, six, with_f = cases
-        columns: dict[str, Any] = dict(zip(kind.fields, map(float, six), strict=True))
-        given = {"f": columns["omega"] / RAD_PER_CYCLE} if with_f else {}
-        return Cases(kind, kind.fields, columns, (), given=given)
+        return self._cases if isinstance(self._cases, Cases) else self._cases.as_cases()
 
     @property
     def remarks(self) -> list[Remark]:
@@ -228,9 +248,9 @@ class Answer(Generic[Number]):
     def remarks_in(self, units: Mapping[str, str]) -> list[Remark]:
         """:attr:`remarks`, with a value in the unit that ``units`` has for its input, as it was
         typed."""
-        if self._cases is None:
+        cases = self._cases
+        if cases is None:
             return [*self.remarks_on_outputs]
-        cases = self.cases
         on_inputs = doubts(cases.columns, "f" in cases.given, {**cases.units, **units})
         return [*on_inputs, *self.remarks_on_outputs]
 
@@ -305,8 +325,8 @@ class Answer(Generic[Number]):
         >>> [*Surrogate.open().evaluate(**case, include=("groups",)).to_dict()]
         ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
         """
-        values = {path: getattr(self, path) for path in self._always} | {**self.outputs}
-        members = nested({path: listed(value) for path, value in values.items()})
+        members = {path: listed(getattr(self, path)) for path in self._always}
+        members |= nested({path: listed(value) for path, value in self.outputs.items()})
         if said := self.remarks:
             members["remarks"] = said
         return members

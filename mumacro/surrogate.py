@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import plotting
-from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer
+from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, PlainCase
 from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
@@ -627,7 +627,7 @@ class Surrogate:
             row.error_bound,
             row.source,
             (row.v_tilde, row.y_tilde, row.length_scale),
-            (kind, six, with_f),
+            PlainCase(kind, six, with_f),
             self,
         )
         if gradient:

@@ -155,6 +155,14 @@ class Work:
         async with within(self.settings.time_limit_s):
             return await asyncio.wrap_future(task)
 
+    async def small_body(self, reading: Awaitable[bytearray], scope: Scope) -> bytearray:
+        """Wait for a small body.
+
+        Our own server limits this wait (server.py); a timer beside that takes a tenth of the time
+        of one case.
+        """
+        return await (reading if "abort" in scope.get("state", ()) else self.client(reading))
+
     async def client(self, move: Awaitable[T]) -> T:
         """Wait for the client to send or to read."""
         limit = self.settings.client_timeout_s

@@ -147,7 +147,8 @@ async def small_body(request: Request, most: int = SMALL_BODY) -> bytes:
         only_json(headers)
     limit = min(most, request.app.state.settings.max_body_bytes)
     work: Work = request.app.state.work
-    body = bytes(await work.client(read_body(headers, request.receive, limit)))
+    reading = read_body(headers, request.receive, limit)
+    body = bytes(await work.small_body(reading, request.scope))
     if len(body) > SMALL_BODY and body.count(b'":') + body.count(b'" :') > _FEW:
         detail = f"a body may have more than {SMALL_BODY} bytes where it is the text of a table"
         raise RequestError(ProblemKind.BODY_TOO_LARGE, detail)

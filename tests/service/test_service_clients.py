@@ -77,42 +77,67 @@ def test_a_head_of_http_2_without_its_framing_is_refused(live_server: Any) -> No
             assert to_end(raw).startswith(b"HTTP/1.1 400 ")
 
 
+async def asked(
+    app: Any,
+    version: str,
+    host: bool,
+    method: str,
+    path: str,
+    body: bytes = b"",
+    stops: bool = False,
+) -> tuple[int, bytes]:
+    """As another server calls the application; ``stops``: the rest of the body never comes."""
+    headers = [(b"content-type", b"application/json"), *([(b"host", b"x")] if host else [])]
+    scope: dict[str, Any] = {
+        "type": "http",
+        "asgi": {"version": "3.0"},
+        "http_version": version,
+    }
+    scope |= {"method": method, "path": path, "raw_path": path.encode(), "query_string": b""}
+    scope |= {"root_path": "", "scheme": "https", "headers": headers}
+    scope |= {"client": ("127.0.0.1", 1), "server": ("127.0.0.1", 2)}
+    sent: list[Any] = []
+    pieces = iter([{"type": "http.request", "body": body, "more_body": stops}])
+
+    async def receive() -> Any:
+        if (piece := next(pieces, None)) is None:
+            await asyncio.Event().wait()
+        return piece
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    await app(scope, receive, send)
+    return sent[0]["status"], b"".join(message.get("body", b"") for message in sent)
+
+
 def test_an_application_answers_requests_of_other_versions() -> None:
     """As servers that speak HTTP/2 call it, with and without a Host."""
     app = create_app(Settings(tables=(TABLES,)))
 
-    async def asked(
-        version: str, host: bool, method: str, path: str, body: bytes = b""
-    ) -> tuple[int, bytes]:
-        headers = [(b"content-type", b"application/json"), *([(b"host", b"x")] if host else [])]
-        scope: dict[str, Any] = {
-            "type": "http",
-            "asgi": {"version": "3.0"},
-            "http_version": version,
-        }
-        scope |= {"method": method, "path": path, "raw_path": path.encode(), "query_string": b""}
-        scope |= {"root_path": "", "scheme": "https", "headers": headers}
-        scope |= {"client": ("127.0.0.1", 1), "server": ("127.0.0.1", 2)}
-        sent: list[Any] = []
-
-        async def receive() -> Any:
-            return {"type": "http.request", "body": body, "more_body": False}
-
-        async def send(message: Any) -> None:
-            sent.append(message)
-
-        await app(scope, receive, send)
-        return sent[0]["status"], b"".join(message.get("body", b"") for message in sent)
-
     async def all_of_them() -> None:
         async with app.router.lifespan_context(app):
             for as_sent in (("2", False), ("2", True), ("3", False)):
-                assert (await asked(*as_sent, "GET", "/readyz"))[0] == 200
-                status, answer = await asked(*as_sent, "POST", SINGLE, BODY)
+                assert (await asked(app, *as_sent, "GET", "/readyz"))[0] == 200
+                status, answer = await asked(app, *as_sent, "POST", SINGLE, BODY)
                 assert (status, json.loads(answer)["regime"]) == (200, "stick_slip")
-            assert (await asked("1.1", False, "GET", "/readyz"))[0] == 400
+            assert (await asked(app, "1.1", False, "GET", "/readyz"))[0] == 400
 
     asyncio.run(all_of_them())
+
+
+@pytest.mark.parametrize("path", [SINGLE, f"{SINGLE}/batch", "/v1/motion"])
+def test_under_another_server_a_body_that_stops_is_given_up(path: str) -> None:
+    """Our own server limits the wait for a small body; another one does not."""
+    app = create_app(Settings(tables=(TABLES,), client_timeout_s=1))
+
+    async def stopped() -> tuple[int, bytes]:
+        async with app.router.lifespan_context(app):
+            asking = asked(app, "1.1", True, "POST", path, BODY[:9], stops=True)
+            return await asyncio.wait_for(asking, 20.0)
+
+    status, text = asyncio.run(stopped())
+    assert (status, json.loads(text)["title"]) == (408, "The request did not come in time")
 
 
 @pytest.mark.slow
