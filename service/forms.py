@@ -330,8 +330,9 @@ def _first(error: ValidationError | InputError) -> Reason:
         return (str(error.field) or None), reason_of(error)
     faults = faults_of(error.errors(include_url=False), Case.model_fields)
     order = list(Case.model_fields)
-    fault = min(faults, key=lambda one: order.index(one.path[0]) if one.path[0] in order else -1)
-    return str(fault.path[0])[:80], fault.reason
+    places = [(one.path[0] if one.path else "", one.reason) for one in faults]
+    name, reason = min(places, key=lambda one: order.index(one[0]) if one[0] in order else -1)
+    return str(name)[:80] or None, reason
 
 
 # --- answers --------------------------------------------------------------------------------------

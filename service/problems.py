@@ -188,6 +188,8 @@ def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
         return f"may have up to {most} entries"
     if kind == "list_type":
         return "must be a list"
+    if kind == "string_unicode":
+        return "must be text, in which \\ud800 to \\udfff stand in pairs"
     message: str = error["msg"]
     return message.replace("Input should be", "must be").replace("Input should", "must")
 

@@ -696,11 +696,14 @@ def _shape_of(*parts: Mapping[str, Any]) -> tuple[int, ...]:
 def codes_of(words: Mapping[str, Any], shape: tuple[int, ...]) -> Codes:
     """The kind of each case by its place in KINDS, -1 where there is no such kind; contact and
     direction are texts or arrays of them."""
-    contacts, directions = (
-        np.broadcast_to(np.asarray(words.get(name, usual), object), shape).ravel().tolist()
-        for name, usual in (("contact", "spring"), ("direction", "across"))
-    )
-    codes = [code_of(*pair) for pair in zip(contacts, directions, strict=True)]
+    pairs = []
+    for name, usual in (("contact", CONTACTS[0]), ("direction", DIRECTIONS[0])):
+        word = words.get(name, usual)
+        one = np.empty((), object)
+        one[()] = word  # which may be a list: no word
+        column = word if isinstance(word, np.ndarray) else one
+        pairs.append(np.broadcast_to(column, shape).ravel().tolist())
+    codes = [code_of(*pair) for pair in zip(*pairs, strict=True)]
     return np.array(codes, np.int8).reshape(shape)
 
 

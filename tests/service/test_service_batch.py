@@ -173,9 +173,11 @@ def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(
     assert len(client.post(BATCH, json=case).json()["mu_macro"]) == 1
 
 
-@pytest.mark.parametrize("entry", [3, "a:b", None, True, [1], {}, {"mu0": {"a": 1}}], ids=repr)
+@pytest.mark.parametrize(
+    "entry", [3, "a:b", None, True, [1], {}, {"mu0": {"a": 1}}, {"mu\ud800": 1}], ids=ascii
+)
 def test_an_entry_that_is_no_case_is_bad_alone(client: Any, case: Case, entry: Any) -> None:
-    reply = client.post("/v1/mu-macro/batch", json=[case, entry, case])
+    reply = client.post(BATCH, content=json.dumps([case, entry, case]))
     assert reply.status_code == 200
     answer = reply.json()
     assert [row is None for row in answer["results"]] == [False, True, False]
@@ -189,6 +191,14 @@ def test_a_name_that_is_given_twice_in_a_row_is_refused(client: Any, case: Case)
         "/v1/mu-macro/batch", content=text, headers={"Content-Type": "application/json"}
     )
     assert reply.status_code == 422
+
+
+@pytest.mark.parametrize("word", [["ball"], [["ball"]], {"ball": 1}, "\ud800", 1], ids=ascii)
+def test_a_list_is_no_word(client: Any, case: Case, word: Any) -> None:
+    """Also where it holds one word, and is the only case."""
+    for body in ([{**case, "contact": word}], {**case, "contact": [word]}):
+        answer = client.post(BATCH, content=json.dumps(body)).json()
+        assert [fault["field"] for fault in answer["errors"]] == ["contact"]
 
 
 def of_one(client: Any, row: Case, **query: Any) -> Any:
