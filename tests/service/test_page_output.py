@@ -111,6 +111,69 @@ def test_a_doubtful_unit_is_told_beside_the_number_and_the_field(open_page: Any)
     assert page.text("#doubt") == ""
 
 
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("#f=20000 kHz", "is f = 20000 kHz right?"),
+        ("#y0=20000 um", "is y₀ = 20000 µm right?"),
+        ("#y0=2", "is it in metres?"),
+    ],
+)
+def test_a_value_is_doubted_as_it_was_typed(open_page: Any, address: str, words: str) -> None:
+    page = open_page(address)
+    assert page.text("#doubt").replace("\xa0", " ").endswith(words)
+    assert not re.search(r"\de\+?\d", page.text("#rows"))  # 20600 periods
+
+
+@pytest.mark.parametrize("address", ["#k=rigid", "#v0=100 m/s", "#y0=1 nm", "#v0=1 m/s"])
+def test_the_number_has_four_digits_at_most(open_page: Any, address: str) -> None:
+    page = open_page(address)
+    assert len(page.text("#mu").removeprefix("0.").lstrip("0")) <= 4
+
+
+@pytest.mark.parametrize("speed", ["20 mm/s", "500 mm/s", "20000 mm/s", "5 m/s", "3 um/s"])
+def test_the_law_has_a_unit_in_which_its_ends_read(open_page: Any, speed: str) -> None:
+    page = open_page(f"#v0={speed}")
+    ends = [page.find(f"#{name}").get_attribute("placeholder") for name in ("from", "to")]
+    assert all(re.fullmatch(r"[\d.]{1,7} [mµ]?m/s", end) for end in ends), ends
+    assert page.run(AXIS) == f"v₀ [{ends[0].split()[1]}]"
+    assert not re.search(r"[1-9]\d{5}", " ".join([page.text("#law-read"), *ends]))
+
+
+def test_bars_and_sentence_have_the_same_shares_of_the_variance(open_page: Any) -> None:
+    page = open_page("#mu0=0.3 ± 0.02&k=1 ± 0.1 N/um&f=20 ± 4 kHz")
+    page.click("#tab-bars")
+    told = page.text("#spread").removeprefix("The variance comes from ").rstrip(".")
+    sentence = dict(part.removesuffix(" %").split() for part in told.split(", "))
+    names = [name.strip() for name in page.texts("#bars tbody th")]
+    bars = dict(zip(names, page.texts("#bars .variance"), strict=True))
+    assert {name: text.removesuffix(" %") for name, text in bars.items() if text != "–"} == {
+        name.replace("₀", "0"): share for name, share in sentence.items()
+    }
+    assert page.texts("#bars thead th") == ["change", "variance"]
+    assert page.run(  # and are seen whole
+        "const one = document.querySelector('#side');"
+        "return one.scrollHeight <= one.clientHeight && one.scrollWidth <= one.clientWidth;"
+    )
+    page = open_page()
+    page.click("#tab-bars")
+    assert page.texts("#bars .variance") == []
+
+
+def test_the_line_of_a_target_strikes_out_no_text(open_page: Any) -> None:
+    page = open_page(width=1280, height=800)
+    page.click("#tab-target")
+    rows = {page.find(f"#solve-form {one}").rect["y"] for one in ("select", "input", "button")}
+    assert max(rows) - min(rows) < 5  # one line
+    page.click("#solve-form button")
+    order = page.run(
+        "return [...document.querySelectorAll('#map :is(.target, .tag, .area, .point)')]"
+        ".map((one) => one.getAttribute('class'));"
+    )
+    assert (order[0], order[-1]) == ("target", "point")
+    assert {*order[1:-1]} == {"tag", "area"}
+
+
 def test_a_target_is_reached_and_drawn(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.click("#tab-target")
@@ -438,10 +501,35 @@ def test_the_measured_example_is_read_and_fitted(open_page: Any) -> None:
     assert page.value("#field-Fz") == "10.79 N"
     assert page.find("[value=along]").is_selected()
     assert page.texts("#points-read th") == ["v0 [mm/s]", "mu0", "mu_macro"]
-    page.click("#fit-button")
-    # docs/how-to/fit.md
+    # docs/how-to/fit.md; it is fitted at once
     page.wait_for("#fit-lines", r"k = 9.97 N/µm \(95 %: 9.77 to 10.19 N/µm\)")
     assert len(page.texts("#fit-plot circle.measured")) == 10  # and the residuals below
+    # each point has its own mu0, so there is no line, and none is spoken of
+    assert (len(page.texts("#fit-plot .fitted")), page.texts("#fit-plot .curve")) == (5, [])
+    assert ("Rings" in page.text("#fit-legend"), "Line" in page.text("#fit-legend")) == (
+        True,
+        False,
+    )
+    page.browser.back()
+    page.settle()
+    assert page.value("#field-Fz") == "10 N"
+
+
+def test_before_the_points_stands_what_they_are(open_page: Any) -> None:
+    page = open_page("#panel=fit", width=1280, height=800)
+    form, hint = page.find("#fit-form").rect, page.find("#fit-hint").rect
+    assert hint["x"] >= form["x"] + form["width"]  # the right half is not empty
+    assert not page.find("#fit-plot").is_displayed()
+    page.choose("#points", "v0 mu_macro\n0.001 0.22\n0.1 0.27")
+    assert (page.find("#fit-hint").is_displayed(), page.find("#fit-plot").is_displayed()) == (
+        False,
+        True,
+    )
+    page.click("#fit-button")
+    assert ("Rings" in page.text("#fit-legend"), "Line" in page.text("#fit-legend")) == (
+        False,
+        True,
+    )
 
 
 GERMAN = "v0 [mm/s];mu_macro;std\n{}\n"
@@ -536,6 +624,14 @@ def test_a_remedy_is_one_of_the_page(open_page: Any) -> None:
         assert not re.search(r"--\w|mumacro ", page.text(f"#note-{field}"))
     page.type("#field-k", "5 psi")
     assert page.find("#tab-stiffness").text in page.text("#note-k")
+
+
+def test_a_motion_says_that_it_has_no_deviation(open_page: Any) -> None:
+    page = open_page("#panel=motion&x=1 um&k=1 ± 0.1 N/um&mu0=0.3 ± 0.02")
+    assert "without the standard deviation (±) of µ₀, k" in page.text("#motion-doubt")
+    page.type("#field-k", "1 N/um")
+    page.type("#field-mu0", "0.3")
+    assert page.text("#motion-doubt") == ""
 
 
 def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
@@ -693,12 +789,18 @@ LONG = "mu0=0.3 ± 0.03&Fz=20 ± 0.5 N&k=10.6114 ± 1 N/µm&y0=0.5 ± 0.05 µm&f
         ("#k=1 ± 0.1 N/um", []),
         (f"#{LONG}&contact=ball&direction=along", ["reverse slip", "565"]),
         (f"#{LONG}&contact=ball&panel=motion&x=0.2 um&y=0.5 um@90", ["Any motion", "drag force"]),
+        ("#panel=fit", []),
+        ("#panel=fit&example", ["k from measured friction", "9.97 N/µm", "residuals", "Rings"]),
     ],
 )
 def test_it_prints_on_one_page(
     open_page: Any, tmp_path: Path, address: str, words: list[str]
 ) -> None:
-    page = open_page(address)
+    page = open_page(address.removesuffix("&example"))
+    if address.endswith("example"):
+        page.click("#fit-example")
+        page.wait_for("#fit-lines", "9.97")
+        page.settle()
     options = {"printBackground": True, "preferCSSPageSize": True}
     data = page.browser.execute_cdp_cmd("Page.printToPDF", options)["data"]
     pdf = base64.b64decode(data)
@@ -707,7 +809,8 @@ def test_it_prints_on_one_page(
         (tmp_path / "page.pdf").write_bytes(pdf)
         text = subprocess.check_output(["pdftotext", tmp_path / "page.pdf", "-"], text=True)
         assert page.text("#mu") in text
-        assert "k=1" in text.replace("+", " ").replace("%20", " ")
+        assert ("k=1" in text.replace("+", " ").replace("%20", " ")) is (address != "#panel=fit")
         assert "Example" not in text
         assert all(one in text for one in words)
         assert ("Any motion" in text) is ("panel=motion" in address)
+        assert ("k from measured friction" in text) is ("example" in address)

@@ -30,6 +30,7 @@ async function encoded(file) {
 export function fitPanel(store, moved, openCase) {
   let source = { points: "" }; // what is sent: a text, or the bytes of a file
   let table, fit, answer;
+  let asked = false; // whether the points are fitted as soon as they and their case are read
   const plot = new Plot($("fit-plot"), paint);
   /** How the table is written, as far as it is chosen; a text has its encoding already. */
   const dialect = () =>
@@ -72,6 +73,7 @@ export function fitPanel(store, moved, openCase) {
       fit = undefined;
       say("");
       draw();
+      fitIfAsked();
     },
     (reason) => {
       if (reason) {
@@ -90,6 +92,12 @@ export function fitPanel(store, moved, openCase) {
     },
     (reason) => say(reason, true),
   );
+  /** Fits the points of the example when they are read, and its case is answered. */
+  function fitIfAsked() {
+    if (!asked || !table || answer?.state !== store.state) return;
+    asked = false;
+    fits.push(question());
+  }
   const read = () => {
     const empty = !(source.points?.trim() || source.points_base64);
     if (empty) {
@@ -214,7 +222,12 @@ export function fitPanel(store, moved, openCase) {
   function draw() {
     render(readTable(), $("points-read"));
     $("fit-button").disabled = !table;
+    $("fit-hint").hidden = Boolean(table);
     $("fit-caption").hidden = !fit;
+    const of = fit?.curve
+      ? "Line: the fit, with its 95 % band."
+      : "Rings: the fit, at µ₀ of each point.";
+    write("fit-legend", `Dots: measured, ± std where it is known. ${of}`);
     render(result(), $("fit-lines"));
     const old = fit && JSON.stringify(question()) !== JSON.stringify(fit.question);
     $("fit-lines").classList.toggle("old", Boolean(old));
@@ -268,11 +281,11 @@ export function fitPanel(store, moved, openCase) {
         ],
         "measured",
       );
-    const dot = (i, y) =>
+    const dot = (i, y, kind = "measured", radius = 3.5) =>
       inside
         .append("circle")
-        .attr("class", "measured")
-        .attr("r", 3.5)
+        .attr("class", kind)
+        .attr("r", radius)
         .attr("cx", plot.x(x[i]))
         .attr("cy", plot.y(y));
     measured.forEach((mu, i) => {
@@ -280,6 +293,8 @@ export function fitPanel(store, moved, openCase) {
       dot(i, mu);
     });
     if (!residuals.length) return;
+    // µ₀ of each point is another one: there is no curve
+    if (!curve) residuals.forEach((one, i) => dot(i, measured[i] - one, "fitted", 6));
     const middle = (-0.5 * share * top) / (1 - share);
     const scale = (0.4 * share * top) / (1 - share) / worst;
     plot.path(
@@ -345,6 +360,7 @@ export function fitPanel(store, moved, openCase) {
     $("points").value = about.example.points;
     $("unknowns").value = about.example.unknowns;
     source = { points: about.example.points };
+    asked = true;
     openCase(about.example.case);
     read();
   });
@@ -361,5 +377,6 @@ export function fitPanel(store, moved, openCase) {
   return (latest) => {
     answer = latest;
     if (table) draw();
+    fitIfAsked();
   };
 }

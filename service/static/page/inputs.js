@@ -3,7 +3,7 @@
 import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
-import { about, inPrint, inUnit, numberOf, prose, toUnit, typeset } from "./words.js";
+import { about, inPrint, inUnit, numberOf, prose, typeset, unitAt } from "./words.js";
 
 const STEPS = 100; // of a slider, a decade
 
@@ -36,10 +36,8 @@ function understood(name, typed, { text, value, unit, std, low, high } = {}) {
   if (typeof value !== "number" || (text ?? typed) !== typed) return "";
   if (low !== undefined && high !== undefined)
     return `${inUnit(name, low, unit ?? undefined)} to ${inUnit(name, high, unit ?? undefined)}`;
-  const number = Math.abs(toUnit(name, value, unit ?? ""));
-  const reads = number === 0 || (number >= 1e-3 && number < 1e4);
-  const said = inUnit(name, value, reads ? (unit ?? undefined) : undefined, 6);
-  if (std) return `${said}, deviation ${inUnit(name, std, unit ?? undefined, 3)}`;
+  const said = inUnit(name, value, unitAt(name, value, unit, 1e4), 6);
+  if (std) return `${said}, standard deviation ${inUnit(name, std, unit ?? undefined, 3)}`;
   return text && asTyped(text) !== asTyped(said) ? `read as ${said}` : "";
 }
 

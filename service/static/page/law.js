@@ -15,7 +15,7 @@ import {
   show,
   toSI,
   toUnit,
-  unitFor,
+  unitOver,
 } from "./words.js";
 
 const { area, bisectCenter } = d3;
@@ -67,8 +67,9 @@ export function lawPanel(store, moved) {
   let behind = false; // whether the number belongs to earlier values
   const plot = new Plot($("law"), paint, mark);
   const along = () => law?.along ?? store.state.along;
-  /** The unit of the axis: that of the input as it was typed. */
-  const unit = () => answer?.inputs[along()]?.unit || unitFor(along(), law?.values.at(-1) ?? 1);
+  /** The unit of the axis: that of the input as it was typed, where the ends of the axis read. */
+  const unit = () =>
+    unitOver(along(), law?.values[0] ?? 1, law?.values.at(-1) ?? 1, answer?.inputs[along()]?.unit);
   const text = (value) => `${about.inputs[along()].symbol} = ${inUnit(along(), value, unit())}`;
   const heading = () =>
     `${about.inputs[along()].symbol}${unit() === "-" ? "" : ` [${inPrint(unit())}]`}`;
@@ -265,9 +266,10 @@ export function lawPanel(store, moved) {
     if (below !== ground) plot.redraw();
     ground = below;
     const question = lawQuestion(state, answer);
-    const [start, stop] = [question.start, question.stop];
-    $("from").placeholder = typeof start === "number" ? inUnit(state.along, start, unit(), 3) : "";
-    $("to").placeholder = typeof stop === "number" ? inUnit(state.along, stop, unit(), 3) : "";
+    const [low, high] = usualRange(state, answer);
+    const usual = unitOver(state.along, low, high, answer.inputs[state.along]?.unit);
+    $("from").placeholder = inUnit(state.along, low, usual, 3);
+    $("to").placeholder = inUnit(state.along, high, usual, 3);
     if (law) describe();
     const words = JSON.stringify(question);
     if (words === latest) return;

@@ -185,7 +185,7 @@ export function motionPanel(store, moved) {
     const names = uncertainOf(store.state, answer, body);
     if (!names.length) return "";
     const symbols = names.map((name) => about.inputs[name].symbol).join(", ");
-    return `Computed without the deviation (±) of ${symbols}: a motion carries none.`;
+    return `Computed without the standard deviation (±) of ${symbols}: a motion carries none.`;
   }
 
   function draw() {

@@ -18,28 +18,22 @@ import {
 const BELOW = ["units", "k is known"];
 /** Rows that doubt the deviation, among what is assumed. */
 const DOUBTS = ["first order", "std"];
+const FEW = 4; // digits of the number, at most
 const SHOWN = 3; // lines of assumptions; all of them are one click away
 
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
 
 /** The number and its deviation as texts. */
 function resultOf(answer, all) {
-  const {
-    mu_macro: mu,
-    std,
-    error_bound: bound,
-    mu_macro_low: low,
-    mu_macro_high: high,
-    digits = 4,
-  } = answer;
+  const { mu_macro: mu, std, error_bound: bound, mu_macro_low: low, mu_macro_high: high } = answer;
   if (all)
     return { value: friction(mu, digitsWithin(mu, bound) + 1), std: std ? show(std, 6) : null };
   if (std) {
     const [value, deviation] = withDeviation(mu, std);
     return { value, std: deviation };
   }
-  const width = high > low ? digitsWithin(mu, (high - low) / 2) + 1 : digits;
-  return { value: friction(mu, Math.min(width, digits)), std: null };
+  const width = high > low ? digitsWithin(mu, (high - low) / 2) + 1 : FEW;
+  return { value: friction(mu, Math.min(width, FEW)), std: null };
 }
 
 /** One line below the number: where its deviation comes from, or how much k matters. */
@@ -104,7 +98,10 @@ export function numberPanel(store) {
     for (const part of document.querySelectorAll("[data-of]"))
       part.hidden = part.dataset.of !== contact;
     const lines = rows.filter(({ row }) => !BELOW.includes(row));
-    const named = { std: "deviation", ...(contact === "ball" && { "one spring": "a ball" }) };
+    const named = {
+      std: "standard deviation",
+      ...(contact === "ball" && { "one spring": "a ball" }),
+    };
     const heading = (row) => capital(named[row] ?? row);
     const words = (text) => sentence(text, answer.inputs);
     const line = ({ row, text }) =>

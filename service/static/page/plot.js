@@ -157,8 +157,9 @@ export class Plot {
       root.append("text").attr("class", "title").attr("transform", place).text(text);
     title(x.title, `translate(${box.x + box.width / 2} ${this.height - 8})`);
     title(y.title, `translate(13 ${box.y + box.height / 2}) rotate(-90)`);
+    const marks = clipped(); // below the texts, which a line would strike out
     this.over = root.append("g");
-    this.marks = [clipped(), root.append("g")];
+    this.marks = [marks, root.append("g")];
     return this;
   }
 

@@ -2,11 +2,21 @@
 // an input reaches a target.
 import { Channel } from "./ask.js";
 import { $, write } from "./dom.js";
-import { html, render, svg } from "../lib/lit-html.js";
+import { html, nothing, render, svg } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf, kindOf } from "./state.js";
-import { about, friction, inUnit, inWords, numberOf, prefixed, show, typeset } from "./words.js";
+import {
+  about,
+  friction,
+  inUnit,
+  inWords,
+  numberOf,
+  prefixed,
+  show,
+  typeset,
+  unitAt,
+} from "./words.js";
 
 /**
  * Tabs: buttons "tab-name" that show one of several parts; `chosen(name)` hears which, and the
@@ -116,8 +126,9 @@ const signed = (share) => `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3
 /** Why an input has no sensitivity. */
 const none = (name) => (name === "k" ? "rigid" : "kink at 0");
 
-/** Per cent that µ changes when an input grows by 1 %, and its deviation's share. */
-function bars({ gradient, mu_macro: mu, inputs }) {
+/** Per cent that µ changes when an input grows by 1 %; where inputs have deviations, what each of
+ * them has of the variance of µ. */
+function bars({ gradient, mu_macro: mu, inputs, std_share: variance }) {
   if (!gradient || !mu) return html`<p class="hint">There is none: µ is 0.</p>`;
   const names = Object.keys(gradient);
   const shares = names.map((name) => {
@@ -125,12 +136,22 @@ function bars({ gradient, mu_macro: mu, inputs }) {
     const value = numberOf(inputs[input]);
     const share =
       gradient[name] === null || value === undefined ? null : (gradient[name] * per * value) / mu;
-    return [input, share];
+    return [input, share, variance && Math.round(100 * (variance[name] ?? 0))];
   });
   const most = Math.max(1, ...shares.map(([, share]) => Math.abs(share)));
   return html`<table>
+    ${
+      variance
+        ? html`<thead>
+            <tr>
+              <th scope="col" colspan="3">change</th>
+              <th scope="col" title="what the ± of an input has of the variance of µ">variance</th>
+            </tr>
+          </thead>`
+        : nothing
+    }
     <tbody>
-      ${shares.map(([name, share]) => {
+      ${shares.map(([name, share, part]) => {
         const width = (50 * Math.abs(share)) / most;
         return html`<tr>
           <th scope="row">${typeset(about.inputs[name].symbol)}</th>
@@ -146,7 +167,8 @@ function bars({ gradient, mu_macro: mu, inputs }) {
                 <path d="M50 0v10" />`}
             </svg>
           </td>
-          <td>${share === null ? `– ${none(name)}` : signed(share)}</td>
+          <td class="change">${share === null ? `– ${none(name)}` : signed(share)}</td>
+          ${variance ? html`<td class="variance">${part ? `${part} %` : "–"}</td>` : nothing}
         </tr>`;
       })}
     </tbody>
@@ -192,10 +214,10 @@ export function sidePanel(store, moved, found) {
   function draw() {
     const { reply } = solved;
     const { unknown, reachable, results } = reply;
-    const unit = answer.inputs[unknown]?.unit ?? undefined;
+    const typed = answer.inputs[unknown]?.unit;
     const [{ roots }] = results;
     const line = ({ value, mu_macro: mu, regime, power }) => {
-      const text = `${about.inputs[unknown].symbol} = ${inUnit(unknown, value, unit, 6)}`;
+      const text = `${about.inputs[unknown].symbol} = ${inUnit(unknown, value, unitAt(unknown, value, typed), 6)}`;
       const shaker = power ? `, shaker ${prefixed(power.oscillation, "W")}` : "";
       return html`<li>
         <span><b>${text}</b>: µ = ${friction(mu, 4)}, ${inWords(regime)}${shaker}</span>

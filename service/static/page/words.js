@@ -33,11 +33,25 @@ const scaleOf = (name, unit) => about.inputs[name].units[unit] ?? [1, 1];
 /** The offered unit in which a value of an input [SI] reads best. */
 export function unitFor(name, value) {
   const { offered } = about.inputs[name];
-  const fits = offered.find((unit) => {
-    const number = Math.abs(toUnit(name, value, unit));
-    return number >= 0.1 && number < 1000;
-  });
-  return fits ?? offered[0];
+  const number = (unit) => Math.abs(toUnit(name, value, unit));
+  const fits = offered.find((unit) => number(unit) >= 0.1 && number(unit) < 1000);
+  const far = (unit) => Math.abs(Math.log10(number(unit)) - 1);
+  const nearest = () => offered.reduce((best, unit) => (far(unit) < far(best) ? unit : best));
+  return fits ?? nearest();
+}
+
+/** The unit that was typed, where a value [SI] reads in it; else the one in which it reads best. */
+export function unitAt(name, value, typed, most = 1e5) {
+  const number = typed ? Math.abs(toUnit(name, value, typed)) : NaN;
+  return number === 0 || (number >= 1e-3 && number < most) ? typed : unitFor(name, value);
+}
+
+/** The unit in which both ends of a range [SI] read: the one that was typed, or an offered one. */
+export function unitOver(name, low, high, typed) {
+  const reads = (unit) =>
+    toUnit(name, high, unit) < 1e5 && (low === 0 || toUnit(name, low, unit) >= 1e-5);
+  const units = [typed, ...about.inputs[name].offered].filter(Boolean);
+  return units.find(reads) ?? typed ?? unitFor(name, high);
 }
 
 export const toUnit = (name, value, unit) => {
@@ -64,13 +78,7 @@ export function inUnit(name, value, unit = unitFor(name, value), digits = 4) {
 /** The text of an input at a value [SI], in the unit and with the relative deviation it had. */
 export function textAt(answer, name, value, digits = 4) {
   const { unit, std, value: before } = answer.inputs[name] ?? {};
-  const number = unit ? Math.abs(toUnit(name, value, unit)) : NaN; // how it would read
-  const text = inUnit(
-    name,
-    value,
-    number >= 1e-3 && number < 1e5 ? unit : unitFor(name, value),
-    digits,
-  );
+  const text = inUnit(name, value, unitAt(name, value, unit), digits);
   return std ? `${text} ± ${show((100 * std) / before, 3)} %` : text;
 }
 
@@ -112,7 +120,7 @@ export const prose = (text) =>
     .replace(/\bomega\b/g, "ω")
     .replace(/\b([yvl])0\b/g, "$1₀")
     .replace(/\b([yv])~/g, "$1\u0303")
-    .replaceAll(" um ", " µm ")
+    .replace(/(?<=[\d/] ?)u(?=[mN]\b)/g, "µ")
     .replace(/(\d) (?=%|µm|N\b|mm\b)/g, "$1\u00a0");
 
 /** A regime as a person names it. */
