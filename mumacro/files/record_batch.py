@@ -253,8 +253,10 @@ def answer_columns(
         cell = batch.column(heading)[i].as_py()
         reason = faults.get(name, {}).get(i, reason)
         rejects.append((i, name, None if cell is None else str(cell), reason))
+    in_heads = {name: split_unit(heading)[1] for name, (heading, _) in columns.headings.items()}
+    remarks = result.remarks_in({name: unit for name, unit in in_heads.items() if unit})
     return AnswerColumns(
-        [arrays[path] for path in columns.answer_names], rejects, by_heading, result.remarks
+        [arrays[path] for path in columns.answer_names], rejects, by_heading, remarks
     )
 
 

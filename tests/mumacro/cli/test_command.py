@@ -829,6 +829,21 @@ def test_a_target_is_read_as_other_values_are(capsys: Capture, text: str) -> Non
     assert answer["target"] == 0.15
 
 
+@pytest.mark.parametrize("row_of_units", [False, True])
+def test_eval_doubts_a_value_in_the_unit_of_its_column(
+    capsys: Capture, tmp_path: Path, row_of_units: bool
+) -> None:
+    names, units = ("mu0", "Fz", "k", "y0", "f", "v0"), ("-", "N", "N/um", "um", "kHz", "mm/s")
+    if row_of_units:
+        head = ",".join(names) + "\n" + ",".join(units)
+    else:
+        head = ",".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
+    (tmp_path / "cases.csv").write_text(f"{head}\n0.3,10,1,2,20000,10\n")
+    main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / "out.csv")])
+    said = capsys.readouterr()
+    assert "is f = 20000 kHz right?" in said.out + said.err
+
+
 def test_the_last_line_of_eval_has_the_remarks(capsys: Capture, tmp_path: Path) -> None:
     cases = tmp_path / "cases.csv"
     cases.write_text(
