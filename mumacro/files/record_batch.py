@@ -223,7 +223,7 @@ def answer_columns(
     faults: dict[str, dict[int, str]] = {}
     for name, (heading, scale) in columns.headings.items():
         by_heading[heading], values[name], faults[name] = numbers(
-            batch.column(heading), name, signs or Signs(".", None), scale
+            batch.column(heading), name, signs or Signs(None, None), scale
         )
     for name in AMPLITUDES:  # an empty cell is a gap, one that cannot be read is none
         if unread := [*faults.get(name, ())]:

@@ -105,6 +105,8 @@ def read_number(text: str, decimal: str = "") -> float:
 def _double(text: str) -> float:
     """The double of a plain number; too many digits must not pass for an infinite stiffness."""
     try:
+        if not text.isascii():  # float reads digits of every script
+            raise ValueError
         value = float(text.replace("D", "e").replace("d", "e").replace("_", "x"))
     except ValueError:
         raise ValueError("must be a number") from None

@@ -196,6 +196,22 @@ def test_ends_of_k_and_amplitudes_are_refused(
         assert low < middle < high or (low == middle == high and "1" in columns.values())
 
 
+@pytest.mark.parametrize(
+    "cell", ["1,5", "1,234.5", "1,000", "1.000", "0,5 mm/s", "٣", "三", "1'000"]
+)
+def test_text_in_a_column_without_layout_is_read_as_by_keyword(
+    surrogate: Surrogate, cell: str
+) -> None:
+    """No other cell tells what a comma is: 1,000 may be 1 or 1000."""
+    answers, rejects = answer(batch_of(v0=[cell]), surrogate)
+    try:
+        expected = surrogate.evaluate(**{**CASE, "v0": cell}).mu_macro
+    except InputError:
+        expected = None
+    assert answers.column("mu_macro").to_pylist() == [expected]
+    assert [one["field"] for one in rejects.to_pylist()] == ["v0"] * (expected is None)
+
+
 @pytest.mark.parametrize("cell", ["x", "2 um", "1e400", "3"])
 def test_an_amplitude_of_another_direction_is_an_empty_cell(
     surrogate: Surrogate, cell: str
