@@ -326,12 +326,14 @@ export function fitPanel(store, moved, openCase) {
 
   $("points").addEventListener("change", ({ target }) => {
     source = { points: target.value };
+    asked = false;
     $("file-name").textContent = "";
     read();
   });
   async function take(file) {
     if (!file) return;
     source = { points_base64: await encoded(file) };
+    asked = false;
     $("points").value = "";
     $("file-name").textContent = `${file.name}, ${prefixedBytes(file.size)}`;
     read();
