@@ -217,7 +217,8 @@ export function sidePanel(store, moved, found) {
     const typed = answer.inputs[unknown]?.unit;
     const [{ roots }] = results;
     const line = ({ value, mu_macro: mu, regime, power }) => {
-      const text = `${about.inputs[unknown].symbol} = ${inUnit(unknown, value, unitAt(unknown, value, typed), 6)}`;
+      const shown = inUnit(unknown, value, unitAt(unknown, value, typed), 6);
+      const text = `${about.inputs[unknown].symbol} = ${shown}`;
       const shaker = power ? `, shaker ${prefixed(power.oscillation, "W")}` : "";
       return html`<li>
         <span><b>${text}</b>: µ = ${friction(mu, 4)}, ${inWords(regime)}${shaker}</span>
