@@ -552,6 +552,19 @@ def test_a_doubt_moves_nothing_on_a_phone(open_page: Any) -> None:
     assert len({*places}) == 1
 
 
+def test_a_phone_shows_the_number_wherever_the_page_is(open_page: Any) -> None:
+    page = open_page(width=360, height=740)
+    height = page.find("#now").rect["height"]
+    for place in ("#field-mu0", "#panels"):
+        page.run(f"document.querySelector('{place}').scrollIntoView();")
+        scrolled = page.run("return scrollY;")
+        assert page.find("#now").rect["y"] == close(scrolled, abs=0.5)
+        assert page.find(place).rect["y"] - scrolled >= height  # covers nothing that is sought
+    page.type("#field-y0", "0")
+    assert page.text("#now") == "µ = 0.3000, continuous"
+    assert not open_page(width=1280, height=800).find("#now").is_displayed()
+
+
 def test_no_message_moves_the_page(open_page: Any) -> None:
     page = open_page(width=1280, height=800)
     places = (

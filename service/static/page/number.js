@@ -92,6 +92,9 @@ export function numberPanel(store) {
       $("number"),
     );
     write("regime", inWords(answer.regime));
+    const short = resultOf(answer, false);
+    const deviation = short.std ? ` ± ${short.std}` : "";
+    write("short", `µ = ${short.value}${deviation}, ${inWords(answer.regime)}`);
     write("spread", spread(answer, rows));
     write("doubt", doubt ? `Check the units: ${prose(doubt.text)}` : "");
     const { contact } = answer.state;
