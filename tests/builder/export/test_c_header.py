@@ -189,8 +189,9 @@ def points(table: Surrogate, n: int, seed: int) -> Any:
 @pytest.mark.parametrize(
     ("form", "name", "lanes"),
     [
-        *(("three", name, lanes) for name in LANGUAGES for lanes in LANES),
-        *(("one", name, 2) for name in LANGUAGES),
+        *((form, name, 2) for form in ("three", "one") for name in LANGUAGES),
+        # zig is clang
+        *(("three", name, n) for name in LANGUAGES for n in LANES if n != 2 and name != "zig cc"),
     ],
 )
 def test_no_compiler_warns(
@@ -199,8 +200,9 @@ def test_no_compiler_warns(
     language = ("-x", "c++") if name.endswith("++") else ()
     sources = ["main.c", "other.c", *(["mumacro.c", "mumacro_table.c"] if form == "three" else [])]
     words = [*compilers.compiler(name), *language, LANGUAGES[name], "-O1", *STRICT, *LANES[lanes]]
-    if lanes != 2 and name.startswith("clang"):
-        # it finds all its warnings before it makes code; that code is tried below, by its bits
+    if lanes != 2 and name != "gcc":
+        # clang finds all its warnings before it makes code, and g++ optimizes as gcc; that code is
+        # tried below, by its bits
         compilers.run(*words, "-fsyntax-only", *sources, cwd=folder / form)
         return
     compilers.run(*words, *sources, "-o", tmp_path / "main", "-lm", cwd=folder / form)
