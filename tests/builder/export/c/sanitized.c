@@ -262,11 +262,13 @@ static double ordinary(int input) {
     return drawn() < 0.02 ? anything() : scaled(low[input], high[input]);
 }
 
-/* Every combination of nasty numbers, one after the other. */
+static uint64_t step; /* between two of the NASTY^6 combinations that are tried */
+
+/* Combinations of nasty numbers, spread over all of them. */
 static double combined(int input) {
     static uint64_t code, rest;
     if (input == 0)
-        rest = (code += 17); /* shares no divisor with 12; 172,800 steps cover 12^6 */
+        rest = (code += step);
     else
         rest /= NASTY;
     return nasty[rest % NASTY];
@@ -313,6 +315,8 @@ int main(int count, char **words) {
                 i % 7 - 1);
         asked += (long)n;
     }
+    step = hostile < 2985984 ? 2985984 / (uint64_t)hostile : 1;
+    while (step % 2 == 0 || step % 3 == 0) ++step; /* shares no divisor with NASTY = 12 */
     while (combinations < hostile) {
         ask_all(kernel, &mumacro_table.spring, LONGEST, combined, -1);
         combinations += LONGEST;
