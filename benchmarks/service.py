@@ -30,7 +30,7 @@ import orjson
 from tests.support.serving import CASE, Server, asking, connect, head, running, serving
 
 FIRST, CLIENT = ("taskset", "-c", "0"), {1}  # the processors of the servers and of the client
-ROUNDS, REQUESTS, CLIENTS = 5, 800, 16
+ROUNDS, REQUESTS, CLIENTS = 15, 800, 16
 BATCH = "/v1/mu-macro/batch"
 
 
