@@ -23,7 +23,7 @@ from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
 from mumacro.inputs.k_range import ENDS
-from mumacro.inputs.kind import CONTACTS, DIRECTIONS, kind_of
+from mumacro.inputs.kind import SPRING, kind_of
 from mumacro.inputs.reading import Value
 
 from .models.inputs import MAX_REASONS
@@ -280,14 +280,11 @@ def _names_of_case(rows: list[Any], words: Mapping[str, Any]) -> tuple[str, ...]
     return tuple(names)
 
 
-_USUAL = {"contact": CONTACTS[0], "direction": DIRECTIONS[0]}
-
-
 def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     """Rows one by one: each is checked as one case, and a bad one gets its first reason."""
     columns: dict[str, Any] = {name: np.full(len(rows), np.nan) for name in (*ALL_FIELDS, *ENDS)}
     columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
-    usual = {name: words.get(name, word) for name, word in _USUAL.items()}
+    usual = {name: words.get(name, word) for name, word in SPRING.names.items()}
     columns |= {name: np.full(len(rows), word, object) for name, word in usual.items()}
     reasons: dict[int, Reason] = {}
     used = set[str]()

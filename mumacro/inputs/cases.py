@@ -29,7 +29,6 @@ from mumacro.inputs.k_range import BOUND, ENDS
 from mumacro.inputs.kind import (
     AMPLITUDE,
     AMPLITUDES,
-    CONTACTS,
     DIRECTIONS,
     KINDS,
     SPRING,
@@ -656,7 +655,7 @@ def _no_such_amplitude(name: str, value: Any, kind: Kind) -> InputError:
 
 def _texts(values: Mapping[str, Any]) -> dict[str, Any]:
     """Contact and direction: one text each, or arrays of them."""
-    texts = {"contact": CONTACTS[0], "direction": DIRECTIONS[0]}
+    texts = SPRING.names
     for name in values.keys() & texts.keys():
         text = values[name]
         if not isinstance(text, str):
@@ -697,7 +696,7 @@ def codes_of(words: Mapping[str, Any], shape: tuple[int, ...]) -> Codes:
     """The kind of each case by its place in KINDS, -1 where there is no such kind; contact and
     direction are texts or arrays of them."""
     pairs = []
-    for name, usual in (("contact", CONTACTS[0]), ("direction", DIRECTIONS[0])):
+    for name, usual in SPRING.names.items():
         word = words.get(name, usual)
         one = np.empty((), object)
         one[()] = word  # which may be a list: no word
