@@ -9,13 +9,14 @@ import os
 import signal
 import sys
 
-# A requested stop is a success, also during the start: exit code 0.  Set before the slow imports,
-# because the first process of a container ignores a signal that has no handler.  Nothing runs yet
-# that would have to be ended, so the process ends at once; an exception could be lost in an import.
-# A health check that is stopped is no success, and worker processes, which import this file by
-# another name, get the handler of the server.
+# A requested stop is a success, also during the start: the process ends at once, with exit code 0.
+# An exception in place of that could be lost or become another one, because what is imported at
+# that moment may catch it.  Set before the slow imports: the first process of a container ignores a
+# signal that has no handler.  A health check that is stopped is no success, and worker processes,
+# which import this file by another name, get the handler of the server.
 if __name__ == "__main__" and "healthcheck" not in sys.argv:
-    signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: os._exit(0))
 
 import argparse
 import errno
@@ -23,8 +24,9 @@ import socket
 import threading
 import time
 import urllib.request
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
+from types import FrameType
 
 try:
     from .settings import PREFIX, Settings, SettingsError, load_settings
@@ -145,9 +147,13 @@ def _allow_files(connections: int) -> str | None:
     )
 
 
+def _at_a_stop(do: Callable[[int, FrameType | None], None]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, do)
+
+
 def _serve(settings: Settings) -> int:
-    # Also from the command mumacro, which has not set it.
-    signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+    _at_a_stop(lambda *_: os._exit(0))  # also from the command mumacro, which has not set it
 
     if _is_taken(settings):
         print(
@@ -165,9 +171,10 @@ def _serve(settings: Settings) -> int:
     from .metrics import shared_counters
     from .observe import log_config
 
-    # The server shuts down gracefully, then raises the signal again, which by default would end the
-    # process with the signal's exit status.  From here on there are things to clean up.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    # A server alone imports the application under the same handler; it then sets its own, shuts
+    # down gracefully, and raises the signal again.  The parent of several has a folder to remove.
+    if settings.workers > 1:
+        _at_a_stop(lambda *_: sys.exit(0))
     if sys.stdout.isatty() and settings.port:  # 0: any free port, which the log names
         threading.Thread(target=_announce, args=(settings,), daemon=True).start()
     try:
