@@ -168,13 +168,16 @@ def _serve(settings: Settings) -> int:
     # Imported here: a health check must not load the server.
     import uvicorn
 
+    if settings.workers == 1:
+        # Here, and not by the server: from then on a stop is an exception (see above).
+        from . import app, server  # noqa: F401
     from .metrics import shared_counters
     from .observe import log_config
 
-    # A server alone imports the application under the same handler; it then sets its own, shuts
-    # down gracefully, and raises the signal again.  The parent of several has a folder to remove.
-    if settings.workers > 1:
-        _at_a_stop(lambda *_: sys.exit(0))
+    # The server sets its own handlers, shuts down gracefully, and raises the signal again, which by
+    # default would end the process with the signal's exit status.  From here on there are things to
+    # clean up: the rest of the log, and the folder that several workers share.
+    _at_a_stop(lambda *_: sys.exit(0))
     if sys.stdout.isatty() and settings.port:  # 0: any free port, which the log names
         threading.Thread(target=_announce, args=(settings,), daemon=True).start()
     try:
