@@ -25,6 +25,7 @@ from mumacro.outputs import OUTPUTS
 from mumacro.outputs.deviation import bent
 from mumacro.outputs.entry import Output, Values
 from mumacro.outputs.evaluated import Evaluated
+from mumacro.outputs.gradient import GRADIENT
 from mumacro.outputs.tabulated import Tabulated
 
 # times of kinds, divided by that of one spring across at one k
@@ -35,16 +36,19 @@ _INTERVAL = 200.0
 
 def names_in(include: Iterable[str] | str) -> list[str]:
     """The names of outputs in a list, or in a text with commas; InputError for an unknown one."""
-    bound = f"one or more of {', '.join(OUTPUTS)}"
     try:
         names = include.split(",") if isinstance(include, str) else [*include]
     except TypeError:
-        raise InputError("include", include, bound) from None
+        raise _unknown(include) from None
     names = [name.strip() if isinstance(name, str) else name for name in names]
     for name in names:
         if not isinstance(name, str) or name not in OUTPUTS:
-            raise InputError("include", name, bound)
+            raise _unknown(name)
     return names
+
+
+def _unknown(name: Any) -> InputError:
+    return InputError("include", name, f"one or more of {', '.join(OUTPUTS)}")
 
 
 def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
@@ -104,26 +108,86 @@ def answer(
     """
     gradient = any(output.gradient for output in outputs)
     detail: Detail = "gradient" if gradient else "groups" if outputs or groups else "values"
-    plain = cases.codes is None and cases.ends is None
-    if cases.shape and plain and not outputs:
+    if not cases.shape:
+        return _of_one(Evaluated(tabulated, cases, detail), outputs)
+    if not outputs and cases.codes is None and cases.ends is None:
         rows = tabulated.rows(cases, detail)  # the kernel's arrays are the answer
         group_values = (rows.v_tilde, rows.y_tilde, rows.length_scale) if groups else None
         numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
         return Answer(*numbers, rows.source, group_values, cases)
+    return _of_many(tabulated, cases, outputs, detail)
+
+
+def _type_of(cases: Cases, outputs: tuple[Output, ...]) -> Any:
+    """The type of the answer."""
+    if cases.ends is not None:
+        return IntervalAnswer
+    if GRADIENT in outputs:
+        return AnswerWithGradient
+    return Answer
+
+
+def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
+    """The answer to one case, in plain numbers."""
+    values: Values = {}
+    with np.errstate(all="ignore"):
+        for output in outputs:
+            values |= output.compute(case)
+    cases = case.cases
+    answer: Answer[float] = _type_of(cases, outputs)(
+        case.mu_macro,
+        case.mu_ratio,
+        case.error_bound,
+        int(case.source),
+        (case.v_tilde, case.y_tilde, case.length_scale),
+        cases,
+    )
+    answer.outputs = {path: float(values[path]) for path in paths_of(outputs, cases.fields)}
+    if isinstance(answer, IntervalAnswer):
+        answer.mu_macro_low, answer.mu_macro_high = case.mu_macro_low, case.mu_macro_high
+    if GRADIENT in outputs:
+        answer.gradient, answer.gradient_bound = case.gradient, case.gradient_bound
+    if cases.std:
+        answer.remarks_on_outputs = bent(case, answer.outputs["std"])
+    return answer
+
+
+def _of_many(
+    tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...], detail: Detail
+) -> Answer[Any]:
+    """The answer to cases in columns, in their shape."""
     remarks: list[Remark] = []
     columns: Values = {}
-    if cases.codes is None:
-        evaluated = Evaluated(tabulated, cases, detail)
-        columns = _columns(evaluated, outputs, remarks)
-        if cases.std and not cases.shape:
-            remarks += bent(evaluated, columns["std"])
-    else:
-        for where, part in cases.by_kind():
-            evaluated = Evaluated(tabulated, part, detail)
-            for name, column in _columns(evaluated, outputs, remarks).items():
+    for where, part in cases.by_kind():
+        evaluated = Evaluated(tabulated, part, detail)
+        for name, column in _columns(evaluated, outputs, remarks).items():
+            if cases.codes is None:
+                columns[name] = column
+            else:
                 none = -1 if name == "source" else math.nan
                 columns.setdefault(name, np.full(cases.size, none))[where] = column
-    return _answer(cases, columns, outputs, detail, remarks)
+
+    def shaped(name: str) -> Any:
+        if name not in columns:
+            return np.full(cases.shape, math.nan)
+        return columns[name].reshape(cases.shape)
+
+    source = columns["source"] if columns else np.full(cases.size, -1)
+    answer: Answer[Any] = _type_of(cases, outputs)(
+        *map(shaped, _ALWAYS[:3]),
+        np.asarray(source, np.int8).reshape(cases.shape),
+        None if detail == "values" else (*map(shaped, GROUPS),),
+        cases,
+    )
+    answer.outputs = {path: shaped(path) for path in paths_of(outputs, cases.fields)}
+    if isinstance(answer, IntervalAnswer):
+        answer.mu_macro_low, answer.mu_macro_high = map(shaped, BAND)
+    if GRADIENT in outputs:
+        answer.gradient, answer.gradient_bound = (
+            {field: shaped(f"{name} {field}") for field in cases.fields} for name in _SLOPES
+        )
+    answer.remarks_on_outputs = remarks
+    return answer
 
 
 # what stands beside the outputs, by the names of attributes
@@ -132,8 +196,8 @@ _SLOPES = ("gradient", "gradient_bound")
 
 
 def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Remark]) -> Values:
-    """All that is computed of cases of one kind: outputs by path, and what stands beside them by
-    name; NaN where a case lacks an output, or is not legal."""
+    """All that is computed of cases of one kind in columns: outputs by path, and what stands beside
+    them by name; NaN where a case lacks an output, or is not legal."""
     gaps: dict[str, Any] = {}
     for output, word, why, where in _lacked(outputs, evaluated.cases):
         gaps[output.name] = where
@@ -150,14 +214,11 @@ def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Re
             if absent is not None:
                 part = {path: np.where(absent, math.nan, x) for path, x in part.items()}
             columns |= part
-    if evaluated.cases.shape:
-        illegal = evaluated.source < 0
-        all_legal = not illegal.any()
-        for path, x in columns.items():
-            if not (all_legal and np.shape(x) == illegal.shape):
-                columns[path] = np.where(illegal, math.nan, x)
-    else:
-        columns = {path: float(x) for path, x in columns.items()}
+    illegal = evaluated.source < 0
+    all_legal = not illegal.any()
+    for path, x in columns.items():
+        if not (all_legal and np.shape(x) == illegal.shape):
+            columns[path] = np.where(illegal, math.nan, x)
     members = evaluated.__dict__
     columns |= {name: members[name] for name in (*_ALWAYS, *GROUPS, *BAND) if name in members}
     for name in _SLOPES:
@@ -180,41 +241,3 @@ def _lacked(
                 wide = np.asarray(low != high)  # a number is an interval of itself
                 if wide.any():
                     yield output, word, why, True if wide.all() else wide
-
-
-def _answer(
-    cases: Cases,
-    columns: Values,
-    outputs: tuple[Output, ...],
-    detail: Detail,
-    remarks: list[Remark],
-) -> Answer[Any]:
-    """The answer in the shape of the cases."""
-    shape = cases.shape
-
-    def shaped(name: str) -> Any:
-        if not shape:
-            return columns[name]
-        return columns[name].reshape(shape) if name in columns else np.full(shape, math.nan)
-
-    source = columns["source"] if columns else np.full(cases.size, -1)
-    source = np.asarray(source, np.int8).reshape(shape) if shape else int(source)
-    groups = None
-    if detail != "values" or not shape:
-        groups = (shaped(GROUPS[0]), shaped(GROUPS[1]), shaped(GROUPS[2]))
-    asked_for_slopes = any(output.name == "gradient" for output in outputs)
-    of_type: Any = Answer
-    if cases.ends is not None:
-        of_type = IntervalAnswer
-    elif asked_for_slopes:
-        of_type = AnswerWithGradient
-    answer: Answer[Any] = of_type(*map(shaped, _ALWAYS[:3]), source, groups, cases)
-    if cases.ends is not None:
-        for name in BAND:
-            setattr(answer, name, shaped(name))
-    if asked_for_slopes:
-        for name in _SLOPES:
-            setattr(answer, name, {field: shaped(f"{name} {field}") for field in cases.fields})
-    answer.outputs = {path: shaped(path) for path in paths_of(outputs, cases.fields)}
-    answer.remarks_on_outputs = remarks
-    return answer
