@@ -13,6 +13,7 @@ from typing import Any
 
 import orjson
 from fastapi import FastAPI
+from fastapi.middleware.asyncexitstack import AsyncExitStackMiddleware
 from fastapi.openapi.constants import REF_TEMPLATE
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
@@ -28,7 +29,8 @@ from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.inputs import without_null
 from .models.options import Case, CaseColumns, CaseRequest
 from .observe import Observe, Observer
-from .problems import HANDLERS, Failures
+from .problems import Failures
+from .reading import Direct
 from .routers import batch, case, contact, health, motion, page, questions, table
 from .security import HEALTH_PATHS, SCHEMES, ClearHead, Keys
 from .settings import Settings, load_settings, unknown_variables
@@ -77,6 +79,21 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     app.state.work.close()
 
 
+class Service(FastAPI):
+    """FastAPI within middlewares of our own alone, the one that was added last outermost.
+
+    :class:`Failures` answers every exception.  Starlette has two middlewares for that, and wraps
+    every endpoint once more (docs/decisions.md).
+    """
+
+    def build_middleware_stack(self) -> ASGIApp:
+        """Put the router within the middlewares; Starlette calls this once, at the start."""
+        app: ASGIApp = AsyncExitStackMiddleware(self.router)  # which FastAPI's own routes need
+        for cls, args, kwargs in reversed(self.user_middleware):
+            app = cls(app, *args, **kwargs)
+        return app
+
+
 class HeadAsGet:
     """Middleware: HEAD is answered as GET, without the body."""
 
@@ -102,7 +119,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     """The application, whose tables are loaded when it starts; settings are read from the
     environment if left out."""
     settings = load_settings() if settings is None else settings
-    app = FastAPI(
+    app = Service(
         title="mumacro",
         version=__version__,
         description=_DESCRIPTION,
@@ -112,7 +129,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
         lifespan=_lifespan,
-        exception_handlers=HANDLERS,
         # it would ask for a provider of OpenTelemetry at every request
         telemetry={"tracing": False, "metrics": False, "logs": False},
     )
@@ -132,12 +148,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     keys = settings.keys()
     app.openapi = lambda: _described(app, has_keys=bool(keys))  # type: ignore[method-assign]
     # the last one is the outermost
-    app.add_middleware(HeadAsGet)
+    app.add_middleware(Direct, routes=app.routes)
     if keys:
         app.add_middleware(Keys, keys=keys, open_paths=open_paths)
     app.add_middleware(ClearHead)
     app.add_middleware(ConnectionLimit)
     app.add_middleware(Failures)
+    app.add_middleware(HeadAsGet)
     app.add_middleware(
         Observe, observer=state.observer, trusted_proxies=list(settings.trusted_proxies)
     )

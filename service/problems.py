@@ -21,7 +21,7 @@ import orjson
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -424,20 +424,17 @@ def problem_of(error: RequestError, scope: Scope) -> Response:
     )
 
 
-async def handle(request: Request, error: Exception) -> ASGIApp:
-    """FastAPI's handler of all of them."""
-    request_error = meaning(error, request.scope)
-    answer = problem_of(request_error, request.scope)
+def answer_to(error: Exception, scope: Scope) -> ASGIApp:
+    """The answer to a request that ended with an exception."""
+    request_error = meaning(error, scope)
+    answer = problem_of(request_error, scope)
     is_slow = request_error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)
     closes = "Connection" in request_error.kind.headers
-    has_body = not {"content-length", "transfer-encoding"}.isdisjoint(request.headers)
-    if closes and has_body and not is_slow and "expect" not in request.headers:
+    names = {name for name, _ in scope["headers"]}
+    has_body = not {b"content-length", b"transfer-encoding"}.isdisjoint(names)
+    if closes and has_body and not is_slow and b"expect" not in names:
         return _BeforeRest(answer)
     return answer
-
-
-#: exception -> its handler: the one table of the application
-HANDLERS: Any = dict.fromkeys(_MEANINGS, handle)
 
 
 class _BeforeRest:
@@ -475,14 +472,16 @@ async def _drop_body(receive: Receive) -> None:
 
 
 class Failures:
-    """Middleware: every exception that the handlers leave becomes a problem document; an unexpected
-    one goes to the log."""
+    """Middleware: every exception becomes a problem document; an unexpected one goes to the log."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
         has_begun = False
 
         async def send_noting(message: Message) -> None:
@@ -495,16 +494,9 @@ class Failures:
         except ClientDisconnect:
             raise
         except Exception as error:
-            if not isinstance(error, (RequestError, MemoryError)) and not _expected(error):
+            if not isinstance(error, tuple(_MEANINGS)):
                 fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
                 _log.exception("unexpected error", extra={"fields": fields})
             if has_begun:  # end the connection without the end of the answer
-                raise ClientDisconnect from (error.__cause__ if _expected(error) else error)
-            response = await handle(Request(scope, receive), error)
-            await response(scope, receive, send)
-
-
-def _expected(error: Exception) -> bool:
-    """Whether Starlette raised this in place of an exception that has a handler: the answer had
-    begun."""
-    return isinstance(error.__cause__, tuple(_MEANINGS))
+                raise ClientDisconnect from error
+            await answer_to(error, scope)(scope, receive, send)

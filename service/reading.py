@@ -10,7 +10,7 @@ solves nothing else: FastAPI's own reading of a case takes longer than its answe
 import json
 import string
 from collections import Counter
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
 from functools import partial
 from typing import Any
 from urllib.parse import parse_qsl
@@ -20,8 +20,8 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.datastructures import ImmutableMultiDict
-from starlette.routing import Match, request_response
-from starlette.types import Scope
+from starlette.routing import BaseRoute
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from .limits import JSON, SMALL_BODY, Work, only_json, read_body
 from .problems import FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
@@ -267,20 +267,8 @@ class DirectRoute(APIRoute):
     """A route for ``async def answer(request, model)``: the model is read straight from the bytes
     of the body, or from the query.
 
-    Nothing else is solved: such an endpoint declares no dependency, and needs no stack for one.
-    Its path has no parameters, and is compared as it is.
+    Nothing else is solved: such an endpoint declares no dependency, and its path no parameter.
     """
-
-    def __init__(self, *args: Any, **settings: Any) -> None:
-        super().__init__(*args, **settings)
-        self.app = request_response(self.get_route_handler())
-
-    def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        """Whether a request is for this route, and in another method only."""
-        if path_in(scope) != self.path or scope["type"] != "http":
-            return Match.NONE, {}
-        match = Match.FULL if scope["method"] in (self.methods or ()) else Match.PARTIAL
-        return match, {"endpoint": self.endpoint, "path_params": {}, "route": self}
 
     def get_route_handler(self) -> Handler:
         """Take the place of FastAPI's handler."""
@@ -306,6 +294,29 @@ class DirectRoute(APIRoute):
         if self.dependant.dependencies:
             raise TypeError(f"{self.path} has a dependency, which a DirectRoute does not solve")
         return of_body if in_body else of_query
+
+
+class Direct:
+    """Middleware: a request for a :class:`DirectRoute` goes straight to its handler.  The router
+    has the others, and these with another method."""
+
+    def __init__(self, app: ASGIApp, routes: Iterable[BaseRoute]) -> None:
+        self._app = app
+        self._handlers = {
+            (method, route.path): route.get_route_handler()
+            for route in routes
+            if isinstance(route, DirectRoute)
+            for method in route.methods or ()
+        }
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        handler = scope["type"] == "http" and self._handlers.get((scope["method"], path_in(scope)))
+        if not handler:
+            await self._app(scope, receive, send)
+            return
+        answer = await handler(Request(scope, receive))
+        await answer(scope, receive, send)
 
 
 def of_members(model: Any, members: Mapping[str, Any]) -> Any:

@@ -45,7 +45,7 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
         if case.model_fields_set <= _PLAIN and "k_range" not in inputs:
             answer = table.surrogate.evaluate(**inputs)
         else:
-            cases = Cases.of({**inputs, **case.kind.names, **case.deviations})
+            cases = Cases.of(inputs | case.deviations, case.kind)
             outputs = chosen(case.outputs, cases)
             work = partial(table.surrogate.answer, cases, outputs)
             large = cost(outputs, cases) > _LARGE

@@ -208,6 +208,21 @@ def test_a_route_that_nobody_thought_of_needs_the_key(started: Any) -> None:
         assert client.get("/new", headers=KEY).json() == "open"
 
 
+@pytest.mark.parametrize("path", ["/v1/mu-macro?mu0=-1", "/v1/table.nc?x=1", "/nowhere", "/docs"])
+def test_an_answer_to_head_has_the_head_of_get_and_no_body(started: Any, path: str) -> None:
+    with started() as client:
+        one, other = client.head(path), client.get(path)
+    assert (one.status_code, one.content) == (other.status_code, b"")
+    assert one.headers["content-type"] == other.headers["content-type"]
+
+
+def test_what_fails_at_the_start_is_told_as_it_is(started: Any) -> None:
+    client = started()
+    client.app.state.tables.load = Mock(side_effect=RuntimeError("no disk"))
+    with pytest.raises(RuntimeError, match="no disk"), client:
+        pass
+
+
 def test_a_direct_route_refuses_a_dependency_that_it_would_not_solve() -> None:
     router = APIRouter(route_class=DirectRoute)
 
