@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from contextlib import suppress
 from functools import lru_cache
 from itertools import chain
-from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
@@ -245,7 +244,7 @@ class _Rows:
         size = len(self.names) * len(rows)
         if _count(text, b":") != size:
             raise ValueError("a name is given twice, or a text has a colon")
-        values = chain.from_iterable(map(attrgetter(*self.names), rows))
+        values = chain.from_iterable(map(msgspec.structs.astuple, rows))
         table = np.fromiter(values, rows[0].kind if rows else float, size)
         if table.dtype == object and None in table:
             raise ValueError("a null")
