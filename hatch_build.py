@@ -138,8 +138,8 @@ def kept(command: list[str], *words: object) -> Path | None:
     bytes."""
     if not (cache := os.environ.get("MUMACRO_BUILD_CACHE")):
         return None
-    compiler = subprocess.run([*command, "--version"], capture_output=True, check=True)  # noqa: S603
-    made_from = hashlib.sha256(repr((command, compiler.stdout, FLAGS, *words)).encode())
+    version = subprocess.check_output([*command, "--version"])  # noqa: S603
+    made_from = hashlib.sha256(repr((command, version, FLAGS, *words)).encode())
     for source in sorted((ROOT / "mumacro" / "kernel").glob("*.[ch]")):
         made_from.update(repr((source.name, source.read_bytes())).encode())
     return Path(cache, made_from.hexdigest())

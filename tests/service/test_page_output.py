@@ -771,7 +771,8 @@ def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None
     v0, mu = (np.array([float(row[i]) for row in rows]) for i in (0, 1))
     assert mu == close(surrogate.evaluate(**{**START, "v0": 1e-3 * v0}).mu_macro, rel=1e-12)
     for button, name in (("#law-image", "friction-law-v0.svg"), ("#map-image", "friction-map.svg")):
-        picture = ElementTree.fromstring(page.download(button, tmp_path, name))  # noqa: S314 - our own file
+        text = page.download(button, tmp_path, name)
+        picture = ElementTree.fromstring(text)  # noqa: S314 - our own file
         assert min(float(picture.attrib[side]) for side in ("width", "height")) >= 300
         # it looks the same without the page's style sheet
         assert all(

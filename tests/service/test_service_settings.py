@@ -116,7 +116,12 @@ def test_the_health_check_asks_this_machine(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(
         "urllib.request.OpenerDirector.open", opened := Mock(side_effect=LookupError)
     )
-    for host, address in (("0.0.0.0", "127.0.0.1"), ("::", "[::1]"), ("10.1.2.3", "10.1.2.3")):  # noqa: S104
+    addresses = {
+        "0.0.0.0": "127.0.0.1",  # noqa: S104
+        "::": "[::1]",
+        "10.1.2.3": "10.1.2.3",
+    }
+    for host, address in addresses.items():
         with pytest.raises(LookupError):
             main(["healthcheck", "--host", host])
         assert opened.call_args.args == (f"http://{address}:8000/readyz",)
