@@ -23,7 +23,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from mumacro.kernel.threads import processors
 
-from .problems import ProblemKind, RequestError, path_in
+from .problems import ABORT, FULL, ProblemKind, RequestError, path_in
 from .security import HEALTH_PATHS
 from .settings import Settings
 
@@ -161,7 +161,7 @@ class Work:
         Our own server limits this wait (server.py); a timer beside that takes a tenth of the time
         of one case.
         """
-        return await (reading if "abort" in scope.get("state", ()) else self.client(reading))
+        return await (reading if ABORT in scope.get("state", ()) else self.client(reading))
 
     async def client(self, move: Awaitable[T]) -> T:
         """Wait for the client to send or to read."""
@@ -205,6 +205,6 @@ class ConnectionLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request pass if there is room for it."""
-        if "full" in scope.get("state", ()) and path_in(scope) not in HEALTH_PATHS:
+        if FULL in scope.get("state", ()) and path_in(scope) not in HEALTH_PATHS:
             raise RequestError(ProblemKind.OVERLOADED, "too many connections are open")
         await self._app(scope, receive, send)

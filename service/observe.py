@@ -23,7 +23,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from .metrics import Metrics
-from .problems import meaning, path_in
+from .problems import ABORT, REFUSED, meaning, path_in
 from .security import HEALTH_PATHS, NOSNIFF
 
 _GONE = 499  # the usual status for a client that disconnected before the answer
@@ -237,9 +237,9 @@ class Observe:
             if isinstance(cause, Exception):
                 # in the middle of its answer: the connection ends without the rest
                 status = meaning(cause, scope).kind.status
-                if "abort" not in state:
+                if ABORT not in state:
                     raise  # another server ends it
-                state["abort"]()
+                state[ABORT]()
         finally:
             seconds = time.perf_counter() - start
-            self._observer.record(scope, state.get("refused", status), seconds)
+            self._observer.record(scope, state.get(REFUSED, status), seconds)

@@ -289,6 +289,11 @@ class RequestError(MumacroError):
         super().__init__(detail)
 
 
+#: what our own server (server.py) says of a request in ``scope["state"]``: how to end its
+#: connection, that too many are open, the status with which it was refused there
+ABORT, FULL, REFUSED = "abort", "full", "refused"
+
+
 def path_in(scope: Scope) -> str:
     """The path without what a proxy has put before it."""
     return str(scope["path"]).removeprefix(scope.get("root_path", ""))

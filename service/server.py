@@ -15,7 +15,7 @@ import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from .observe import Observer
-from .problems import ProblemKind, RequestError, problem_of
+from .problems import ABORT, FULL, REFUSED, ProblemKind, RequestError, problem_of
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head, at most
 MAX_FIELDS = 100  # fields of a head, at most
@@ -135,7 +135,7 @@ class Connection(HttpToolsProtocol):
         if self._busy:
             busy: Any = self.scope
             self._observer.name(busy)
-            busy["state"]["refused"] = status
+            busy["state"][REFUSED] = status
             return busy
         if not self._in_head:  # nothing of a request is there
             super().on_message_begin()
@@ -258,8 +258,8 @@ class Connection(HttpToolsProtocol):
         self._in_head, self._due = False, math.inf
         self.waiting.pop(self, None)
         if len(self.connections) > self._settings.max_connections:
-            self.scope["state"]["full"] = True
-        self.scope["state"]["abort"] = self.abort
+            self.scope["state"][FULL] = True
+        self.scope["state"][ABORT] = self.abort
         super().on_headers_complete()
         self._end = self.loop.time() + self._settings.time_limit_s + _MARGIN_S
 
