@@ -116,7 +116,7 @@ class Cases(NamedTuple):
         of_direction = _of_direction(texts) if kind is None else kind
         fields = ALL_FIELDS if of_direction is None else of_direction.fields
         strange = _strange_amplitude(values, of_direction)
-        columns, others, std, ends, units = _numbers(values, fields)
+        columns, std, ends, units, others = _inputs(values, fields)
         std |= _deviations(values, fields, std)
         others |= strange | texts
         shape = _shape_of(columns, std, others)
@@ -555,22 +555,29 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     _strange_amplitude(values, kind, refuse=True)
     for name in values.keys() & {"std", *DEVIATIONS}:
         raise InputError(name, values[name], NO_DEVIATION)
-    columns, _, std, ends, _ = _numbers(values, kind.fields)
-    for name in std:
+    inputs = _inputs(values, kind.fields)
+    for name in inputs.std:
         raise InputError(name, values.get(name, values.get("f")), NO_DEVIATION)
-    if ends is not None:
+    if inputs.ends is not None:
         raise InputError("k", values.get("k"), "one value, no interval")
-    return columns
+    return inputs.columns
 
 
 _Numbers = dict[str, float | Array]
 
 
-def _numbers(
-    values: Mapping[str, Any], fields: tuple[str, ...]
-) -> tuple[_Numbers, dict[str, Any], _Numbers, tuple[Any, Any] | None, dict[str, str]]:
-    """The inputs of these names as numbers or arrays; f, where it was given; deviations, ends and
-    units that stand in the values themselves."""
+class _Inputs(NamedTuple):
+    """The inputs as numbers, and what else their values say."""
+
+    columns: _Numbers
+    std: _Numbers
+    ends: tuple[Any, Any] | None
+    units: dict[str, str]
+    others: dict[str, Any]  #: f, where it was given
+
+
+def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
+    """The inputs of these names."""
     columns: _Numbers = {}
     units: dict[str, str] = {}
     std: _Numbers = {}
@@ -601,7 +608,7 @@ def _numbers(
             others["f"] = value
             value = _angular(value)
         columns[name] = value
-    return columns, others, std, ends, units
+    return _Inputs(columns, std, ends, units, others)
 
 
 def _deviations(
