@@ -106,11 +106,17 @@ class HeadAsGet:
             await self._app(scope, receive, send)
             return
 
+        closes = False
+
         async def send_head(message: Message) -> None:
+            nonlocal closes
             if message["type"] == "http.response.start":
+                closes = (b"connection", b"close") in message["headers"]
                 await send(message)
-                # at once: the client may already send its next request
-                await send({"type": "http.response.body", "body": b""})
+                if not closes:  # at once: the client may already send its next request
+                    await send({"type": "http.response.body", "body": b""})
+            elif closes:  # when the rest of the request is read
+                await send({**message, "body": b""})
 
         await self._app({**scope, "method": "GET"}, receive, send_head)
 

@@ -410,7 +410,9 @@ def document_of(error: RequestError, scope: Scope) -> dict[str, Any]:
     """The problem document of an error."""
     slug = error.kind.name.lower().replace("_", "-")
     body: dict[str, Any] = {"type": f"urn:problem-type:mumacro:{slug}", "title": error.kind.title}
-    body |= {"status": error.kind.status, "detail": error.detail, "instance": scope["path"]}
+    # a server may leave halves of surrogate pairs in a path
+    path = scope["path"].encode("utf-8", "replace").decode()
+    body |= {"status": error.kind.status, "detail": error.detail, "instance": path}
     if "request_id" in scope:
         body["request_id"] = scope["request_id"]
     if error.faults:
@@ -499,9 +501,18 @@ class Failures:
         except ClientDisconnect:
             raise
         except Exception as error:
-            if not isinstance(error, tuple(_MEANINGS)):
-                fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
-                _log.exception("unexpected error", extra={"fields": fields})
+            _log_unexpected(error, scope)
             if has_begun:  # end the connection without the end of the answer
                 raise ClientDisconnect from error
-            await answer_to(error, scope)(scope, receive, send)
+            try:
+                answer = answer_to(error, scope)
+            except Exception as fault:  # such as a detail that JSON does not hold
+                _log_unexpected(fault, scope)
+                answer = answer_to(fault, scope)
+            await answer(scope, receive, send)
+
+
+def _log_unexpected(error: Exception, scope: Scope) -> None:
+    if not isinstance(error, tuple(_MEANINGS)):
+        fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
+        _log.error("unexpected error", exc_info=error, extra={"fields": fields})

@@ -206,6 +206,19 @@ def test_a_refusal_is_sent_at_once_and_its_sender_may_go_on_sending(strict: Any)
     assert json.loads(content)["max_bytes"] == 65536
 
 
+def test_a_refusal_of_a_head_lets_its_sender_go_on_sending(strict: Any) -> None:
+    twice = "X-API-Key: a\r\nX-API-Key: b\r\n"
+    with connect(strict) as raw:
+        raw.sendall(head(SINGLE, 3_000_000, extra=twice).replace(b"POST", b"HEAD"))
+        refusal = raw.recv(65536)
+        assert refusal.startswith(b"HTTP/1.1 400")
+        for _ in range(30):
+            raw.sendall(b" " * 100_000)
+            time.sleep(0.01)
+        _, _, content = (refusal + to_end(raw)).partition(b"\r\n\r\n")
+    assert content == b""
+
+
 def test_large_batches_have_slots_and_small_ones_take_none(strict: Any) -> None:
     large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
     compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})

@@ -1,16 +1,18 @@
 """Common to all requests: errors, request ids, keys, body limits, headers, files, the interface's
 description."""
 
+import asyncio
 import itertools
 import json
 import re
 import time
-from typing import Any
-from unittest.mock import Mock
+from typing import Any, cast
+from unittest.mock import AsyncMock, Mock
 from urllib.parse import urljoin
 
 import pytest
 from fastapi import APIRouter, Depends, Request
+from starlette.exceptions import HTTPException
 from starlette.websockets import WebSocketDisconnect
 
 from mumacro.inputs.fields import FIELDS, SI
@@ -149,6 +151,55 @@ def test_an_unexpected_error_is_logged_and_not_shown(
             assert "secret" not in response.text
     assert caplog.text.count("RuntimeError: secret detail") == 2
     assert "MemoryError: secret" not in caplog.text  # too little memory is no fault
+
+
+@pytest.mark.parametrize(
+    ("error", "logged"),
+    [
+        (HTTPException(400, cast("str", {"a set"})), "not JSON serializable"),
+        (HTTPException(400, headers={"X-Why": "\u03bc"}), "latin-1"),
+    ],
+)
+@pytest.mark.parametrize("method", ["GET", "HEAD"])
+def test_an_error_that_cannot_be_told_is_an_unexpected_one(
+    started: Any,
+    problem: Any,
+    caplog: pytest.LogCaptureFixture,
+    error: Any,
+    logged: str,
+    method: str,
+) -> None:
+    client = started()
+
+    def fail() -> None:
+        raise error
+
+    client.app.add_api_route("/new", fail)
+    with client:
+        response = client.request(method, "/new")
+    assert response.status_code == 500
+    if method == "GET":
+        problem(response, 500)
+    assert caplog.text.count("unexpected error") == 1
+    assert logged in caplog.text
+
+
+def test_a_path_that_is_no_text_is_not_there(client: Any) -> None:
+    sent = []
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    scope: dict[str, Any] = {
+        "type": "http",
+        "method": "GET",
+        "path": "/\udcff",
+        "query_string": b"",
+    }
+    scope |= {"http_version": "1.1", "headers": [(b"host", b"x")], "client": None}
+    asyncio.run(client.app(scope, AsyncMock(), send))
+    assert sent[0]["status"] == 404
+    assert json.loads(sent[1]["body"])["instance"] == "/?"
 
 
 @pytest.fixture(scope="module")
