@@ -22,7 +22,7 @@ from mumacro.inputs.kind import Kind
 from mumacro.kernel.arrays import Bools
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
-from mumacro.outputs.deviation import bent
+from mumacro.outputs.deviation import STD, bent
 from mumacro.outputs.entry import Output, Values
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.gradient import GRADIENT
@@ -147,7 +147,7 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
         answer.mu_macro_low, answer.mu_macro_high = case.mu_macro_low, case.mu_macro_high
     if GRADIENT in outputs:
         answer.gradient, answer.gradient_bound = case.gradient, case.gradient_bound
-    if cases.std:
+    if STD in outputs:
         answer.remarks_on_outputs = bent(case, answer.outputs["std"])
     return answer
 
