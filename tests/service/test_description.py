@@ -3,6 +3,8 @@ complete, and the documents name all of its paths."""
 
 import json
 import re
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -50,6 +52,24 @@ def _asked(client: Any, model: str, body: dict[str, Any]) -> tuple[int, Any]:
     if model == "Case" and document["errors"]:
         return 422, document
     return answer.status_code, document
+
+
+#: a new process, because a description that is made once leaves parts that the next one takes
+AT_ONCE = """
+from concurrent.futures import ThreadPoolExecutor
+from service.app import create_app
+from service.settings import Settings
+
+apps = [create_app(Settings()) for _ in range(2)]
+with ThreadPoolExecutor(4) as pool:
+    made = [*pool.map(lambda app: app.openapi(), [*apps, *apps])]
+assert made[0]["paths"] and all(one == made[0] for one in made)
+"""
+
+
+def test_descriptions_that_are_asked_for_at_once_are_the_same() -> None:
+    """The start makes one in a thread, and a request may ask for it meanwhile."""
+    subprocess.run([sys.executable, "-c", AT_ONCE], cwd=ROOT, check=True)
 
 
 @pytest.mark.parametrize("model", BODIES)
