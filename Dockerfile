@@ -45,17 +45,17 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # pip has no business in a running image.
     && venv/bin/python -m pip uninstall --quiet --yes pip setuptools
 COPY LICENSE ./
-COPY mumacro mumacro
+COPY src src
 COPY service service
 COPY tables tables
 COPY hatch_build.py pyproject.toml /build/
-COPY mumacro/kernel /build/mumacro/kernel
+COPY src/mumacro/kernel /build/src/mumacro/kernel
 # The kernel holds code for several processors and chooses when it is loaded: the image also runs on
 # other machines than the one that built it.  Its sources stay in this stage.  Every user of the
 # container may read all files, whatever the umask of the checkout; no user may write them.
-RUN /build/venv/bin/python /build/hatch_build.py mumacro \
-    && rm mumacro/kernel/*.[ch] \
-    && venv/bin/python -m compileall -q mumacro service \
+RUN /build/venv/bin/python /build/hatch_build.py src/mumacro \
+    && rm src/mumacro/kernel/*.[ch] \
+    && venv/bin/python -m compileall -q src service \
     && chmod -R a+rX,go-w .
 
 FROM ${BASE}
@@ -67,7 +67,7 @@ LABEL org.opencontainers.image.title="mumacro" \
 COPY --from=build /app /app
 WORKDIR /app
 ENV PATH=/app/venv/bin:$PATH \
-    PYTHONPATH=/app \
+    PYTHONPATH=/app/src:/app \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/nonexistent \

@@ -86,9 +86,9 @@ def current() -> dict[str, str]:
     sources."""
     kernel = sorted(
         [
-            *(ROOT / "mumacro" / "kernel").glob("*.[ch]"),
-            *(ROOT / "mumacro" / "kernel").glob("_declarations.py"),
-            *(ROOT / "mumacro").glob("_kernel.*"),
+            *(ROOT / "src" / "mumacro" / "kernel").glob("*.[ch]"),
+            *(ROOT / "src" / "mumacro" / "kernel").glob("_declarations.py"),
+            *(ROOT / "src" / "mumacro").glob("_kernel.*"),
         ]
     )
     locks = {

@@ -122,7 +122,7 @@ def declare(folder: Path) -> Path:
     out-of-line ABI mode): the parser would take as long at every start as all else together."""
     from cffi import FFI
 
-    sources, path = ROOT / "mumacro" / "kernel", folder / "kernel" / "_declarations.py"
+    sources, path = ROOT / "src" / "mumacro" / "kernel", folder / "kernel" / "_declarations.py"
     texts = ((sources / name).read_text("ascii") for name in ("data.h", "records.h", "library.h"))
     lines = (line for text in texts for line in text.splitlines() if not line.startswith("#"))
     ffi = FFI()
@@ -140,7 +140,7 @@ def kept(command: list[str], *words: object) -> Path | None:
         return None
     version = subprocess.check_output([*command, "--version"])  # noqa: S603
     made_from = hashlib.sha256(repr((command, version, FLAGS, *words)).encode())
-    for source in sorted((ROOT / "mumacro" / "kernel").glob("*.[ch]")):
+    for source in sorted((ROOT / "src" / "mumacro" / "kernel").glob("*.[ch]")):
         made_from.update(repr((source.name, source.read_bytes())).encode())
     return Path(cache, made_from.hexdigest())
 
@@ -151,7 +151,7 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     name = "_kernel.dll" if platform.startswith("win") else "_kernel.so"
     # musl has another file name on every system; it is always there, Python has loaded it.
     libraries = {"win": [], "mus": ["-nostdlib"]}.get(platform[:3], ["-lm"])
-    sources, has = ROOT / "mumacro" / "kernel", levels(platform)
+    sources, has = ROOT / "src" / "mumacro" / "kernel", levels(platform)
     objects = {
         f"{level}.o": ["level.c", f"-DMUMACRO_LEVEL={level}", *flags]
         for level, flags in has.items()
@@ -212,8 +212,8 @@ class KernelHook(BuildHookInterface[Any]):
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, in place or into a folder of its own that ends with the process."""
         if version == "editable":
-            build(ROOT / "mumacro")
-            declare(ROOT / "mumacro")
+            build(ROOT / "src" / "mumacro")
+            declare(ROOT / "src" / "mumacro")
             return
         self.folder = tempfile.TemporaryDirectory()
         folder = Path(self.folder.name)
@@ -227,7 +227,7 @@ class KernelHook(BuildHookInterface[Any]):
 
 
 if __name__ == "__main__":
-    place = Path(sys.argv[1]).resolve() if sys.argv[1:] else ROOT / "mumacro"
+    place = Path(sys.argv[1]).resolve() if sys.argv[1:] else ROOT / "src" / "mumacro"
     path, platform = build(place)
     declare(place)
     print(f"{path} for {platform}, {path.stat().st_size} bytes")

@@ -240,7 +240,7 @@ def _without_noise(exact: Array, noise: Array) -> Array:
 
 def _without_edge(off: Array, b: _CellPoints, axis: Axis, cells: int) -> None:
     """Errors along b of the last cells below the border as evaluation has them, see
-    ``mumacro/kernel/points.c``.
+    ``src/mumacro/kernel/points.c``.
 
     It takes the derivative at the border out of them.  What is left is linear in the distance to
     the border, by which the chain rule divides; the bound counts it at most half the number of

@@ -1,5 +1,5 @@
 """What only the builder knows of each tabulated quantity; the rest is its record in
-``mumacro/kernel/records.c``.
+``src/mumacro/kernel/records.c``.
 
 The solver's column (:data:`builder.solver.sweep.COLUMNS`) has the quantity's name.
 """

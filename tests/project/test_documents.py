@@ -261,8 +261,8 @@ def test_the_floors_of_contributing_are_those_that_are_checked() -> None:
         if contract["type"] == "layers"
     )
     text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    heads = re.findall(r"^    (mumacro/[^\s,]+(?:, [^\s,]+)*)", text, re.MULTILINE)
-    told = re.findall(r"\w+(?=/|\.py)", " ".join(heads).replace("mumacro/", ""))
+    heads = re.findall(r"^    (src/mumacro/[^\s,]+(?:, [^\s,]+)*)", text, re.MULTILINE)
+    told = re.findall(r"\w+(?=/|\.py)", " ".join(heads).replace("src/mumacro/", ""))
     checked = [name for floor in floors for name in floor.split(" | ")]
     assert told == [name for name in checked if name not in ("__main__", "version")]
 

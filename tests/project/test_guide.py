@@ -8,6 +8,7 @@ What another check runs is in ``ELSEWHERE``.
 """
 
 import importlib.metadata
+import json
 import os
 import re
 import shutil
@@ -276,13 +277,20 @@ def venv(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What ``pip install .`` gives in a copy of this tree."""
-    folder = tmp_path_factory.mktemp("bare")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """This tree as git clones it: nothing is compiled or installed in place."""
+    folder = tmp_path_factory.mktemp("clone") / "mumacro"
     unwanted = shutil.ignore_patterns(
         ".*", "build", "dist", "_kernel.*", "_declarations.py", "__pycache__", "tests"
     )
-    shutil.copytree(ROOT, folder / "tree", ignore=unwanted)
+    shutil.copytree(ROOT, folder, ignore=unwanted)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bare(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What ``pip install .`` gives in a clone."""
+    folder = tmp_path_factory.mktemp("bare")
     programs = venv(folder / "venv")
     # the tested versions, probably in pip's cache
     pins = folder / "pins.txt"
@@ -290,9 +298,17 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = {"PIP_CONSTRAINT": str(pins)}
     if cache := os.environ.get("MUMACRO_BUILD_CACHE"):  # the same sources, compiled before
         settings["MUMACRO_BUILD_CACHE"] = cache
-    pip(programs, folder / "tree", INSTALLS["bare"], **settings)
-    shutil.rmtree(folder / "tree")
+    pip(programs, clone, INSTALLS["bare"], **settings)
     return programs
+
+
+@pytest.fixture(scope="module")
+def bare_with_packages(bare: Path) -> Path:
+    """The same with the packages of this environment, which meet every extra, but without the
+    links to this tree."""
+    (packages,) = bare.parent.glob("lib/python*/site-packages")
+    (packages / "more.pth").write_text("\n".join(site.getsitepackages()), "utf-8")
+    return bare
 
 
 @pytest.fixture(scope="module")
@@ -345,10 +361,13 @@ def reader(tmp_path: Path) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", having("pycon"), ids=name)
 def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    programs = request.getfixturevalue("bare" if page.stem in BARE else "full")
+    bare = page.stem in BARE
+    programs = request.getfixturevalue("bare" if bare else "full")
+    # a newcomer is still in the folder from which it was installed
+    folder = request.getfixturevalue("clone") if bare else tmp_path
     session = "\n".join(block.text for block in blocks(page, "pycon") if not block.marked)
     (tmp_path / "session.txt").write_text(session, "utf-8")
-    run(programs, tmp_path, programs / "python", "-c", SESSION, "session.txt")
+    run(programs, folder, programs / "python", "-c", SESSION, tmp_path / "session.txt")
 
 
 def number_parts(text: str) -> tuple[list[str], list[str]]:
@@ -421,14 +440,41 @@ def test_commands(page: Path, reader: Path, request: pytest.FixtureRequest) -> N
                 pytest.skip("curl is not installed")
             url = request.getfixturevalue("service")
             command, more = command.replace(SERVICE, url), {"MUMACRO_PORT": url.rpartition(":")[2]}
+        bare = page.stem in BARE and not runs_until_a_signal
         if in_checkout:
-            programs = Path(sys.executable).parent
+            programs, folder = Path(sys.executable).parent, ROOT
+        elif bare:
+            programs, folder = request.getfixturevalue("bare"), request.getfixturevalue("clone")
         else:
-            bare = page.stem in BARE and not runs_until_a_signal
-            programs = request.getfixturevalue("bare" if bare else "full")
+            programs, folder = request.getfixturevalue("full"), reader
         if runs_until_a_signal:
             serve(programs, reader / "log.jsonl", command)
             continue
-        output = run(programs, ROOT if in_checkout else reader, "sh", "-c", command, **more)
+        output = run(programs, folder, "sh", "-c", command, **more)
         if shown:
             compare(output, shown, command)
+
+
+@posix
+@pytest.mark.slow
+def test_every_entrance_works_in_the_folder_from_which_it_was_installed(
+    clone: Path, bare_with_packages: Path, tmp_path: Path
+) -> None:
+    programs = bare_with_packages
+    assert not list(clone.rglob("_kernel.*"))
+    places = "import mumacro, builder, service; print(mumacro.__file__, builder.__file__)"
+    library, builder = run(programs, clone, "python", "-c", places).split()
+    assert Path(library).is_relative_to(programs.parent)
+    assert Path(builder).is_relative_to(clone)
+    solved = json.loads(
+        run(programs, clone, "python", "-m", "builder", "solve", "--v", "0.1", "--y", "0.5")
+    )
+    assert solved["regime"] == "stick_slip"
+    shown = run(programs, clone, "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20e3 v0=0.01", "--json")
+    for words in (["mumacro", "serve"], ["python", "-m", "service"]):
+        command = [str(programs / words[0]), *words[1:], "--port", "0"]
+        with running(command, tmp_path / "log.jsonl", cwd=clone, PYTHONPATH="") as server:
+            server.wait_until_ready()
+            query = "mu0=0.3&Fz=10&k=1e6&y0=2e-6&f=20e3&v0=0.01"
+            answer = run(programs, clone, "curl", "-s", f"{server.url}/v1/mu-macro?{query}")
+            assert json.loads(answer)["mu_macro"] == json.loads(shown)["mu_macro"]

@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.places import ROOT
 
-FOLDERS = (".ci", "builder", "deploy", "examples", "mumacro", "service", "tests")
+FOLDERS = (".ci", "builder", "deploy", "examples", "service", "src", "tests")
 KINDS = {
     ".c",
     ".h",

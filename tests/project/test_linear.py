@@ -20,7 +20,7 @@ import pytest
 from tests.support.growth import MOST
 from tests.support.places import ROOT
 
-PACKAGES = ("mumacro", "builder", "service")
+PACKAGES = ("src/mumacro", "builder", "service")
 FUNCTIONS = ("match", "fullmatch", "search", "sub", "subn", "split", "findall", "finditer")
 LIMIT_S = 300  # for all of them, which take a tenth of that on an idle machine
 
@@ -40,7 +40,7 @@ def _sources() -> list[Path]:
 
 def _module(path: Path) -> ModuleType:
     parts = path.relative_to(ROOT).with_suffix("").parts
-    return importlib.import_module(".".join(parts).removesuffix(".__init__"))
+    return importlib.import_module(".".join(parts).removeprefix("src.").removesuffix(".__init__"))
 
 
 def _calls(tree: ast.AST) -> Iterator[ast.Call]:

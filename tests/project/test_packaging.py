@@ -127,17 +127,22 @@ def test_a_platform_without_a_wheel_is_refused_by_name(repository: Path) -> None
 def test_a_failed_compilation_keeps_the_shared_object_that_was_there(
     repository: Path, tmp_path: Path
 ) -> None:
-    shutil.copytree(repository / "mumacro" / "kernel", tmp_path / "mumacro" / "kernel")
+    shutil.copytree(
+        repository / "src" / "mumacro" / "kernel", tmp_path / "src" / "mumacro" / "kernel"
+    )
     for name in ("hatch_build.py", "pyproject.toml"):
         shutil.copy(repository / name, tmp_path)
-    before = tmp_path / "mumacro" / "_kernel.so"
+    before = tmp_path / "src" / "mumacro" / "_kernel.so"
     before.write_bytes(b"a shared object")
-    (tmp_path / "mumacro" / "kernel" / "kernel.c").write_text("#error broken\n")
+    (tmp_path / "src" / "mumacro" / "kernel" / "kernel.c").write_text("#error broken\n")
     done = python(tmp_path, BUILD)
     assert done.returncode == 1
     assert "broken" in done.stderr
     assert before.read_bytes() == b"a shared object"
-    assert {path.name for path in (tmp_path / "mumacro").iterdir()} == {"kernel", before.name}
+    assert {path.name for path in (tmp_path / "src" / "mumacro").iterdir()} == {
+        "kernel",
+        before.name,
+    }
 
 
 @pytest.mark.slow
@@ -147,7 +152,7 @@ def test_a_failed_compilation_keeps_the_shared_object_that_was_there(
 def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: Path) -> None:
     done = python(repository, BUILD, tmp_path, CC="gcc", MUMACRO_BUILD_DEBUG="1")
     assert done.returncode == 0, done.stderr
-    for folder, debug in ((tmp_path, True), (repository / "mumacro", False)):
+    for folder, debug in ((tmp_path, True), (repository / "src" / "mumacro", False)):
         library = (folder / "_kernel.so").read_bytes()
         assert (b"libasan" in library, b"libubsan" in library) == (debug, debug)
 
@@ -156,7 +161,9 @@ def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: P
 def test_a_kernel_is_compiled_once_for_the_same_sources_compiler_and_flags(
     repository: Path, tmp_path: Path
 ) -> None:
-    kernel = shutil.copytree(repository / "mumacro" / "kernel", tmp_path / "mumacro" / "kernel")
+    kernel = shutil.copytree(
+        repository / "src" / "mumacro" / "kernel", tmp_path / "src" / "mumacro" / "kernel"
+    )
     for name in ("hatch_build.py", "pyproject.toml"):
         shutil.copy(repository / name, tmp_path)
     compiler, calls = tmp_path / "cc", tmp_path / "calls"
@@ -172,17 +179,17 @@ def test_a_kernel_is_compiled_once_for_the_same_sources_compiler_and_flags(
             tmp_path, BUILD, **{"CC": str(compiler), "MUMACRO_BUILD_CACHE": "kept", **more}
         )
         assert done.returncode == 0, done.stderr
-        return (tmp_path / "mumacro" / "_kernel.so").read_bytes()
+        return (tmp_path / "src" / "mumacro" / "_kernel.so").read_bytes()
 
     first = made()
-    (tmp_path / "mumacro" / "_kernel.so").write_bytes(b"another")
+    (tmp_path / "src" / "mumacro" / "_kernel.so").write_bytes(b"another")
     assert made() == first
     assert made(MUMACRO_BUILD_CACHE="empty") != first
     assert made(MUMACRO_BUILD_DEBUG="1") != first
     (kernel / "kernel.c").write_text("other")
     assert made() != first
     compiler.write_text(compiler.read_text().replace("echo one", "echo two"))
-    shutil.copy(repository / "mumacro" / "kernel" / "kernel.c", kernel)
+    shutil.copy(repository / "src" / "mumacro" / "kernel" / "kernel.c", kernel)
     assert made() != first
     compiler.write_text(compiler.read_text().replace("echo two", "echo one"))
     assert made() == first
@@ -194,10 +201,10 @@ def test_dev_py_sees_a_changed_c_source(
     monkeypatch.syspath_prepend(repository)
     dev = importlib.import_module("dev")
     monkeypatch.setattr(dev, "ROOT", tmp_path)
-    kernel = tmp_path / "mumacro" / "kernel"
+    kernel = tmp_path / "src" / "mumacro" / "kernel"
     kernel.mkdir(parents=True)
-    made = ("mumacro/_kernel.so", "mumacro/kernel/_declarations.py")
-    for path in ("hatch_build.py", "mumacro/kernel/kernel.c", *made):
+    made = ("src/mumacro/_kernel.so", "src/mumacro/kernel/_declarations.py")
+    for path in ("hatch_build.py", "src/mumacro/kernel/kernel.c", *made):
         (tmp_path / path).write_text(path)
     shutil.copytree(repository / "requirements", tmp_path / "requirements")
     digests = {dev.current()["kernel"]}
@@ -207,7 +214,7 @@ def test_dev_py_sees_a_changed_c_source(
         lambda: (kernel / "kernel.c").write_text("other"),
         lambda: (kernel / "new.h").write_text("new"),
         lambda: (tmp_path / "hatch_build.py").write_text("other flags"),
-        lambda: (tmp_path / "mumacro" / "_kernel.so").unlink(),
+        lambda: (tmp_path / "src" / "mumacro" / "_kernel.so").unlink(),
         lambda: (kernel / "_declarations.py").unlink(),
     ):
         change()
@@ -225,8 +232,8 @@ def test_the_source_distribution_builds_and_its_tests_collect(
     with tarfile.open(archive) as opened:
         opened.extractall(tmp_path, filter="data")
     source = tmp_path / archive.name.removesuffix(".tar.gz")
-    assert not list((source / "mumacro").glob("_kernel.*"))
-    assert not list((source / "mumacro").rglob("_declarations.py"))
+    assert not list((source / "src" / "mumacro").glob("_kernel.*"))
+    assert not list((source / "src" / "mumacro").rglob("_declarations.py"))
     done = python(source, BUILD)
     assert done.returncode == 0, done.stderr
     command = [sys.executable, "-m", "pytest", "--collect-only", "-m", "", "-rs"]
@@ -252,6 +259,7 @@ def test_a_package_finds_its_own_tables(
         folder.mkdir()
     (tmp_path / "tables" / "hdf5-table.nc").touch()
     monkeypatch.setattr(bundled, "_PACKAGE", package)
+    monkeypatch.setattr(bundled, "_CHECKOUT", tmp_path)
     assert bundled.bundled_tables() == []
     (package / "data").mkdir()
     (package / "data" / "mumacro-1e-10.nc").touch()
@@ -261,7 +269,7 @@ def test_a_package_finds_its_own_tables(
 PARTS = ("service", "builder", "mumacro")
 LACKS = [(name, "packages", r'.*(\w+) is not installed: pip install "mumacro.*') for name in PARTS]
 LACKS += [
-    (name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*")
+    (name, "kernel", r".*compiled kernel.* missing: .*sources in .*/mumacro.* hide .* ziglang.*")
     for name in PARTS[1:]
 ]
 
@@ -273,7 +281,8 @@ def test_one_line_says_what_is_missing(
     made = ["_kernel.*", "_declarations.py"] if lacks == "kernel" else []
     ignored = shutil.ignore_patterns("__pycache__", *made)
     for name in {"mumacro", module}:
-        shutil.copytree(repository / name, tmp_path / name, ignore=ignored)
+        source = "src/mumacro" if name == "mumacro" else name
+        shutil.copytree(repository / source, tmp_path / name, ignore=ignored)
     # without site-packages: the standard library alone
     options = ["-S"] if lacks == "packages" else []
     command = [sys.executable, *options, "-m", module]

@@ -151,7 +151,8 @@ def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(
     assert len([name for name in names if name.startswith("mumacro/_kernel.")]) == 1
     assert "mumacro/kernel/_declarations.py" in names
     sources = {
-        f"mumacro/kernel/{path.name}" for path in (repository / "mumacro" / "kernel").iterdir()
+        f"mumacro/kernel/{path.name}"
+        for path in (repository / "src" / "mumacro" / "kernel").iterdir()
     }
     assert sources == {name for name in names if name.startswith("mumacro/kernel/")}
     assert "Root-Is-Purelib: false" in metadata

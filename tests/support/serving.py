@@ -25,7 +25,9 @@ class Server:
     """A process and its log.  Its port is the one that the log names; the service's own settings
     are left out."""
 
-    def __init__(self, command: Sequence[str], log: Path, **environment: str) -> None:
+    def __init__(
+        self, command: Sequence[str], log: Path, cwd: Path = ROOT, **environment: str
+    ) -> None:
         variables = {
             name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")
         }
@@ -34,7 +36,7 @@ class Server:
         with log.open("wb") as sink:
             self.process = subprocess.Popen(
                 command,
-                cwd=ROOT,
+                cwd=cwd,
                 env=variables,
                 stdin=subprocess.DEVNULL,
                 stdout=sink,
@@ -152,9 +154,11 @@ def serving(
 
 
 @contextmanager
-def running(command: Sequence[str], log: Path, **environment: str) -> Iterator[Server]:
+def running(
+    command: Sequence[str], log: Path, cwd: Path = ROOT, **environment: str
+) -> Iterator[Server]:
     """Any server until the context ends."""
-    server = Server(command, log, **environment)
+    server = Server(command, log, cwd, **environment)
     try:
         yield server
     finally:

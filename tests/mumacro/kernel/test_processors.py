@@ -47,7 +47,7 @@ _START = """
 import importlib, runpy, sys, types
 levels, module, *words = sys.argv[1:]
 empty = sys.modules["mumacro"] = types.ModuleType("mumacro")
-empty.__path__ = ["mumacro"]
+empty.__path__ = ["src/mumacro"]
 kernels = importlib.import_module("mumacro.kernel.binding").kernels
 kernels[:] = [kernel for kernel in kernels if kernel.level in levels.split()]
 del sys.modules["mumacro"]

@@ -46,15 +46,16 @@ OVERVIEW = (
 
 
 def _part(name: str) -> Any:
-    """The command of ``builder`` or ``service``: inside the package when installed, beside it in a
+    """The command of ``builder`` or ``service``: inside the package when installed, at the top of a
     checkout."""
     package = Path(__file__).resolve().parent.parent
     if (package / name).is_dir():
         return importlib.import_module(f"mumacro.{name}.__main__")
-    if not (package.parent / name).is_dir():
+    checkout = package.parent.parent
+    if not (checkout / name).is_dir():
         raise ImpossibleError(f'this installation has no {name}: pip install "mumacro[{name}]"')
-    if str(package.parent) not in sys.path:
-        sys.path.insert(0, str(package.parent))
+    if str(checkout) not in sys.path:
+        sys.path.insert(0, str(checkout))
     return importlib.import_module(f"{name}.__main__")
 
 

@@ -31,11 +31,22 @@ def _opened() -> tuple[Any, Any]:
     except (ImportError, OSError) as error:
         if isinstance(error, ImportError) and error.name != "mumacro.kernel._declarations":
             raise
-        raise ImportError(
-            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing or does not fit this "
-            f"machine ({error}): install a wheel for this platform, or build one with a C compiler "
-            "or the package ziglang: pip install ."
-        ) from None
+        raise ImportError(_why_unopened(error)) from None
+
+
+def _why_unopened(error: Exception) -> str:
+    """Say in one line which folder was imported and what to do about it."""
+    if not _SHARED_OBJECT.exists() and (_HERE / "kernel" / "kernel.c").exists():
+        return (
+            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing: Python imported the "
+            f"sources in {_HERE}, which hide an installed mumacro: start Python in another folder, "
+            "or compile these sources with a C compiler or the package ziglang: pip install -e ."
+        )
+    return (
+        f"mumacro: the compiled kernel {_SHARED_OBJECT} is missing or does not fit this machine "
+        f"({error}): install a wheel for this platform, or build one with a C compiler or the "
+        "package ziglang: pip install ."
+    )
 
 
 _FFI, _LIBRARY = _opened()

@@ -5,6 +5,7 @@ from pathlib import Path
 from mumacro.errors import InputError, TableError
 
 _PACKAGE = Path(__file__).resolve().parent.parent
+_CHECKOUT = _PACKAGE.parent.parent  # of a checkout, whose library stands in src/mumacro
 
 
 def bundled_tables() -> list[Path]:
@@ -14,9 +15,8 @@ def bundled_tables() -> list[Path]:
     >>> sorted(path.name for path in bundled_tables())[0]
     'mumacro-1e-10.nc'
     """
-    # A folder "tables" beside the package may belong to another project; this project's are
-    # mumacro-*.nc.
-    for folder in (_PACKAGE / "data", _PACKAGE.parent / "tables"):
+    # A folder "tables" there may belong to another project; this project's are mumacro-*.nc.
+    for folder in (_PACKAGE / "data", _CHECKOUT / "tables"):
         paths = sorted(folder.glob("mumacro-*.nc"))
         if paths:
             return paths
