@@ -222,6 +222,32 @@ def test_dev_py_sees_a_changed_c_source(
     assert len(digests) == 6
 
 
+@pytest.mark.parametrize(
+    ("uv", "fails", "programs"),
+    [
+        ("uv", False, ["uv"]),
+        ("uv", True, ["uv", "python"]),
+        (None, False, ["python"]),
+    ],
+)
+def test_packages_are_installed_by_uv_where_it_is_there_and_else_by_pip(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, uv: Any, fails: bool, programs: list[str]
+) -> None:
+    monkeypatch.syspath_prepend(repository)
+    dev = importlib.import_module("dev")
+    used = []
+
+    def run(program: str, *words: str, quiet: bool = False) -> int:
+        used.append(Path(program).stem)
+        assert words[-1] == "numpy"
+        return int(fails and program == uv)
+
+    monkeypatch.setattr(dev, "run", run)
+    monkeypatch.setattr(dev.shutil, "which", lambda name: uv)
+    dev.pip("numpy")
+    assert used == programs
+
+
 @pytest.mark.slow
 def test_the_source_distribution_builds_and_its_tests_collect(
     repository: Path, tmp_path: Path
