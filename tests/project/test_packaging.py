@@ -237,13 +237,14 @@ def test_packages_are_installed_by_uv_where_it_is_there_and_else_by_pip(
     dev = importlib.import_module("dev")
     used = []
 
-    def run(program: str, *words: str, quiet: bool = False) -> int:
+    def run(program: str, *words: str, quiet: bool) -> int:
         used.append(Path(program).stem)
         assert words[-1] == "numpy"
+        assert quiet
         return int(fails and program == uv)
 
     monkeypatch.setattr(dev, "run", run)
-    monkeypatch.setattr(dev.shutil, "which", lambda name: uv)
+    monkeypatch.setattr(dev.shutil, "which", {"uv": uv}.get)
     dev.pip("numpy")
     assert used == programs
 

@@ -146,7 +146,7 @@ def serving(
     ]
     with (
         tempfile.TemporaryDirectory() as folder,
-        running(command, Path(folder) / "log.jsonl", **environment) as server,
+        running(command, Path(folder) / "log.jsonl", ROOT, **environment) as server,
     ):
         if ready:
             server.wait_until_ready()
