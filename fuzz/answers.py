@@ -10,8 +10,10 @@ range.
 import itertools
 import math
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,12 +22,13 @@ from numpy.typing import NDArray
 from builder.solver.ball import Springs
 from builder.solver.steady import V_RANGE, Y_RANGE
 from builder.solver.sweep import Sweep
-from builder.tables.contacts import FINE, SolvedContact, ball, spring
+from builder.tables.build import build_table
+from builder.tables.contacts import FINE, SolvedContact, ball, scale_of, spring
 from builder.tables.draws import DRAWS
 from builder.tables.verify import Neighbours, bound_over_error
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
-from mumacro.inputs.kind import BALL, SPRING
+from mumacro.inputs.kind import BALL, SPRING, Kind
 from mumacro.kernel.binding import CaseRows, kernels
 from mumacro.table.atlas import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE
 from tests.support import extended
@@ -33,7 +36,9 @@ from tests.support.driven import answered, beside_lines, hard, ordinary
 from tests.support.measuring import main, markdown, quantity, sections
 from tests.support.seams import (
     beside_every_seam,
+    beyond_both_sides,
     by_its_values,
+    doubles_at_every_seam,
     off_the_lines,
     true_slopes,
     with_slopes,
@@ -395,42 +400,46 @@ def driven(share: float) -> str:
     )
 
 
+#: tolerances between those of the bundled tables: other cells, other seams
+OTHER_TOLERANCES = (3e-9, 5e-6)
+LINES = 300  # that look for seams in a full run
+
+
 def seams(share: float) -> str:
-    """Both sides of every seam of cells, of the border's too, in every table: values and slopes
-    against the finest table and fresh solves, slopes against differences of the table's own
-    values."""
-    rows, fine = [], Surrogate.open(1e-12)
-    springs = Springs(fine)
-    with Sweep(os.cpu_count() or 1) as sweep:
-        for tolerance, kind in itertools.product((1e-4, 1e-7, 1e-10, 1e-12), (SPRING, BALL)):
-            table = Surrogate.open(tolerance)
-            contact = ball(springs, FINE, os.cpu_count() or 1) if kind == BALL else spring(sweep)
+    """Both sides of every seam of cells, of the border's too, in every bundled table and in two
+    that are built for it: values and slopes against the finest table and fresh solves, slopes
+    against differences of the table's own values; and all doubles beside every seam, against both
+    sides of it, too."""
+    rows, fine = [], Surrogate.open(FINE)
+    springs, workers = Springs(fine), os.cpu_count() or 1
+    with Sweep(workers) as sweep, tempfile.TemporaryDirectory() as folder:
+        tables = [Surrogate.open(tolerance) for tolerance in (1e-4, 1e-7, 1e-10, 1e-12)]
+        tables += [
+            build_table(Path(folder, f"{tolerance:g}.nc"), tolerance, sweep)
+            for tolerance in OTHER_TOLERANCES
+        ]
+        for table, kind in itertools.product(tables, (SPRING, BALL)):
+            contact = ball(springs, FINE, workers) if kind == BALL else spring(sweep)
             sources = {
                 "own values": (by_its_values(table, contact), N // 50),
                 "fresh solves": (contact, N // 2500),
             }
-            if tolerance > FINE:
+            if table.tolerance > FINE:
                 sources["finest table"] = (by_its_values(fine, contact), N // 10)
+            named = kind.names.get("contact", "spring"), f"{table.tolerance:g}"
             for source, (truth, n) in sources.items():
-                found: dict[str, list[tuple[Array, Array]]] = {}
+                found: Found = {}
                 for _, v, y in beside_every_seam(table, kind, max(40, int(n * share))):
                     here = off_the_lines(table, v, y)
                     for row, ratios in beside(table, truth, source, v[here], y[here]):
                         found.setdefault(row, []).append(ratios)
-                for row, parts in found.items():
-                    beyond, over = (np.concatenate(x) for x in zip(*parts, strict=True))
-                    cells = f"{beyond.size:,}", f"{beyond.max():.2f}", f"{(beyond > 1.0).sum():,}"
-                    middle = quantity(float(np.nanmedian(over))) if (over == over).any() else ""
-                    rows.append(
-                        [
-                            kind.names.get("contact", "spring"),
-                            f"{tolerance:g}",
-                            source,
-                            row,
-                            *cells,
-                            middle,
-                        ]
-                    )
+                rows += rows_of_seams(*named, source, found)
+            rows += rows_of_seams(*named, "both sides", doubles(table, kind, share))
+            sources.pop("own values")  # two sides of a seam are in no difference of a step
+            for source, (truth, n) in sources.items():
+                v, y = drawn_doubles(table, kind, share, 10 * n)
+                found = {row: [pair] for row, pair in beside(table, truth, source, v, y)}
+                rows += rows_of_seams(*named, f"{source}, doubles", found)
     return markdown(
         (
             "across",
@@ -445,6 +454,39 @@ def seams(share: float) -> str:
         rows,
         4,
     )
+
+
+Found = dict[str, list[tuple[Array, Array]]]  # error over bound and bound over error by row
+
+
+def rows_of_seams(contact: str, tolerance: str, source: str, found: Found) -> list[list[str]]:
+    rows = []
+    for row, parts in found.items():
+        beyond, over = (np.concatenate(x) for x in zip(*parts, strict=True))
+        cells = f"{beyond.size:,}", f"{beyond.max():.2f}", f"{(beyond > 1.0).sum():,}"
+        middle = quantity(float(np.nanmedian(over))) if (over == over).any() else ""
+        rows.append([contact, tolerance, source, row, *cells, middle])
+    return rows
+
+
+def doubles(table: Surrogate, kind: Kind, share: float) -> Found:
+    """All doubles beside every seam that random lines cross, against both sides of it."""
+    found: Found = {}
+    for points in doubles_at_every_seam(table, kind, max(3, int(LINES * share))):
+        for row, beyond in beyond_both_sides(table, kind, points):
+            found.setdefault(row, []).append((beyond, np.full(beyond.shape, np.nan)))
+    return found
+
+
+def drawn_doubles(table: Surrogate, kind: Kind, share: float, n: int) -> tuple[Array, Array]:
+    """About ``n`` of these, off the lines where differences have no step."""
+    rng = np.random.default_rng(61)
+    parts = doubles_at_every_seam(table, kind, max(3, int(LINES * share)), seed=1)
+    pairs = zip(*(part[:2] for part in parts), strict=True)
+    v, y = (np.concatenate(x) / scale_of(kind) for x in pairs)
+    here = np.flatnonzero(off_the_lines(table, v, y))
+    here = rng.choice(here, min(here.size, max(400, int(n * share))), replace=False)
+    return v[here], y[here]
 
 
 def beside(

@@ -11,21 +11,25 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from builder.tables.contacts import SolvedContact
+from builder.tables.contacts import SolvedContact, scale_of
 from builder.tables.verify import BESIDE_BORDER, Neighbours
 from mumacro import Surrogate
 from mumacro.inputs.kind import BALL, CONTACTS, Kind
+from mumacro.kernel.binding import BLOCK_ROW, PIECE_ROW, kernels
 from mumacro.table.atlas import (
     BORDER_PIECES,
     MIDDLE,
+    QUANTITIES,
     QUANTITY_NAMES,
     STEEPEST,
+    Y_CONT,
+    Y_TAIL,
     Axis,
     Chart,
     Quantity,
 )
 from mumacro.table.blocks import Block, BorderPiece
-from mumacro.table.polynomials import Border
+from mumacro.table.polynomials import Border, block_rows
 
 Array = NDArray[np.float64]
 #: decades of the distance to a seam, in cells
@@ -225,3 +229,98 @@ def true_slopes(
             better = unsure < noise
             slopes, noise = np.where(better, across, slopes), np.where(better, unsure, noise)
         yield name, slopes, noise
+
+
+# --- the doubles beside a seam --------------------------------------------------------------------
+
+BESIDE = 10  # doubles on either side of a seam
+APART = 2.0**-36  # relative, from them to the points that they are compared with
+Places = tuple[NDArray[np.intp], ...]
+
+
+def _cells(table: Surrogate, kind: Kind, v: Array, y: Array) -> Places:
+    """What tells points of two cells apart: block, cells along a and b, the border's cell."""
+    entry, middle = table.table.contacts[CONTACTS[kind.contact]], scale_of(kind)
+    v, y = v / middle, y / middle
+    block, a, b = kernels[-1].places(table.tabulated.data("mu_ratio", kind), v, y, kind.contact)
+    rows = block_rows(entry).view(BLOCK_ROW)[block, 0]
+    piece = np.searchsorted([Y_CONT, Y_TAIL], y)
+    pieces = table.border.arrays[1].view(PIECE_ROW)[piece, 0]
+    x = np.choose(piece, [y * y, np.log(y), 1.0 / y])
+    counts = (
+        rows["step_a"] * a + rows["offset_a"],
+        rows["step_b"] * b + rows["offset_b"],
+        pieces["step"] * x + pieces["offset"],
+    )
+    return block.astype(np.intp), *(np.floor(count).astype(np.intp) for count in counts)
+
+
+def doubles_at_every_seam(
+    table: Surrogate, kind: Kind, lines: int, seed: int = 0, samples: int = 1500
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """v~, y~ and a step along each, of the doubles beside all seams that random lines cross.
+
+    A line runs along v~, or along y~.  Where two of its ``samples`` are in different cells, what is
+    between them is halved until they are neighbouring doubles.  That finds the edges of cells and
+    blocks, the knots of folded coordinates, the border and its cells, without a list of them.
+    """
+    rng, ends = np.random.default_rng([seed, kind.contact]), (V_RANGE, Y_RANGE)
+    for along in (0, 1):
+        still = np.exp(rng.uniform(*np.log(ends[1 - along]), lines))
+        common = rng.random(lines) < 0.7  # where most blocks are
+        still[common] = 10.0 ** rng.uniform(-3.0, 1.5, np.count_nonzero(common))
+        grids = np.geomspace(*ends[along], samples), np.geomspace(1e-3, 30.0, samples)
+        grid = np.sort(np.concatenate(grids)).view(np.int64)
+        low, high = (np.tile(x, lines) for x in (grid[:-1], grid[1:]))
+        still = np.repeat(still, grid.size - 1)
+
+        def differ(
+            one: NDArray[np.int64], other: NDArray[np.int64], still: Array, along: int = along
+        ) -> NDArray[np.bool_]:
+            first, second = (
+                _cells(table, kind, *(x.view(np.float64), still)[:: 1 - 2 * along])
+                for x in (one, other)
+            )
+            return np.any([a != b for a, b in zip(first, second, strict=True)], axis=0)
+
+        crossed = differ(low, high, still)
+        low, high, still = low[crossed], high[crossed], still[crossed]
+        while np.any(high - low > 1):
+            between = low + (high - low) // 2
+            first = differ(low, between, still)
+            high, low = np.where(first, between, high), np.where(first, low, between)
+        beside = (high[:, None] + np.arange(-BESIDE, BESIDE + 1)).view(np.float64).ravel()
+        still = np.repeat(still, 2 * BESIDE + 1)
+        step, none = APART * beside, np.zeros(beside.size)
+        yield (beside, still, step, none) if along == 0 else (still, beside, none, step)
+
+
+def beyond_both_sides(
+    table: Surrogate, kind: Kind, points: Sequence[Array], names: Sequence[str] = QUANTITY_NAMES
+) -> Iterator[tuple[str, Array]]:
+    """How far answers at ``points`` (v~, y~ and a step along each) are outside of those one step to
+    either side, over what their bounds allow, by quantity; and the same of its slopes.
+
+    At a seam an answer is between these two, or misses them by no more than the bounds.  So what is
+    wrong for a few doubles only is found, whatever the table's tolerance, without another solver.
+    """
+
+    def beyond(values: Sequence[Array], bounds: Sequence[Array]) -> Array:
+        left, here, right = values
+        off = np.maximum(here - np.maximum(left, right), np.minimum(left, right) - here)
+        with np.errstate(all="ignore"):
+            share = np.where(off > 0.0, off / (bounds[1] + np.maximum(bounds[0], bounds[2])), 0.0)
+        return np.asarray(np.where(np.isnan(off), np.inf, share))
+
+    v, y, step_v, step_y = points
+    places = [(v + side * step_v, y + side * step_y) for side in (-1, 0, 1)]
+    for name in names:
+        answers = [table.quantity(name, *place, **kind.names) for place in places]
+        yield name, beyond([x[0] for x in answers], [x[1] for x in answers])
+        if kind == BALL and name != "mu_ratio":
+            continue  # a table has no slopes of these
+        keep = with_slopes(table, QUANTITIES[QUANTITY_NAMES.index(name)], v, y)
+        slopes = [table.tabulated.slopes(name, *(x[keep] for x in at), kind) for at in places]
+        for row in (1, 2):
+            share = beyond([x[row] for x in slopes], [x[row + 2] for x in slopes])
+            yield f"slopes of {name}", share

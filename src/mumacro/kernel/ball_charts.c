@@ -27,17 +27,18 @@ MU_INLINE mu_lanes mu_entry(mu_lanes t, mu_mask half, mu_lanes root) {
     return t * sum;
 }
 
-/* d ln entry / d ln t at 0 < t < 1; and d ln entry / d sqrt(1 - t), which stays finite. */
-static double mu_entry_slope(double t, double root, double *of_root) {
-    const double *c = MU_ENTRY[t < 0.5 ? 0 : 1],
-                 u = t < 0.5 ? 4.0 * t - 1.0 : 2.0 * MU_SQRT2 * root - 1.0;
+/* d ln entry / d ln t at 0 < t < 1; and d ln entry / d sqrt(1 - t), which stays finite.  half: t is
+ * in the first half. */
+static double mu_entry_slope(double t, int half, double root, double *of_root) {
+    const double *c = MU_ENTRY[half ? 0 : 1],
+                 u = half ? 4.0 * t - 1.0 : 2.0 * MU_SQRT2 * root - 1.0;
     double sum = c[0], slope = 0.0;
     for (int i = 1; i < MU_ENTRY_TERMS; ++i) {
         slope = mu_fma1(slope, u, sum);
         sum = mu_fma1(sum, u, c[i]);
     }
     slope /= sum;
-    if (t < 0.5) {
+    if (half) {
         const double along = 1.0 + 4.0 * t * slope;
         *of_root = -2.0 * root / t * along;
         return along;
@@ -61,10 +62,10 @@ static double mu_entry_bend(double root, double at_end) {
     return 8.0 * bend / sum - 2.0 / (1.0 - root * root);
 }
 
-/* x^(1/6), then 2 MU_FOLD_KNOT - MU_FOLD_SCALE sqrt(1 - x) from x = 1/2 on: from the root of x or
- * of 1 - x. */
-MU_INLINE mu_lanes mu_folded(mu_mask half, mu_lanes root) {
-    return mu_select(half, mu_cube_root(root), 2.0 * MU_FOLD_KNOT - MU_FOLD_SCALE * root);
+/* x^(1/6), then 2 MU_FOLD_KNOT - MU_FOLD_SCALE sqrt(1 - x) from x = 1/2 on: from the sixth root of
+ * x, and from the root of 1 - x. */
+MU_INLINE mu_lanes mu_folded(mu_mask half, mu_lanes sixth_root, mu_lanes rest) {
+    return mu_on_side(half, sixth_root, 2.0 * MU_FOLD_KNOT - MU_FOLD_SCALE * rest, MU_FOLD_KNOT);
 }
 
 /* The steepest ray as the table's border has it: where the two touch, a digit of one is the root of
@@ -91,13 +92,14 @@ MU_INLINE mu_places mu_place_ball(double steepest, mu_lanes v, mu_lanes y, mu_la
     /* where the last digits of t have y~ beyond the entry, the ray gives way: at fixed y~ a
      * quantity depends on root by its square only */
     const mu_lanes nearer = mu_fma(beyond, mu_all(-MU_ENTRY_WAY), root);
-    const mu_lanes first = mu_folded(half, mu_select(half, root, mu_higher(nearer, zero)));
+    const mu_lanes sixth = mu_cube_root(root);
+    const mu_lanes first = mu_select(ring, mu_folded(half, sixth, mu_higher(nearer, zero)), sixth);
     /* second ones */
     const mu_lanes way = mu_lower(on_ray, one), z = mu_select(ring, way, rho);
     const mu_mask half_z = MU_WHERE(z < 0.5);
     const mu_lanes root_z = mu_sqrt(mu_select(slides, one, mu_select(half_z, z, 1.0 - z)));
-    const mu_lanes second = mu_folded(half_z, root_z),
-                   sigma = mu_select(half_z, root_z, MU_SQRT2 - root_z);
+    const mu_lanes second = mu_folded(half_z, mu_cube_root(root_z), root_z),
+                   sigma = mu_sigma(half_z, root_z);
     const mu_lanes share = mu_share(v, y, slides, low), log = mu_log(mu_select(low, v, rho)),
                    squared = y * y;
     const mu_lanes hypotenuse = mu_sqrt(v * v * share);
@@ -151,7 +153,7 @@ static mu_place mu_locate_ball(const mumacro_data *data, double v, double y) {
         if (rho > MU_RHO_MAX) return at;
         at.a = 1.0 / y;
         at.block = rho >= 1.0 ? MU_B_TAIL : MU_B_S_TAIL;
-        at.b = rho >= 1.0 ? mu_log1(rho) : rho < 0.5 ? sqrt(rho) : MU_SQRT2 - sqrt(1.0 - rho);
+        at.b = rho >= 1.0 ? mu_log1(rho) : mu_sigma_of(rho);
     } else {
         const mu_places places = mu_place_ball(mu_steepest_of(data), mu_all(v), mu_all(y),
                                                mu_all(at.crit), mu_all(ln_y));
@@ -170,15 +172,17 @@ static mu_place mu_locate_as(const mumacro_data *data, int contact, double v, do
 /* d b / d ln x of a folded coordinate. */
 MU_INLINE double mu_fold_slope(double b) {
     const double root = mu_max((2.0 * MU_FOLD_KNOT - b) / MU_FOLD_SCALE, 1e-9);
-    return b < MU_FOLD_KNOT ? b / 6.0 : 0.5 * MU_FOLD_SCALE * (1.0 - root * root) / root;
+    return mu_is_first_half(b, MU_FOLD_KNOT) ? b / 6.0
+                                             : 0.5 * MU_FOLD_SCALE * (1.0 - root * root) / root;
 }
 
 static mu_turn mu_turn_of_ring(const mu_place *at) {
     const double cube = at->a * at->a * at->a, left = (2.0 * MU_FOLD_KNOT - at->a) / MU_FOLD_SCALE;
-    const double t = at->a < MU_FOLD_KNOT ? cube * cube : 1.0 - left * left;
-    const double root = at->a < MU_FOLD_KNOT ? sqrt(1.0 - t) : mu_max(left, 1e-9);
+    const int half = mu_is_first_half(at->a, MU_FOLD_KNOT);
+    const double t = half ? cube * cube : 1.0 - left * left;
+    const double root = half ? sqrt(1.0 - t) : mu_max(left, 1e-9);
     double of_root;
-    const double tilt = mu_entry_slope(t, root, &of_root), a = mu_fold_slope(at->a),
+    const double tilt = mu_entry_slope(t, half, root, &of_root), a = mu_fold_slope(at->a),
                  b = mu_fold_slope(at->b);
     const mu_turn out = {a,   -a,    -tilt * b,  (1.0 + tilt) * b,   0.0,
                          0.0, -tilt, 1.0 + tilt, 2.0 * MU_FOLD_KNOT, MU_FOLD_SCALE};
@@ -235,8 +239,7 @@ MU_INLINE mu_turn mu_turn_of_ball(const mu_place *at) {
             break;
     }
     if (!mu_is_sliding_block(at->block)) {
-        const double root = mu_max(MU_SQRT2 - at->b, 1e-9);
-        out.b_v = at->b < 0.5 * MU_SQRT2 ? 0.5 * at->b : 0.5 * (1.0 - root * root) / root;
+        out.b_v = mu_sigma_slope(at->b);
         out.b_y = -at->tilt.slope * out.b_v;
     }
     return out;

@@ -16,6 +16,42 @@ MU_INLINE int mu_is_sliding_block(int block) {
     return mu_is_ball(block) ? block < MU_B_RING : block < MU_S_LOW;
 }
 
+/* --- coordinates with two halves -------------------------------------------------------------- */
+
+/* A folded coordinate has one formula in its first half and another in its second.  The knot
+ * between them is an edge of cells, and the slope of the coordinate may jump there.  So the half is
+ * decided once, by the point: the coordinate is at the knot at most in the first half, and above it
+ * in the second by as much as cells are counted short of their ends (polynomials.py), with two
+ * digits for rounding.  Cell and slope then follow from the coordinate. */
+#define MU_PAST_KNOT 8.881784197001252e-16 /* 2^-50 */
+
+MU_INLINE mu_lanes mu_on_side(mu_mask half, mu_lanes first, mu_lanes second, double knot) {
+    return mu_select(half, mu_lower(first, mu_all(knot)),
+                     mu_higher(second, mu_all(knot + MU_PAST_KNOT)));
+}
+
+MU_INLINE int mu_is_first_half(double b, double knot) { return b <= knot; }
+
+/* sigma stands for s: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2 on, from the root of
+ * rho or of 1 - rho; both square-root edges become smooth for one root. */
+#define MU_SIGMA_KNOT (0.5 * MU_SQRT2)
+
+MU_INLINE mu_lanes mu_sigma(mu_mask half, mu_lanes root) {
+    return mu_on_side(half, root, MU_SQRT2 - root, MU_SIGMA_KNOT);
+}
+
+static double mu_sigma_of(double rho) {
+    const mu_mask half = mu_all_whole(rho < 0.5 ? -1 : 0);
+    return mu_first(mu_sigma(half, mu_all(sqrt(rho < 0.5 ? rho : 1.0 - rho))));
+}
+
+/* d sigma / d ln rho; in the last 1e-9 below the border that 1e-9 below it. */
+MU_INLINE double mu_sigma_slope(double sigma) {
+    const double root = mu_max(MU_SQRT2 - sigma, 1e-9);
+    return mu_is_first_half(sigma, MU_SIGMA_KNOT) ? 0.5 * sigma
+                                                  : 0.5 * (1.0 - root * root) / root;
+}
+
 /* --- many points: selections, no branches ----------------------------------------------------- */
 
 /* The one quotient of all common charts: 1/(1 + v~^2), 1/(v~^2 + y~^2) or, in stick-slip, 1/y~. */
@@ -55,10 +91,7 @@ MU_INLINE mu_places mu_place_common(mu_lanes v, mu_lanes y, mu_lanes crit, mu_la
     const mu_lanes share = mu_share(v, y, sliding, small);
     const mu_lanes root =
         mu_sqrt(mu_select(sliding, v * v * share, mu_select(half, rho, 1.0 - rho)));
-    /* sigma stands for s: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2
-     * on; both square-root edges become smooth for one root, and the knot between
-     * the halves is an edge of cells */
-    const mu_lanes sigma = mu_select(half, root, MU_SQRT2 - root);
+    const mu_lanes sigma = mu_sigma(half, root);
     const mu_lanes beyond = mu_select(small, 1.0 - share, mu_log(rho));
     /* -1 where true: what is counted is subtracted */
     const mu_mask of_regime =
@@ -120,8 +153,7 @@ static mu_place mu_locate(const mumacro_data *data, double v, double y) {
         at.a = 1.0 / y;
         at.block = v >= at.crit ? MU_C_TAIL : MU_S_TAIL;
         at.b = v >= at.crit ? mu_log1(v / root)
-               : rho < 0.5  ? sqrt(rho)
-                            : MU_SQRT2 - sqrt(1.0 - rho);
+                            : mu_sigma_of(rho);
     } else {
         const mu_places places =
             mu_place_common(mu_all(v), mu_all(y), mu_all(at.crit), mu_all(ln_y));
@@ -164,7 +196,6 @@ MU_INLINE double mu_speed_share(double v) {
     return v < 1.0 ? v * v * rest : 1.0 - rest;
 }
 
-/* In the last 1e-9 of sigma below the border the derivative of b is that 1e-9 below it. */
 MU_INLINE mu_turn mu_turn_of_spring(const mu_place *at) {
     /* a is this power of y~; where it is 0, ln y~ */
     static const signed char power[MU_CHARTS] = {2, 0, 0, 0, -1, 2, 1, 0, 0, 0, 0, -1};
@@ -172,8 +203,7 @@ MU_INLINE mu_turn mu_turn_of_spring(const mu_place *at) {
     if (at->block == MU_CORNER) return mu_turn_corner(at);
     if (power[at->block]) out.a_y = power[at->block] * at->a;
     if (at->block >= MU_S_LOW) {
-        const double root = mu_max(MU_SQRT2 - at->b, 1e-9);
-        out.b_v = at->b < 0.5 * MU_SQRT2 ? 0.5 * at->b : 0.5 * (1.0 - root * root) / root;
+        out.b_v = mu_sigma_slope(at->b);
         out.b_y = -at->tilt.slope * out.b_v;
     } else if (at->block == MU_C_LOW) {
         out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);

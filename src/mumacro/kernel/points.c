@@ -116,8 +116,8 @@ static mu_across mu_across_rays(const double *cell, const mu_place *at, mu_spot 
         mu_without_edge(cell, spot, turn->end - at->b, block[MU_STEP_B], turn, per_z);
     else
         for (int i = 0; i < 8; ++i) per_z[i] *= mu_fold_slope(at->b) * 2.0 * block[MU_STEP_B];
-    (void)mu_entry_slope(t, root, &of_root);
-    (void)mu_entry_slope(1.0, 0.0, &of_edge);
+    (void)mu_entry_slope(t, 0, root, &of_root);
+    (void)mu_entry_slope(1.0, 0, 0.0, &of_edge);
     rise = mu_rise(per_z, spot.u, &at_edge);
     bend = mu_entry_bend(root, of_edge);
     out.slope = 0.5 * t * (bend * at_edge - of_u * (of_u * mu_bend(row, spot.u) + of_root * rise));
