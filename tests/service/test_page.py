@@ -276,6 +276,64 @@ def test_it_fits_every_width(open_page: Any, width: int, address: str) -> None:
     assert small == [] or width > 760
 
 
+#: the texts that are not seen whole: their own box, or one around it that hides or scrolls, is
+#: smaller than they are
+CUT = """
+const unseen = '.unseen, legend, option, script, style, svg, .choice input';
+const cut = (box, text) => text.bottom > box.bottom + 1 || text.right > box.right + 1 ||
+  text.top < box.top - 1 || text.left < box.left - 1;
+const found = [];
+const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (walk.nextNode()) {
+  const [node, range] = [walk.currentNode, document.createRange()];
+  range.selectNodeContents(node);
+  const text = range.getBoundingClientRect();
+  if (!node.data.trim() || !text.width || node.parentElement.closest(unseen)) continue;
+  let box = node.parentElement;
+  while (/^inline$|contents/.test(getComputedStyle(box).display)) box = box.parentElement;
+  if (box.scrollHeight > box.clientHeight || box.scrollWidth > box.clientWidth)
+    found.push(`${node.data.trim()} in ${box.tagName} #${box.id} .${box.className}`);
+  for (; box !== document.body; box = box.parentElement)
+    if (getComputedStyle(box).overflow !== 'visible' && cut(box.getBoundingClientRect(), text))
+      found.push(`${node.data.trim()} below ${box.tagName} #${box.id}`);
+}
+for (const field of document.querySelectorAll('textarea'))
+  if (field.scrollHeight > field.clientHeight || field.scrollWidth > field.clientWidth)
+    if (field.value) found.push(`${field.value} in the field #${field.id}`);
+return [...new Set(found)];
+"""
+#: the first view, the longest texts, and what is told where something is doubted or refused
+STATES = (
+    "",
+    LONGEST,
+    "#k=1 ± 0.1 N/um&mu0=0.3 ± 0.02&Fz=10 ± 1 N&y0=2 ± 0.2 um",
+    "#k=0.8..1.2 N/um&contact=ball&direction=along",
+    "#k=rigid&y0=2",
+    "#direction=normal&Fz_amplitude=9.99 N",
+    "#f=20000 kHz&mu0=30&Fz=5 apples&v0=0",
+    "#mu0=-1&from=0&along=Fz",
+    "#panel=motion&x=2 parsec&y=2&normal=3 N @ 45 deg",
+    "#panel=motion&y=2 um&k=1 ± 0.1 N/um",
+    "#panel=fit",
+)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("address", STATES)
+def test_every_box_holds_its_text(open_page: Any, width: int, address: str) -> None:
+    page = open_page(address, width=width, height=800)
+    assert page.run(CUT) == []
+
+
+def test_a_clamp_is_found(open_page: Any) -> None:
+    page = open_page(width=1280, height=800)
+    page.run(
+        "Object.assign(document.querySelector('#rows').style,"
+        " { height: '41.99px', minHeight: '0', overflow: 'hidden' });"
+    )
+    assert any("#rows" in one for one in page.run(CUT))
+
+
 def test_one_screen_holds_inputs_number_and_map(open_page: Any) -> None:
     page = open_page(width=1280, height=800)
     for name in ("inputs", "answer", "map-section", "law-section", "side", "copy"):

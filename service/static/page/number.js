@@ -87,7 +87,7 @@ export function numberPanel(store) {
     const doubt = rows.find(({ row }) => row === "units");
     render(
       html`<output id="mu" for="fields">${value}</output>${
-          std ? html`<span id="std"> ± ${std}</span>` : nothing
+          std ? html`<wbr /><span id="std"> ± ${std}</span>` : nothing
         }`,
       $("number"),
     );
@@ -95,6 +95,7 @@ export function numberPanel(store) {
     const short = resultOf(answer, false);
     const deviation = short.std ? ` ± ${short.std}` : "";
     write("short", `µ = ${short.value}${deviation}, ${inWords(answer.regime)}`);
+    if (store.dragged) return; // words may grow, and would move the map that is dragged
     write("spread", spread(answer, rows));
     write("doubt", doubt ? `Check the units: ${prose(doubt.text)}` : "");
     const { contact } = answer.state;
