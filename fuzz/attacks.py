@@ -7,9 +7,12 @@ Beside each attack another client asks ``/livez``, one new connection after anot
 most memory of the process, and the longest of these waits.
 """
 
+import io
 import json
 import resource
 import time
+import zipfile
+from base64 import b64encode
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
@@ -129,6 +132,50 @@ def nulls(share: float) -> bytes:
     return json.dumps({name: [None] * round(CASES * share) for name in CASE}).encode()
 
 
+def fits(number: int, body: Callable[[int], bytes]) -> Attack:
+    """So many clients ask for a fit at the same time, with bodies of 1 MiB and of 64 KiB."""
+
+    def ask(server: Server, share: float) -> None:
+        def one(body: bytes) -> None:
+            with suppress(OSError, HTTPException):  # a server that reads no more
+                server.ask("POST", "/v1/fit", body, {"Content-Type": "application/json"})
+
+        for size in (2**20, 2**16):
+            with ThreadPoolExecutor(clients := max(2, round(number * share))) as pool:
+                list(pool.map(one, [body(size)] * clients))
+
+    return ask
+
+
+def table_of_brackets(size: int) -> bytes:
+    return b'{"points": "v0 mu_macro ' + b"[" * (size - 30) + b'"}'
+
+
+def workbook(_: int) -> bytes:
+    """The smallest workbook that openpyxl opens, with very many equal styles."""
+    pieces, kinds = io.BytesIO(), "application/vnd.openxmlformats-officedocument.spreadsheetml."
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    links = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    style = '<xf numFmtId="0" fontId="0" fillId="0" borderId="0" xfId="0"/>'
+    styles = f'<styleSheet xmlns="{main}"><cellXfs>{style * (30 * 2**20 // len(style))}</cellXfs>'
+    package = "http://schemas.openxmlformats.org/package/2006"
+    parts = {
+        "[Content_Types].xml": f'<Types xmlns="{package}/content-types">'
+        f'<Override PartName="/xl/workbook.xml" ContentType="{kinds}sheet.main+xml"/></Types>',
+        "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{links}">'
+        '<sheets><sheet name="a" sheetId="1" r:id="r1"/></sheets></workbook>',
+        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{package}/relationships">'
+        f'<Relationship Id="r1" Type="{links}/worksheet" Target="/xl/worksheets/a.xml"/>'
+        "</Relationships>",
+        "xl/worksheets/a.xml": f'<worksheet xmlns="{main}"><sheetData/></worksheet>',
+        "xl/styles.xml": f"{styles}</styleSheet>",
+    }
+    with zipfile.ZipFile(pieces, "w", zipfile.ZIP_DEFLATED) as book:
+        for name, text in parts.items():
+            book.writestr(name, text)
+    return json.dumps({"points_base64": b64encode(pieces.getvalue()).decode()}).encode()
+
+
 ROW = json.dumps(CASE).encode()
 TYPED = ROW.replace(b"1000000.0", b'"' + b"x" * 60 + b'"')
 STRANGE_ROW = ROW[:-1] + b"".join(b',"%c":0' % (97 + i) for i in range(12)) + b"}"
@@ -144,6 +191,14 @@ ATTACKS: dict[str, Attack] = {
     "Bodies of 64 KB that lack their last byte": holding(
         head("/v1/mu-macro", 65_000) + b" " * 64_999
     ),
+    "Fits of 1 MiB that lack their last byte": holding(
+        head("/v1/fit", 2**20) + b" " * (2**20 - 1), 600 / CONNECTIONS
+    ),
+    "Fits of 64 KiB that lack their last byte": holding(
+        head("/v1/fit", 2**16) + b" " * (2**16 - 1), 600 / CONNECTIONS
+    ),
+    "Heads of tables with as many brackets as a body has room for": fits(60, table_of_brackets),
+    "A workbook whose styles unpack to 30 MiB": fits(4, workbook),
     "Rows without a member": batches_of(
         repeated(b"[", b"{},", b"{}]", CASES), repeated(b"[", b"{},", b"{}]")
     ),

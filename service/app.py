@@ -23,8 +23,9 @@ from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
+from .admission import Admission, Admitted
 from .guide_pages import GuidePages
-from .limits import ConnectionLimit, Work
+from .limits import Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.inputs import without_null
@@ -161,6 +162,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     state = app.state
     state.methods = _methods_of_paths(app)
     state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
+    state.admission = Admission(settings.max_held_bytes)
     state.metrics = Metrics({*state.methods, *page.OPEN})
     state.observer = Observer(state.metrics)
     keys = settings.keys()
@@ -169,7 +171,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     if keys:
         app.add_middleware(Keys, keys=keys, open_paths=open_paths)
     app.add_middleware(ClearHead)
-    app.add_middleware(ConnectionLimit)
+    app.add_middleware(Admitted)
     app.add_middleware(Failures)
     app.add_middleware(HeadAsGet)
     app.add_middleware(

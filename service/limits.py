@@ -19,12 +19,12 @@ from typing import Annotated, TypeVar
 
 from fastapi import Depends, Request
 from starlette.requests import ClientDisconnect
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Receive, Scope
 
 from mumacro.kernel.threads import processors
 
-from .problems import ABORT, FULL, ProblemKind, RequestError, path_in
-from .security import HEALTH_PATHS
+from .admission import Ticket
+from .problems import ABORT, ProblemKind, RequestError
 from .settings import Settings
 
 T = TypeVar("T")
@@ -79,9 +79,11 @@ async def read_body(
     headers: Mapping[bytes, bytes],
     receive: Receive,
     limit: int,
+    ticket: Ticket,
     large: Callable[[], None] = lambda: None,
 ) -> bytearray:
-    """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
+    """The body of a request, which its ``ticket`` holds; ``large`` is called before more than
+    SMALL_BODY is read."""
     length = headers.get(b"content-length", b"0").strip()
     size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
     body, more = bytearray(), True
@@ -96,6 +98,7 @@ async def read_body(
                 f"a body may have up to {limit} bytes: {remedy}",
                 max_bytes=limit,
             )
+        ticket.weigh(size)
         if size > SMALL_BODY:
             large()
         if not more:
@@ -106,6 +109,7 @@ async def read_body(
         body += message.get("body", b"")
         more = message.get("more_body", False)
         size = len(body)
+        ticket.hold(size)
 
 
 class Slots:
@@ -150,7 +154,11 @@ class Work:
         slots = self.long_questions if cost > LONG else self.questions
         slots.take()
         loop = asyncio.get_running_loop()
-        task = slots.threads.submit(work)
+        try:
+            task = slots.threads.submit(work)
+        except BaseException:  # such as RuntimeError: no thread can start
+            slots.give_back()
+            raise
         task.add_done_callback(lambda _: loop.call_soon_threadsafe(slots.give_back))
         async with within(self.settings.time_limit_s):
             return await asyncio.wrap_future(task)
@@ -194,17 +202,3 @@ async def within(limit: int) -> AsyncIterator[None]:
 
 def _late(kind: ProblemKind, limit: int) -> RequestError:
     return RequestError(kind, f"this may take up to {limit} s")
-
-
-class ConnectionLimit:
-    """Middleware: while more connections are open than the settings allow, only the probes are
-    answered."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request pass if there is room for it."""
-        if FULL in scope.get("state", ()) and path_in(scope) not in HEALTH_PATHS:
-            raise RequestError(ProblemKind.OVERLOADED, "too many connections are open")
-        await self._app(scope, receive, send)

@@ -23,13 +23,13 @@ from starlette.datastructures import ImmutableMultiDict
 from starlette.routing import BaseRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from .admission import ticket_of
 from .limits import JSON, SMALL_BODY, Work, only_json, read_body
 from .problems import FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 # the characters of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
-_FEW = 100  # members, at most, of a body that is not small
 _LISTS = frozenset(("include",))
 _MOST_MEMBERS = 200  # members of an object in a small body, at most
 
@@ -137,21 +137,15 @@ class Json(Response):
 # --- requests -------------------------------------------------------------------------------------
 
 
-async def small_body(request: Request, most: int = SMALL_BODY) -> bytes:
-    """The bytes of a JSON body of ``most`` bytes, beside which there is no query.
-
-    More than is small may be the text of a table, and not many members.
-    """
+async def small_body(request: Request) -> bytes:
+    """The bytes of a small JSON body, beside which there is no query."""
     headers = dict(request.scope["headers"])
     if headers.get(b"content-type") != JSON or b"content-encoding" in headers:
         only_json(headers)
-    limit = min(most, request.app.state.settings.max_body_bytes)
+    limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
     work: Work = request.app.state.work
-    reading = read_body(headers, request.receive, limit)
+    reading = read_body(headers, request.receive, limit, ticket_of(request.scope))
     body = bytes(await work.small_body(reading, request.scope))
-    if len(body) > SMALL_BODY and body.count(b'":') + body.count(b'" :') > _FEW:
-        detail = f"a body may have more than {SMALL_BODY} bytes where it is the text of a table"
-        raise RequestError(ProblemKind.BODY_TOO_LARGE, detail)
     query = request.scope["query_string"]
     if query and (pairs := _pairs(query)):
         refuse(
@@ -182,15 +176,13 @@ def members_of(query: bytes) -> dict[str, Any]:
 class StrictRequest(Request):
     """A request whose body and query say nothing twice."""
 
-    #: bytes of a body, at most
-    most = SMALL_BODY
     _json: Any
     _body: bytes
 
     async def read(self) -> None:
         """Read all that the endpoint may need, so that FastAPI finds it."""
         if self.method == "POST":
-            self._body = await small_body(self, self.most)
+            self._body = await small_body(self)
             self._json = decode(self._body)
             if not isinstance(self._json, dict):
                 refuse([FieldFault((), "must be a JSON object", self._json)])
@@ -237,30 +229,16 @@ def _number(text: str) -> Any:
 class StrictRoute(APIRoute):
     """FastAPI's own handling of a :class:`StrictRequest`."""
 
-    request: type[StrictRequest] = StrictRequest
-
     def get_route_handler(self) -> Handler:
         """FastAPI's handler, with the request read before."""
         answer = super().get_route_handler()
 
         async def read_and_answer(request: Request) -> Response:
-            strict = self.request(request.scope, request.receive)
+            strict = StrictRequest(request.scope, request.receive)
             await strict.read()
             return await answer(strict)
 
         return read_and_answer
-
-
-class TableRequest(StrictRequest):
-    """One that may hold a table as text."""
-
-    most = 1024 * 1024
-
-
-class TableRoute(StrictRoute):
-    """The handling of a :class:`TableRequest`."""
-
-    request = TableRequest
 
 
 class DirectRoute(APIRoute):

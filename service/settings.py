@@ -116,6 +116,7 @@ class Settings(BaseSettings):
     port: int = _whole(8000, 0, 65535, " (any free port)")
     workers: int = _whole(1, 1, 256)
     max_body_bytes: int = _whole(16 * 2**20, 1024, 2**31)
+    max_held_bytes: int = _whole(32 * 2**20, 1024, 2**40)
     max_batch: int = _whole(100_000, 1, 10_000_000)
     max_batches: int = _whole(4, 1, 1024)
     max_connections: int = _whole(1000, 1, 1_000_000)

@@ -15,6 +15,7 @@ from starlette.types import Receive, Scope, Send
 
 from mumacro.inputs.cases import KIND
 
+from ..admission import ticket_of
 from ..batch import Batch
 from ..forms import MORE_CASES, read
 from ..limits import AT_ONCE, JSON, Work, only_json, read_body, within
@@ -42,6 +43,7 @@ class _Answer(Response):
         self._work: Work = self._state.work
         settings = self._state.settings
         self._limit, self._most = settings.max_body_bytes, settings.max_batch
+        self._ticket = ticket_of(request.scope)
         # HTTP/1.0 knows no answer in pieces
         self._piece = math.inf if request.scope["http_version"] == "1.0" else _PIECE
         self._placed = False
@@ -71,7 +73,8 @@ class _Answer(Response):
 
     async def _answer(self, receive: Receive, send: Send) -> None:
         only_json(self._fields, f"for more cases than a batch may have {MORE_CASES}")
-        text = await self._work.client(read_body(self._fields, receive, self._limit, self._place))
+        reading = read_body(self._fields, receive, self._limit, self._ticket, self._place)
+        text = await self._work.client(reading)
         if not text:
             raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
         # Reading costs by the byte, computing by the case: a small body can request much
@@ -82,6 +85,7 @@ class _Answer(Response):
         else:  # a small body of many rows or words: its reading needs no slot
             threads = self._work.questions.threads
             batch = await asyncio.wrap_future(threads.submit(self._batch, text))
+        self._ticket.hold(0)  # the text is gone
         cost += batch.cost
         pieces = _gathered(batch.write(), self._piece)
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)

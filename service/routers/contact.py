@@ -13,20 +13,23 @@ from mumacro.analysis.measured_points import read_points, unknowns_beside
 from mumacro.contacts.geometries import contact_of, doubts_of
 from mumacro.errors import InputError
 from mumacro.inputs.decoding import TextError
-from mumacro.inputs.text_tables import Table
+from mumacro.inputs.text_tables import Most, Table
+from mumacro.inputs.workbooks import BEGIN as WORKBOOK
 
 from .. import API_VERSION
 from ..limits import Working
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
 from ..problems import FieldFault, refuse, with_members
-from ..reading import Json, StrictRoute, TableRoute
+from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable
 from ..understood import understood_in
 from . import POST_PROBLEMS, router_of
 
-router, _tables = router_of("answers", StrictRoute), router_of("answers", TableRoute)
+router = router_of("answers", StrictRoute)
 _FAULTS = 100  # lines of a table that an answer names
+#: the largest table of points: so many columns, and characters in a cell
+MOST = Most(MAX_POINTS, columns=200, cell=200)
 
 
 @router.post(
@@ -46,7 +49,7 @@ async def post_stiffness(request: Request, contact: StiffnessRequest) -> Respons
         return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 
 
-@_tables.post(
+@router.post(
     "/fit",
     responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS},
     summary="k and mu0 from measured points",
@@ -68,7 +71,9 @@ async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Respo
 def _points(member: str, data: bytes, measured: FitRequest) -> Table:
     """The points of a table; a request has what is wrong with its lines at ``member``."""
     try:
-        return read_points(data, measured.dialect, MAX_POINTS)
+        if data.startswith(WORKBOOK):  # a few kB of it may unpack to any size
+            raise TextError("it is a workbook, or another zip file: save it as CSV")
+        return read_points(data, measured.dialect, MOST)
     except TextError as error:
         faults = error.faults or [str(error)]
         refuse([FieldFault.of(member, fault) for fault in faults[:_FAULTS]])
@@ -108,6 +113,3 @@ def _fitted(
         reason = f"line {points.lines[error.index]}: {error.field} must be {error.bound}"
         refuse([FieldFault.of("points", reason, error.value)])
     return {**fit.to_dict(), **reading, **table.signature}
-
-
-router.routes.extend(_tables.routes)

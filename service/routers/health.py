@@ -1,6 +1,7 @@
 """The state of the service: ``/livez`` (the process answers), ``/readyz`` and ``/healthz`` (answers
 are correct), ``/metrics``."""
 
+import asyncio
 from typing import Any
 
 from fastapi import Request, Response
@@ -8,7 +9,6 @@ from fastapi.routing import APIRoute
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from .. import API_VERSION, __version__
-from ..limits import Working
 from ..models.answers import Health
 from ..reading import Json
 from ..tables import Loaded
@@ -54,7 +54,7 @@ _COUNTERS: dict[int | str, Any] = {
 @router.get(
     "/metrics", response_class=Response, responses=_COUNTERS, summary="Counters for Prometheus"
 )
-async def get_metrics(request: Request, work: Working) -> Response:
+async def get_metrics(request: Request) -> Response:
     """Return the counters of all worker processes, in the text form of Prometheus."""
-    text = await work.question(request.app.state.metrics.text)
+    text = await asyncio.to_thread(request.app.state.metrics.text)  # without a slot
     return Response(text, headers={**_NO_STORE, "Content-Type": CONTENT_TYPE_LATEST})

@@ -240,6 +240,27 @@ def test_large_batches_have_slots_and_small_ones_take_none(strict: Any) -> None:
         assert strict.ask("POST", BATCH, json.dumps([CASE]))[0] == 200
 
 
+@pytest.mark.parametrize("path", [SINGLE, BATCH, "/v1/fit"])
+def test_the_bytes_of_all_bodies_together_are_limited(
+    serving: Any, surrogate: Surrogate, path: str
+) -> None:
+    with serving(surrogate.path, MUMACRO_MAX_HELD_BYTES="100000") as server:
+        with connect(server) as first, connect(server) as second:
+            first.sendall(head(path, 60_000) + b" " * 59_999)
+            time.sleep(0.3)
+            second.sendall(head(path, 60_000) + b" " * 30_000)
+            refused = to_end(second)
+            assert refused.startswith(b"HTTP/1.1 503")
+            assert b"retry-after: " in refused
+            assert server.ask("POST", SINGLE, json.dumps(CASE))[0] == 200
+            first.sendall(b" ")
+            assert answer(first)[0] == 400
+        for _ in range(3):  # what the first one held is free again
+            with connect(server) as third:
+                third.sendall(posted(path, b" " * 60_000))
+                assert answer(third)[0] == 400
+
+
 def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
     query = "&".join(f"{name}={value}" for name, value in CASE.items())
     with ExitStack() as connections:

@@ -5,14 +5,16 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from mumacro import Surrogate
-from tests.support.cases import Case
+from tests.support.cases import CASE, Case
 
 PATH = "/v1/mu-macro"
 
@@ -153,3 +155,21 @@ def test_without_room_for_shared_counters_a_worker_has_its_own(
         assert counted in done.stdout.splitlines()
     files = [path.name for path in tmp_path.iterdir()]
     assert len(files) == 3, files
+
+
+def test_a_slot_is_given_back_when_its_thread_cannot_start_and_counters_need_none(
+    fresh: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    law = {**CASE, "start": 1e-3, "stop": 1.0}
+    del law["v0"]
+    with monkeypatch.context() as without_threads:
+        without_threads.setattr(
+            ThreadPoolExecutor, "submit", Mock(side_effect=RuntimeError("can't start new thread"))
+        )
+        for _ in range(20):
+            assert fresh.post("/v1/law", json=law).status_code in (500, 503)
+    assert fresh.post("/v1/law", json=law).status_code == 200
+    slots = fresh.app.state.work.questions
+    monkeypatch.setattr(slots, "used", slots.number)
+    assert fresh.post("/v1/law", json=law).status_code == 503
+    assert [fresh.get(path).status_code for path in ("/metrics", "/livez", "/readyz")] == [200] * 3

@@ -21,6 +21,7 @@ BAD = {
     "MUMACRO_PORT": ("", "http", "-1", "65536", "80.5", "tcp://10.0.0.1:80"),
     "MUMACRO_LOG_LEVEL": ("", "loud"),
     "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)),
+    "MUMACRO_MAX_HELD_BYTES": ("1023", "32M", str(2**40 + 1)),
     "MUMACRO_MAX_BATCH": ("0", "10000001"),
     "MUMACRO_MAX_BATCHES": ("0", "1025"),
     "MUMACRO_MAX_CONNECTIONS": ("0", "many", "1000001"),

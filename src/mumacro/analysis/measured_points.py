@@ -14,7 +14,7 @@ from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import NO_DEVIATION, read
-from mumacro.inputs.text_tables import ColumnNames, Dialect, Table, read_table
+from mumacro.inputs.text_tables import ColumnNames, Dialect, Most, Table, read_table
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate
@@ -37,7 +37,7 @@ _COLUMN_NAMES = ColumnNames(COLUMNS, (("v0",), ("mu_macro",)))
 def read_points(
     source: Path | bytes,
     dialect: Dialect = Dialect(),  # noqa: B008
-    most: int = 1_000_000,
+    most: Most = Most(),  # noqa: B008
 ) -> Table:
     """Measured points in a table as text, or in a workbook: a file or its bytes.
 

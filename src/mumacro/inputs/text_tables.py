@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.decoding import NAMES, Piece, Text, TextError, file_pieces
+from mumacro.inputs.decoding import LONGEST, NAMES, Piece, Text, TextError, file_pieces
 from mumacro.inputs.fields import is_rigid
 from mumacro.inputs.headings import (
     absent,
@@ -56,6 +56,7 @@ GAPS = frozenset(
 )
 # cells between blanks: quoted, or with blanks within brackets; brackets belong to what is before
 _CELL = re.compile(r'"([^"]*)"|((?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+)')
+_BETWEEN = re.compile(r"[,;|\s]")  # cells, whatever separates them
 _SEP_LINE = re.compile(r'\ufeff?"?sep=(.)"?', re.IGNORECASE | re.DOTALL)
 _APART = "give the rows from there on as a file of their own"
 _END_OF_HEADER = "***End_of_Header***"
@@ -74,6 +75,30 @@ class Dialect(NamedTuple):
     def signs(self, layout: "Layout") -> Signs:
         """What is known of the signs of numbers in a table."""
         return Signs(self.decimal or layout.decimal, self.thousands, layout.sep, self.dashes)
+
+
+class Most(NamedTuple):
+    """The largest table that is read."""
+
+    rows: int = 1_000_000
+    columns: int = _MOST_COLUMNS
+    cell: int = LONGEST  #: characters
+
+    def check(self, piece: Piece) -> None:
+        """Check lines before they are taken apart, whatever separates their cells: TextError for
+        one with too many cells or too long a cell.
+
+        >>> Most(cell=3).check(Piece(7, ["a,b", "a,abcd"]))
+        Traceback (most recent call last):
+        mumacro.inputs.decoding.TextError: line 8: a cell may have up to 3 characters
+        """
+        for number, line in enumerate(piece.lines, piece.first):
+            if len(line) > self.cell and max(map(len, _BETWEEN.split(line))) > self.cell:
+                raise TextError(f"line {number}: a cell may have up to {self.cell:,} characters")
+            if len(line) > self.columns:
+                cells = max(len(line.split()), 1 + max(line.count(sep) for sep in ",;|\t"))
+                if cells > self.columns:
+                    raise TextError(f"line {number}: there may be up to {self.columns:,} columns")
 
 
 class ColumnNames(NamedTuple):
@@ -375,16 +400,27 @@ def _with_units(
 
 
 def begin(
-    text: Text, column_names: ColumnNames, dialect: Dialect
+    text: Text,
+    column_names: ColumnNames,
+    dialect: Dialect,
+    check: Callable[[Piece], None] = lambda _piece: None,
 ) -> tuple[Layout, Iterator[tuple[int, str]]]:
-    """How a text is written, and the numbered lines behind the head."""
+    """How a text is written, and the numbered lines behind the head; every piece is checked before
+    it is taken apart."""
     start = list[str]()
     for piece in text:
+        check(piece)
         start += piece.lines
         if len(start) >= _LOOKED_AT:
             break
+
+    def following() -> Iterator[str]:
+        for piece in text:
+            check(piece)
+            yield from piece.lines
+
     layout = find_layout(Piece(1, start), column_names, dialect, text.encoding)
-    lines = chain(start, chain.from_iterable(piece.lines for piece in text))
+    lines = chain(start, following())
     return layout, iter(enumerate(islice(lines, layout.first - 1, None), layout.first))
 
 
@@ -582,12 +618,14 @@ def _sheet_in(path: Path) -> Iterator[bytes]:
 
 
 def read_table(
-    source: Path | bytes, column_names: ColumnNames, dialect: Dialect, most: int = 1_000_000
+    source: Path | bytes,
+    column_names: ColumnNames,
+    dialect: Dialect,
+    most: Most = Most(),  # noqa: B008
 ) -> Table:
     """The columns of a table that mean something, in SI, from a file or its bytes.
 
-    TextError tells all that is wrong: its ``faults`` are one for each line.  A table may have
-    ``most`` rows.
+    TextError tells all that is wrong: its ``faults`` are one for each line.
 
     >>> data = "Rig 7\\n\\nv0\\tmu_macro\\nmm/s\\t%\\n1,5\\t7\\n2,5\\t9\\n".encode()
     >>> table = read_table(data, ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]]), Dialect())
@@ -598,7 +636,7 @@ def read_table(
     """
     pieces, dialect = source_of(source, dialect)
     text = Text(pieces, dialect.encoding)
-    layout, lines = begin(text, column_names, dialect)
+    layout, lines = begin(text, column_names, dialect, most.check)
     columns, faults = find_heads(layout.heads, column_names.like)
     missing = [
         group[0] for group in column_names.required_groups if not columns.keys() & set(group)
@@ -611,9 +649,10 @@ def read_table(
     if faults:
         raise TextError.of([f"line {layout.head}: {fault}" for fault in faults])
     skipped = [*layout.skipped]
-    rows = [*islice(records(lines, layout, column_names, skipped.append), most + 1)]
-    if len(rows) > most:
-        raise TextError(f"line {rows[-1].line}: there are more than {most:,} rows: average them")
+    rows = [*islice(records(lines, layout, column_names, skipped.append), most.rows + 1)]
+    if len(rows) > most.rows:
+        fault = f"there are more than {most.rows:,} rows: average them"
+        raise TextError(f"line {rows[-1].line}: {fault}")
     if not rows:
         raise TextError(f"line {layout.head}: no row follows the names of the columns")
     signs = dialect.signs(layout)

@@ -17,7 +17,11 @@ from mumacro.inputs.signs import evidence
 BEGIN = b"PK\x03\x04"  #: the first bytes of a workbook
 SEP = "\t"  #: between the cells of a line
 _ROWS = 1_048_576  # rows of a sheet of Excel, at most
-_UNPACKED = 512 * 2**20  # bytes of an unpacked workbook, at most
+# bytes of the parts of a workbook, unpacked, at most: openpyxl reads sheets row by row, the texts
+# of cells into a list, and everything else into objects, of which 1 MiB of styles takes 16 MiB
+_SHEETS, _TEXTS, _OTHERS = 512 * 2**20, 64 * 2**20, 4 * 2**20
+# parts that openpyxl does not open here
+_UNREAD = tuple(f"xl/{name}" for name in ("media/", "charts/", "drawings/", "embeddings/", "pivot"))
 _LINES = 4096  # lines of a piece
 
 
@@ -32,10 +36,7 @@ def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:
         remedy = f"{missing('files', error)}; or save it as CSV"
         raise TextError(f"it is a workbook (.xlsx), and {remedy}") from None
     try:
-        with zipfile.ZipFile(stream) as parts:
-            if sum(part.file_size for part in parts.infolist()) > _UNPACKED:
-                size = f"{_UNPACKED >> 20} MiB"
-                raise TextError(f"it is a workbook of more than {size}; save it as CSV")
+        _weigh(stream)
         sheet: Any = openpyxl.load_workbook(stream, read_only=True, data_only=True).worksheets[0]
         sheet.reset_dimensions()
         lines: list[str] = []
@@ -50,6 +51,25 @@ def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:
     except Exception as error:  # openpyxl raises what a damaged file makes it to
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise TextError(f"it is no workbook, or a damaged one ({reason})") from None
+
+
+def _weigh(stream: BinaryIO) -> None:
+    """Refuse a workbook that would be too large unpacked; the directory of the zip file tells the
+    sizes, and no part unpacks to more than that."""
+    sizes = dict.fromkeys((_SHEETS, _TEXTS, _OTHERS), 0)
+    with zipfile.ZipFile(stream) as parts:
+        for part in parts.infolist():
+            name = part.filename.lower().lstrip("/")
+            if name.startswith(_UNREAD):
+                continue
+            is_sheet = name.startswith("xl/worksheets/")
+            most = _SHEETS if is_sheet else _TEXTS if name == "xl/sharedstrings.xml" else _OTHERS
+            sizes[most] += part.file_size
+            if sizes[most] > most:
+                raise TextError(
+                    f"it is a workbook with more than {most >> 20} MiB in {part.filename[:80]!r} "
+                    "and parts such as this; save it as CSV"
+                )
 
 
 def sheet_of(data: bytes) -> Iterator[bytes]:

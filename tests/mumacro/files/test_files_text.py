@@ -4,8 +4,10 @@ files of a folder are left out."""
 import csv
 import io
 import math
+import zipfile
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -274,6 +276,24 @@ def test_a_corner_far_away_and_a_damaged_workbook(tmp_path: Path, workbook: Path
         with pytest.raises(FilesError, match="workbook"):
             evaluate_files([workbook], tmp_path / "cut.csv", TABLE)
     assert not math.isnan(summary.answered)
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("xl/styles.xml", 5), ("xl/sharedStrings.xml", 65), ("xl/any.xml", 5)]
+)
+def test_the_parts_of_a_workbook_are_weighed_before_they_are_read(
+    tmp_path: Path, workbook: Path, monkeypatch: pytest.MonkeyPatch, name: str, size: int
+) -> None:
+    monkeypatch.setattr(
+        pytest.importorskip("openpyxl"), "load_workbook", Mock(side_effect=AssertionError)
+    )
+    with zipfile.ZipFile(workbook, "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr("[Content_Types].xml", "<Types/>")
+        with book.open(name, "w") as part:
+            for _ in range(size):
+                part.write(bytes(2**20))
+    with pytest.raises(FilesError, match=f"MiB in '{name}' .*save it as CSV"):
+        evaluate_files([workbook], tmp_path / "out.csv", TABLE)
 
 
 def test_a_workbook_without_openpyxl_gets_the_remedy(
