@@ -102,6 +102,7 @@ def _solve(options: Namespace) -> int:
 def _verify(options: Namespace) -> int:
     from .solver.sweep import Sweep
     from .tables.build import SOLVED_BY, write_verified
+    from .tables.plain_grid import interpolation_errors
     from .tables.verify import holds, verify
 
     if options.write:
@@ -118,16 +119,18 @@ def _verify(options: Namespace) -> int:
             )
             for name, contact in table.contacts.items()
         }
+        of_grid = interpolation_errors(table, sweep, options.seed)
     all_hold = all(
         holds(report, table.contacts[name].tolerance) for name, report in reports.items()
     )
-    print(as_json({"tolerance": surrogate.tolerance, "holds": all_hold, "contacts": reports}))
+    report = {"tolerance": surrogate.tolerance, "holds": all_hold, "contacts": reports}
+    print(as_json(report | {"plain_grid": of_grid}))
     if not all_hold:
         raise ImpossibleError(
             f"{options.table} misses its tolerance of {surrogate.tolerance:g} or a bound"
         )
     if options.write:
-        write_verified(options.table, reports)
+        write_verified(options.table, reports, of_grid)
     return 0
 
 
@@ -140,7 +143,7 @@ def _export(options: Namespace) -> str:
         paths = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
         return _report(options, {"table": str(surrogate.path), "format": kind, "out": paths})
     from .export.c import ExportError
-    from .export.grid import FORMATS, check_format, export_table
+    from .export.grid import FORMATS, check_format, export_table, grid_errors
 
     try:
         check_format(kind)
@@ -150,18 +153,24 @@ def _export(options: Namespace) -> str:
     out = out or Path(FORMATS[kind][0].format(path.stem))
     if out.is_dir():
         raise UsageError(f"--out {out} is a folder")
-    shape = export_table(path, kind, out).mu_ratio.shape
-    return _report(options, {"table": str(path), "format": kind, "out": str(out), "shape": shape})
+    exported = export_table(path, kind, out)
+    members = {"table": str(path), "format": kind, "out": str(out)}
+    if kind == "csv":
+        members |= {"shape": exported.mu_ratio.shape, **grid_errors(exported)}
+    return _report(options, members)
 
 
 def _report(options: Namespace, members: dict[str, Any]) -> str:
     """What was written, as JSON or in columns, as ``mumacro table``."""
     if options.json:
         return as_json(members)
-    texts = {
-        name: x if isinstance(x, str) else " ".join(map(str, x)) for name, x in members.items()
-    }
-    return in_columns(list(texts.items()))
+    return in_columns([(name, _text(value)) for name, value in members.items()])
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.2g}"
+    return value if isinstance(value, str) else " ".join(map(str, value))
 
 
 def _figures(options: Namespace) -> str:

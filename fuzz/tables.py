@@ -334,7 +334,9 @@ HOSTILE: dict[str, Make] = {
     "a tolerance that is text": attribute("tolerance", "1e-4", "border/spring"),
     "a tolerance of three numbers": attribute("tolerance", np.zeros(3), "border/spring"),
     "a tolerance that is not finite": attribute("tolerance", np.nan, "border/ball"),
-    "a tolerance of the root that is text": attribute("tolerance", "1e-4"),
+    "an error of interpolation that is text": attribute(
+        "interpolation_error_linear_largest", "small"
+    ),
     "a checksum of three numbers": attribute("content_sha256", np.zeros(3)),
     "an error that is text": attribute("verified_max_abs_error", "small", "border/ball"),
     "names of errors that are numbers": attribute(

@@ -2,9 +2,9 @@
 
 The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and
 ``error_estimate`` over (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all
-dimensionless.  It is a grid for tools with their own interpolation: its nodes are solved, the
-values between them depend on that tool.  The tolerance of the table is kept by
-:class:`mumacro.Surrogate` alone.
+dimensionless.  It is a grid for tools with their own interpolation: its nodes are solved, between
+them such tools err as much as the table states of its plain grid.  The tolerance of the table is
+kept by :class:`mumacro.Surrogate` alone.
 
 Every file is written beside its name and then renamed, and the same table gives the same bytes.
 """
@@ -16,7 +16,7 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array
 from mumacro.table.atomic import write_whole
-from mumacro.table.blocks import Table
+from mumacro.table.blocks import INTERPOLATION_ERRORS, Table
 from mumacro.table.netcdf import read_table
 
 from .c import ExportError, write_c
@@ -31,6 +31,11 @@ def long_columns(table: Table) -> dict[str, Array]:
     plane = {name: np.asarray(getattr(table, name)) for name in PLANE}
     columns = {"v_tilde": v, "y_tilde": y, **plane, "v_tilde_crit": crit}
     return {name: column.ravel() for name, column in columns.items()}
+
+
+def grid_errors(table: Table) -> dict[str, float]:
+    """What tools err by that interpolate the grid, as the table names it."""
+    return {name: float(table.attributes[name]) for name in INTERPOLATION_ERRORS}
 
 
 def _csv(table: Table) -> bytes:

@@ -1,9 +1,7 @@
 """From a tolerance to a verified table file: border, blocks, plain grid, fresh solves,
 provenance."""
 
-import dataclasses
 import json
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from mumacro import MumacroError, Surrogate
-from mumacro.kernel.arrays import Array
 from mumacro.table.atlas import CHARTS, QUANTITY_NAMES
 from mumacro.table.blocks import Block, Table, TabulatedContact
 from mumacro.table.netcdf import read_table, write_table
@@ -23,7 +20,9 @@ from ..solver.sweep import Sweep
 from .blocks import build_block, build_border
 from .contacts import FINE, SolvedContact, ball, spring
 from .measure import block_errors, border_errors
+from .plain_grid import interpolation_errors, plain_grid
 from .quantities import ABS_TO_REL
+from .rounding import ERROR_BITS, round_block, to_bits
 from .verify import QUANTILES, holds, uncovered, verify
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
@@ -36,56 +35,20 @@ BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 SPRING_POINTS = 2000  # fresh solves that the springs of a ball are compared with
 ATTEMPTS = 4
-#: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to
-#: rounding
-STEPS = 256
-ERROR_BITS = 3  # digits of the errors of the plain grid and of cells
 REFERENCE = (
     "Benad J., Nakano K., Popov V. L., Popov M.: Active control of friction by transverse "
     "oscillations. Friction (2018)"
+)
+#: for whoever opens the file with another program
+COMMENT = (
+    "mu_ratio is right at its nodes; interpolation between them errs as much as the attributes "
+    "interpolation_error_* say. mumacro answers from the blocks in /border, whose tolerance and "
+    "verified errors are attributes of /border/spring and /border/ball."
 )
 
 
 class BuildError(MumacroError):
     """The tolerance was not reached; the message states where and by how much."""
-
-
-# --- rounding: bits below the tolerance are zero, which zlib compresses; errors are those of the
-# rounded numbers ---
-
-
-def bits(tolerance: float) -> int:
-    """Binary digits after the point of which the last one is at most
-    ``tolerance``/:data:`STEPS`."""
-    return math.ceil(math.log2(STEPS / tolerance))
-
-
-def to_step(values: Array, tolerance: float) -> Array:
-    """``values`` at multiples of a power of two; none moves by more than half of
-    ``tolerance``/:data:`STEPS`."""
-    return np.asarray(np.ldexp(np.round(np.ldexp(values, bits(tolerance))), -bits(tolerance)))
-
-
-def to_bits(values: Array, digits: int, away_from_zero: bool = False) -> Array:
-    """``values`` with ``digits`` binary digits each, to the nearest or away from zero."""
-    mantissa, exponent = np.frexp(values)
-    multiple = np.ldexp(mantissa, digits)
-    whole = (
-        np.copysign(np.ceil(np.abs(multiple)), multiple) if away_from_zero else np.round(multiple)
-    )
-    return np.asarray(np.ldexp(whole, exponent - digits))
-
-
-def round_block(block: Block, tolerance: float) -> Block:
-    """``block`` with its node values rounded.
-
-    All that a block tabulates is of order one, and mu~ changes by at most about as much as what is
-    tabulated: a step that is the same for all values of a block suits the relative error of mu~
-    too.
-    """
-    return dataclasses.replace(
-        block, nodes={name: to_step(x, tolerance) for name, x in block.nodes.items()}
-    )
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -98,34 +61,6 @@ def stages() -> int:
     """How many stages a build has, each of which calls ``progress`` when it is done."""
     of_contacts = sum(len(charts) + len(("errors", "fresh solves")) for charts in CHARTS.values())
     return len(("border", "plain grid")) + of_contacts
-
-
-def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
-    """The log-spaced grid for plots; finer for finer tables, nodes solved, not interpolated.
-
-    mu~ and the stick fraction keep as many digits as the table's tolerance needs;
-    ``error_estimate`` is the solver's and that of the rounding.
-    """
-    n = 31 if tolerance > 1e-5 else (61 if tolerance > 1e-9 else 121)
-    v, y = np.geomspace(1e-3, 1e3, n), np.geomspace(1e-3, 1e3, n)
-    solution = sweep.solve("full", v[:, None], y[None, :])
-    crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
-    mu, stick = (
-        to_bits(solution[name], bits(tolerance)) for name in ("mu_ratio", "stick_fraction")
-    )
-    error = to_bits(
-        solution["error_estimate"] + np.abs(mu - solution["mu_ratio"]),
-        ERROR_BITS,
-        away_from_zero=True,
-    )
-    return {
-        "v_tilde": v,
-        "y_tilde": y,
-        "mu_ratio": mu,
-        "stick_fraction": stick,
-        "error_estimate": error,
-        "v_tilde_crit": crit,
-    }
 
 
 def build_table(
@@ -151,14 +86,16 @@ def build_table(
         piece.max_rel_error = SAFETY * largest
     progress("border", True)
     table = Table(pieces, {}, **plain_grid(sweep, tolerance))
-    progress("plain grid", True)
     table.attributes = {"quantities": " ".join(QUANTITY_NAMES)}
+    of_grid = interpolation_errors(table, sweep)
+    progress("plain grid", True)
     targets = {name: add_contact(table, out, name, tolerance, sweep, progress) for name in CHARTS}
     table.attributes = {
         "title": "Macroscopic friction coefficient under transverse oscillation",
         "summary": "mu_macro/mu0 of a contact dragged at constant speed and shaken across, as a "
         "function of the dimensionless speed and amplitude; plain grid for reading, border-fitted "
         "Chebyshev blocks for evaluation",
+        "comment": COMMENT,
         "history": f"mumacro {__version__}: python -m builder build --tolerance {tolerance:g}",
         "source": "full stick-slip model, steady cycle by root-finding on half a period",
         "references": REFERENCE,
@@ -166,6 +103,7 @@ def build_table(
         "product_version": __version__,
         "Conventions": "CF-1.11",
         "quantities": " ".join(table.quantities),
+        **of_grid,
         "n_solves": np.int32(sweep.n_solves),
         "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),
     }
@@ -312,10 +250,13 @@ def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def write_verified(path: Path, reports: dict[str, dict[str, Any]]) -> None:
-    """Put what reports of :func:`.verify.verify` found, by contact, into the attributes of a table
-    file; no other number of it changes."""
+def write_verified(
+    path: Path, reports: dict[str, dict[str, Any]], of_grid: dict[str, float]
+) -> None:
+    """Put what reports of :func:`.verify.verify` found, by contact, and the errors of interpolating
+    the plain grid into the attributes of a table file; no other number of it changes."""
     table = read_table(path)
+    table.attributes |= of_grid
     for name, report in reports.items():
         table.contacts[name].attributes |= verified_attributes(report)
     write_table(table, path)

@@ -83,7 +83,8 @@ def test_verify_stores_what_it_finds_only_when_asked(
     words = ("verify", path, "--points", 300, "--seed", 5)
     assert here(*words).returncode == 0
     assert path.read_bytes() == image
-    reports = json.loads(here(*words, "--write").stdout)["contacts"]
+    found = json.loads(here(*words, "--write").stdout)
+    reports = found["contacts"]
     after = Surrogate.open(path)
     assert after.checksum == before.checksum
     assert after.max_abs_error == reports["spring"]["max_abs_error"] < before.max_abs_error
@@ -95,6 +96,8 @@ def test_verify_stores_what_it_finds_only_when_asked(
             numbers = [*part["error_quantiles"], *part["bound_over_error"]]
             assert [*new.error_distribution[name].values()] == numbers
             assert numbers != [*old.error_distribution[name].values()]
+    for name, error in found["plain_grid"].items():
+        assert after.attributes[name] == error != before.attributes[name]
     # a table that misses its bounds is left as it is
     table = read_table(path)
     table.contacts["spring"].attributes["tolerance"] = 1e-9

@@ -19,25 +19,23 @@ def run(words: Sequence[str]) -> str:
     common.add_table(parser)
     options = parser.parse_args(words)
     surrogate = open_table(options.table)
-    names = (
-        "verified_max_abs_error",
-        "verified_max_rel_error",
-        "content_sha256",
-        "format_version",
-        "product_version",
-    )
-    properties = {name: surrogate.attributes.get(name) for name in names}
-    properties["checksum"] = properties.pop("content_sha256")
     members = {
         **common.table_members(surrogate),
         "path": str(surrogate.path),
-        **properties,
+        "verified_max_abs_error": surrogate.max_abs_error,
+        "verified_max_rel_error": surrogate.max_rel_error,
+        "checksum": surrogate.checksum,
+        "format_version": surrogate.attributes["format_version"],
+        "product_version": surrogate.attributes.get("product_version"),
         "bytes": surrogate.path.stat().st_size,
     }
     bundled = [str(path) for path in bundled_tables()]
     if options.json:
-        errors = surrogate.error_distribution
-        return as_json({**members, "error_distribution": errors, "bundled": bundled})
+        errors = {
+            "error_distribution": surrogate.error_distribution,
+            "interpolation_errors": surrogate.table.interpolation_errors,
+        }
+        return as_json({**members, **errors, "bundled": bundled})
     rows = [
         (name, f"{value:.3g}" if isinstance(value, float) else str(value))
         for name, value in members.items()
@@ -47,19 +45,25 @@ def run(words: Sequence[str]) -> str:
 
 
 def _errors(surrogate: Surrogate) -> Iterator[str]:
-    """How the verified errors are distributed, as text; nothing for a table without that."""
-    distribution = surrogate.error_distribution
-    if distribution:
-        heads = [
-            f"{100.0 * float(x):g} %" if x[0].isdigit() else x
-            for x in next(iter(distribution.values()))
-        ]
-        rows = [
-            (name, *(f"{value:.2g}" for value in part.values()))
-            for name, part in distribution.items()
-        ]
-        text = (
-            "Errors that a share of the verified points does not exceed; then how many\n"
-            "times the error its bound is: 1 or more is a bound that holds."
-        )
-        yield f"{text}\n{in_columns([('', *heads), *rows])}"
+    """How the errors of the answers are distributed, and those of others' interpolation of the
+    plain grid, as text."""
+    yield (
+        "Errors that a share of the verified points does not exceed; then how many\n"
+        "times the error its bound is: 1 or more is a bound that holds.\n"
+        f"{_by_share(surrogate.error_distribution)}"
+    )
+    yield (
+        "The same of tools that interpolate the plain grid of the file over ln v_tilde\n"
+        "and ln y_tilde, as mumacro does not.\n"
+        f"{_by_share(surrogate.table.interpolation_errors)}"
+    )
+
+
+def _by_share(errors: dict[str, dict[str, float]]) -> str:
+    """Statistics by name in columns, shares of points as per cent."""
+    heads = [
+        f"{100.0 * float(name):g} %" if name[0].isdigit() else name
+        for name in next(iter(errors.values()))
+    ]
+    rows = [(name, *(f"{value:.2g}" for value in part.values())) for name, part in errors.items()]
+    return in_columns([("", *heads), *rows])

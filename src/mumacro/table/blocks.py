@@ -53,6 +53,24 @@ class Block:
 RATIOS = ("least", "median", "largest")
 
 
+#: how tools interpolate the plain grid, over ln v~ and ln y~ -> the statistics of what that errs
+#: by: as an attribute of the root names them, and as an error distribution does
+INTERPOLATIONS = ("linear", "cubic")
+INTERPOLATION_STATISTICS = {"median": "0.5", "99_percent": "0.99", "largest": "1"}
+
+
+def interpolation_error(method: str, statistic: str) -> str:
+    """The attribute of the root that states an error of interpolating the plain grid."""
+    return f"interpolation_error_{method}_{statistic}"
+
+
+INTERPOLATION_ERRORS = tuple(
+    interpolation_error(method, statistic)
+    for method in INTERPOLATIONS
+    for statistic in INTERPOLATION_STATISTICS
+)
+
+
 @dataclass
 class TabulatedContact:
     """One contact of a table: its blocks, and what the table states of them."""
@@ -107,6 +125,18 @@ class Table:
     def quantities(self) -> list[str]:
         """The names of the tabulated quantities, mu_ratio first."""
         return names_in(self.attributes)
+
+    @property
+    def interpolation_errors(self) -> dict[str, dict[str, float]]:
+        """What tools err by that interpolate the plain grid, by method: the absolute error of mu~
+        that a share of the points does not exceed, "0.5", "0.99" and "1"."""
+        return {
+            method: {
+                share: float(self.attributes[interpolation_error(method, statistic)])
+                for statistic, share in INTERPOLATION_STATISTICS.items()
+            }
+            for method in INTERPOLATIONS
+        }
 
     def quantities_of(self, chart: atlas.Chart) -> list[atlas.Quantity]:
         """The quantities that the block of ``chart`` tabulates."""

@@ -1,4 +1,4 @@
-"""The table file, format 1: netCDF-4 with CF-1.11 conventions; written atomically, checked on
+"""The table file, format 2: netCDF-4 with CF-1.11 conventions; written atomically, checked on
 reading.
 
 docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
@@ -21,6 +21,7 @@ from mumacro.table import atlas, hdf5
 from mumacro.table.atomic import write_whole
 from mumacro.table.blocks import (
     BY_NAME,
+    INTERPOLATION_ERRORS,
     RATIOS,
     Block,
     BorderPiece,
@@ -30,7 +31,7 @@ from mumacro.table.blocks import (
 )
 from mumacro.table.polynomials import nodes
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 # What is larger is refused before memory is taken; behind each limit the figure of the largest
 # table that the builder makes
 MOST_BYTES = 16 * 2**20  # bytes of a file: 425 kB
@@ -58,7 +59,13 @@ _PLAIN = {
         ("y_tilde",),
     ),
 }
-#: what every contact states; the root repeats those of one spring, for people
+#: attributes of ``mu_ratio`` beside its name and unit
+_OF_MU_RATIO = {
+    "ancillary_variables": "error_estimate",
+    "comment": "right at the nodes; interpolation between them errs as much as the attributes "
+    "interpolation_error_* of the file say, mumacro itself answers from the blocks in /border",
+}
+#: what every contact states
 _STATED = ("tolerance", "verified_max_abs_error", "verified_max_rel_error")
 CELL_AXES = ("quantity", "cell", "derivative")
 LEAST_PACKED = 256  # numbers: as few are stored as they are, since a chunk's index takes 2 kB
@@ -153,7 +160,7 @@ def _geometry(chart: atlas.Chart) -> dict[str, Any]:
 def _write(root: Any, table: Table) -> None:
     root.setncatts(table.attributes)
     for name, (long_name, axes) in _PLAIN.items():
-        extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
+        extra = _OF_MU_RATIO if name == "mu_ratio" else {}
         _add_variable(root, name, getattr(table, name), long_name, axes, **extra)
     border = root.createGroup("border")
     for (name, axis, meaning), piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
@@ -211,8 +218,6 @@ def write_table(table: Table, path: str | Path) -> str:
     import tempfile  # only writing needs it: reading a table starts sooner without
 
     path = Path(path)
-    spring_attributes = table.contacts["spring"].attributes
-    table.attributes |= {name: spring_attributes[name] for name in _STATED}
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
     try:
@@ -317,10 +322,15 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
         raise root.refuse("not a mumacro table: format_version or content_sha256 is missing")
     version = root.attribute("format_version")
     if not np.array_equal(version, FORMAT_VERSION):
-        raise root.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
+        raise root.refuse(
+            f"format version {version}, this program reads {FORMAT_VERSION}: build the table anew "
+            "with python -m builder build, or open it with the release that wrote it"
+        )
     attributes = root.attributes()
     if not isinstance(attributes["content_sha256"], str):
         raise root.refuse("attribute 'content_sha256' is no text")
+    for name in INTERPOLATION_ERRORS:
+        _error(root, name)
     try:
         json.loads(attributes.get("builder_options", "{}"))
     except (ValueError, TypeError, RecursionError) as error:
@@ -373,16 +383,6 @@ def _contact(group: hdf5.Group, name: str, quantities: list[str]) -> TabulatedCo
     return contact
 
 
-def _check_root(root: hdf5.Group, spring: TabulatedContact) -> None:
-    """Refuse a root that states other errors than the group of one spring."""
-    for name in _STATED:
-        if not np.array_equal(root.attribute(name), spring.attributes[name]):
-            raise root.refuse(
-                f"attribute {name!r} is {root.attribute(name)} at the root and "
-                f"{spring.attributes[name]} in /border/spring"
-            )
-
-
 def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str]) -> None:
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
     numbers = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
@@ -398,7 +398,6 @@ def _read(root: hdf5.Group) -> Table:
     below = root.group("border")
     border = [_border_piece(below.group(name), axis) for name, axis, _ in atlas.BORDER_PIECES]
     contacts = {name: _contact(below.group(name), name, names) for name in atlas.CHARTS}
-    _check_root(root, contacts["spring"])
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         shape = tuple(plain[axis].size for axis in axes) if axes else None

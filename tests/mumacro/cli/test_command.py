@@ -721,16 +721,24 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
         properties["verified_max_abs_error"],
     ) == expected
     assert properties["error_distribution"] == surrogate.error_distribution
+    assert properties["interpolation_errors"] == surrogate.table.interpolation_errors
     text = output_of(capsys, 0, "table")
     assert text.count(".nc") > len(properties["bundled"])
     assert "times the error its bound is: 1 or more is a bound that holds." in text
     assert f"{surrogate.error_distribution['border']['0.95']:.2g}" in text
+    grid = text.partition("interpolate the plain grid")[2]
+    assert f"{surrogate.table.interpolation_errors['cubic']['0.99']:.2g}" in grid
 
 
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:
     out, table = tmp_path / "grid.csv", str(tables_dir / "mumacro-1e-4.nc")
     words = ("export", "--format", "csv", "--out", str(out), "--table", "1e-4")
-    assert json.loads(output_of(capsys, 0, *words, "--json"))["table"] == table
+    report = json.loads(output_of(capsys, 0, *words, "--json"))
+    assert report["table"] == table
+    stated = Surrogate.open(table).attributes
+    assert (
+        report["interpolation_error_cubic_largest"] == stated["interpolation_error_cubic_largest"]
+    )
     rows = [line.split() for line in output_of(capsys, 0, *words).splitlines()]
     assert rows[:3] == [["table", table], ["format", "csv"], ["out", str(out)]]
     assert out.read_text().startswith("v_tilde,")
