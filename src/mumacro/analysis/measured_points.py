@@ -21,6 +21,7 @@ from mumacro.surrogate import Surrogate
 
 UNKNOWNS = ("k", "mu0")
 STD = "std"  # the column of standard deviations
+FORCE = "Ft"  # the mean friction force [N], which over Fz is mu_macro
 #: how far a point may lie outside of 0 <= mu_macro <= mu0: in standard deviations; where the
 #: points have none, as a share of mu0
 _SCATTER, _SHARE = 5.0, 0.05
@@ -30,8 +31,8 @@ _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their product
 
 #: columns of a table of points, and the input whose units each has
 COLUMNS = {name: LIKE.get(name, name) for name in (*NAMES, AMPLITUDE)}
-COLUMNS |= {"mu_macro": "mu0", STD: "mu0"}
-_COLUMN_NAMES = ColumnNames(COLUMNS, (("v0",), ("mu_macro",)))
+COLUMNS |= {"mu_macro": "mu0", STD: "mu0", FORCE: "Fz"}
+_COLUMN_NAMES = ColumnNames(COLUMNS, (("v0",), ("mu_macro", FORCE)))
 
 
 def read_points(
@@ -101,16 +102,16 @@ class Measured:
                     fixed[name],
                     f"left out, or taken from unknowns={self.unknowns}: it is fitted",
                 )
-            if name not in (*names, "mu_macro", STD):
+            if name not in (*names, "mu_macro", FORCE, STD):
                 raise InputError(
                     name, fixed[name], f"one of {', '.join(names)}; {unknown_name(name, names)}"
                 )
         if isinstance(data, Mapping) and not library_of(data):  # a table may have other columns
-            members = (*names, *UNKNOWNS, "mu_macro", STD)
+            members = (*names, *UNKNOWNS, "mu_macro", FORCE, STD)
             for name in data:
                 if name not in members and split_unit(str(name))[0] not in members:
                     raise unknown(str(name), data[name], members)
-        columns = select("data", data, [*names, "mu_macro", STD])
+        columns = select("data", data, [*names, "mu_macro", FORCE, STD])
         if duplicates := [name for name in select("data", data, UNKNOWNS) if name in self.unknowns]:
             raise InputError(
                 duplicates[0],
@@ -122,10 +123,16 @@ class Measured:
                 duplicates[0], fixed[duplicates[0]], "given once: as a column or as a keyword"
             )
         inputs = {**columns, **fixed}
+        force = inputs.pop(FORCE, None)
+        if force is not None and "mu_macro" not in inputs:
+            inputs["mu_macro"] = _friction(force, inputs.get("Fz"))
         for name in ("mu_macro", "v0"):
             if name not in inputs:
                 raise InputError(
-                    name, sorted(columns), f"a column of the data: {name} of each point"
+                    name,
+                    sorted(columns),
+                    f"a column of the data: {name} of each point"
+                    + (f", or {FORCE} with Fz" if name == "mu_macro" else ""),
                 )
         return inputs
 
@@ -274,6 +281,22 @@ class Measured:
         answer = self.surrogate.evaluate(**inputs, gradient=slopes)
         mu = np.asarray(answer.mu_macro)
         return mu, np.asarray(answer.gradient[name]) if slopes else np.zeros_like(mu)
+
+
+def _friction(force: Any, load: Any) -> Any:
+    """mu_macro, as the friction force over the normal force; their deviations have no meaning
+    here."""
+    if load is None:
+        raise InputError("Fz", None, f"given beside {FORCE}: mu_macro is {FORCE}/Fz")
+    numbers = {FORCE: read(FORCE, force, "force"), "Fz": read("Fz", load)}
+    for name, one in numbers.items():
+        if one.std is not None or one.low is not None:
+            raise InputError(name, force if name == FORCE else load, NO_DEVIATION)
+    above, below = (np.asarray(one.si, np.float64) for one in numbers.values())
+    if above.ndim and below.ndim and above.shape != below.shape:
+        raise InputError("data", (above.shape, below.shape), "columns of one length")
+    with np.errstate(all="ignore"):  # a load that is no number is refused by its name
+        return np.where(below > 0.0, above / below, 0.0)
 
 
 def _number(name: str, value: Any) -> Any:

@@ -4,6 +4,7 @@ writes them."""
 import argparse
 import csv
 import difflib
+import io
 import json
 import math
 import os
@@ -194,6 +195,10 @@ def add_form(parser: argparse.ArgumentParser) -> None:
 def run(title: str, command: Callable[[Any], int | str], arguments: Any) -> int:
     """Run a command, print the text that it returns, and return the exit code; an error is one line
     on stderr."""
+    for stream in (sys.stdout, sys.stderr):
+        # a sign that a terminal's codec lacks must not end a run whose output is written
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
     try:
         output = command(arguments)
         if isinstance(output, str):

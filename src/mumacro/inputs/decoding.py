@@ -30,16 +30,21 @@ _MARKS = (
 )
 # files that are no tables as text, by their first bytes
 _OTHERS = (
-    (b"PK\x03\x04", "is a workbook (.xlsx) or another zip file"),
+    (b"PK\x03\x04", "is a workbook (.xlsx) or another zip file; save its table as CSV"),
     (b"\xd0\xcf\x11\xe0", "is a workbook of old Excel (.xls); save it as .xlsx or as CSV"),
     (b"\x1f\x8b", "is compressed; name it .gz, or unpack it"),
     (b"PAR1", "is Parquet; name it .parquet"),
+    (b"ARROW1", "is an Arrow file (Feather, .arrow); write it as Parquet"),
+    (b"\xff\xff\xff\xff", "is a stream of Arrow; write it as Parquet"),
+    (b"FEA1", "is Feather; write it as Parquet"),
+    (b"SQLite format 3", "is a database of SQLite; export a table as CSV"),
     (b"TDSm", "is a TDMS file of LabVIEW; export it as text"),
     (b"\x89HDF", "is HDF5; export a table as text"),
     (b"MATLAB 5", "is a MAT-file of MATLAB; write a table as text (writetable)"),
     (b"%PDF", "is a PDF"),
     (b"<", "is HTML or XML; save it as CSV"),
 )
+_JSON = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\{\s*[\"}]|\[\s*[\[{\"]|\[\s*-?\d[\d.eE+-]*\s*,)")
 # the encodings that are read: without those of Python that are not for texts, or are slow
 _ENCODING = re.compile(
     r"ascii|big5\w*|cp\w+|euc\w+|gb\w+|hp_roman8|iso8859\w+|johab|koi8\w+|latin\w+|mac\w+"
@@ -177,6 +182,8 @@ class Text:
         for begin, what in _OTHERS:
             if data.startswith(begin):
                 raise TextError(f"it {what}")
+        if _JSON.match(data[:_START]):
+            raise TextError("it is JSON; write a table as CSV, with a line for each case")
         codec_of_mark = next((name for mark, name in _MARKS if data.startswith(mark)), None)
         self.encoding = (
             self._codec_of_caller or codec_of_mark or _of_zeros(data[:_START]) or "utf-8"

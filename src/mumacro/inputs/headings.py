@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from mumacro.inputs.fields import INPUTS, QUANTITY_OF
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.units import QUANTITIES, Scale, scale_of, split_unit
+from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, scale_of, split_unit
 
 # heads that a message lists, and that are compared with misspelt names
 _LISTED, _COMPARED = 20, 100
@@ -61,9 +61,18 @@ def find_heads(
 
 
 def _no_unit(name: str, unit: str, like: Mapping[str, str]) -> str:
-    """Why a unit of a column is refused."""
-    hint = "; a frequency is f [Hz]" if name == "omega" and scale_of("f", unit) else ""
-    return f"{name} cannot have{hint}; give {QUANTITIES[QUANTITY_OF[like[name]]].such_as}"
+    """Why a unit of a column is refused, with the number to give where it is clear what is meant.
+
+    >>> _no_unit("y0", "um pp", {"y0": "y0"})
+    'y0 cannot have: it must be half of peak to peak: give 0.5um in place of 1 um pp'
+    """
+    quantity = QUANTITY_OF[like[name]]
+    if name == "omega" and scale_of("f", unit):
+        return f"{name} cannot have: a frequency is f [Hz]; give {QUANTITIES[quantity].such_as}"
+    bound = bound_of_unit(quantity, 1.0, unit)
+    if bound == QUANTITIES[quantity].bound:
+        return f"{name} cannot have; give {QUANTITIES[quantity].such_as}"
+    return f"{name} cannot have: it must be {bound} in place of 1 {unit}"
 
 
 def meant_by(head: str, *, loosely: bool = True) -> str | None:

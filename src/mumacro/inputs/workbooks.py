@@ -14,6 +14,8 @@ from mumacro.errors import missing
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.signs import evidence
 
+# other zip files, by what their first member or the list of their members begins with
+_OPEN_DOCUMENT = b"mimetypeapplication/vnd.oasis.opendocument"
 BEGIN = b"PK\x03\x04"  #: the first bytes of a workbook
 SEP = "\t"  #: between the cells of a line
 _ROWS = 1_048_576  # rows of a sheet of Excel, at most
@@ -30,6 +32,7 @@ def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:
 
     TextError where it is no workbook, or openpyxl is missing.
     """
+    _refuse_no_workbook(stream)
     try:
         import openpyxl  # type: ignore[import-untyped]
     except ModuleNotFoundError as error:
@@ -70,6 +73,22 @@ def _weigh(stream: BinaryIO) -> None:
                     f"it is a workbook with more than {most >> 20} MiB in {part.filename[:80]!r} "
                     "and parts such as this; save it as CSV"
                 )
+
+
+def _refuse_no_workbook(stream: BinaryIO) -> None:
+    """Name a zip file for what it is, where that is no workbook; openpyxl refuses a damaged one."""
+    if _OPEN_DOCUMENT in stream.read(200):
+        raise TextError("it is an OpenDocument file (.ods); save it as .xlsx or as CSV")
+    try:
+        with zipfile.ZipFile(stream) as parts:
+            names = parts.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError):
+        return
+    if "xl/workbook.bin" in names:
+        raise TextError("it is a binary workbook (.xlsb); save it as .xlsx or as CSV")
+    if not any(name.lower().lstrip("/").startswith("xl/") for name in names):
+        members = ", ".join(name[:60] for name in names[:3])
+        raise TextError(f"it is a zip file with {members or 'nothing in it'}; unpack it")
 
 
 def sheet_of(data: bytes) -> Iterator[bytes]:

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import os
 import shlex
 import subprocess
 import sys
@@ -862,3 +863,21 @@ def test_the_last_line_of_eval_has_the_remarks(capsys: Capture, tmp_path: Path) 
     assert last[0].startswith("3 of 3 rows evaluated with")
     assert "; remark on mu0: mu0 = 30" in last[0]
     assert "; remark on k in 2 rows: l0 = mu0 Fz / k = 3 m" in last[0]
+
+
+def test_a_terminal_of_another_codec_does_not_end_a_run_that_has_written_its_output(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "µ"
+    folder.mkdir()
+    (folder / "c.csv").write_text("mu0,Fz,k,y0,f,v0\n0.3,10,1e6,2e-6,20e3,0.01\n")
+    words = [sys.executable, "-m", "mumacro", "eval", str(folder / "c.csv"), "-o"]
+    done = subprocess.run(
+        [*words, str(folder / "o.csv")],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"\\xb5" in done.stdout
+    assert (folder / "o.csv").is_file()

@@ -258,7 +258,7 @@ SIMILAR = "{!r} is similar: rename that column to {}"
         (
             "mu0,Fz,k [psi],y0,omega [Hz],v0",
             {},
-            ["unit that k cannot have", "N/mm", "; ", "a frequency is f [Hz]"],
+            ["unit that k cannot have", "a force over a length", "; ", "a frequency is f [Hz]"],
         ),
         ("mu0,Fz,y0,omega,v0,c", {}, ["no column k [N/m]", "'omega', 'v0', 'c'", "--rigid"]),
         ("mu0,Fz,k,y0,v0", {}, ["omega [rad/s] or f [Hz]"]),

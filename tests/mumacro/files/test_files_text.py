@@ -181,7 +181,7 @@ def test_files_that_differ_in_their_dialect_alone_are_one(tmp_path: Path) -> Non
         (f"{HEAD}\n{ROWS}\0\0", ("line 4 has a zero byte",)),
         (f"{HEAD}\n" + "1," * (9 * 2**20), ("line 2 has more than 16 MiB",)),
         (f"{HEAD}\n{ROWS}" + "1" * (17 * 2**20), ("line 4 has more than 16 MiB",)),
-        ("{}", ("there are no columns",)),
+        ("{}", ("it is JSON",)),
     ],
     ids=["ambiguous", "another head", "no unit", "zero", "wide", "long", "json"],
 )

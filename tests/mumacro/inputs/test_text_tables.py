@@ -6,6 +6,7 @@ import io
 import itertools
 import re
 import time
+import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -16,7 +17,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from mumacro.analysis.fit import fit
 from mumacro.analysis.measured_points import read_points
+from mumacro.errors import InputError
 from mumacro.inputs.decoding import Text, TextError, encoding_of
 from mumacro.inputs.headings import absent
 from mumacro.inputs.signs import Signs, evidence
@@ -424,3 +427,60 @@ def test_advice_to_rename_a_column_keeps_its_unit_and_halves_peak_to_peak(
     head: str, column: str
 ) -> None:
     assert f"rename that column to {column} (or another unit" in absent("y0", [head])
+
+
+@pytest.mark.parametrize(
+    ("head", "advice"),
+    [
+        ("y0 [um pp]", "half of peak to peak: give 0.5um"),
+        ("y0 [um rms]", "1.41421 times its rms value"),
+        ("Fz [g]", "the weight of 1 g is 0.00980665 N"),
+        ("Fz [kg]", "the weight of 1 kg is 9.80665 N"),
+        ("v0 [rpm]", "times the radius"),
+        ("omega [kHz]", "a frequency is f [Hz]"),
+    ],
+)
+def test_the_unit_of_a_head_gets_the_advice_that_a_value_gets(head: str, advice: str) -> None:
+    name = head.partition(" ")[0]
+    columns = [head, *(one for one in ("v0", "mu_macro") if one != name)]
+    with pytest.raises(TextError, match=re.escape(advice)):
+        read_points(f"{','.join(columns)}\n{','.join('1' * len(columns))}\n".encode())
+
+
+def test_columns_of_two_forces_stand_for_mu_macro() -> None:
+    rows = [f"{v0},{10 * mu},10" for v0, mu in zip(V0, MU, strict=True)]
+    table = read_points("\n".join(["v0,Ft,Fz", *rows]).encode())
+    result = fit(table.columns, y0=0.4e-6, f=20e3)
+    expected = fit({"v0": V0, "mu_macro": MU}, Fz=10.0, y0=0.4e-6, f=20e3)
+    assert result.values["k"] == close(expected.values["k"], rel=1e-9)
+    in_newtons = {"v0": V0, "Ft": [10.0 * mu for mu in MU]}
+    same = fit(in_newtons, Fz=10.0, y0=0.4e-6, f=20e3)
+    assert same.values["k"] == result.values["k"]
+    with pytest.raises(InputError, match="Ft/Fz"):
+        fit(in_newtons, y0=0.4e-6, f=20e3)
+    measured = {"v0": V0, "mu_macro": MU, "Ft": [7.0] * len(V0)}  # mu_macro is what counts
+    assert fit(measured, Fz=10.0, y0=0.4e-6, f=20e3).values["k"] == expected.values["k"]
+
+
+@pytest.mark.parametrize(
+    ("data", "what"),
+    [
+        (b'{"v0": [1, 2], "mu_macro": [0.1, 0.2]}', "JSON"),
+        (b'[{"v0": 1, "mu_macro": 0.1}]', "JSON"),
+        (b"ARROW1\0\0", "Arrow"),
+        (b"FEA1\0\0\0\0", "Feather"),
+        (
+            b"PK\x03\x04" + bytes(26) + b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
+            "ods",
+        ),
+    ],
+)
+def test_what_is_no_table_as_text_is_named_for_what_it_is(data: bytes, what: str) -> None:
+    assert what in str(refused(data))
+
+
+def test_a_zip_file_is_named_with_what_it_holds() -> None:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as parts:
+        parts.writestr("points.csv", "v0,mu_macro\n1,0.2\n")
+    assert "zip file with points.csv; unpack it" in str(refused(stream.getvalue()))
