@@ -251,6 +251,7 @@ class MotionAnswer(BaseModel):
         "Until a small disturbance has fallen to 1 %; null: infinite, nothing slips", "-"
     )
     contact: ContactName
+    warnings: list[str] | None = Field(None, description="Only where the search gave up: why")
     cycle: CycleColumns | None = Field(None, description="Only if requested")
     inputs: dict[str, Understood] | None = understood_inputs()
     api_version: str

@@ -42,6 +42,8 @@ def _answered(scene: MotionRequest) -> dict[str, Any]:
         # of a group of inputs, such as the speed: none of them is bad by itself
         refuse([FieldFault((), f"{error.field} {reason_of(error)}", error.value)])
     answer = {name: getattr(motion, name) for name in _NUMBERS} | {"contact": scene.contact}
+    if motion.warnings:
+        answer["warnings"] = motion.warnings
     if scene.cycle:
         columns = motion.cycle()._asdict()
         answer["cycle"] = {name: column.tolist() for name, column in columns.items()}

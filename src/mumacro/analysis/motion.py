@@ -25,6 +25,7 @@ from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
 from mumacro.shown import cell, frame_of, html_of, html_of_rows, members_of, text_of
+from mumacro.stopping import current, look
 
 TOLERANCES = 1e-9, 1e-2
 # the longest and the shortest way in a radian, in units of mu0 Fz / k; below the last, rounding
@@ -163,8 +164,9 @@ class Motion:
             shares, weights = 1.5 * at**2 * (2.0 - at**2), halves * at
         case = scenes.dimensionless[i].copy()
         forces = _KERNEL.motion_cycle(
-            scenes.orders, case, shares, weights, scenes.tolerance, points
+            scenes.orders, case, shares, weights, scenes.tolerance, points, current().flag
         )
+        look()
         mu0, Fz, _, omega, v0 = (float(column[i]) for column in scenes.columns.values())
         tau = np.linspace(0.0, 2.0 * math.pi, points + 1)
         x, y, load = (
@@ -212,10 +214,25 @@ class Motion:
         """The numbers by name, each in the shape of the cases."""
         return {name: getattr(self, name) for name in NUMBERS}
 
+    @property
+    def warnings(self) -> list[str]:
+        """What to do where the search gave up before the estimate was below the tolerance."""
+        c, tolerance = self.scenes.columns, self.scenes.tolerance
+        error = np.ravel(self.error_estimate)
+        left = error > tolerance * c["mu0"] * (1.0 + 1e-9)
+        if not left.any():
+            return []
+        cases = f" in {np.count_nonzero(left)} of {left.size} cases" if left.size > 1 else ""
+        return [
+            f"the search gave up{cases}: the error is about {error[left].max():.1e}, above the "
+            f"tolerance {tolerance:g} mu0; try a larger tolerance, fewer harmonics or a faster drag"
+        ]
+
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON of a motion over HTTP, without cycle and api_version; arrays as
         lists, None where a number is not finite."""
-        return members_of({**self.columns, "contact": self.scenes.contact})
+        warnings = {"warnings": self.warnings} if self.warnings else {}
+        return members_of({**self.columns, "contact": self.scenes.contact, **warnings})
 
     def to_frame(self) -> Any:
         """The numbers as a DataFrame of pandas, one row a case; ``cycle().to_frame()`` is the cycle
@@ -229,21 +246,22 @@ class Motion:
 
     def __repr__(self) -> str:
         if np.shape(self.mu_macro):
-            return text_of(self._heading(), self.columns)
-        return (
+            return text_of(self._heading(), self.columns, self.warnings)
+        one = (
             f"<Motion of a {self.scenes.contact}: mu_macro {self.mu_macro:.6g}, mu_lateral "
             f"{self.mu_lateral:.6g}, error_estimate {self.error_estimate:.1e}>"
         )
+        return "\n".join([one, *self.warnings])
 
     def _repr_html_(self) -> str:
         """A table for notebooks: of one case a number a row with unit and meaning."""
         if np.shape(self.mu_macro):
-            return html_of(self._heading(), self.columns)
+            return html_of(self._heading(), self.columns, self.warnings)
         rows = [
             (name, cell(getattr(self, name)), f"[{unit}]", meaning)
             for name, (unit, meaning) in NUMBERS.items()
         ]
-        return html_of_rows(self._heading(), rows)
+        return html_of_rows(self._heading(), rows, self.warnings)
 
 
 def motion(
@@ -281,7 +299,8 @@ def motion(
     contact : str
         "spring", or "ball" under a constant normal force.
     tolerance : float
-        Of the mean force over mu0 Fz, 1e-9 to 1e-2.
+        Of the mean force over mu0 Fz, 1e-9 to 1e-2.  A motion that needs more than 50 million
+        steps, some seconds, gives up; ``warnings`` says so.
     threads : int, optional
         Threads for arrays; all processors if left out.
 
@@ -435,11 +454,15 @@ def _steady(scenes: Scenes, legal: Bools, threads: int) -> Array:
     cases = np.ascontiguousarray(scenes.dimensionless[legal])
     out = np.empty((cases.shape[0], 7))
     ball = scenes.contact == "ball"
-    step = _AT_ONCE[ball]
+    step, stop = _AT_ONCE[ball], current()
 
     def work(start: int) -> None:
         part = slice(start, start + step)
-        _KERNEL.motions(int(ball), scenes.orders, cases[part], scenes.tolerance, out[part])
+        stop.look()
+        _KERNEL.motions(
+            int(ball), scenes.orders, cases[part], scenes.tolerance, out[part], stop.flag
+        )
+        stop.look()  # what it reached by then is no answer
 
     starts = range(0, cases.shape[0], step)
     if threads == 1 or len(starts) < 2:

@@ -69,7 +69,7 @@ def run(words: Sequence[str]) -> str:
         tolerance=options.tolerance,
     )
     if options.json:
-        lines = as_json(motion.columns)
+        lines = as_json(motion.columns | ({"warnings": motion.warnings} if motion.warnings else {}))
     else:
         rows = [
             (name, *_shown(name, getattr(motion, name), unit, motion, options.digits), meaning)
@@ -77,7 +77,7 @@ def run(words: Sequence[str]) -> str:
             if name != "error_estimate"
         ]
         error = f"numerical error of both about {motion.error_estimate:.1e}"
-        lines = f"{in_columns(rows)}\n{error}"
+        lines = "\n".join([in_columns(rows), error, *(f"warning: {x}" for x in motion.warnings)])
     if options.out is None:
         return lines
     columns = {}

@@ -16,7 +16,10 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array, Codes
 
-MOST_STEPS = 200_000  # steps of a period of a motion, at most
+ROOM = 200_000  # steps of a period of a motion, at most
+# steps that the search for the steady cycle of a motion tries, at most: 2 to 6 s; a step counts as
+# often as the motion has harmonics and once more
+MOST_STEPS = 50_000_000
 
 _HERE = Path(__file__).resolve().parent.parent
 _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
@@ -52,6 +55,7 @@ def _why_unopened(error: Exception) -> str:
 _FFI, _LIBRARY = _opened()
 _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "mumacro_case *"))
 _POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
+_FLAG = _FFI.typeof("int32_t[]")
 _COLUMNS = _FFI.typeof("mumacro_columns *")
 _NOTHING: Any = _FFI.NULL
 _new, _from_buffer = _FFI.new, _FFI.from_buffer
@@ -391,9 +395,12 @@ class Kernel:
         cases: Array,
         tolerance: float,
         out: Array,
+        stop: Any,
+        most: int = MOST_STEPS,
     ) -> None:
         """Steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms), see
-        ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force."""
+        ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force.  A flag
+        ``stop`` that another thread sets ends it."""
         counts, all_orders = _harmonics(orders)
         self._functions.motions(
             contact,
@@ -402,8 +409,10 @@ class Kernel:
             all_orders,
             _numbers(cases),
             tolerance,
-            MOST_STEPS,
-            _numbers(np.empty(2 * MOST_STEPS)),
+            ROOM,
+            _numbers(np.empty(2 * ROOM)),
+            most,
+            _from_buffer(_FLAG, stop),
             _numbers(out),
         )
 
@@ -415,6 +424,7 @@ class Kernel:
         weights: Array,
         tolerance: float,
         n: int,
+        stop: Any,
     ) -> Array:
         """Forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
         forces, (counts, all_orders) = np.empty((n + 1, 2)), _harmonics(orders)
@@ -425,8 +435,10 @@ class Kernel:
             shares.size,
             *map(_numbers, (shares, weights)),
             tolerance,
+            ROOM,
+            _numbers(np.empty(2 * ROOM)),
             MOST_STEPS,
-            _numbers(np.empty(2 * MOST_STEPS)),
+            _from_buffer(_FLAG, stop),
             n,
             _numbers(forces),
         )

@@ -89,14 +89,18 @@ typedef struct {
      * amplitude and phase of each.  A row of out: mean forces along and across, share of stick,
      * path of the foot per period, work of the shaker per period, decay of a disturbance per period
      * as a logarithm, estimate of the error of the mean force.  work: 2 room numbers for room
-     * steps */
+     * steps.  A motion tries so many steps at most, each counted as often as it has harmonics and
+     * once more; then it gives up with the mean force that it has reached and its estimate, and
+     * so it does as soon as stop is not 0 */
     void (*motions)(int contact, int64_t n, const int32_t *counts, const double *orders,
-                    const double *cases, double tolerance, int64_t room, double *work, double *out);
+                    const double *cases, double tolerance, int64_t room, double *work,
+                    int64_t most, const int32_t *stop, double *out);
     /* one cycle of a case, summed over springs by weight, each with its share of the limit: forces
      * (n + 1, 2) at equal times of the period */
     void (*motion_cycle)(const int32_t *counts, const double *orders, const double *one,
                          int springs, const double *shares, const double *weights, double tolerance,
-                         int64_t room, double *work, int64_t n, double *forces);
+                         int64_t room, double *work, int64_t most, const int32_t *stop, int64_t n,
+                         double *forces);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this

@@ -376,13 +376,19 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
                 worst = i;
             }
         }
-        if (error <= mu_max(half, tolerance - of_springs) || n == MU_MOTION_PANELS) break;
+        if (error <= mu_max(half, tolerance - of_springs) || n == MU_MOTION_PANELS ||
+            steps->left < 0)
+            break;
         {
             const mu_panel whole = panels[worst];
             int kink;
             const double middle = mu_division(&ball, &whole, half, &kink);
             panels[worst] = mu_ball_panel(&ball, whole.low, middle, whole.kinks[0], kink, half);
             panels[n] = mu_ball_panel(&ball, middle, whole.high, kink, whole.kinks[1], half);
+            if (steps->left < 0) { /* what was reached */
+                panels[worst] = whole;
+                break;
+            }
         }
     }
     for (int i = 0; i < n; ++i) {
@@ -399,13 +405,15 @@ static mu_steady mu_ball_motion(const mu_shaken *m, double tolerance, mu_grid *g
 /* Steady cycles of n motions, see library.h. */
 static void mu_motions(int contact, int64_t n, const int32_t *counts, const double *orders,
                        const double *cases, double tolerance, int64_t room, double *work,
-                       double *out) {
-    mu_grid grid = {work, 0, room}, steps = {work + room, 0, room};
+                       int64_t most, const int32_t *stop, double *out) {
+    mu_grid grid = {work, 0, room, 0, stop}, steps = {work + room, 0, room, 0, stop};
     const int64_t numbers = 1 + 2 * ((int64_t)counts[0] + counts[1] + counts[2]);
     for (int64_t i = 0; i < n; ++i, cases += numbers, out += MU_MEANS + 2) {
         const mu_shaken m = mu_shaken_as(counts, orders, cases);
         double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
-        const mu_steady cycle =
+        mu_steady cycle;
+        steps.left = most;
+        cycle =
             contact == MU_BALL
                 ? mu_ball_motion(&m, tolerance, &grid, &steps)
                 : mu_spring_motion(&m, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
@@ -418,9 +426,9 @@ static void mu_motions(int contact, int64_t n, const int32_t *counts, const doub
 /* One cycle of springs with shares of the limit and weights at n + 1 equal times, see library.h. */
 static void mu_motion_cycle(const int32_t *counts, const double *orders, const double *one,
                             int springs, const double *shares, const double *weights,
-                            double tolerance, int64_t room, double *work, int64_t n,
-                            double *forces) {
-    mu_grid grid = {work, 0, room}, steps = {work + room, 0, room};
+                            double tolerance, int64_t room, double *work, int64_t most,
+                            const int32_t *stop, int64_t n, double *forces) {
+    mu_grid grid = {work, 0, room, 0, stop}, steps = {work + room, 0, room, 0, stop};
     const mu_shaken m = mu_shaken_as(counts, orders, one);
     double f[2] = {m.drag > 0.0 ? 1.0 : 0.0, 0.0};
     for (int64_t i = 0; i < 2 * (n + 1); ++i) forces[i] = 0.0;
@@ -430,7 +438,9 @@ static void mu_motion_cycle(const int32_t *counts, const double *orders, const d
         mu_march march;
         march.step = 0.0;
         march.steps = &steps;
+        steps.left = most;
         (void)mu_spring_motion(&spring, tolerance, MU_MOTION_LEVELS, &grid, &steps, f);
+        steps.left = most;
         mu_take_period(&spring, &grid, f, tolerance, &march, &drawing);
     }
 }

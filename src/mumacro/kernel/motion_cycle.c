@@ -107,10 +107,13 @@ enum {
 #define MU_MOTION_NEAR 2.0 /* drags: a cycle of this one leads to that of the drag itself */
 enum { MU_MEAN_X, MU_MEAN_Y, MU_MEAN_STUCK, MU_MEAN_PATH, MU_MEAN_WORK, MU_MEANS };
 
-/* Times at which steps end at the latest, up to 2 pi, and room for more of them. */
+/* Times at which steps end at the latest, up to 2 pi, and room for more of them.  Of the steps that
+ * are taken: how many more a motion may try, each of which counts as often as it has harmonics and
+ * once more, and where another thread asks it to stop. */
 typedef struct {
     double *nodes;
-    int64_t n, room;
+    int64_t n, room, left;
+    const volatile int32_t *stop;
 } mu_grid;
 
 /* Where a period is, and what it has summed so far. */
@@ -318,6 +321,8 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
     static const mu_march none;
     const double step = march->step;
     mu_grid *steps = march->steps;
+    const int64_t cost =
+        1 + (m->highest ? m->highest : m->counts[0] + m->counts[1] + m->counts[2]);
     int64_t count = 0;
     int fresh, ends = 1;
     *march = none;
@@ -349,7 +354,7 @@ static void mu_take_period(const mu_shaken *m, const mu_grid *grid, const double
             if (march->at.tau > before && steps->n < steps->room)
                 steps->nodes[steps->n++] = march->at.tau;
             if (steps->n == steps->room || ++count > MU_MOTION_TRIALS * steps->room ||
-                !(march->step > MU_STEP_NONE))
+                (steps->left -= cost) < 0 || *steps->stop || !(march->step > MU_STEP_NONE))
                 march->failed = 1;
         }
     }
@@ -743,6 +748,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
             of_step *= MU_STEP_HALVED;
             out = mu_cycle_near(m, grid, steps, of_step, goal, near, f);
         }
+        if (level > 0 && steps->left < 0) return last; /* what was reached */
         out.level = level;
         out.error = MU_MOTION_UNKNOWN * limit;
         if (level > 0)

@@ -14,6 +14,7 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
+from mumacro.stopping import current
 
 SLICE = 16_384  # points of a slice, whose arrays stay in the second-level cache
 ONE_THREAD = 65_536  # points that one thread evaluates before a second one has started
@@ -63,20 +64,26 @@ def default_threads() -> int:
 def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: int = 1) -> None:
     """Call ``work`` with every slice of n points, which cost about ``cost`` times as much as those
     of one spring; on :func:`default_threads` where ``threads`` is None."""
-    length = SLICE // cost
+    length, stop = SLICE // cost, current()
+    stop.look()
     if n <= length:
         work(slice(0, n))
         return
+
+    def work_or_stop(part: slice) -> None:
+        stop.look()
+        work(part)
+
     parts = [slice(low, min(low + length, n)) for low in range(0, n, length)]
     workers = 1 if n < ONE_THREAD // cost else threads or default_threads()
     if workers == 1:
         for part in parts:
-            work(part)
+            work_or_stop(part)
         return
     from concurrent.futures import ThreadPoolExecutor  # one case starts sooner without
 
     with ThreadPoolExecutor(min(workers, len(parts)), thread_name_prefix="mumacro") as pool:
-        for _ in pool.map(work, parts):
+        for _ in pool.map(work_or_stop, parts):
             pass
 
 

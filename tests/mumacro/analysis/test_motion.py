@@ -3,15 +3,18 @@ estimate; refusals."""
 
 import json
 import math
+import threading
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mumacro import Element, InputError, Motion, Surrogate, motion, settling
+from mumacro import Element, InputError, Motion, Surrogate, motion, settling, solve_motion
 from mumacro.analysis.motion import SLOWEST
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
+from mumacro.kernel.binding import Kernel
+from mumacro.stopping import Stop, StopError
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close
 from tests.support.refusals import refused
@@ -735,3 +738,48 @@ def test_the_picture_has_forces_and_path() -> None:
     assert len(forces.lines) == 5
     assert path.lines[0].get_xdata()[0] == close(2.0, abs=1e-9)
     assert "mumacro motion" in EXAMPLE
+
+
+# --- a computation that ends ----------------------------------------------------------------------
+
+RIG = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+def test_a_motion_beyond_its_steps_gives_up_with_what_it_has_reached(
+    monkeypatch: pytest.MonkeyPatch, contact: str
+) -> None:
+    case = {**RIG, "contact": contact, "x": (1e-6, 90.0), "y": 2e-6}
+    right = motion(**case)
+    assert right.warnings == []
+    assert "warnings" not in right.to_dict()
+    of_kernel = Kernel.motions
+    estimates = []
+    for most in (0, 100, 10_000, 100_000, 1_000_000):
+        monkeypatch.setattr(Kernel, "motions", lambda *a, most=most: of_kernel(*a, most=most))
+        answer = motion(**case)
+        estimates.append(answer.error_estimate)
+        assert abs(answer.mu_macro - right.mu_macro) <= estimates[-1] + right.error_estimate
+        gave_up = estimates[-1] > 1e-6 * case["mu0"]
+        assert [("gave up" in text) for text in answer.to_dict().get("warnings", [])] == (
+            [True] if gave_up else []
+        )
+        assert ("gave up" in repr(answer)) == ("gave up" in answer._repr_html_()) == gave_up
+    assert estimates[0] > 1e-6 * case["mu0"] >= estimates[-1]
+
+
+def test_a_motion_ends_when_another_thread_asks_for_it() -> None:
+    """Each of these would take minutes."""
+    slow = {**RIG, "contact": "ball", "y": [(20, 3e-6, 0.0)], "tolerance": 1e-9}
+    right, stop = motion(**RIG, x=1e-6), Stop()
+    threading.Timer(0.1, stop.set).start()
+    with stop.of_this_thread():
+        with pytest.raises(StopError):
+            motion(**slow, x=np.geomspace(1e-7, 1e-5, 10_000), threads=1)
+        with pytest.raises(StopError):
+            motion(**slow, x=np.geomspace(1e-7, 1e-5, 10_000), threads=2)
+        with pytest.raises(StopError):
+            solve_motion("k", [0.01], **{name: x for name, x in slow.items() if name != "k"})
+        with pytest.raises(StopError):
+            right.cycle()
+    assert motion(**RIG, x=1e-6).warnings == []

@@ -1,0 +1,53 @@
+"""A computation that another thread ends: every question of the library looks at the flag."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mumacro
+from mumacro.kernel.threads import share_out
+from mumacro.stopping import Stop, StopError
+from tests.support.cases import CASE, opened
+
+SWEPT = {name: x for name, x in CASE.items() if name != "v0"}
+V0 = np.geomspace(1e-3, 0.3, 20)
+TABLE = opened(1e-12)
+POINTS = {**SWEPT, "v0": V0, "mu_macro": TABLE.evaluate(**SWEPT, v0=V0).mu_macro}
+QUESTIONS: dict[str, Callable[[], Any]] = {
+    "array": lambda: TABLE.evaluate(**SWEPT, v0=V0),
+    "outputs": lambda: TABLE.evaluate(**SWEPT, v0=V0, include=("power", "settling", "gradient")),
+    "law": lambda: mumacro.law(TABLE, "v0", start=1e-3, stop=1.0, **SWEPT),
+    "solve_for": lambda: mumacro.solve_for(TABLE, "v0", [0.1, 0.2], **SWEPT),
+    "fit": lambda: mumacro.fit({n: x for n, x in POINTS.items() if n not in ("k", "mu0")}),
+    "map": lambda: TABLE.mu_ratio(V0, V0),
+    "motion": lambda: mumacro.motion(mu0=0.3, Fz=10.0, k=1e6, f=2e4, v0=0.01, x=1e-6),
+    "solve_motion": lambda: mumacro.solve_motion("v0", 0.1, mu0=0.3, Fz=10.0, k=1e6, f=2e4, x=1e-6),
+}
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_every_question_ends_once_the_flag_is_set(name: str) -> None:
+    stop = Stop()
+    with stop.of_this_thread():
+        QUESTIONS[name]()
+        stop.set()
+        with pytest.raises(StopError):
+            QUESTIONS[name]()
+    QUESTIONS[name]()
+
+
+def test_an_array_ends_between_its_pieces() -> None:
+    for threads in (1, 2):
+        stop, pieces = Stop(), list[slice]()
+
+        def work(part: slice, stop: Stop = stop, pieces: list[slice] = pieces) -> None:
+            pieces.append(part)
+            stop.set()
+            time.sleep(0.01)
+
+        with stop.of_this_thread(), pytest.raises(StopError):
+            share_out(10_000_000, threads, work)
+        assert 1 <= len(pieces) <= threads + 1
