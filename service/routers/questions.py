@@ -55,8 +55,9 @@ def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict
         stiffness_exponent=question.stiffness_exponent,
         **question.kind.names,
         **case,
+        **question.deviations,
     )
-    answer = _answer_at(question, table, along, law.values, law.stiffening)
+    answer = table.surrogate.answer(law.cases, chosen(question.outputs, law.cases))
     columns = {path: listed(path, answer[path]) for path in answer.paths}
     columns["mu_static"] = law.mu_static.tolist()
     if law.stiffening is not None:

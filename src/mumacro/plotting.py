@@ -297,6 +297,7 @@ def plot_law(
     ax: Any = None,
     *,
     band: tuple[Array, Array] | None = None,
+    band_of: str = "k",
     borders: Iterable[tuple[float, str]] = (),
     roots: Iterable[float] = (),
     target: float | None = None,
@@ -304,16 +305,16 @@ def plot_law(
 ) -> Any:
     """mu_macro (n,) over values ``x`` (n,) of the input ``along``, with its static limit (n,).
 
-    ``band`` are the least and the most mu_macro over an interval of k, (n,) each; ``borders``
-    places on ``x`` with their names, such as "border of continuous sliding"; ``roots`` values of
-    the input to mark, and ``target`` the mu_macro [-] that they give; ``title`` the other inputs.
+    ``band`` are the least and the most mu_macro over an interval of k, (n,) each, or with
+    ``band_of`` "std" one standard deviation below and above; ``borders`` places on ``x`` with their
+    names, such as "border of continuous sliding"; ``roots`` values of the input to mark, and
+    ``target`` the mu_macro [-] that they give; ``title`` the other inputs.
     """
     ax, ink = axes_for(ax), _ink()
     ax.plot(x, mu_macro, color="C0", label=r"$\mu_\mathrm{macro}$")
     if band:
-        ax.fill_between(
-            x, *band, color="C0", alpha=0.2, lw=0.0, label="for every $k$ of the interval"
-        )
+        words = {"k": "for every $k$ of the interval", "std": "one standard deviation"}[band_of]
+        ax.fill_between(x, *band, color="C0", alpha=0.2, lw=0.0, label=words)
     ax.plot(x, mu_static, ":", color=ink, alpha=0.7, label=r"static limit, $v_0 \to 0$")
     legend_names = set[str]()
     for value, name in borders:

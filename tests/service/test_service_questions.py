@@ -128,6 +128,8 @@ def test_a_solution_is_the_librarys(client: Any, surrogate: Surrogate, case: Any
         {},
         {"f": 2e4, "omega": ...},
         {"along": "Fz", "v0": 0.01, "start": 1.0, "stop": 20.0, "contact": "ball"},
+        {"k": "0.8..1.2 N/um"},
+        {"k": "1 ± 0.1 N/um", "mu0": "0.3 ± 0.02"},
     ],
 )
 def test_a_law_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> None:

@@ -48,10 +48,13 @@ class InputCurve:
     ) -> Answer[Any]:
         """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``others`` replace
         inputs of the case.  InputError for a value out of bounds where ``strict``, else NaN."""
-        k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
-        inputs = {**self.case, **k, self.unknown: x, **others}
-        cases = Cases.of(inputs, self.kind, strict)
+        cases = self.cases(x, strict, **others)
         return self.surrogate.answer(cases, (GRADIENT,) if gradient else (), groups)
+
+    def cases(self, x: Any, strict: bool, **others: Any) -> Cases:
+        """The cases that :meth:`answer` evaluates; ``others`` may have deviations, too."""
+        k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
+        return Cases.of({**self.case, **k, self.unknown: x, **others}, self.kind, strict)
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""

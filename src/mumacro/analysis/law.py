@@ -1,7 +1,7 @@
 """The friction law: mu_macro over a range of v0, or of any one input, with its marks."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,12 +13,13 @@ from mumacro.analysis.input_curve import InputCurve
 from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
-from mumacro.inputs.cases import fixed_inputs, without_interval
+from mumacro.inputs.cases import DEVIATIONS, Cases, fixed_inputs, named, without_interval
 from mumacro.inputs.fields import NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
+from mumacro.outputs.evaluation import chosen
 from mumacro.shown import frame_of, html_of, members_of, text_of
 from mumacro.surrogate import Surrogate
 
@@ -31,8 +32,10 @@ class Law:
 
     along: str  #: the swept input, as it was named: omega [rad/s] or f [Hz]
     values: Array  #: its values [SI], ascending, shape (n,)
-    #: the results, arrays (n,); of an interval of k those at its geometric middle, and the band
+    #: the results, arrays (n,); of an interval of k those at its geometric middle, and the band; of
+    #: inputs with a deviation that of mu_macro, too
     answer: Answer[Any]
+    cases: Cases  #: what they are the results of: the inputs at each value, with what is uncertain
     #: static limit (v0 -> 0) of each case [-], of one spring across eq. (38), shape (n,)
     mu_static: Array
     #: where in the range continuous sliding, or along reverse slip, begins or ends
@@ -53,16 +56,27 @@ class Law:
 
     @property
     def band(self) -> tuple[Array, Array] | None:
-        """Smallest and largest mu_macro over an interval of k [-], (n,) each; None where k is one
-        number."""
+        """Smallest and largest mu_macro over an interval of k [-], or mu_macro less and plus its
+        standard deviation, (n,) each; None where no input is uncertain."""
         low, high = (getattr(self.answer, name, None) for name in BAND)
-        return None if low is None or high is None else (low, high)
+        if low is not None and high is not None:
+            return low, high
+        if self.std is None:
+            return None
+        return self.answer.mu_macro - self.std, self.answer.mu_macro + self.std
+
+    @property
+    def std(self) -> Array | None:
+        """Standard deviation of mu_macro at each value [-], (n,); None where no input has one."""
+        outputs = self.answer.outputs
+        return np.asarray(outputs["std"]) if "std" in outputs else None
 
     @property
     def columns(self) -> dict[str, Any]:
         """The law as a table: column -> values (n,), the swept input first."""
-        names = ["mu_macro", *(BAND if self.band else ()), "regime", "error_bound", "source"]
-        answer_columns = {name: getattr(self.answer, name) for name in names}
+        uncertain = ("std",) if self.std is not None else BAND if self.band else ()
+        names = ["mu_macro", *uncertain, "regime", "error_bound", "source"]
+        answer_columns = {name: self.answer[name] for name in names}
         k = {} if self.stiffening is None else {"k": self.inputs["k"]}
         return {self.along: self.values, **k, **answer_columns, "mu_static": self.mu_static}
 
@@ -106,6 +120,7 @@ class Law:
             self.mu_static,
             ax,
             band=self.band,
+            band_of="k" if self.std is None else "std",
             borders=[(crossing.value, crossing.name) for crossing in self.border],
             roots=roots,
             target=target,
@@ -159,6 +174,26 @@ def _ascending(along: str, values: Any) -> Array:
     return x
 
 
+def _apart(case: Mapping[str, Any], swept: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The exact inputs of a case, and the deviations of those that have one, std_k and so on."""
+    inputs = named(None, {name: x for name, x in case.items() if x is not None or name == "k"})
+    deviations = {name: inputs.pop(name) for name in DEVIATIONS if name in inputs}
+    for name in inputs.keys() & QUANTITY_OF.keys():
+        if inputs[name] is None:
+            continue
+        one = read(name, inputs[name])
+        if one.std is None:
+            continue
+        if f"std_{name}" in deviations:
+            raise InputError(f"std_{name}", deviations[f"std_{name}"], "given once")
+        inputs[name], deviations[f"std_{name}"] = one.si, one.std
+    for name in deviations:
+        if field_of(DEVIATIONS[name])[0] == swept:
+            bound = "left out: a sweep is over exact values"
+            raise InputError(name, deviations[name], bound)
+    return inputs, deviations
+
+
 def law(
     surrogate: Surrogate,
     along: str = "v0",
@@ -200,12 +235,14 @@ def law(
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: the law has a band, see
-        :attr:`mumacro.analysis.law.Law.band`.
+        :attr:`mumacro.analysis.law.Law.band`.  So it has where inputs have a standard deviation:
+        "1 ± 0.1 N/um", or ``std_k`` and so on; where k grows with Fz, its deviation grows alike.
 
     Raises
     ------
     InputError
-        An input that is missing, out of bounds, or given twice; an interval of k where k is swept;
+        An input that is missing, out of bounds, or given twice; an interval of k where k is swept,
+        a deviation of the swept input;
         a range out of bounds; an exponent without the load at which k holds, or along another input
         than Fz.
 
@@ -228,6 +265,7 @@ def law(
         raise InputError("values", "an array", "left out beside start and stop")
     name, per = field_of(along)
     kind, x = kind_of(contact, direction), per * axis
+    case, deviations = _apart(case, name)
     middle_case, ends = without_interval(case, name)
     middle_case, stiffening = stiffening_of(middle_case, name, kind, stiffness_exponent)
     inputs = fixed_inputs(middle_case, along, kind)
@@ -239,13 +277,19 @@ def law(
     if refine:
         x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
         axis = x / per
-    answer = curve.answer(x, groups=True, strict=True)
+    whole = curve
     if ends:
         interval = {**{name: value for name, value in inputs.items() if name != "k"}, **ends}
-        band_curve = InputCurve(surrogate, interval, name, kind, stiffening)
-        answer = band_curve.answer(x, groups=True, strict=True)
+        whole = InputCurve(surrogate, interval, name, kind, stiffening)
+    if stiffening is not None and "std_k" in deviations:  # it grows as k does
+        relative = read_one("std_k", deviations["std_k"]) / inputs["k"]
+        deviations["std_k"] = stiffening.stiffness(inputs["k"], x) * relative
+    cases = whole.cases(x, True, **deviations)
+    answer = surrogate.answer(cases, chosen((), cases), groups=True)
     at_rest = curve.answer(x, v0=0.0) if name != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
     k_range = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
     marks = tuple(replace(crossing, value=crossing.value / per) for crossing in border)
-    return Law(along, axis, answer, mu_static, marks, inputs, kind, curve.stiffening, k_range)
+    return Law(
+        along, axis, answer, cases, mu_static, marks, inputs, kind, curve.stiffening, k_range
+    )

@@ -52,7 +52,7 @@ def run(words: Sequence[str]) -> str:
     (along, *ends), kind = options.along, common.kind_in(options)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
-    case = read_case(options.words, kind, **common.without_or_load(along))
+    case = read_case(options.words, kind, deviations=True, **common.without_or_load(along))
     start, stop = common.read_values(((along, end) for end in ends), read_one)
     is_picture = options.out is not None and options.out.suffix != ".csv"
     surrogate = open_table(options.table)
@@ -84,7 +84,7 @@ def run(words: Sequence[str]) -> str:
     count = common.count_for(options, surrogate, {**case, along: middle}, kind)
     units = common.units_in(options.words, **{along: ends})
     unit = Unit.of(along, middle, units, options.digits)
-    of_k = ", for the geometric middle of k" if law.band else ""
+    of_k = ", for the geometric middle of k" if law.k_range else ""
     notes = [
         f"{c.name} at {along} = {unit.shown(c.value, count, options.digits)} {unit.name}{of_k}"
         for c in law.border

@@ -196,6 +196,9 @@ def test_the_articles_formulas_are_refused_for_another_contact(
         ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range"),
         ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high"),
         ("v0", {**LINE, "step": 9}, "across", "step"),
+        ("v0", {**LINE, "std_v0": 1e-3}, "across", "std_v0"),
+        ("f", {**without(CASE, "omega"), "std_omega": 1.0}, "across", "std_omega"),
+        ("v0", {**LINE, "k": "1 ± 0.1 N/um", "std_k": 1.0}, "across", "std_k"),
         ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude"),
         (
             "k",
@@ -216,6 +219,32 @@ def test_a_bad_interval_is_named(
 ) -> None:
     with refused(place):
         friction_law(surrogate, along, values=[1.0, 10.0], **case, direction=direction)
+
+
+@pytest.mark.parametrize(
+    "uncertain",
+    [{"k": "1 ± 0.1 N/um"}, {"k": 1e6, "std_k": 1e5}, {"k": 1e6, "mu0": "0.3 ± 0.02"}],
+)
+def test_a_deviation_is_that_of_each_case(surrogate: Surrogate, uncertain: Any) -> None:
+    case = {**without(LINE, "k"), **uncertain}
+    law = friction_law(surrogate, values=SPEEDS, **case)
+    each = surrogate.evaluate(**case, v0=law.values)
+    assert law.std == close(each["std"], rel=1e-12)
+    assert law.band is not None
+    assert law.band[1] - law.band[0] == close(2.0 * each["std"], rel=1e-9)
+    exact = friction_law(surrogate, values=SPEEDS, **{**LINE, "k": 1e6, "mu0": 0.3})
+    assert law.answer.mu_macro.tolist() == exact.answer.mu_macro.tolist()
+    assert exact.std is exact.band is None
+    assert law.to_dict()["std"] == law.columns["std"].tolist()
+
+
+def test_the_deviation_of_k_grows_with_k(surrogate: Surrogate) -> None:
+    case = {**without(LINE, "k", "Fz"), "v0": 0.01, "contact": "ball"}
+    loads = [1.0, 10.0, 1e3]
+    law = friction_law(surrogate, "Fz", values=loads, Fz=10.0, k="1 ± 0.1 N/um", **case)
+    k = law.columns["k"]
+    each = surrogate.evaluate(**case, Fz=law.values, k=k, std_k=0.1 * k)
+    assert law.std == close(each["std"], rel=1e-9)
 
 
 @every_pair
