@@ -18,6 +18,7 @@ if _TYPE_CHECKING:
     from mumacro import closed_forms, plotting, stiffness, validity
     from mumacro.analysis.fit import fit
     from mumacro.analysis.fitted import Fit
+    from mumacro.analysis.harmonics import Harmonics, harmonics
     from mumacro.analysis.law import law
     from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.settling import settling
@@ -38,6 +39,8 @@ _PLACES = {
     "validity": "validity",
     "Fit": "analysis.fitted",
     "fit": "analysis.fit",
+    "Harmonics": "analysis.harmonics",
+    "harmonics": "analysis.harmonics",
     "law": "analysis.law",
     "Motion": "analysis.motion",
     "motion": "analysis.motion",
@@ -59,6 +62,7 @@ __all__ = [
     "Answer",
     "Element",
     "Fit",
+    "Harmonics",
     "InputError",
     "Motion",
     "MotionSolution",
@@ -68,6 +72,7 @@ __all__ = [
     "__version__",
     "closed_forms",
     "fit",
+    "harmonics",
     "law",
     "motion",
     "open",

@@ -1,0 +1,170 @@
+"""Samples of an oscillation, such as those of a sensor, as the harmonics that a motion is made
+of."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mumacro.errors import InputError
+from mumacro.inputs.cases import real
+from mumacro.inputs.oscillation import MOST_HARMONIC
+from mumacro.inputs.reading import carries_unit, read
+from mumacro.inputs.signature import Numbers
+from mumacro.kernel.arrays import Array
+from mumacro.shown import frame_of, html_of, members_of, text_of
+
+# shares of the largest sample: what rounding alone leaves of a term, and between equal samples
+_NOTHING, _SAME = 8.0 * 2.0**-52, 1e-9
+# A symmetric oscillation may begin and end with the same value and repeat nothing: then it leaves
+# out this much less than without its last sample.
+_CLEARLY = 1e-3
+_REPEATED = "the last sample repeats the first, which begins the next period: it is left out"
+
+
+@dataclass(frozen=True, repr=False)
+class Harmonics:
+    """The harmonics of an oscillation, in the unit of its samples."""
+
+    #: (harmonic, amplitude, phase in degrees): amplitude sin(harmonic omega t + phase), with t = 0
+    #: at the first sample; without those that are 0
+    terms: tuple[tuple[int, float, float], ...]
+    mean: float  #: of the samples
+    rms: float  #: of what the mean and the terms leave out
+    notes: tuple[str, ...]  #: what was done to the samples
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The terms as columns: harmonic, amplitude, phase."""
+        numbers, amplitudes, phases = zip(*self.terms, strict=True) if self.terms else ((), (), ())
+        return {
+            "harmonic": np.array(numbers, np.int64),
+            "amplitude": np.array(amplitudes),
+            "phase": np.array(phases),
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members as JSON has them; each term is a dict, as HTTP takes it."""
+        names = ("harmonic", "amplitude", "phase")
+        terms = [dict(zip(names, term, strict=True)) for term in self.terms]
+        return members_of(
+            {"terms": terms, "mean": self.mean, "rms": self.rms, "notes": [*self.notes]}
+        )
+
+    def to_frame(self) -> Any:
+        """The terms as a DataFrame of pandas, one row a harmonic."""
+        return frame_of(self.columns)
+
+    def _heading(self) -> str:
+        return f"<Harmonics: {len(self.terms)}, mean {self.mean:.6g}, rms left out {self.rms:.3g}>"
+
+    def __repr__(self) -> str:
+        return text_of(self._heading(), self.columns if self.terms else {}, self.notes)
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        return html_of(self._heading(), self.columns, self.notes)
+
+
+def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
+    """The harmonics of a sampled oscillation, as :func:`mumacro.motion` takes them.
+
+    Parameters
+    ----------
+    samples : array_like
+        Values at equal steps of time over whole periods, shape (n,): of x or y [m], or of the
+        normal force [N], whose mean is Fz.  A last sample that repeats the first is left out, with
+        a note.
+    periods : int
+        How many periods they are.
+    most : int
+        The largest harmonic, less than half of the samples of a period.
+
+    Returns
+    -------
+    Harmonics
+        ``terms`` for ``motion``, ``mean``, and ``rms``, the root mean square of what both leave
+        out: harmonics above ``most``, noise, and what differs from period to period.
+
+    Raises
+    ------
+    InputError
+        A sample that is no finite number; too few samples for the harmonics.
+
+    Examples
+    --------
+    A triangle of 2 um along the drag, from 200 samples:
+
+    >>> from mumacro import motion
+    >>> tau = 2 * np.pi * np.arange(200) / 200
+    >>> wanted = harmonics(2e-6 * np.arcsin(np.sin(tau)) / (np.pi / 2), most=5)
+    >>> [(order, f"{size:.3g}", round(phase) % 360) for order, size, phase in wanted.terms]
+    [(1, '1.62e-06', 0), (3, '1.8e-07', 180), (5, '6.5e-08', 0)]
+    >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, f=20e3, v0=0.02)
+    >>> f"{motion(**case, x=wanted.terms).mu_macro:.4f}, {motion(**case, x=2e-6).mu_macro:.4f}"
+    '0.1560, 0.1398'
+    """
+    values = _samples(samples)
+    for name, number, bound in (
+        ("periods", periods, "a whole number >= 1"),
+        ("most", most, f"a whole number from 1 to {MOST_HARMONIC}"),
+    ):
+        whole = isinstance(number, (int, np.integer)) and not isinstance(number, bool)
+        if not whole or number < 1 or (name == "most" and number > MOST_HARMONIC):
+            raise InputError(name, number, bound)
+    scale = float(np.abs(values).max()) or 1.0
+    scaled = values / scale
+    size, swing, notes = scaled.size, float(np.ptp(scaled)), []
+    repeats = swing > 0.0 and abs(scaled[-1] - scaled[0]) <= _SAME * swing
+    if not 2 * most * periods < size - repeats:
+        allowed = (size - repeats - 1) // (2 * periods)
+        bound = f"less than half of the samples of a period, {(size - repeats) / periods:g}"
+        remedy = f"at most {allowed} here" if allowed else "give more samples"
+        raise InputError("most", most, f"{bound}: {remedy}")
+    result = _spectrum(scaled, scale, periods, most)
+    if repeats:
+        shorter = _spectrum(scaled[:-1], scale, periods, most)
+        if not result.rms < _CLEARLY * shorter.rms:
+            result, notes = shorter, [_REPEATED]
+    return Harmonics(result.terms, result.mean, result.rms, tuple(notes))
+
+
+def _samples(samples: Any) -> Array:
+    """Finite numbers, (n,), n >= 3, in SI."""
+    values = real("samples", _in_si(samples) if carries_unit(samples) else samples)
+    if values.ndim != 1 or values.size < 3:
+        raise InputError("samples", values.shape, "a list of 3 numbers or more")
+    if not np.isfinite(values).all():
+        index = int(np.argmin(np.isfinite(values)))
+        bound = "finite: a sample that is missing cannot be left out, the steps would differ"
+        raise InputError("samples", float(values[index]), bound, index)
+    return values
+
+
+def _in_si(samples: Any) -> Any:
+    """Samples that carry a unit, of a length or of a force."""
+    try:
+        return read("samples", samples, "length").si
+    except InputError:
+        return read("samples", samples, "force").si
+
+
+def _spectrum(scaled: Array, scale: float, periods: int, most: int) -> Harmonics:
+    """The harmonics of samples in units of ``scale`` that repeat nothing."""
+    mean = float(scaled.mean())
+    spectrum = np.fft.rfft(scaled - mean) / scaled.size
+    orders = np.arange(1, most + 1)
+    lines = spectrum[orders * periods]
+    amplitudes, phases = 2.0 * np.abs(lines), np.degrees(np.angle(1j * lines))
+    spectrum[0] = 0.0
+    spectrum[orders * periods] = 0.0
+    rest = np.fft.irfft(spectrum * scaled.size, scaled.size)
+    terms = tuple(
+        (order, scale * amplitude, phase)
+        for order, amplitude, phase in zip(
+            orders.tolist(), amplitudes.tolist(), phases.tolist(), strict=True
+        )
+        if amplitude > _NOTHING
+    )
+    return Harmonics(terms, scale * mean, scale * math.sqrt(float(np.mean(rest**2))), ())
