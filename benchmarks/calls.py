@@ -193,6 +193,7 @@ def outputs(points: int, quick: bool) -> str:
             with_groups,
             partial(s.quantity, "mu_ratio", v, y),
             partial(s.quantity, "power", v, y),
+            partial(s.quantity, "stick_fraction", v, y),
         ],
     }
     parts = {name: parts[name] for name in OUTPUTS}  # none is left out

@@ -251,7 +251,7 @@ def _row_of_tilt(mu0: float, y: float) -> Row | None:
 def _rows_of_cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
     """Rows that follow from the slip path of a period, taken from one spring."""
     cases = Evaluated(surrogate.tabulated, Cases.of(six, SPRING), "groups")
-    periods, time, slip, _ = decay(cases)
+    _, periods, _, slip, _ = decay(cases)
     force = six["mu0"] * six["Fz"]
     # [m], [Hz]
     slip_path, frequency = slip * force / six["k"], six["omega"] / RAD_PER_CYCLE
@@ -261,8 +261,8 @@ def _rows_of_cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     elif periods > _PERIODS:
         text = (
-            f"creeping: a disturbance falls to 1 % within {plain(periods, 3)} periods, "
-            f"{plain(time, 3)} s"
+            f"creeping: a large disturbance falls to 1 % within {plain(periods, 3)} periods, "
+            f"{plain(periods / frequency, 3)} s"
         )
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:

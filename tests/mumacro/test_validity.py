@@ -101,7 +101,7 @@ def test_an_assumption_is_called_by_its_contact(surrogate: Surrogate, contact: s
 
 
 def test_large_numbers_in_a_sentence_have_no_power_of_ten(surrogate: Surrogate) -> None:
-    told = rows(surrogate, f=20e6)  # 20600 periods
+    told = rows(surrogate, f=20e6)  # 41200 periods
     assert re.search(r"within \d{5} periods", told["steady cycle"][0])
     assert "contact turns 3000 W" in rows(surrogate, v0=1e3)["no wear, no heating"][0]
 
@@ -110,8 +110,8 @@ def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
     text, _ = rows(surrogate, v0=1e-6)["steady cycle"]
     periods, seconds = (float(x) for x in re.findall(r"([\d.e+]+) (?:periods|s$)", text))
     assert periods == close(20e3 * seconds, rel=0.01)
-    # l0 over the way of a period, times ln 100
-    assert periods == close(math.log(100.0) * 3e-6 / (1e-6 / 20e3), rel=0.6)
+    # l0 over the way of a period, times 2 ln 100
+    assert periods == close(2.0 * math.log(100.0) * 3e-6 / (1e-6 / 20e3), rel=0.6)
     assert "largest force" in rows(surrogate, v0=0.0)["steady cycle"][0]
     assert "steady cycle" not in rows(surrogate, v0=0.1)
 

@@ -452,6 +452,14 @@ class Kernel:
         self._functions.tabulated(data.pointer, quantity, block, a.size, *map(_numbers, (a, b, q)))
         return q
 
+    def turns_in_stick(self, v: Array, y: Array, stick: Array, bound: Array) -> tuple[Array, Array]:
+        """1 - cos of the angle by which the force of one spring turns in a stick, at points (n,)
+        with their stick fraction and its bound; and what that leaves open."""
+        turn, error = np.empty(v.size), np.empty(v.size)
+        arrays = map(_numbers, (v, y, stick, bound, turn, error))
+        self._functions.turns_in_stick(v.size, *arrays)
+        return turn, error
+
     def forms(
         self, quantity: int, block: int, v: Array, y: Array, eta: Array, contact: int = 0
     ) -> tuple[Array, Array]:

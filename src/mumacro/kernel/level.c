@@ -4,6 +4,7 @@
 #include "motion_slip.c"
 #include "motion_cycle.c"
 #include "motion_ball.c"
+#include "settling.c"
 #include "library.h"
 #include "interval.c"
 
@@ -178,4 +179,5 @@ const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     mu_element_steps,
     mu_motions,
     mu_motion_cycle,
+    mu_turns_in_stick,
 };

@@ -101,6 +101,10 @@ typedef struct {
                          int springs, const double *shares, const double *weights, double tolerance,
                          int64_t room, double *work, int64_t most, const int32_t *stop, int64_t n,
                          double *forces);
+    /* 1 - cos of the angle by which the force of a spring turns in a stick, from the stick fraction
+     * and its bound, and what that leaves open; 0 for what is no point */
+    void (*turns_in_stick)(int64_t n, const double *v, const double *y, const double *stick,
+                           const double *bound, double *turn, double *error);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this

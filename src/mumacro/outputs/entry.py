@@ -26,6 +26,8 @@ class Output(NamedTuple):
     members: Mapping[str, Member]
     #: its time for one case, divided by the time of mu_macro of one spring across
     cost: float
+    #: the same of a ball, where it is not that of a spring
+    cost_of_ball: float | None = None
     gradient: bool = False  #: whether it needs the slopes of mu_macro
     #: a direction, or k_range for an interval of k, for which the output does not exist -> why
     lacks: Mapping[str, str] = {}

@@ -18,7 +18,7 @@ from mumacro.answer import (
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.doubts import Remark
-from mumacro.inputs.kind import Kind
+from mumacro.inputs.kind import BALL, Kind
 from mumacro.kernel.arrays import Bools
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
@@ -87,9 +87,10 @@ def _paths(names: tuple[str, ...], fields: tuple[str, ...]) -> tuple[str, ...]:
 def cost(outputs: Iterable[Output], cases: Cases) -> float:
     """The time of one of the cases with these outputs, about, in times of mu_macro alone for one
     spring across; of several kinds that of the slowest."""
+    ball = any(kind.contact == BALL.contact for kind in cases.kinds)
+    costs = ((ball and output.cost_of_ball) or output.cost for output in outputs)
     slowest = max(map(_cost_of, cases.kinds), default=1.0)
-    each = 1.0 + sum(output.cost for output in outputs)
-    return each * slowest * (_INTERVAL if cases.ends is not None else 1.0)
+    return (1.0 + sum(costs)) * slowest * (_INTERVAL if cases.ends is not None else 1.0)
 
 
 @cache

@@ -14,69 +14,169 @@ for every disturbance, of any size,
 
 and for small ones exp(-n S) in continuous sliding, exp(-n S) cos^(2n)(th1 - th0) in stick-slip,
 where th0 and th1 are the angles at which stick begins and ends.  S follows from the energy that
-drive and shaker put in:
+drive and shaker put in, and the angles from the duration of stick (kernel/settling.c):
 
     S = 2 pi (v~ mu~ + p),    p = <y~ cos tau u_y>, the oscillation power
 
-Both are tabulated, with bounds.  The springs of a ball are independent, and S rises along the ray
-of their v~ and y~ (60 rays from y~/v~ = 1e-4 to 1e6), so the middle one is the slowest: that of the
-smallest k, two thirds of the mean.
+mu~, p and the stick fraction are tabulated, with bounds.  The springs of a ball are independent,
+and the slowest one counts.  S rises along the ray of their v~ and y~ (60 rays from y~/v~ = 1e-4 to
+1e6), but the cosine does not fall, so the slowest one is looked for.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mumacro.inputs.kind import CONTACTS, SPRING, SPRINGS_OF
+from mumacro.kernel.arrays import Array
+from mumacro.kernel.binding import kernels
 from mumacro.outputs.entry import Member, Output, Values
-from mumacro.outputs.evaluated import Evaluated, where
+from mumacro.outputs.evaluated import Evaluated
+from mumacro.outputs.tabulated import Tabulated
+from mumacro.table.atlas import ROUNDING
 
 REMAINING = 0.01  # share of a disturbance that is left
+_KERNEL = kernels[-1]
 
 
-def decay(cases: Evaluated, remaining: float = REMAINING) -> tuple[Any, Any, Any, Any]:
-    """Periods until a small disturbance has fallen to ``remaining``, their time [s], the slip path
-    of a period over l0, and the bound of the error of the periods; for oscillation across."""
+class Decay(NamedTuple):
+    """How fast a disturbance of one spring across decays, by points (n,)."""
+
+    #: slip speed of the foot, mean over a period, in units of l0 omega; 2 pi of it are the path S
+    rate: Array
+    #: -ln of what is left of a small disturbance after a period; and its least and largest value
+    #: within the bounds of the table
+    of_small: Array
+    least: Array
+    most: Array
+
+
+def decay_of_springs(tabulated: Tabulated, v: Array, y: Array) -> Decay:
+    """The decay of springs at finite v~, y~."""
+    (ratio, off), (power, power_off), (stick, stick_off) = (
+        tabulated.values(name, v, y, SPRING)[:2] for name in ("mu_ratio", "power", "stick_fraction")
+    )
+    turn, turn_off = _KERNEL.turns_in_stick(v, y, stick, stick_off)
+    rate = v * ratio + power
+    rate_off = v * off + power_off + 2.0 * ROUNDING * rate
+    low, high = np.maximum(rate - rate_off, 0.0), rate + rate_off
+    # the cosine may pass zero between the ends
+    cosines = [_size_of_cosine(x) for x in (turn - turn_off, turn + turn_off)]
+    passes = (turn - turn_off < 1.0) & (turn + turn_off > 1.0)
+    largest, smallest = np.maximum(*cosines), np.where(passes, -np.inf, np.minimum(*cosines))
+    path = 2.0 * math.pi
+    return Decay(
+        rate,
+        path * rate - 2.0 * _size_of_cosine(turn),
+        path * low - 2.0 * largest,
+        path * high - 2.0 * smallest,
+    )
+
+
+def _size_of_cosine(turn: Array) -> Array:
+    """ln abs(cos) of an angle, from 1 - cos of it."""
+    rest = np.clip(np.where(turn < 1.0, turn, 2.0 - turn), 0.0, 1.0)
+    return np.asarray(np.log1p(-rest))
+
+
+#: springs of a ball that are tried, down to the share 1/REACH of the middle one's load, or to where
+#: y~ is REACH: FIRST, and FINER between those beside the slowest, ROUNDS times
+REACH, FIRST, FINER, ROUNDS = 8.0, 129, 17, 10
+AT_ONCE = 128  # balls
+
+
+def decay_of_balls(tabulated: Tabulated, v: Array, y: Array) -> Decay:
+    """The decay of the slowest springs of balls at finite v~, y~ of their middle springs; the rate
+    is that of the middle one."""
+    parts = [
+        _decay_of_balls(tabulated, v[start : start + AT_ONCE], y[start : start + AT_ONCE])
+        for start in range(0, max(v.size, 1), AT_ONCE)
+    ]
+    return Decay(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _decay_of_balls(tabulated: Tabulated, v: Array, y: Array) -> Decay:
+    stop = np.log(np.maximum(REACH / np.maximum(y, 1e-300), REACH))
+    springs, shares, slowest = _along_rays(tabulated, v, y, np.zeros(v.size), stop, FIRST)
+    found = Decay(*(x[:, 0] for x in springs))  # of the middle ones
+    inner = np.flatnonzero(slowest > 0)
+    if not inner.size:
+        return found
+    v, y, shares, slowest = v[inner], y[inner], shares[inner], slowest[inner]
+    each = np.arange(inner.size)
+    for _ in range(ROUNDS):
+        ends = (np.clip(slowest + side, 0, shares.shape[1] - 1) for side in (-1, 1))
+        low, high = (shares[each, end] for end in ends)
+        springs, shares, slowest = _along_rays(tabulated, v, y, low, high, FINER)
+    small, least, most = (x[each, slowest] for x in springs[1:])
+    # a decay that bends upwards is nowhere lower by more than it rises to the next springs
+    ends = (np.clip(slowest + side, 0, FINER - 1) for side in (-1, 1))
+    rise = np.maximum(*(springs.of_small[each, end] for end in ends)) - small
+    for column, value in zip(found[1:], (small, np.maximum(least - rise, 0.0), most), strict=True):
+        column[inner] = value
+    return found
+
+
+def _along_rays(
+    tabulated: Tabulated, v: Array, y: Array, low: Array, high: Array, count: int
+) -> tuple[Decay, Array, NDArray[np.intp]]:
+    """The decay of springs at ``count`` places along the ray of each ball, from ``low`` to ``high``
+    as logarithms of v~ and y~ over those of the middle spring; these places, and which spring is
+    the slowest."""
+    places = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, count)
+    with np.errstate(over="ignore"):
+        ray = [np.minimum((x[:, None] * np.exp(places)).ravel(), 1e300) for x in (v, y)]
+    springs = Decay(*(x.reshape(places.shape) for x in decay_of_springs(tabulated, *ray)))
+    return springs, places, np.argmin(springs.of_small, axis=1)
+
+
+def decay(cases: Evaluated, remaining: float = REMAINING) -> tuple[Any, Any, Any, Any, Any]:
+    """Periods until a small disturbance has fallen to ``remaining``, and until any has, the time of
+    the former [s], the slip path of a period over l0, and the bound of the error of the first; for
+    oscillation across."""
     load_ratio = SPRINGS_OF[CONTACTS[cases.kind.contact]].middle_load
-    speed, frequency = cases.columns["v0"], cases.columns["omega"]
-    v, y = cases.v_tilde / load_ratio, cases.y_tilde / load_ratio
-    l0 = load_ratio * cases.length_scale
-    # no oscillation: dragged only, mu~ = 1
-    unshaken = np.logical_not(cases.moving)
+    speed, frequency, moving, ratio, length, v, y = np.atleast_1d(
+        *(cases.columns["v0"], cases.columns["omega"], cases.moving),
+        *(cases.mu_ratio, cases.length_scale, cases.v_tilde, cases.y_tilde),
+    )
+    v, y, l0 = v / load_ratio, y / load_ratio, load_ratio * length
+    unshaken = np.logical_not(moving)  # dragged only, mu~ = 1
     inside = np.isfinite(v) & np.isfinite(y) & ~unshaken
-    groups = where(inside, v, 1.0), where(inside, y, 0.0)
-    ratio, bound = cases.quantity("mu_ratio", *groups, SPRING)
-    power, power_bound = cases.quantity("power", *groups, SPRING)
+    of = decay_of_balls if cases.kind.contact else decay_of_springs
+    found = of(cases.tabulated, v[inside], y[inside])
     to_remaining = math.log(1.0 / remaining)
     with np.errstate(all="ignore"):
-        # slip speed of the foot in units of l0 omega; infinite for rigid contact and beyond double
-        # range
-        drag_rate = np.where(speed == 0.0, 0.0, np.divide(np.divide(speed, l0), frequency))
-        rate = np.where(inside, v * ratio + power, np.where(unshaken, drag_rate, np.inf))
-        rate = np.where(np.isnan(cases.mu_ratio), np.nan, rate)  # an illegal case
-        relative_error = np.where(inside, (v * bound + power_bound) / rate, 0.0)
+        # in units of l0 omega; infinite for rigid contact and beyond double range
+        drag_rate = np.where(speed == 0.0, 0.0, speed / l0 / frequency)
+        rate = np.where(unshaken, drag_rate, np.inf)
+        rate[inside] = found.rate
+        rate = np.where(np.isnan(ratio), np.nan, rate)  # an illegal case
         slip_path = 2.0 * math.pi * rate
-        periods = to_remaining / slip_path
+        small, least, most = slip_path.copy(), slip_path.copy(), slip_path.copy()
+        small[inside], least[inside], most[inside] = found[1:]
         # nothing slips at rate 0, rigid contact at rest included
-        dragged = l0 * np.divide(to_remaining, speed)
-        shaken = to_remaining / rate / frequency
-        time = np.where(rate == 0.0, np.inf, np.where(unshaken, dragged, shaken))
-        error = np.where(
-            (rate == 0.0) | (relative_error >= 1.0),
-            np.inf,
-            periods * relative_error / (1.0 - relative_error),
+        still = rate == 0.0
+        periods, longest, shortest = (
+            np.where(still, np.inf, to_remaining / x) for x in (small, least, most)
         )
-    parts = periods, time, slip_path, error
-    return parts if cases.cases.shape else tuple(map(float, parts))  # type: ignore[return-value]
+        error = np.where(still, np.inf, np.maximum(longest - periods, periods - shortest))
+        error = np.where(np.isinf(small) & ~np.isinf(least), longest, error)
+        any_size = np.where(still, np.inf, 2.0 * to_remaining / slip_path)
+        dragged = l0 * (to_remaining / speed)
+        time = np.where(unshaken, dragged, periods * 2.0 * math.pi / frequency)
+        time = np.where(still, np.inf, time)
+    parts = periods, any_size, time, slip_path, error
+    return parts if cases.cases.shape else tuple(float(x[0]) for x in parts)  # type: ignore[return-value]
 
 
 def settling(cases: Evaluated) -> Values:
     """Periods until a disturbed contact is within 1 % of its steady cycle."""
-    periods, time, slip_path, bound = decay(cases)
+    periods, any_size, time, slip_path, bound = decay(cases)
     return {
         "settling.periods": periods,
-        "settling.periods_any": 2.0 * periods,
+        "settling.periods_any": any_size,
         "settling.time": time,
         "settling.slip_path": slip_path,
         "settling_bound.periods": bound,
@@ -89,15 +189,18 @@ SETTLING = Output(
     settling,
     {
         "settling.periods": Member(
-            "-", "For a small disturbance: ln(100)/slip_path; in stick-slip at most as many"
+            "-", "Until 1 % of a small disturbance is left; of a ball in its slowest spring"
         ),
-        "settling.periods_any": Member("-", "For a disturbance of any size: twice as many"),
+        "settling.periods_any": Member(
+            "-", "The same for a disturbance of any size: at most 2 ln(100)/slip_path"
+        ),
         "settling.time": Member("s", "periods as a time; also without oscillation"),
         "settling.slip_path": Member(
             "-", "Path of the foot in a period over l0; no value for a rigid contact"
         ),
         "settling_bound.periods": Member("-", "Bound of the absolute error of periods"),
     },
-    cost=5,
+    cost=75,
+    cost_of_ball=5000,
     lacks={"along": _DERIVED, "normal": _DERIVED},
 )

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from builder.solver.steady import solve, solve_raw, workspace
-from mumacro import Surrogate
+from mumacro import Surrogate, motion
 from mumacro.analysis.settling import settling
 from tests.support import naive
-from tests.support.cases import CASE, UNIT
+from tests.support.cases import CASE, UNIT, log_uniform, opened
 from tests.support.comparing import close
 from tests.support.refusals import refused
 
@@ -39,8 +39,10 @@ def test_the_slip_path_is_the_solvers(surrogate: Surrogate, v: Any, y: Any) -> N
     decay = of(surrogate, v, y)
     exact = 2.0 * math.pi * solve(v, y).slip_speed
     assert decay.slip_path == close(exact, rel=1e-10)
-    assert abs(decay.periods - math.log(100.0) / exact) <= decay.error_bound
-    assert decay.periods_any == 2.0 * decay.periods
+    cosine = at_rest_angles(v, y)[0] if (v, y) in STICKING else 1.0
+    periods = math.log(100.0) / (exact - 2.0 * math.log(abs(cosine)))
+    assert abs(decay.periods - periods) <= decay.error_bound
+    assert decay.periods_any == close(2.0 * math.log(100.0) / exact, rel=1e-10)
     assert decay.time == close(decay.periods * 2.0 * math.pi, rel=1e-14)
     assert of(surrogate, v, y, remaining=0.1).periods == close(0.5 * decay.periods, rel=1e-14)
 
@@ -65,8 +67,9 @@ def test_a_small_disturbance_decays_as_derived(surrogate: Surrogate, v: Any, y: 
     ]
     cosine, share = at_rest_angles(v, y) if (v, y) in STICKING else (1.0, 0.0)
     assert (share > 0.0) == ((v, y) in STICKING)
-    multiplier = math.exp(-of(surrogate, v, y).slip_path) * cosine**2
-    assert apart[1] / apart[0] == close(multiplier, rel=5e-3)
+    decay = of(surrogate, v, y)
+    assert math.exp(-decay.slip_path) * cosine**2 == close(0.01 ** (1.0 / decay.periods), rel=1e-9)
+    assert apart[1] / apart[0] == close(0.01 ** (1.0 / decay.periods), rel=5e-3)
 
 
 @pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (0.004, 0.5), (0.01, 0.95)])
@@ -190,13 +193,45 @@ def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:
         assert np.isnan(column[1:]).all()
 
 
-@pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (1e-3, 30.0), (3.0, 0.1)])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
+def test_settling_and_a_motion_agree_within_their_bounds_over_the_plane(tolerance: float) -> None:
+    table, rng = opened(tolerance), np.random.default_rng(64)
+    y, v = log_uniform(rng, 1e-2, 30.0, 500), log_uniform(rng, 1e-3, 30.0, 500)
+    decay, cycle = of(table, v, y), motion(**UNIT, y=y, v0=v, tolerance=1e-9)
+    # the share of the periods by which the steps of a motion may miss them: 50 times the tolerance
+    allowed = decay.error_bound + 5e-8 * decay.periods
+    assert np.all(np.abs(decay.periods - cycle.periods) <= allowed)
+    assert np.median(decay.error_bound / decay.periods) < tolerance
+    sticks = table.stick_fraction(v, y) > 0.0
+    assert 100 < sticks.sum() < 400
+    # without the turn in stick it would be up to 64 times as long
+    assert np.max(math.log(100.0) / decay.slip_path / decay.periods) > 10.0
+
+
+@pytest.mark.parametrize("v", [1e-300, 1e-12, 1e-3])
+def test_at_creep_a_disturbance_is_lost_where_slip_begins(surrogate: Surrogate, v: float) -> None:
+    """At half of the largest amplitude the force turns by 60 degrees in each stick."""
+    assert of(surrogate, v, 0.5).periods == close(
+        math.log(100.0) / -math.log(0.25), rel=0.6 * math.sqrt(v) + 1e-9
+    )
+    # 90 degrees at 1/sqrt 2
+    assert of(surrogate, 1e-12, math.sqrt(0.5)).periods < 0.1
+
+
+@pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (1e-3, 30.0), (3.0, 0.1), (1e-6, 0.4)])
 def test_a_ball_settles_as_its_slowest_spring(surrogate: Surrogate, v: Any, y: Any) -> None:
     decay = of(surrogate, v, y, contact="ball")
     # a spring with the share s of the middle one's load has l0 that is 1.5 s as long
-    loads = 1.5 * np.linspace(1, 0.01, 50) * UNIT["Fz"]
-    springs = [settling(surrogate, **{**UNIT, "Fz": load}, y0=y, v0=v) for load in loads]
-    assert decay.periods == close(max(spring.periods for spring in springs), rel=1e-12)
-    assert decay.time == close(springs[0].time, rel=1e-12)
-    assert decay.slip_path == close(springs[0].slip_path, rel=1e-12)
-    assert decay.periods_any == 2.0 * decay.periods
+    # many of them, and more where y~ = 1
+    apart = np.outer([-1.0, 1.0], np.geomspace(1e-9, 0.3, 300)).ravel()
+    shares = np.append(np.geomspace(1.0, 0.01, 400), y / 1.5 * (1.0 + apart))
+    loads = 1.5 * UNIT["Fz"] * shares[shares <= 1.0]
+    springs = settling(surrogate, **{**UNIT, "Fz": loads}, y0=y, v0=v)
+    slowest = springs.periods.max()
+    assert slowest <= (decay.periods + decay.error_bound) * (1.0 + 1e-12)
+    assert slowest == close(decay.periods, rel=1e-2)
+    assert decay.slip_path == close(springs.slip_path[0], rel=1e-12)
+    assert decay.periods_any == close(2.0 * math.log(100.0) / springs.slip_path[0], rel=1e-12)
+    cycle = motion(**UNIT, y=y, v0=v, contact="ball", tolerance=1e-5)
+    # which sums 20 springs or more, not the slowest one
+    assert decay.periods * 0.8 <= cycle.periods <= decay.periods * (1.0 + 1e-4)
