@@ -24,9 +24,9 @@ SCALARS = {
     "mu_ratio(v, y)": "s.mu_ratio(0.1, 0.5)",
     "evaluate, floats": "s.evaluate(**case)",
     "evaluate, gradient=True": "s.evaluate(**case, gradient=True)",
-    "evaluate, k from a tenth to ten times": "s.evaluate(**soft, k_range=near)",
-    "evaluate, k from 1e-300 to 1e300": "s.evaluate(**soft, k_range=(1e-300, 1e300))",
-    "the same, a ball": "s.evaluate(**soft, k_range=(1e-300, 1e300), contact='ball')",
+    "evaluate, k from a tenth to ten times": "s.evaluate(**soft, **near)",
+    "evaluate, k from 1e-300 to 1e300": "s.evaluate(**soft, k_low=1e-300, k_high=1e300)",
+    "the same, a ball": "s.evaluate(**soft, k_low=1e-300, k_high=1e300, contact='ball')",
 }
 EVALUATE = "s.evaluate(**case)"
 WITH_F = {name: x for name, x in CASE.items() if name != "omega"} | {"f": 20e3}
@@ -92,7 +92,7 @@ def calls(points: int, quick: bool) -> str:
         "m": rng.uniform(0.0, 1.0, n),
         "case": CASE,
         "soft": {name: x for name, x in CASE.items() if name != "k"},
-        "near": (0.1 * CASE["k"], 10.0 * CASE["k"]),
+        "near": {"k_low": 0.1 * CASE["k"], "k_high": 10.0 * CASE["k"]},
         "many": {**CASE, "v0": 0.4 * v, "y0": 3e-6 * y},
     }
     tables = []
@@ -173,14 +173,14 @@ def outputs(points: int, quick: bool) -> str:
     v, y = 10.0 ** rng.uniform(-3.0, 3.0, (2, n))
     unit = CASE["mu0"] * CASE["Fz"] / CASE["k"]
     many = {**CASE, "v0": unit * CASE["omega"] * v, "y0": unit * y}
-    spreads = {"k": 1e5, "v0": 1e-4}
+    spreads = {"std_k": 1e5, "std_v0": 1e-4}
 
     def crit() -> None:
         s.evaluate({**many, "v0": unit * CASE["omega"] * s.v_tilde_crit(y)})
 
     plain = partial(s.evaluate, many)
     at_rest = partial(s.evaluate, {**many, "v0": 0.0})
-    with_groups = partial(s.evaluate, many, groups=True)
+    with_groups = partial(s.evaluate, many, include="groups")
     gradient = partial(s.evaluate, many, gradient=True)
     parts: dict[str, list[Callable[[], object]]] = {
         "groups": [with_groups],
@@ -199,7 +199,7 @@ def outputs(points: int, quick: bool) -> str:
     parts = {name: parts[name] for name in OUTPUTS}  # none is left out
     work = {f"{name} {i}": part for name, some in parts.items() for i, part in enumerate(some)}
     for name in parts:
-        options: Any = {"std": spreads} if name == "std" else {"include": (name,)}
+        options: Any = spreads if name == "std" else {"include": (name,)}
         work[name] = partial(s.evaluate, many, **options)
     best = best_of(2 if quick else 9, {"plain": plain, **work})
     rows = []

@@ -186,7 +186,7 @@ def trends() -> str:
     rows.append(["mu0 of each speed", *cells, *static])
     # a spring here never slips backwards: its path of slip is v0 times a period
     case = {**RIG, "mu0": mu0, "k": fitted("spring").values["k"], "v0": p.v0}
-    answer = table().evaluate(case, groups=True, **ALONG)
+    answer = table().evaluate(case, include="groups", **ALONG)
     stick = table().quantity("stick_fraction", answer.v_tilde, answer.y_tilde, **ALONG)[0]
     at = start + slope * np.log(p.v0 / (1.0 - stick))
     cell = ratio("spring", fitted("spring", at).values["k"], at)

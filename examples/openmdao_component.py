@@ -38,7 +38,9 @@ class Friction(om.ExplicitComponent):
                 "the power of a rigid contact is not defined: give a finite k, or power=False"
             )
         try:
-            friction = self.table.evaluate(case, gradient=gradient, groups=True, illegal="raise")
+            friction = self.table.evaluate(
+                case, gradient=gradient, include="groups", illegal="raise"
+            )
             return friction, case["mu0"] * case["Fz"], case["omega"]
         except InputError as error:
             raise om.AnalysisError(str(error)) from error

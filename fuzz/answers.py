@@ -208,7 +208,7 @@ def fresh_solves(table: Surrogate, share: float) -> Count:
     count = Count()
     with Sweep(os.cpu_count() or 1) as sweep:
         for _, _, cases in pieces(N // 10, share, 20_000):
-            a = table.evaluate(cases, groups=True)
+            a = table.evaluate(cases, include="groups")
             v, y = a.v_tilde, a.y_tilde
             (v_low, v_high), (y_low, y_high) = V_RANGE, Y_RANGE
             solvable = (v_low <= v) & (v <= v_high) & (y_low <= y) & (y <= y_high)

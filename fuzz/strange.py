@@ -80,7 +80,8 @@ def document(chance: random.Random) -> tuple[str, Any]:
         del one["y0"]
         one["Fz_amplitude"] = one["Fz"] * chance.random()
     if chance.random() < 0.05 and isinstance(one["k"], float):
-        one["k_range"] = [one["k"], one.pop("k") * 10.0 ** chance.uniform(0, 2)]
+        k = one.pop("k")
+        one |= {"k_low": k, "k_high": k * 10.0 ** chance.uniform(0, 2)}
     rest = {name: value for name, value in one.items() if name != "v0"}
     speeds = sorted(10.0 ** chance.uniform(-5, 1) for _ in range(chance.choice([1, 3, 6])))
     measured = {
@@ -205,6 +206,7 @@ NAMES = (
     "f",
     "include",
     "std",
+    "std_k",
     "tolerance",
     "target",
     "unknown",

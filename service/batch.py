@@ -14,7 +14,7 @@ import numpy as np
 
 from mumacro.answer import Answer, add
 from mumacro.errors import InputError
-from mumacro.inputs.cases import DEVIATIONS, Cases, named
+from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.reading import Value
 from mumacro.kernel.arrays import Codes
@@ -61,7 +61,7 @@ class Batch:
         lengths = {
             name: len(value)
             for name, value in body.members.items()
-            if isinstance(value, (list, np.ndarray)) and name not in ("include", "k_range")
+            if isinstance(value, (list, np.ndarray)) and name != "include"
         }
         if any(length > max_batch for length in lengths.values()):
             raise too_large(max_batch)
@@ -69,9 +69,6 @@ class Batch:
         if beside := model.beside:
             raise InputError("include", beside[0], f"without {beside[0]}, which is for one case")
         values, reasons = model.columns, dict(body.reasons)
-        if body.std:
-            values = {name: x for name, x in values.items() if name not in DEVIATIONS}
-            values |= body.std
         # the first bad input of a case, in the order of the inputs, is told
         for name, column in [*values.items()]:
             if isinstance(column, Column):

@@ -21,7 +21,7 @@ from pydantic import ValidationError
 from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
-from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.fields import ENDS, field_of
 from mumacro.inputs.kind import SPRING, kind_of
 from mumacro.inputs.reading import Value
 
@@ -48,8 +48,6 @@ class Body(NamedTuple):
     #: why cases could not be read, by their index; they have a NaN
     reasons: Mapping[int, Reason] = MappingProxyType({})
     rows: bool = False
-    #: deviations of rows, those of the query among them, as the library names them
-    std: Mapping[str, Any] = MappingProxyType({})
 
 
 def too_large(max_batch: int) -> RequestError:
@@ -271,7 +269,7 @@ def _names_of_case(rows: list[Any], words: Mapping[str, Any]) -> tuple[str, ...]
     if not rows or not isinstance(rows[0], dict):
         raise ValueError("no row")
     names = [*rows[0]]
-    if not {*names} <= {*ALL_FIELDS, "f", *ENDS, *KIND}:
+    if not {*names} <= {*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS}:
         raise ValueError("an unknown name")
     first = rows[0]
     ones = {name: np.ones(2) if name not in KIND else [first[name]] * 2 for name in names}
@@ -285,6 +283,7 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
     usual = {name: words.get(name, word) for name, word in SPRING.names.items()}
     columns |= {name: np.full(len(rows), word, object) for name, word in usual.items()}
+    in_query = {field_of(DEVIATIONS[name])[0] for name in words.keys() & DEVIATIONS.keys()}
     reasons: dict[int, Reason] = {}
     used = set[str]()
     for i, row in enumerate(rows):
@@ -300,7 +299,7 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
         k = one.columns["k"]
         ends: Any = one.ends or ((k,), (k,))  # a number, or rigid, is an interval of itself
         filled = {name: end[0] for name, end in zip(ENDS, ends, strict=True)} | one.columns
-        filled |= {f"std_{name}": x for name, x in one.std.items()}
+        filled |= {f"std_{name}": x for name, x in one.std.items() if name not in in_query}
         filled |= {name: values[name] for name in KIND if name in values}
         for name, value in filled.items():
             columns[name][i] = value
@@ -310,8 +309,8 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     # both amplitudes only beside a column of directions
     fields = ALL_FIELDS if "direction" in used else kind_of(direction=usual["direction"]).fields
     members = {name: columns[name] for name in (*fields, *(name for name in KIND if name in used))}
-    std = {name: columns[name] for name in DEVIATIONS if name in used}
-    return Body(members, reasons, True, std)
+    members |= {name: columns[name] for name in DEVIATIONS if name in used}
+    return Body(members, reasons, True)
 
 
 def _row(row: Any) -> Case:

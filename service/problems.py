@@ -27,9 +27,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.analysis.motion import PARTS
 from mumacro.errors import InputError, MumacroError, TableError
-from mumacro.inputs.fields import BOUNDS, LIKE, RIGID, STIFFNESS, refusal
+from mumacro.inputs.fields import BOUNDS, ENDS, LIKE, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
-from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import no_number
@@ -73,8 +72,7 @@ class FieldFault:
         names = [step for step in self.path if isinstance(step, str)]
         entry: dict[str, object] = {}
         if query if self.parameter is None else self.parameter:
-            # one for each input
-            entry["parameter"] = _shown("_".join(names)) if names != ["std"] else "std_mu0"
+            entry["parameter"] = _shown("_".join(names))
         else:
             steps = (
                 str(_shown(str(step))).replace("~", "~0").replace("/", "~1") for step in self.path
@@ -85,7 +83,7 @@ class FieldFault:
             entry["value"] = _shown(self.value)
         entry["reason"] = self.reason
         if self.path and self.path[-1] in BOUNDS:
-            entry["bound"] = BOUNDS["v0" if self.path[0] == "std" else str(self.path[-1])]
+            entry["bound"] = BOUNDS[str(self.path[-1])]
         return entry
 
 
@@ -163,8 +161,6 @@ def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
     if kind == "missing":
         return "is required"
     if kind == "extra_forbidden":
-        if name == "k_range" and "k_low" in allowed:  # of a query
-            return "unknown field; write the interval as k=low..high"
         return unknown_name(name, allowed)
     if kind == "float_type" and type(value) is int and name in BOUNDS:  # beyond double range
         return refusal(name, math.inf)
@@ -202,7 +198,7 @@ _LARGE = 1e308
 def names_of(model: type[BaseModel]) -> tuple[str, ...]:
     """What a model may be given: inputs first, options after them."""
     fields = model.model_fields
-    inputs = [name for name in (*INPUTS, *LIKE, "k_range") if name in fields]
+    inputs = [name for name in (*INPUTS, *LIKE) if name in fields]
     return tuple(dict.fromkeys([*inputs, *fields]))
 
 
@@ -235,7 +231,7 @@ def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
     amplitudes = ("y0", AMPLITUDE) if not one else ("y0",)
     if one and direction == "normal":
         amplitudes = (AMPLITUDE,)
-    for names in (("k", "k_range", *ENDS), amplitudes, ("omega", "f")):
+    for names in (("k", *ENDS), amplitudes, ("omega", "f")):
         if all(members.get(name) is None for name in names):
             yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))
 
@@ -358,8 +354,7 @@ def _no_such_path(scope: Scope) -> str:
 def of_input(error: InputError, **members: Any) -> RequestError:
     """What the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
-    name = error.field.removeprefix("std_")  # a deviation is a member of std
-    path: tuple[str | int, ...] = (name,) if name == error.field else ("std", name)
+    path: tuple[str | int, ...] = (error.field,)
     if error.index is not None:
         path = (*path, error.index)
     return refused([FieldFault(path, reason_of(error), value)], **members)

@@ -47,35 +47,15 @@ def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         try:
             if quantity and (one := _of(name, members.get(name), quantity)) is not None:
                 inputs[name] = one
-            deviation = _of(name, _deviation(members, name), quantity)
+            deviation = _of(name, members.get(f"std_{name}"), quantity)
             if name in inputs and deviation is not None:
                 inputs[name]["std"] = deviation["value"]
         except InputError:
             continue
-    if (interval := _interval(members.get("k_range"))) is not None:
-        inputs["k"] = interval
     for name in PARTS:
         if (part := _part(name, members.get(name))) is not None:
             inputs[name] = part
     return inputs
-
-
-def _interval(ends: Any) -> dict[str, Any] | None:
-    """An interval of k, of a text or of both ends."""
-    try:
-        if isinstance(ends, str):
-            one = _of("k_range", ends, "stiffness")
-            return one if one and "low" in one else None
-        if not isinstance(ends, (list, tuple)) or len(ends) != 2:
-            return None
-        low, high = (_of("k", end, "stiffness") for end in ends)
-    except InputError:
-        return None
-    if not low or not high or not all(isinstance(end["value"], float) for end in (low, high)):
-        return None
-    middle = math.sqrt(low["value"]) * math.sqrt(high["value"])
-    span = {"low": low["value"], "high": high["value"]}
-    return {"text": None, "value": middle, "unit": low["unit"], **span}
 
 
 def _part(name: str, value: Any) -> dict[str, Any] | None:
@@ -98,12 +78,6 @@ def _part(name: str, value: Any) -> dict[str, Any] | None:
 def _is_pair(value: Any) -> bool:
     """Whether a list of JSON is an amplitude and its phase."""
     return isinstance(value, list) and len(value) == 2 and not isinstance(value[0], dict)
-
-
-def _deviation(members: Mapping[str, Any], name: str) -> Any:
-    std = members.get("std")
-    within = std.get(name) if isinstance(std, Mapping) else None
-    return members.get(f"std_{name}") if within is None else within
 
 
 def _of(name: str, value: Any, quantity: str) -> dict[str, Any] | None:

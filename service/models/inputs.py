@@ -15,16 +15,13 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainValidator,
-    ValidationError,
     ValidationInfo,
     WithJsonSchema,
 )
-from pydantic_core import InitErrorDetails
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import A_DEVIATION, AN_END, DEVIATIONS, EXACT
-from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, described, refusal
-from mumacro.inputs.k_range import BOUND, ENDS
+from mumacro.inputs.fields import BOUNDS, ENDS, MOST_HZ, POSITIVE, described, refusal
 from mumacro.inputs.kind import AMPLITUDES, CONTACTS, DIRECTIONS, UNREADABLE
 from mumacro.inputs.reading import Value, no_number, read, reason_of
 
@@ -44,7 +41,6 @@ from .values import (
     StiffnessEnd,
     fault,
     stiffness_inputs,
-    text_schema,
 )
 
 #: what a case may hold, in the order in which it is described
@@ -59,7 +55,6 @@ INPUTS = (
     "Fz_amplitude",
     "k_low",
     "k_high",
-    "k_range",
 )
 #: the first case of the documentation: mu_macro = 0.2405
 EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
@@ -138,7 +133,7 @@ ONE_FREQUENCY = one_of("omega", "f")
 #: what is given of every case, beside what is always required
 ALTERNATIVES: Any = {
     "allOf": [
-        one_of("k", "k_range", "k_low"),
+        one_of("k", "k_low"),
         one_of("y0", "Fz_amplitude"),
         ONE_FREQUENCY,
         both_or_none("k_low", "k_high"),
@@ -147,7 +142,6 @@ ALTERNATIVES: Any = {
 #: the same of a case whose unknown or swept input is left out
 NOT_BOTH: Any = {
     "allOf": [
-        not_both("k", "k_range"),
         not_both("k", "k_low"),
         not_both("y0", "Fz_amplitude"),
         not_both("omega", "f"),
@@ -155,46 +149,10 @@ NOT_BOTH: Any = {
 }
 
 
-def _of_interval(value: Any) -> Any:
-    """Both ends of an interval, numbers or texts, or a text such as 0.8..1.2 N/um, as they came."""
-    if isinstance(value, str):
-        try:
-            interval = read("k_range", value)
-        except InputError as error:
-            raise fault(reason_of(error.bound)) from None
-        if interval.low is None:
-            raise fault(f"must be {BOUND}")
-        return value
-    if not isinstance(value, list) or len(value) != 2:
-        raise fault(f"must be {BOUND}")
-    for i, end in enumerate(value):
-        _, reason = entry("k_low", end)
-        if reason is not None:
-            one_fault = InitErrorDetails(type=fault(reason), loc=(i,), input=end)
-            raise ValidationError.from_exception_data("k_range", [one_fault])
-    return value
+class CaseInputs(Strict):
+    """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
 
-
-_END: Any = {
-    "anyOf": [{"type": "number", "exclusiveMinimum": 0}, text_schema("stiffness", positive=True)]
-}
-#: an interval of k
-Interval = Annotated[
-    Any,
-    PlainValidator(_of_interval),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "array", "items": _END, "minItems": 2, "maxItems": 2},
-                {"type": "string", "pattern": r"^[1-4]\.\.[5-9]( ?(N/m|N/mm|N/um))?$"},
-            ]
-        }
-    ),
-]
-
-
-class OneCase(Strict):
-    """The inputs of one case; omega or f, and k or an interval of it: exactly one of each."""
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})
 
     mu0: Friction = Field(description=_MU0, examples=[0.3])
     Fz: Force = Field(description=_FZ, examples=[10.0])
@@ -211,14 +169,6 @@ class OneCase(Strict):
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite."""
         return _given(self)
-
-
-class CaseInputs(OneCase):
-    """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})
-
-    k_range: Interval | None = optional(f"In place of k: {BOUND}; or a text as 0.8..1.2 N/um")
 
 
 class OtherInputs(Strict):
@@ -245,7 +195,7 @@ class OtherInputs(Strict):
 
 
 def _given(model: BaseModel) -> dict[str, Any]:
-    """The inputs that are given, by name; k_range for an interval in k."""
+    """The inputs that are given, by name; an interval in k by both of its ends."""
     values = model.__dict__
     inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
     return inputs | stiffness_inputs(inputs.pop("k")) if type(inputs.get("k")) is str else inputs
@@ -345,12 +295,6 @@ def _of_cases(value: Any, info: ValidationInfo) -> float | str | Column | None:
     return cells(info.field_name or "", value)
 
 
-def _of_deviations(value: Any, info: ValidationInfo) -> float | str | Column | None:
-    if value is None:
-        raise fault("must be a number")
-    return cells(f"std_{info.field_name}", value)
-
-
 def _words(value: Any, info: ValidationInfo) -> Any:
     """One word for all cases, or a list with one for each, which the library reads."""
     if isinstance(value, list):
@@ -379,7 +323,7 @@ HertzColumn = Annotated[Any, _CELLS, _or_listed({**_FROM_ZERO, "maximum": MOST_H
 StiffnessColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, POSITIVE_TEXT, RIGID)]
 
 
-DeviationColumn = Annotated[Any, PlainValidator(_of_deviations), _or_listed(_FROM_ZERO, PLAIN_TEXT)]
+DeviationColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO, PLAIN_TEXT)]
 _WORDS = PlainValidator(_words)
 ContactColumn = Annotated[Any, _WORDS, _or_listed({"type": "string", "enum": [*CONTACTS]})]
 DirectionColumn = Annotated[Any, _WORDS, _or_listed({"type": "string", "enum": [*DIRECTIONS]})]
@@ -401,10 +345,9 @@ class InputColumns(Strict):
     Fz_amplitude: NotNegativeColumn = optional(_AMPLITUDE)
     k_low: PositiveColumn = optional(_LOW)
     k_high: PositiveColumn = optional(_HIGH)
-    k_range: Interval | None = optional(f"For every case, in place of k: {BOUND}")
 
     @property
     def columns(self) -> dict[str, Any]:
         """What is given, by name."""
         values = self.__dict__
-        return {name: values[name] for name in INPUTS if values[name] is not None}
+        return {name: x for name in INPUTS if (x := values[name]) is not None}

@@ -1,11 +1,11 @@
 """What is asked beside the inputs: which contact and table, what else is computed."""
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field
 
-from mumacro.errors import InputError
+from mumacro.inputs.cases import DEVIATIONS
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import ContactName, DirectionName, Kind, kind_of
 from mumacro.outputs import OUTPUTS
@@ -19,7 +19,6 @@ from .inputs import (
     DeviationColumn,
     DirectionColumn,
     InputColumns,
-    OneCase,
     Strict,
     either,
     optional,
@@ -67,56 +66,41 @@ class Choice(Strict):
         return words
 
 
-def _unit(name: str, more: str = "", before: str = "") -> str:
-    """The unit of a deviation, which is that of its input."""
-    return f"{before}[{unit_of(name)}]{more}"
+def _deviation(name: str, more: str = "") -> str:
+    """What a deviation is, in the unit of its input."""
+    return f"Standard deviation of {name} [{unit_of(name)}], of independent errors{more}"
 
 
-class InputStd(Strict):
-    """Standard deviations of the inputs, in their units; independent errors are assumed."""
+class Deviations(Strict):
+    """Standard deviations of the inputs, in their units; they imply include=std."""
 
-    mu0: Deviation = Field(0.0, description=_unit("mu0"))
-    Fz: Deviation = Field(0.0, description=_unit("Fz"))
-    k: Deviation = Field(0.0, description=_unit("k"))
-    y0: Deviation = Field(0.0, description=_unit("y0"))
-    omega: Deviation = Field(0.0, description=_unit("omega", "; or f"))
-    f: Deviation = Field(0.0, description=_unit("f", ", in place of omega"))
-    v0: Deviation = Field(0.0, description=_unit("v0"))
-    Fz_amplitude: Deviation = Field(
-        0.0, description=_unit("Fz_amplitude", ", for direction normal")
-    )
-
-    @model_validator(mode="after")
-    def _one_frequency(self) -> Self:
-        if self.omega and self.f:
-            bound = "left out beside omega: give the deviation of one of them, not of both"
-            raise InputError("f", self.f, bound)
-        return self
+    std_mu0: Deviation | None = optional(_deviation("mu0"))
+    std_Fz: Deviation | None = optional(_deviation("Fz"))
+    std_k: Deviation | None = optional(_deviation("k"))
+    std_y0: Deviation | None = optional(_deviation("y0"))
+    std_omega: Deviation | None = optional(_deviation("omega", "; or std_f"))
+    std_f: Deviation | None = optional(_deviation("f", ", in place of std_omega"))
+    std_v0: Deviation | None = optional(_deviation("v0"))
+    std_Fz_amplitude: Deviation | None = optional(_deviation("Fz_amplitude"))
 
     @property
-    def columns(self) -> dict[str, Any]:
-        """Those that are given, as the library names them: ``std_k`` and so on; none of them says
-        that the inputs are exact."""
-        members = {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
-        return members or {"std_mu0": 0.0}
+    def deviations(self) -> dict[str, Any]:
+        """Those that are given, by name."""
+        names = self.model_fields_set & DEVIATIONS.keys()
+        return {name: x for name in names if (x := getattr(self, name)) is not None}
 
 
-class StdColumns(Strict):
-    """Standard deviations of the inputs of many cases: numbers, or lists with one for each case."""
+class DeviationColumns(Strict):
+    """The same of many cases: one value for all of them, or lists with one for each."""
 
-    mu0: DeviationColumn = either(_unit("mu0"))
-    Fz: DeviationColumn = either(_unit("Fz"))
-    k: DeviationColumn = either(_unit("k"))
-    y0: DeviationColumn = either(_unit("y0"))
-    omega: DeviationColumn = either(_unit("omega", "; or f"))
-    f: DeviationColumn = either(_unit("f", ", in place of omega"))
-    v0: DeviationColumn = either(_unit("v0"))
-    Fz_amplitude: DeviationColumn = either(_unit("Fz_amplitude", ", for direction normal"))
-
-    @property
-    def columns(self) -> dict[str, Any]:
-        """Those that are given, as the library names them: ``std_k`` and so on."""
-        return {f"std_{name}": getattr(self, name) for name in self.model_fields_set}
+    std_mu0: DeviationColumn = optional(_deviation("mu0"))
+    std_Fz: DeviationColumn = optional(_deviation("Fz"))
+    std_k: DeviationColumn = optional(_deviation("k"))
+    std_y0: DeviationColumn = optional(_deviation("y0"))
+    std_omega: DeviationColumn = optional(_deviation("omega", "; or std_f"))
+    std_f: DeviationColumn = optional(_deviation("f", ", in place of std_omega"))
+    std_v0: DeviationColumn = optional(_deviation("v0"))
+    std_Fz_amplitude: DeviationColumn = optional(_deviation("Fz_amplitude"))
 
 
 class Outputs(Strict):
@@ -147,38 +131,29 @@ class Outputs(Strict):
         return UNDERSTOOD in (self.include or ())
 
 
-class Options(Outputs, Choice):
-    """The options of a request in JSON."""
-
-    std: InputStd | None = optional("Standard deviations of the inputs; they imply include=std")
-
-    @property
-    def deviations(self) -> dict[str, Any]:
-        """Those that are given, as the library names them."""
-        return {} if self.std is None else self.std.columns
+class Options(Deviations, Outputs, Choice):
+    """The options of a request."""
 
 
 class CaseRequest(Options, CaseInputs):
     """One case and the options of its answer."""
 
 
-class Case(CaseInputs):
+class Case(Deviations, CaseInputs):
     """One case of a batch in rows."""
 
     contact: ContactName | None = optional(_CONTACT)
     direction: DirectionName | None = optional(_DIRECTION)
-    std: InputStd | None = optional("Standard deviations of the inputs")
 
     @property
     def values(self) -> dict[str, Any]:
         """All that the library takes."""
         words = {"contact": self.contact, "direction": self.direction}
-        deviations = {} if self.std is None else self.std.columns
         members = {name: word for name, word in words.items() if word is not None}
-        return self.inputs | members | deviations
+        return self.inputs | members | self.deviations
 
 
-class CaseColumns(Outputs, InputColumns):
+class CaseColumns(DeviationColumns, Outputs, InputColumns):
     """Cases as columns and the options of their answers: lists of one length; a number holds for
     every case."""
 
@@ -196,45 +171,17 @@ class CaseColumns(Outputs, InputColumns):
         "across", description=f"{_DIRECTION}; a list has one for each case"
     )
     tolerance: Positive | None = optional(_TOLERANCE)
-    std: StdColumns | None = optional("Standard deviations of the inputs; they imply include=std")
 
     @property
     def columns(self) -> dict[str, Any]:
         """All that the library takes: numbers, texts, and what lists hold."""
-        deviations = {} if self.std is None else self.std.columns
         words = {"contact": self.contact, "direction": self.direction}
+        values = self.__dict__
+        deviations = {name: x for name in DEVIATIONS if (x := values[name]) is not None}
         return super().columns | words | deviations
 
 
 # --- queries --------------------------------------------------------------------------------------
-
-
-class Deviations(Strict):
-    """The members of ``std``, each as a parameter of its own."""
-
-    std_mu0: Deviation | None = optional(_unit("mu0", before="Standard deviation "))
-    std_Fz: Deviation | None = optional(_unit("Fz", before="Standard deviation "))
-    std_k: Deviation | None = optional(_unit("k", before="Standard deviation "))
-    std_y0: Deviation | None = optional(_unit("y0", before="Standard deviation "))
-    std_omega: Deviation | None = optional(_unit("omega", before="Standard deviation "))
-    std_f: Deviation | None = optional(_unit("f", before="Standard deviation "))
-    std_v0: Deviation | None = optional(_unit("v0", before="Standard deviation "))
-    std_Fz_amplitude: Deviation | None = optional(
-        _unit("Fz_amplitude", before="Standard deviation ")
-    )
-
-    @property
-    def deviations(self) -> dict[str, Any]:
-        """Those that are given."""
-        names = self.model_fields_set & _DEVIATIONS
-        return {name: x for name in names if (x := getattr(self, name)) is not None}
-
-
-_DEVIATIONS = frozenset(Deviations.model_fields)
-
-
-class QueryOptions(Deviations, Outputs, Choice):
-    """The options of a request as a query."""
 
 
 class BatchOptions(Deviations, Outputs):
@@ -249,16 +196,10 @@ class BatchOptions(Deviations, Outputs):
         """What is given, as in a body."""
         names = ("contact", "direction", "tolerance", "include")
         inputs = {name: value for name in names if (value := getattr(self, name)) is not None}
-        if deviations := self.deviations:
-            inputs["std"] = {name.removeprefix("std_"): x for name, x in deviations.items()}
-        return inputs
+        return inputs | self.deviations
 
 
-class CaseQuery(QueryOptions, OneCase):
-    """One case and the options of its answer."""
-
-
-class TextQuery(CaseQuery):
+class TextQuery(CaseRequest):
     """One case and the value that is wanted of its answer."""
 
     value: Annotated[str, BeforeValidator(str)] = Field(

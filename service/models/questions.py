@@ -22,7 +22,6 @@ from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS, described
-from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.reading import no_number, read_one, reason_of
 from mumacro.inputs.signs import THOUSANDS
@@ -32,7 +31,6 @@ from .inputs import (
     EXAMPLE,
     NOT_BOTH,
     OR_RIGID,
-    Interval,
     Name,
     OtherInputs,
     Strict,
@@ -40,7 +38,7 @@ from .inputs import (
     optional,
 )
 from .motion import FORMS, Oscillation
-from .options import Choice, Options, QueryOptions
+from .options import Choice, Deviations, Options
 from .values import End, Length, Load, Modulus, Ratio, Start, Stop, fault, text_schema
 
 MAX_VALUES = 10_001  # values of a law, at most
@@ -48,12 +46,11 @@ _OF_A_MOTION = ("mu0", "Fz", "k", "omega", "f", "v0", "contact")
 _NOT_OF_A_MOTION = (
     "y0",
     "Fz_amplitude",
-    "k_range",
     "k_low",
     "k_high",
     "direction",
     "include",
-    "std",
+    *Deviations.model_fields,
     "stiffness_exponent",
 )
 MAX_TARGETS = 10_000
@@ -111,12 +108,6 @@ class LawRequest(Options, Sweep, OtherInputs):
         }
     )
 
-    k_range: Interval | None = optional(f"In place of k: {BOUND}")
-
-
-class LawQuery(QueryOptions, Sweep, OtherInputs):
-    """mu_macro over a range of one input."""
-
 
 # its error names the field, so that no schema of numbers >= 0 is needed
 _TARGET: list[dict[str, Any]] = [{"type": "number"}, text_schema("ratio", False)]
@@ -136,7 +127,6 @@ class SolveForRequest(Options, OtherInputs):
         }
     )
 
-    k_range: Interval | None = optional(f"In place of k: {BOUND}")
     unknown: Unknown = Field(
         description="The input to solve for, which is left out of the case; of a motion also the "
         "amplitude or the phase of a part"

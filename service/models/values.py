@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, WithJsonSchema, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF
+from mumacro.inputs.fields import ENDS, MOST_HZ, QUANTITY_OF
 from mumacro.inputs.reading import read, reason_of
 from mumacro.inputs.units import QUANTITIES
 
@@ -126,8 +126,8 @@ Ratio = Annotated[
 
 
 def stiffness_inputs(k: str) -> dict[str, Any]:
-    """The inputs that a checked text gives: k, infinite where rigid, or k_range."""
+    """The inputs that a checked text gives: k, infinite where rigid, or both ends of it."""
     one = read("k", k)
     if one.low is not None:
-        return {"k_range": (one.low, one.high)}
+        return dict(zip(ENDS, (one.low, one.high), strict=True))
     return {"k": math.inf if one.si == math.inf else k}

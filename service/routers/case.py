@@ -13,7 +13,7 @@ from mumacro.outputs.evaluation import chosen, cost
 from mumacro.validity import digits, k_effect, model_rows
 
 from ..models.answers import CaseAnswer
-from ..models.options import MODEL, CaseQuery, CaseRequest, TextQuery
+from ..models.options import MODEL, CaseRequest, TextQuery
 from ..problems import of_input
 from ..reading import DirectRoute, Json, dump
 from ..understood import UNDERSTOOD, understood
@@ -34,7 +34,7 @@ _CACHED: Any = {
 }
 
 
-async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str, Any]:
+async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
     """The answer to a case."""
     state, inputs = request.app.state, case.inputs
     table = state.tables.pick(case.tolerance)
@@ -42,7 +42,7 @@ async def _answered(request: Request, case: CaseRequest | CaseQuery) -> dict[str
     if case.include and UNDERSTOOD in case.include:
         more = {UNDERSTOOD: understood(case.model_dump(warnings=False))}
     try:
-        if case.model_fields_set <= _PLAIN and "k_range" not in inputs:
+        if case.model_fields_set <= _PLAIN and "k_low" not in inputs:
             answer = table.surrogate.evaluate(**inputs)
         else:
             cases = Cases.of(inputs | case.deviations, case.kind)
@@ -70,7 +70,7 @@ def _of_model(surrogate: Surrogate, inputs: Any, words: Any) -> dict[str, Any]:
     responses={200: _CACHED, **GET_PROBLEMS},
     summary="Macroscopic friction of one case",
 )
-async def get_mu_macro(request: Request, case: Annotated[CaseQuery, Query()]) -> Response:
+async def get_mu_macro(request: Request, case: Annotated[CaseRequest, Query()]) -> Response:
     """Answer one case given as a query.  The answer can be cached."""
     answer = await _answered(request, case)
     return Json(answer, headers=request.app.state.settings.cache_fields)

@@ -28,7 +28,7 @@ from ..limits import Working
 from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
 from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
-from ..models.questions import LawQuery, LawRequest, SolveForRequest
+from ..models.questions import LawRequest, SolveForRequest
 from ..problems import with_members
 from ..reading import Json, StrictRoute
 from ..tables import Loaded, LoadedTable, Tables
@@ -41,7 +41,7 @@ router = router_of("answers", StrictRoute)
 # --- friction law ---------------------------------------------------------------------------------
 
 
-def _law(question: LawRequest | LawQuery, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
+def _law(question: LawRequest, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
     """The library's law and all columns beside the swept input."""
     case, along, (start, stop) = question.inputs, question.along, question.ends
     _refuse_model(question)
@@ -130,7 +130,7 @@ _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "s
     summary="mu_macro over a range of one input, as a table",
 )
 async def get_law_csv(
-    question: Annotated[LawQuery, Query()], tables: Loaded, work: Working
+    question: Annotated[LawRequest, Query()], tables: Loaded, work: Working
 ) -> Response:
     """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their
     units."""

@@ -146,7 +146,9 @@ class Answer(Generic[Number]):
 
     def _group(self, place: int) -> Number:
         if self._groups is None:
-            raise AttributeError(f"{GROUPS[place]} was not requested: evaluate(..., groups=True)")
+            raise AttributeError(
+                f'{GROUPS[place]} was not requested: evaluate(..., include="groups")'
+            )
         return self._groups[place]
 
     @property
@@ -199,7 +201,7 @@ class Answer(Generic[Number]):
         """Whether the regime is the same for every v~crit within its bound: bool or ndarray of
         bool; as v_tilde."""
         if self._groups is None:
-            raise AttributeError("regime_certain needs the groups: evaluate(..., groups=True)")
+            raise AttributeError('regime_certain needs the groups: evaluate(..., include="groups")')
         cases, shape = self.cases, np.shape(np.asarray(self.mu_macro))
         kind = cases.kind if cases.codes is None else cases.codes.reshape(shape)
         certain = self._surrogate.tabulated.certain(*self._groups[:2], kind)

@@ -15,7 +15,7 @@ from mumacro.answer import BAND, DEFAULT, GROUPS, Answer, IntervalAnswer, add
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, codes_of, library_of
 from mumacro.inputs.doubts import Remark
-from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.fields import ENDS
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.reading import without_unit
 from mumacro.outputs import MEMBERS, OUTPUTS
@@ -232,7 +232,7 @@ def _of_chunks(
         for remark in answer.remarks:
             add(remarks, remark)
         if (cases.std and not deviations) or (cases.ends is not None and not band):
-            bound = "numbers: give deviations and intervals as arrays, std={...}, k_low and k_high"
+            bound = "numbers: give deviations and intervals as arrays, std_k, k_low and k_high"
             raise InputError("inputs", "texts", bound)
         values = dict(answer.outputs)
         for name, path in _SLOPES_OF_K.items():

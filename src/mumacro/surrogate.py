@@ -17,12 +17,12 @@ from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
     ABSENT,
-    DEVIATIONS,
+    COLUMNS,
     Absent,
     Cases,
     has_labels,
     named,
-    unknown,
+    no_such_input,
 )
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
@@ -45,7 +45,7 @@ _FLOAT = np.dtype(np.float64)
 #: effects of an illegal value in an array
 ILLEGAL = ("nan", "raise")
 _WORDS = (Absent, str)
-_OPTIONS: dict[str, Any] = {"include": (), "gradient": False, "groups": False, "illegal": "nan"}
+_OPTIONS: dict[str, Any] = {"include": (), "gradient": False, "illegal": "nan"}
 _SHORT: dict[Any, Kind] = {ABSENT: SPRING, "spring": SPRING, "ball": BALL}
 _SLOPES = tuple(f"{name}.{field}" for name in ("gradient", "gradient_bound") for field in FIELDS)
 
@@ -442,7 +442,6 @@ class Surrogate:
         mu0: Any = ABSENT,
         Fz: Any = ABSENT,
         k: Any = ABSENT,
-        k_range: Any = ABSENT,
         k_low: Any = ABSENT,
         k_high: Any = ABSENT,
         y0: Any = ABSENT,
@@ -450,14 +449,20 @@ class Surrogate:
         omega: Any = ABSENT,
         f: Any = ABSENT,
         v0: Any = ABSENT,
+        std_mu0: Any = ABSENT,
+        std_Fz: Any = ABSENT,
+        std_k: Any = ABSENT,
+        std_y0: Any = ABSENT,
+        std_Fz_amplitude: Any = ABSENT,
+        std_omega: Any = ABSENT,
+        std_f: Any = ABSENT,
+        std_v0: Any = ABSENT,
         contact: Any = ABSENT,
         direction: Any = ABSENT,
         include: Iterable[str] | str = (),
-        std: Mapping[str, Any] | None = None,
         gradient: bool = False,
-        groups: bool = False,
         illegal: str = "nan",
-        **more: Any,
+        **unknown_names: Any,
     ) -> Any:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
@@ -474,10 +479,8 @@ class Surrogate:
         k : array_like or "rigid"
             Tangential stiffness of the contact [N/m], > 0; "rigid" or infinity is rigid contact,
             eq. (37).  It must always be given, here or as an interval: None is refused.
-        k_range : pair of array_like
-            Lowest and highest stiffness [N/m] in place of k.
         k_low, k_high : array_like
-            The same as two columns.
+            Lowest and highest stiffness [N/m] in place of k.
         y0 : array_like
             Amplitude of the oscillation, half of peak to peak [m], >= 0, across or along the
             sliding direction.
@@ -500,17 +503,15 @@ class Surrogate:
             Outputs to compute beside mu_macro, by name: groups, limits, gradient, std,
             stick_fraction, power, settling (``mumacro.outputs.OUTPUTS``).  Each is in the
             answer by its path, such as ``answer["power.saved"]``, with its bound.
-        std : mapping
-            Standard deviations of inputs by name, in their units, of independent errors; numbers or
-            arrays.  They imply the output std.  Columns of a frame are std_k and so on.
-        gradient, groups : bool
-            The same as these two names in ``include``: the slopes with respect to every input, with
-            bounds; v~, y~ and l0.
+        std_mu0, std_Fz, std_k, std_y0, std_Fz_amplitude, std_omega, std_f, std_v0 : array_like
+            Standard deviations of the inputs, in their units, of independent errors.  They imply
+            the output std.
+        gradient : bool
+            The same as this name in ``include``: the slopes with respect to every input, with
+            bounds.
         illegal : str
             Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case,
             "raise" raises.
-        **more
-            Deviations as ``std_k`` and so on; other names are refused.
 
         Returns
         -------
@@ -538,20 +539,22 @@ class Surrogate:
         >>> case = dict(mu0=0.3, Fz=10, y0=2e-6, f=20e3, v0=0.01)
         >>> s.evaluate(k=1e6, contact="ball", **case).regime
         'partial_slip'
-        >>> a = s.evaluate(k_range=(0.8e6, 1.2e6), **case)
+        >>> a = s.evaluate(k_low=0.8e6, k_high=1.2e6, **case)
         >>> f"{a.mu_macro_low:.4f} {a.mu_macro:.4f} {a.mu_macro_high:.4f}"
         '0.2095 0.2432 0.2640'
-        >>> a = s.evaluate(k=1e6, include=("power",), std={"k": 1e5, "v0": 1e-3}, **case)
+        >>> a = s.evaluate(k=1e6, include=("power",), std_k=1e5, std_v0=1e-3, **case)
         >>> f"{a['power.saved']:.6f} {a['std']:.4f} {a['std_share.k']:.2f}"
         '0.005953 0.0136 0.99'
         """
         if (
-            cases is std is None
-            and k_range is k_low is k_high is Fz_amplitude is direction is ABSENT
+            cases is None
+            and k_low is k_high is Fz_amplitude is direction is ABSENT
+            and std_mu0 is std_Fz is std_k is std_y0 is std_Fz_amplitude is ABSENT
+            and std_omega is std_f is std_v0 is ABSENT
             and type(contact) in _WORDS
             and contact in _SHORT
             and (f is ABSENT or omega is ABSENT)
-            and not (include or groups or more)
+            and not (include or unknown_names)
             and illegal == "nan"
         ):
             # One case across in plain numbers takes this short way, in a third of the time.  What
@@ -562,39 +565,21 @@ class Surrogate:
                     answer = self._one(six, f is not ABSENT, gradient, _SHORT[contact])
                     if answer.source_code >= 0:
                         return answer
-        keywords = {
-            "mu0": mu0,
-            "Fz": Fz,
-            "k": k,
-            "k_range": k_range,
-            "k_low": k_low,
-            "k_high": k_high,
-            "y0": y0,
-            "Fz_amplitude": Fz_amplitude,
-            "omega": omega,
-            "f": f,
-            "v0": v0,
-            "contact": contact,
-            "direction": direction,
+        for name, value in unknown_names.items():
+            raise no_such_input(name, value)
+        arguments = locals()
+        keywords = {name: x for name in COLUMNS if (x := arguments[name]) is not ABSENT}
+        keywords |= {
+            name: x for name, usual in _OPTIONS.items() if (x := arguments[name]) is not usual
         }
-        keywords = {name: x for name, x in keywords.items() if x is not ABSENT}
-        options: dict[str, Any] = {
-            "include": include,
-            "gradient": gradient,
-            "groups": groups,
-            "illegal": illegal,
-        }
-        keywords |= {name: x for name, x in options.items() if x is not _OPTIONS[name]}
-        keywords |= {} if std is None else {"std": std}
-        for name in more.keys() - DEVIATIONS.keys():
-            raise unknown(name, more[name])
-        values = named(cases, keywords | more)
-        options = {name: values.pop(name, default) for name, default in _OPTIONS.items()}
+        values = named(cases, keywords)
+        options = {name: values.pop(name, usual) for name, usual in _OPTIONS.items()}
         if options["illegal"] not in ILLEGAL:
             raise InputError("illegal", options["illegal"], '"nan" or "raise"')
         strict = options["illegal"] == "raise"
-        shorthand = [name for name in ("gradient", "groups") if options[name]]
-        names = [*names_in(options["include"]), *shorthand]
+        names = names_in(options["include"])
+        if options["gradient"]:
+            names.append("gradient")
         if has_labels(values.values()):
             return evaluate_labelled(self, cases, values, names, strict)
         cases = Cases.of(values, strict=strict)

@@ -81,7 +81,7 @@ def model_rows(
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
     >>> [k_row] = [row for row in model_rows(Surrogate.open(), case) if row["row"] == "k is known"]
     >>> k_row["text"]
-    '10 % more or less of k changes mu_macro by 6 %: give k_range, or fit k'
+    '10 % more or less of k changes mu_macro by 6 %: give k as an interval, or fit k'
     """
     case, ends = without_interval(case)
     kind = kind_of(contact, direction)
@@ -226,7 +226,8 @@ def _row_of_stiffness(
     effect = k_effect(surrogate, case, contact, direction)
     margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{plain(100.0 * effect, 2)} %"
     if effect >= 1e-3:
-        text = f"{margin} more or less of k changes mu_macro by {change}: give k_range, or fit k"
+        advice = "give k as an interval, or fit k"
+        text = f"{margin} more or less of k changes mu_macro by {change}: {advice}"
     elif y > HARDLY:
         text = (
             f"y~ = {plain(y, 3)}, above {HARDLY:g}: {margin} more or less of k changes mu_macro by "

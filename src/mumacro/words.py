@@ -5,7 +5,7 @@ from typing import Any
 
 from mumacro.answer import Answer
 from mumacro.inputs.doubts import UNITS
-from mumacro.inputs.fields import LIKE, PER_UNIT
+from mumacro.inputs.fields import ENDS, LIKE, PER_UNIT
 from mumacro.inputs.kind import Kind
 from mumacro.inputs.units import Scale, scale_of, suited
 from mumacro.outputs import MEMBERS
@@ -38,7 +38,7 @@ def of_one_case(
     surrogate, cases = answer._surrogate, answer.cases
     kind, case = cases.one_kind, cases.columns
     ends = cases.ends and tuple(float(end[0]) for end in cases.ends)
-    asked = {**case} if ends is None else {**_without_k(case), "k_range": ends}
+    asked = {**case} if ends is None else {**_without_k(case), **dict(zip(ENDS, ends, strict=True))}
     effect = k_effect(surrogate, asked, *kind.names.values()) if shown is None else 0.0
     rows = _rows_of(answer, kind, shown, digits(effect), units or {})
     notes: Rows = [
@@ -67,10 +67,10 @@ def _without_k(case: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def in_words(text: str, case: Mapping[str, Any]) -> str:
-    """The advice of a model line with what is typed in place of Python's keyword."""
+    """The advice of a model line with what is typed in place of its words."""
     unit, scale = suited("N/m", case["k"])
     k = scale.of_si(case["k"])
-    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}")
+    return text.replace("give k as an interval", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}")
 
 
 #: paths that have the unit of an input

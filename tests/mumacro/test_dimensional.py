@@ -3,6 +3,7 @@ of the range."""
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -14,6 +15,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mumacro import InputError, Surrogate, fit, law, settling, solve_for
+from mumacro.inputs.cases import DEVIATIONS
 from mumacro.inputs.fields import BOUNDS, FIELDS, POSITIVE, STIFFNESS
 from tests.support.cases import CASE, Case, log_uniform, tables, without
 from tests.support.comparing import close
@@ -67,7 +69,7 @@ def test_groups_are_right_whatever_overflows_and_the_answer_is_finite(
     assert 0.0 <= answer.mu_macro <= mu0
     assert 0.0 <= answer.error_bound <= mu0  # a larger bound would be useless
     for columns in ({**case, "mu0": [mu0]}, {name: np.array([x]) for name, x in case.items()}):
-        many = table.evaluate(columns, groups=True)
+        many = table.evaluate(columns, include="groups")
         for name in ("v_tilde", "y_tilde", "length_scale", "mu_ratio", "error_bound"):
             assert getattr(many, name)[0] == getattr(answer, name)
 
@@ -182,7 +184,7 @@ def test_illegal_value_is_named_with_field_and_bound(
 
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
-@pytest.mark.parametrize("options", [{}, {"groups": True}, {"gradient": True}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"include": "groups"}, {"gradient": True}], ids=str)
 def test_an_illegal_value_of_an_array_spoils_its_case(
     table: Surrogate, field: str, bad: float, options: Case
 ) -> None:
@@ -286,9 +288,27 @@ def test_the_index_of_an_illegal_value_is_that_of_its_case(table: Surrogate) -> 
 
 def test_every_input_is_named_in_the_signature(table: Surrogate) -> None:
     named = inspect.signature(table.evaluate).parameters
-    for name in (*FIELDS, "f", "Fz_amplitude", "k_range", "k_low", "k_high"):
+    for name in (*FIELDS, "f", "Fz_amplitude", "k_low", "k_high", *DEVIATIONS):
         assert named[name].kind is inspect.Parameter.KEYWORD_ONLY
         assert repr(named[name].default) == "left out"
+
+
+@pytest.mark.parametrize(
+    ("former", "now"),
+    [
+        ({"k_range": (8e5, 1.2e6)}, "k_low and k_high"),
+        ({"std": {"k": 1e5}}, "std_k"),
+        ({"groups": True}, 'include="groups"'),
+    ],
+)
+def test_a_former_name_is_refused_with_the_new_one(
+    table: Surrogate, former: Case, now: str
+) -> None:
+    [name] = former
+    for ask in (lambda: table.evaluate(**CASE, **former), lambda: table.evaluate(CASE | former)):
+        with pytest.raises(InputError, match=re.escape(now)) as caught:
+            ask()
+        assert caught.value.field == name
 
 
 def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> None:

@@ -19,9 +19,9 @@ SPEEDS = np.geomspace(1e-3, 1.0, 30)
     [
         {},
         {"gradient": True},
-        {"groups": True},
+        {"include": "groups"},
         {"contact": "ball"},
-        {"k_range": (0.8e6, 1.2e6)},
+        {"k_low": 0.8e6, "k_high": 1.2e6},
         {"v0": 0.01},
         {"v0": SPEEDS.reshape(5, 6)},
         {"v0": np.array([0.01, -1.0])},
@@ -31,14 +31,14 @@ def test_a_frame_has_one_row_a_case_with_what_was_requested(
     surrogate: Surrogate, more: Any
 ) -> None:
     pandas = pytest.importorskip("pandas")
-    case = {name: value for name, value in CASE.items() if name != "k" or "k_range" not in more}
+    case = {name: value for name, value in CASE.items() if name != "k" or "k_low" not in more}
     answer = surrogate.evaluate(**{**case, "v0": SPEEDS, **more})
     frame = answer.to_frame()
     assert isinstance(frame, pandas.DataFrame)
     assert len(frame) == np.size(answer.mu_macro)
     for name in ("mu_macro", "mu_ratio", "regime", "error_bound", "source"):
         np.testing.assert_array_equal(frame[name].to_numpy(), np.ravel(getattr(answer, name)))
-    assert ("mu_macro_low" in frame) == ("k_range" in more)
+    assert ("mu_macro_low" in frame) == ("k_low" in more)
     assert ("gradient.k" in frame) == ("gradient" in more)
     assert list(frame) == answer.paths
 

@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mumacro import InputError, Surrogate, law, settling, solve_for
+from mumacro import InputError, Surrogate, settling, solve_for
 from mumacro.analysis.motion import motion
 from mumacro.answer import TEXTS
 from mumacro.contacts.element import Element
 from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.kind import KINDS, Kind
 from mumacro.outputs import MEMBERS, OUTPUTS
-from tests.support.cases import CASE, Case, as_kind, tables, without
+from tests.support.cases import CASE, Case, as_kind, flat, tables, without
 from tests.support.comparing import close
 
 table = tables(1e-10)
@@ -53,11 +53,11 @@ def same(one: Any, other: Any) -> bool:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: " ".join(kind.names.values()))
 def test_one_case_has_the_outputs_that_it_has_among_many(table: Surrogate, kind: Kind) -> None:
     columns, include = draw(kind), names_for(kind)
-    many = table.evaluate(columns, **kind.names, include=include, std={"mu0": 0.01, "v0": 1e-3})
+    many = table.evaluate(columns, **kind.names, include=include, std_mu0=0.01, std_v0=1e-3)
     assert set(many.outputs) <= {*MEMBERS}
     for i in range(0, N, 3):
         case = {name: float(x[i]) for name, x in columns.items()}
-        one = table.evaluate(case, **kind.names, include=include, std={"mu0": 0.01, "v0": 1e-3})
+        one = table.evaluate(case, **kind.names, include=include, std_mu0=0.01, std_v0=1e-3)
         assert one.paths == many.paths
         for path in one.paths:
             assert type(one[path]) is (str if path in TEXTS else float), path
@@ -72,8 +72,8 @@ def test_one_case_has_the_outputs_that_it_has_among_many(table: Surrogate, kind:
 def test_one_interval_is_answered_in_plain_numbers(table: Surrogate, kind: Kind) -> None:
     _, _, case = as_kind(CASE, (kind.names["contact"], kind.names["direction"]))
     k = case.pop("k")
-    include = [name for name in names_for(kind) if "k_range" not in OUTPUTS[name].lacks]
-    answer = table.evaluate(case, **kind.names, k_range=(0.8 * k, 1.2 * k), include=include)
+    include = [name for name in names_for(kind) if "interval" not in OUTPUTS[name].lacks]
+    answer = table.evaluate(case, **kind.names, k_low=0.8 * k, k_high=1.2 * k, include=include)
     assert "mu_macro_low" in answer.paths
     for path in answer.paths:
         assert type(answer[path]) is (str if path in TEXTS else float), path
@@ -182,7 +182,7 @@ def test_an_output_that_no_case_has_is_refused_with_the_reason(table: Surrogate)
     ends = without(CASE, "k")
     asked: list[tuple[Any, Any, Any]] = [
         ({"direction": "along"}, CASE, {"include": ["settling"]}),
-        ({}, {**ends, "k_range": (1e6, 2e6)}, {"std": {"v0": 1e-3}}),
+        ({}, {**ends, "k_low": 1e6, "k_high": 2e6}, {"std_v0": 1e-3}),
     ]
     for words, case, include in asked:
         for v0 in (0.01, [0.01, 0.02]):
@@ -196,7 +196,7 @@ def test_an_output_that_no_case_has_is_refused_with_the_reason(table: Surrogate)
 
 @pytest.mark.parametrize("k", [CASE["k"], "rigid"])
 def test_a_deviation_implies_std_to_first_order_with_shares(table: Surrogate, k: Any) -> None:
-    answer = table.evaluate(**{**CASE, "k": k}, std=STD, gradient=True)
+    answer = table.evaluate(**{**CASE, "k": k}, **flat(STD), gradient=True)
     parts = {
         name: 0.0 if (name, k) == ("k", "rigid") else answer.gradient[name] * x
         for name, x in STD.items()
@@ -208,34 +208,33 @@ def test_a_deviation_implies_std_to_first_order_with_shares(table: Surrogate, k:
 
 
 def test_deviations_come_in_every_form(table: Surrogate) -> None:
-    expected = table.evaluate(**CASE, std={"k": 1e5})["std"]
+    expected = table.evaluate(**CASE, std_k=1e5)["std"]
     case = without(CASE, "k")
     assert table.evaluate(k="1 ± 0.1 N/um", **case)["std"] == close(expected, rel=1e-12)
     assert table.evaluate(k=["1 ± 0.1 N/um", 1e6], **case)["std"].tolist() == [expected, 0.0]
-    assert table.evaluate({**CASE, "std": {"k": "0.1 N/um"}})["std"] == expected
+    assert table.evaluate({**CASE, "std_k": "0.1 N/um"})["std"] == expected
     frame = pd.DataFrame({**CASE, "std_k": [1e5, 0.0]})
     assert table.evaluate(frame)["std"].tolist() == [expected, 0.0]
     assert table.evaluate(frame.iloc[0])["std"] == expected
-    by_f = table.evaluate(**CASE, std={"f": 1e3 / (2.0 * math.pi)})
-    assert by_f["std"] == close(table.evaluate(**CASE, std={"omega": 1e3})["std"], rel=1e-12)
-    assert table.evaluate(**CASE, std={})["std"] == 0.0
+    by_f = table.evaluate(**CASE, std_f=1e3 / (2.0 * math.pi))
+    assert by_f["std"] == close(table.evaluate(**CASE, std_omega=1e3)["std"], rel=1e-12)
+    assert table.evaluate(**CASE, std_k=0.0)["std"] == 0.0
 
 
 @pytest.mark.parametrize(
     ("std", "field"),
     [
-        ({"k": -1.0}, "std_k"),
-        ({"k": math.nan}, "std_k"),
-        ({"k": "1 m"}, "k"),
-        ({"speed": 1.0}, "std"),
-        ({"Fz_amplitude": 1.0}, "std_Fz_amplitude"),
-        ({"omega": 1.0, "f": 1.0}, "std_f"),
-        (0.1, "std"),
+        ({"std_k": -1.0}, "std_k"),
+        ({"std_k": math.nan}, "std_k"),
+        ({"std_k": "1 m"}, "k"),
+        ({"std_speed": 1.0}, "std_speed"),
+        ({"std_Fz_amplitude": 1.0}, "std_Fz_amplitude"),
+        ({"std_omega": 1.0, "std_f": 1.0}, "std_f"),
     ],
 )
 def test_a_bad_deviation_is_refused_by_name(table: Surrogate, std: Any, field: str) -> None:
     with pytest.raises(InputError) as caught:
-        table.evaluate(**CASE, std=std)
+        table.evaluate(**CASE, **std)
     assert caught.value.field == field
 
 
@@ -247,28 +246,26 @@ def test_a_bad_deviation_spoils_its_case_alone(table: Surrogate) -> None:
 
 
 def test_where_first_order_is_not_enough_is_told_for_one_case(table: Surrogate) -> None:
-    straight = table.evaluate(**CASE, std={"k": 1e4})
+    straight = table.evaluate(**CASE, std_k=1e4)
     assert straight.remarks == []
-    bent = table.evaluate(**CASE, std={"k": 6e5, "mu0": 0.01})
+    bent = table.evaluate(**CASE, std_k=6e5, std_mu0=0.01)
     [remark] = [remark for remark in bent.remarks if remark["row"] == "std"]
     assert (remark["field"], remark["cases"]) == ("k", 1)
     up, down = (table.evaluate(**{**CASE, "k": k}).mu_macro for k in (1.6e6, 4e5))
     slope = table.evaluate(**CASE, gradient=True).gradient["k"] * 6e5
     off = max(abs(up - bent.mu_macro - slope), abs(down - bent.mu_macro + slope))
     assert off > 0.2 * bent["std"]
-    [below] = table.evaluate(**CASE, std={"v0": 0.02}).remarks  # v0 one deviation down is negative
+    [below] = table.evaluate(**CASE, std_v0=0.02).remarks  # v0 one deviation down is negative
     assert (below["row"], below["field"]) == ("std", "v0")
 
 
 def test_what_computes_no_deviation_refuses_one_by_name(table: Surrogate) -> None:
     five, doubt = without(CASE, "v0", "mu0"), "0.3 ± 0.1"
     calls: list[tuple[str, Any]] = [
-        ("mu0", lambda: law(table, start=1e-3, stop=1.0, mu0=doubt, **five)),
         ("mu0", lambda: solve_for(table, "v0", 0.2, mu0=doubt, **five)),
         ("mu0", lambda: settling(table, mu0=doubt, v0=0.01, **five)),
         ("mu0", lambda: motion(mu0=doubt, v0=0.01, y=2e-6, **without(five, "y0"))),
         ("mu0", lambda: Element(doubt, 10.0, 1e6)),
-        ("std", lambda: law(table, start=1e-3, stop=1.0, mu0=0.3, std={"mu0": 0.1}, **five)),
         ("std_mu0", lambda: solve_for(table, "v0", 0.2, mu0=0.3, std_mu0=0.1, **five)),
     ]
     for field, ask in calls:

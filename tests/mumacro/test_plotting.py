@@ -62,7 +62,7 @@ MOTION: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e5, "f": 50.0, "v0": 0.01}
 PICTURES: dict[str, Callable[[Surrogate], Any]] = {
     "one case": lambda s: s.evaluate(**CASE),
     "rigid": lambda s: s.evaluate(**{**CASE, "k": "rigid"}),
-    "interval": lambda s: s.evaluate(**case_of(KINDS[0], k=None, k_range=(3e5, 3e6))),
+    "interval": lambda s: s.evaluate(**case_of(KINDS[0], k=None, k_low=3e5, k_high=3e6)),
     "array": lambda s: s.evaluate(**{**CASE, "v0": SPEEDS}, direction="along"),
     "normal": lambda s: s.evaluate(**case_of(Kind(0, 2), v0=SPEEDS)),
     "two kinds": lambda s: s.evaluate(**CASE, contact=["spring", "ball"]),
@@ -127,7 +127,7 @@ def test_cases_stand_on_the_map_of_their_kind_though_no_groups_were_asked_for(
 ) -> None:
     case = case_of(kind, v0=v0)
     axes = surrogate.evaluate(**case).plot()
-    grouped = surrogate.evaluate(**case, groups=True)
+    grouped = surrogate.evaluate(**case, include="groups")
     looks = {look.words: look for look in plotting.REGIMES.values()}
     places = {(x, y) for line in axes.lines if line.get_label() in looks for x, y in data(line)}
     expected = zip(np.ravel(grouped.v_tilde), np.ravel(grouped.y_tilde), strict=True)
@@ -217,7 +217,7 @@ def test_several_kinds_have_a_map_each(surrogate: Surrogate) -> None:
 
 def test_an_interval_of_k_is_a_line_on_the_map(surrogate: Surrogate) -> None:
     ends = (3e5, 3e6)
-    answer = surrogate.evaluate(**case_of(KINDS[0], k=None, k_range=ends))
+    answer = surrogate.evaluate(**case_of(KINDS[0], k=None, k_low=ends[0], k_high=ends[1]))
     axes = answer.plot()
     (line,) = [line for line in axes.lines if "interval" in line.get_label()]
     places = data(line)

@@ -42,12 +42,14 @@ EVERY = [*OUTPUTS]
 RESULTS: dict[str, Callable[[Surrogate, int], Any]] = {
     "answer": lambda s, n: s.evaluate(**without("v0"), v0=np.geomspace(1e-4, 1.0, n)),
     "answer with all outputs": lambda s, n: s.evaluate(
-        **without("v0"), v0=np.geomspace(1e-4, 1.0, n), include=EVERY, std={"k": 1e5}
+        **without("v0"), v0=np.geomspace(1e-4, 1.0, n), include=EVERY, std_k=1e5
     ),
     "answer in two dimensions": lambda s, n: s.evaluate(
         **without("v0", "y0"), v0=np.geomspace(1e-4, 1.0, n)[:, None], y0=[1e-6, 2e-6]
     ),
-    "interval": lambda s, n: s.evaluate(**without("k", "v0"), v0=[0.01] * n, k_range=(8e5, 1.2e6)),
+    "interval": lambda s, n: s.evaluate(
+        **without("k", "v0"), v0=[0.01] * n, k_low=8e5, k_high=1.2e6
+    ),
     "law": lambda s, n: mumacro.law(s, start=1e-4, stop=1.0, points=n + 1, **without("v0")),
     "solution": lambda s, n: mumacro.solve_for(
         s, "y0", np.linspace(0.1, 0.4, n), **without("y0")
@@ -65,9 +67,9 @@ RESULTS: dict[str, Callable[[Surrogate, int], Any]] = {
 }  # fmt: skip
 ONE: dict[str, Callable[[Surrogate], Any]] = {
     "answer": lambda s: s.evaluate(**CASE),
-    "answer with all outputs": lambda s: s.evaluate(**CASE, include=EVERY, std={"k": 1e5}),
+    "answer with all outputs": lambda s: s.evaluate(**CASE, include=EVERY, std_k=1e5),
     "rigid": lambda s: s.evaluate(**{**CASE, "k": "rigid"}),
-    "interval": lambda s: s.evaluate(**without("k"), k_range=(8e5, 1.2e6)),
+    "interval": lambda s: s.evaluate(**without("k"), k_low=8e5, k_high=1.2e6),
     "motion": lambda _: mumacro.motion(**MOTION, v0=0.01),
     "solution of a motion": lambda _: mumacro.solve_motion("v0", 0.0, **MOTION),
     "solution without a root": lambda s: mumacro.solve_for(s, "y0", 0.5, **without("y0")),

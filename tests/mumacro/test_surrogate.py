@@ -163,7 +163,7 @@ def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
         with pytest.raises(AttributeError, match=f"{name} was not requested"):
             getattr(plain, name)
         np.testing.assert_array_equal(
-            getattr(table.evaluate(**columns, groups=True), name), getattr(whole, name)
+            getattr(table.evaluate(**columns, include="groups"), name), getattr(whole, name)
         )
     np.testing.assert_array_equal(plain.mu_macro, whole.mu_macro)
     names = (
@@ -205,7 +205,7 @@ def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(
     assert all(np.array_equal(result.ravel(), expected) for result in others)
 
 
-@pytest.mark.parametrize("options", [{}, {"groups": True}, {"gradient": True}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"include": "groups"}, {"gradient": True}], ids=str)
 @pytest.mark.parametrize("shape", [(0,), (0, 3)])
 def test_empty_arrays_give_empty_answers(
     fine: Surrogate, shape: tuple[int, ...], options: Case

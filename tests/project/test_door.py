@@ -106,14 +106,14 @@ TEXTS: dict[str, Kind] = {
 }
 #: deviations and intervals, which evaluate and its forms take: mu_macro, its deviation, its least
 SPREADS: dict[str, tuple[Read, Read]] = {
-    "deviation": ({"k": "1 ± 0.1 N/um"}, {"std": {"k": 1e5}}),
-    "deviation in ASCII": ({"k": "1 N/um +/- 100 N/mm"}, {"std": {"k": 1e5}}),
-    "share": ({"k": "1 N/um +- 10%"}, {"std": {"k": 1e5}}),
-    "percentage points": ({"mu0": "30 % ± 2 %"}, {"std": {"mu0": 0.02}}),
-    "decimal commas": ({"mu0": "0,30 ± 0,02"}, {"std": {"mu0": 0.02}}),
-    "of a frequency": ({"f": "20 ± 1 kHz"}, {"std": {"f": 1e3}}),
-    "interval": ({"k": "0.8..1.2 N/um"}, {"k_range": (0.8e6, 1.2e6)}),
-    "interval of two units": ({"k": "800N/mm … 1,2N/um"}, {"k_range": (0.8e6, 1.2e6)}),
+    "deviation": ({"k": "1 ± 0.1 N/um"}, {"std_k": 1e5}),
+    "deviation in ASCII": ({"k": "1 N/um +/- 100 N/mm"}, {"std_k": 1e5}),
+    "share": ({"k": "1 N/um +- 10%"}, {"std_k": 1e5}),
+    "percentage points": ({"mu0": "30 % ± 2 %"}, {"std_mu0": 0.02}),
+    "decimal commas": ({"mu0": "0,30 ± 0,02"}, {"std_mu0": 0.02}),
+    "of a frequency": ({"f": "20 ± 1 kHz"}, {"std_f": 1e3}),
+    "interval": ({"k": "0.8..1.2 N/um"}, {"k_low": 0.8e6, "k_high": 1.2e6}),
+    "interval of two units": ({"k": "800N/mm … 1,2N/um"}, {"k_low": 0.8e6, "k_high": 1.2e6}),
 }
 #: what has no text: objects of Python, NumPy and pandas
 OBJECTS: dict[str, Kind] = {
@@ -421,7 +421,7 @@ def test_a_value_with_a_deviation_of_its_own_is_understood(kind: str) -> None:
     module, make = DEVIATING[kind]
     _importable(module)
     answer = surrogate().evaluate(**{**BASE, "k": make()})
-    right = surrogate().evaluate(**BASE, std={"k": 1e5})
+    right = surrogate().evaluate(**BASE, std_k=1e5)
     assert (answer.mu_macro, answer["std"]) == close((right.mu_macro, right["std"]), rel=1e-9)
     many = surrogate().evaluate(**{**BASE, "k": [make(), 1e6]})
     assert many["std"].tolist() == close([right["std"], 0.0], rel=1e-9)
@@ -531,14 +531,13 @@ def test_json_that_is_no_value_is_refused(
 
 def _spread(answer: Mapping[str, Any]) -> list[float]:
     """mu_macro, its deviation and the least over an interval, of JSON."""
-    ends = answer.get("k_range") or answer
-    numbers = (answer["mu_macro"], answer.get("std"), ends.get("mu_macro_low"))
+    numbers = (answer["mu_macro"], answer.get("std"), answer.get("mu_macro_low"))
     return [float(np.ravel(x)[0]) for x in numbers if x is not None]
 
 
 def _right(kind: str) -> list[float]:
     change = SPREADS[kind][1]
-    rest = {name: x for name, x in BASE.items() if not ("k_range" in change and name == "k")}
+    rest = {name: x for name, x in BASE.items() if not ("k_low" in change and name == "k")}
     return _spread(surrogate().evaluate(**rest, **change).to_dict())
 
 
@@ -573,5 +572,5 @@ def test_a_cell_with_two_numbers_says_which_columns_have_them(
     assert main(["eval", str(table), "-o", str(tmp_path / "out.csv"), "--table", "1e-7"]) == 3
     capsys.readouterr()
     [rejects] = tmp_path.glob("*rejects*")
-    columns = "k_low and k_high" if "k_range" in SPREADS[kind][1] else f"std_{name}"
+    columns = "k_low and k_high" if "k_low" in SPREADS[kind][1] else f"std_{name}"
     assert columns in rejects.read_text("utf-8")

@@ -10,6 +10,7 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.outputs import OUTPUTS
+from tests.support.cases import flat
 from tests.support.serving import CASE
 
 Row = dict[str, Any]
@@ -134,13 +135,13 @@ def test_the_service_answers_in_every_format_what_the_library_does(
 INCLUDED = [*OUTPUTS]
 
 
-def flat(document: Row, path: str = "") -> Row:
+def leaves_of(document: Row, path: str = "") -> Row:
     """Leaves of nested objects by their paths; JSON has no number that is not finite, and says
     null."""
     leaves: Row = {}
     for name, value in document.items():
         if isinstance(value, dict):
-            leaves |= flat(value, f"{path}{name}.")
+            leaves |= leaves_of(value, f"{path}{name}.")
         else:
             leaves[path + name] = (
                 None if isinstance(value, float) and not math.isfinite(value) else value
@@ -150,8 +151,10 @@ def flat(document: Row, path: str = "") -> Row:
 
 def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any) -> None:
     good, std = list(GOOD), {"v0": 1e-3, "mu0": 0.01}
-    options = {"include": INCLUDED, "std": std}
-    single = [flat(client.post("/v1/mu-macro", json={**row, **options}).json()) for row in good]
+    options = {"include": INCLUDED, **flat(std)}
+    single = [
+        leaves_of(client.post("/v1/mu-macro", json={**row, **options}).json()) for row in good
+    ]
     names = [name for name in single[0] if not name.startswith(("table", "api", "remarks"))]
     assert names[: len(COLUMNS)] == list(COLUMNS)
     assert len(names) > 30
@@ -159,12 +162,12 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     columns = client.post(
         BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **options}
     ).json()
-    listed = {name: values for name, values in flat(columns).items() if name in names}
+    listed = {name: values for name, values in leaves_of(columns).items() if name in names}
     assert [
         dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)
     ] == single
     query = {"include": ",".join(INCLUDED), **{f"std_{name}": value for name, value in std.items()}}
-    of_query = flat(client.get("/v1/mu-macro", params={**CASE, **query}).json())
+    of_query = leaves_of(client.get("/v1/mu-macro", params={**CASE, **query}).json())
     assert {name: of_query[name] for name in names} == single[0]
     reply = client.post(BATCH, params=query, json=good).json()
-    assert [{name: flat(row)[name] for name in names} for row in reply["results"]] == single
+    assert [{name: leaves_of(row)[name] for name in names} for row in reply["results"]] == single

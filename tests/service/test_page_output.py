@@ -402,7 +402,7 @@ def test_all_contacts_and_directions_answer(
     swing = {"y0": None, "Fz_amplitude": 5.0} if normal else {}
     case = {name: x for name, x in {**START, **swing, "k": None}.items() if x is not None}
     expected = surrogate.evaluate(
-        **case, contact=contact, direction=direction, k_range=(8e5, 1.2e6)
+        **case, contact=contact, direction=direction, k_low=8e5, k_high=1.2e6
     )
     match = page.wait_for("#spread", r"^(\S+) to (\S+) for k = 0.8..1.2 N/um$")
     ends = [expected.mu_macro_low, expected.mu_macro_high]

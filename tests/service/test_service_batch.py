@@ -216,7 +216,7 @@ STIFFNESSES = st.sampled_from(
     [
         {"k": "rigid"},
         {"k": "0.8..1.2 N/um"},
-        {"k_range": [8e5, 1.2e6]},
+        {"k_low": 8e5, "k_high": 1.2e6},
         {"k_low": "0.8 N/um", "k_high": 1.2e6},
         {"k": None},
         {"k_low": "1 ± 0.1 N/um", "k_high": 2e6},
@@ -284,9 +284,9 @@ def test_an_amplitude_of_another_direction_is_left_out_or_null(client: Any, numb
 @pytest.mark.parametrize(
     ("columns", "field"),
     [
-        ({"mu0": ["0.3 ± 0.01", 0.3], "std": {"mu0": 0.05}}, "mu0"),
+        ({"mu0": ["0.3 ± 0.01", 0.3], "std_mu0": 0.05}, "std_mu0"),
         ({"k": ["0.8..1.2 N/um", 1e6], "k_low": [1e5, 1e5], "k_high": [2e5, 2e5]}, "k"),
-        ({"v0": [0.01, 0.1], "std_mu0": 0.05}, "std_mu0"),
+        ({"v0": [0.01, 0.1], "std": {"mu0": 0.05}}, "std"),
         ({"v0": [0.01, 0.1], "std_nothing": 0.05}, "std_nothing"),
     ],
 )
@@ -302,7 +302,7 @@ def test_no_column_is_dropped_for_another(
 def test_an_end_or_a_deviation_has_no_deviation(client: Any, name: str) -> None:
     values = ["1 ± 0.1 N/um", "1 N/um"]
     column = {"k_low": values, "k_high": "2 N/um"} if name == "k_low" else {"k": 1e6}
-    std = {"std": {"k": values}} if name == "std_k" else {}
+    std = {"std_k": values} if name == "std_k" else {}
     (fault,) = client.post(BATCH, json={**SPRING, **column, **std}).json()["errors"]
     assert (fault["index"], fault["field"]) == (0, name)
     assert fault["reason"].startswith("must be one number: ")
@@ -317,10 +317,10 @@ def test_a_query_holds_for_rows_in_whichever_way_they_are_read(client: Any) -> N
         alone = of_one(client, normal, direction="normal")
         assert [row["mu_macro"] for row in answer["results"]] == [alone["mu_macro"]] * 2
     plain = {**SPRING, "k": 1e6}
-    of_mu0, of_k = {**plain, "std": {"mu0": 0.01}}, {**plain, "std": {"k": 2e5}}
+    of_mu0, of_k = {**plain, "std_mu0": 0.01}, {**plain, "std_k": 2e5}
     answer = client.post(BATCH, params={"std_k": 1e5}, json=[plain, of_mu0, of_k]).json()
-    both = of_one(client, {**plain, "std": {"mu0": 0.01, "k": 1e5}})
-    alone = of_one(client, {**plain, "std": {"k": 1e5}})
+    both = of_one(client, {**plain, "std_mu0": 0.01, "std_k": 1e5})
+    alone = of_one(client, {**plain, "std_k": 1e5})
     assert [row and row["std"] for row in answer["results"]] == [alone["std"], both["std"], None]
     (fault,) = answer["errors"]
     assert (fault["field"], "given in the query" in fault["reason"]) == ("std_k", True)

@@ -15,6 +15,7 @@ from fastapi import APIRouter, Depends, Request
 from starlette.exceptions import HTTPException
 from starlette.websockets import WebSocketDisconnect
 
+from mumacro.inputs.cases import DEVIATIONS
 from mumacro.inputs.fields import FIELDS, SI
 from service.models.inputs import EXAMPLE
 from service.models.options import CaseRequest
@@ -306,7 +307,7 @@ def test_a_key_given_twice_is_refused_and_blanks_around_one_are_not(
     ("path", "members"),
     [
         ("/v1/mu-macro", {}),
-        ("/v1/mu-macro", {"std": None}),
+        ("/v1/mu-macro", {"std_k": None}),
         ("/v1/law", {"start": 1e-3, "stop": 1.0}),
         ("/v1/solve-for", {"unknown": "v0", "target": 0.1}),
         ("/v1/motion", {"x": None}),
@@ -356,7 +357,7 @@ def test_the_description_is_whole(client: Any) -> None:
     document = client.get("/openapi.json").json()
     schemas = document["components"]["schemas"]
     inputs = {*UNITS, "f", "Fz_amplitude"}
-    words = {"contact", "direction", "std", "k_low", "k_high", "k_range"}
+    words = {"contact", "direction", "k_low", "k_high", *DEVIATIONS}
     assert set(schemas["Case"]["properties"]) == {*inputs, *words}
     assert set(schemas["CaseColumns"]["properties"]) == set(schemas["CaseRequest"]["properties"])
     assert all(
@@ -396,7 +397,7 @@ def allows(schema: Any, members: set[str]) -> bool:
     )
 
 
-_INTERVAL = {"k_range": [1e6, 2e6], "k_low": 1e6, "k_high": 2e6}
+_INTERVAL = {"k_low": 1e6, "k_high": 2e6}
 
 
 @pytest.mark.parametrize(
@@ -416,7 +417,7 @@ _INTERVAL = {"k_range": [1e6, 2e6], "k_low": 1e6, "k_high": 2e6}
             "SolveForRequest",
             "/v1/solve-for",
             {"unknown": "k", "target": 0.2},
-            ("k", "k_range", "y0", "omega", "f"),
+            ("k", "y0", "omega", "f"),
             False,
         ),
     ],

@@ -104,7 +104,7 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any
     "case",
     [
         {"target": [0.15, 0.4]},
-        {"k": ..., "k_range": [8e5, 1.25e6]},
+        {"k": ..., "k_low": 8e5, "k_high": 1.25e6},
         {"contact": "ball", "target": [0.25]},
         {"unknown": "Fz", "y0": 2e-6, "target": 0.2, "contact": "ball"},
         {"unknown": "v0", "v0": ..., "y0": 0.0},
@@ -115,7 +115,8 @@ def test_a_solution_is_the_librarys(client: Any, surrogate: Surrogate, case: Any
     answer = answered(client, "solve-for", question)
     unknown, target = question.pop("unknown"), question.pop("target")
     own = mumacro.solve_for(surrogate, unknown, target, **question).to_dict()
-    for k, end in zip(question.get("k_range", ()), own.get("ends", ()), strict=True):
+    interval = [question[name] for name in ("k_low", "k_high") if name in question]
+    for k, end in zip(interval, own.get("ends", ()), strict=True):
         end["k"] = k
     beside = {"quantity", "table", "api_version", *({"model"} if unknown == "Fz" else ())}
     assert answer.keys() == {*own, *beside}
@@ -143,7 +144,7 @@ def test_a_law_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> 
 
 def test_both_ends_of_an_interval_of_k_are_solved_for(client: Any) -> None:
     rest = {name: value for name, value in SOLVE.items() if name != "k"}
-    whole = answered(client, "solve-for", {**rest, "k_range": [8e5, 1.25e6]})
+    whole = answered(client, "solve-for", {**rest, "k_low": 8e5, "k_high": 1.25e6})
     for k, one in zip((8e5, 1.25e6), whole.pop("ends"), strict=True):
         alone = answered(client, "solve-for", {**rest, "k": k})
         assert one == {"k": k, **{name: alone[name] for name in ("results", "range", "reachable")}}
@@ -239,7 +240,7 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
 def test_every_quantity_has_its_unit_in_the_description(client: Any) -> None:
     for direction, amplitude in (("across", "y0"), ("normal", "Fz_amplitude")):
         names = [name for name, one in OUTPUTS.items() if direction not in one.lacks]
-        question = {**LAW, "y0": ..., amplitude: 1e-6, "direction": direction, "std": {"mu0": 0.01}}
+        question = {**LAW, "y0": ..., amplitude: 1e-6, "direction": direction, "std_mu0": 0.01}
         law = answered(client, "law", question, include=names)
         for name in names:
             for part in law[name] if isinstance(law[name], dict) else [""]:

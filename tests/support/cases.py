@@ -47,6 +47,11 @@ def without(case: Mapping[str, Any], *names: str) -> Case:
     return {name: value for name, value in case.items() if name not in names}
 
 
+def flat(std: Mapping[str, Any]) -> Case:
+    """Deviations by input as keywords: ``std_k`` and so on."""
+    return {f"std_{name}": x for name, x in std.items()}
+
+
 def as_kind(
     case: Mapping[str, Any], pair: tuple[str, str], share: float = 0.4
 ) -> tuple[Case, Any, Case]:

@@ -60,7 +60,7 @@ const capital = (words) => `${words[0].toUpperCase()}${words.slice(1)}`;
 function sentence(text, inputs) {
   const k = numberOf(inputs?.k);
   const example = k === undefined ? "" : `, such as ${around(k)}`;
-  return prose(text.replace("give k_range", `give k as an interval${example}`));
+  return prose(text.replace("give k as an interval", `give k as an interval${example}`));
 }
 
 export function numberPanel(store) {

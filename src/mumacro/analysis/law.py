@@ -14,8 +14,7 @@ from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.cases import DEVIATIONS, Cases, fixed_inputs, named, without_interval
-from mumacro.inputs.fields import NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
-from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.fields import ENDS, NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
@@ -44,7 +43,7 @@ class Law:
     kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
     #: how k grows along Fz; None where k is constant
     stiffening: Stiffening | None = None
-    k_range: tuple[float, float] | None = None  #: the interval of k [N/m]; None for one number
+    k_ends: tuple[float, float] | None = None  #: of the interval of k [N/m]; None for one number
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -125,7 +124,7 @@ class Law:
             roots=roots,
             target=target,
             title=plotting.in_words(
-                self.case if self.k_range is None else {**self.case, "k": self.k_range},
+                self.case if self.k_ends is None else {**self.case, "k": self.k_ends},
                 self.kind.names,
             ),
         )
@@ -234,7 +233,7 @@ def law(
         a constant k, and the case has no ``Fz``.
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
-        for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: the law has a band, see
+        for ``omega``; ``k_low`` and ``k_high`` for ``k``: the law has a band, see
         :attr:`mumacro.analysis.law.Law.band`.  So it has where inputs have a standard deviation:
         "1 ± 0.1 N/um", or ``std_k`` and so on; where k grows with Fz, its deviation grows alike.
 
@@ -288,8 +287,6 @@ def law(
     answer = surrogate.answer(cases, chosen((), cases), groups=True)
     at_rest = curve.answer(x, v0=0.0) if name != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
-    k_range = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
+    k_ends = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
     marks = tuple(replace(crossing, value=crossing.value / per) for crossing in border)
-    return Law(
-        along, axis, answer, cases, mu_static, marks, inputs, kind, curve.stiffening, k_range
-    )
+    return Law(along, axis, answer, cases, mu_static, marks, inputs, kind, curve.stiffening, k_ends)

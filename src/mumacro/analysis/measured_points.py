@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import check, columns_of, library_of, select, unknown
+from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, select
 from mumacro.inputs.doubts import UNITS, Remark, remarks
 from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
@@ -110,7 +110,7 @@ class Measured:
             members = (*names, *UNKNOWNS, "mu_macro", FORCE, STD)
             for name in data:
                 if name not in members and split_unit(str(name))[0] not in members:
-                    raise unknown(str(name), data[name], members)
+                    raise no_such_input(str(name), data[name], members)
         columns = select("data", data, [*names, "mu_macro", FORCE, STD])
         if duplicates := [name for name in select("data", data, UNKNOWNS) if name in self.unknowns]:
             raise InputError(

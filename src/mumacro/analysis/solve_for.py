@@ -214,7 +214,7 @@ def solve_for(
         Fz_given: see :func:`mumacro.law`.
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
-        for ``omega``; ``k_range``, lowest and highest stiffness, for ``k``: see
+        for ``omega``; ``k_low`` and ``k_high`` for ``k``: see
         ``Solution.ends``.
 
     Raises

@@ -20,8 +20,8 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.cases import KIND, check, without_interval
-from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, in_help, unit_of
+from mumacro.inputs.cases import A_DEVIATION, EXACT, KIND, check, without_interval
+from mumacro.inputs.fields import ENDS, INPUTS, RAD_PER_CYCLE, in_help, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import NO_DEVIATION, read, read_one
@@ -239,64 +239,67 @@ def read_case(
     ``Surrogate.evaluate``.
 
     ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
-    not be an interval ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all
+    not be an interval here, which otherwise becomes ``k_low`` and ``k_high``; where ``whole``, all
     other inputs must be there, but for those that are ``optional``.  With ``deviations`` those
-    that are typed, as in ``k=1±0.1N/um``, are in ``std``, by input.  UsageError tells everything
+    that are typed, as in ``k=1±0.1N/um``, become ``std_k`` and so on.  UsageError tells everything
     that is wrong, in one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])["k"]
     1000000.0
     """
-    case: dict[str, Any] = {}
-    std: dict[str, float] = {}
+    allowed = [*kind.columns, *([] if one_k else ENDS)]
+    allowed += [f"std_{name}" for name in kind.columns] if deviations else []
+    case: dict[str, float] = {}
     faults: list[str] = []
-    strange: list[str] = []
+    no_pairs: list[str] = []
     for name, text in _pairs(words):
         if text is None:
-            strange.append(repr(name))
+            no_pairs.append(repr(name))
             continue
-        if name not in kind.columns:
+        if name not in allowed:
             similar = suggestion(name)
             case[similar or name] = math.nan  # not reported as missing, too
             faults.append(_unknown(name, text, similar, kind))
             continue
-        if name in case:
-            faults.append(f"{name} is given twice")
-        case[name] = math.nan
         try:
-            case[name], deviation = _read(name, text, one_k, deviations)
-            if deviation is not None:
-                std[name] = deviation
+            values = _read(name, text, one_k, deviations)
         except InputError as error:
             faults.append(str(error))
-    if strange:
-        verb = "is" if len(strange) == 1 else "are"
-        faults.insert(0, f"{', '.join(strange)} {verb} no name=value such as Fz=10")
+            values = {name: math.nan}
+        faults += [f"{twice} is given twice" for twice in values if twice in case]
+        case |= values
+    if no_pairs:
+        verb = "is" if len(no_pairs) == 1 else "are"
+        faults.insert(0, f"{', '.join(no_pairs)} {verb} no name=value such as Fz=10")
     absent = {*optional} - case.keys()
     faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:
         raise UsageError("; ".join(faults))
-    read_in_si: dict[str, Any] = {
-        "k_range" if isinstance(value, tuple) else name: value for name, value in case.items()
-    }
-    return read_in_si | ({"std": std} if std else {})
+    return case
 
 
-def _read(
-    name: str, text: str, one_k: str, deviations: bool
-) -> tuple[float | tuple[float, float], float | None]:
-    """The value of an input, or the ends of k, and its deviation; InputError where it is none, or
-    out of bounds."""
-    value = read(name, text)
+def _read(name: str, text: str, one_k: str, deviations: bool) -> dict[str, float]:
+    """Return what a text says of an input: its value, with its deviation, or both ends of k.
+
+    Raise InputError where it says none, or one out of bounds.
+    """
+    value = read(name.removeprefix("std_"), text)
+    if name.startswith("std_"):
+        if value.std is not None or value.low is not None:
+            raise InputError(name, text, A_DEVIATION)
+        if not 0.0 <= value.si < math.inf:
+            raise InputError(name, text, EXACT)
+        return {name: float(value.si)}
     if value.low is not None:
         if one_k:
             raise InputError(name, text, f"one number: {one_k}")
-        return (value.low, value.high), None
+        return dict(zip(ENDS, (value.low, value.high), strict=True))
     if value.std is not None and not deviations:
         raise InputError(name, text, NO_DEVIATION)
     field, in_model = ("omega", value.si * RAD_PER_CYCLE) if name == "f" else (name, value.si)
     check({field: in_model}, value.si if name == "f" else None)
-    return float(value.si), value.std
+    std = {} if value.std is None else {f"std_{name}": value.std}
+    return {name: float(value.si), **std}
 
 
 def _unknown(name: str, text: str, similar: str | None, kind: Kind) -> str:
@@ -349,7 +352,8 @@ def _faults_of_names(
     ]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
-    complete = case.keys() | unknowns | (frequencies if frequencies & case.keys() else set())
+    complete = case.keys() | unknowns | ({"k"} if case.keys() & {*ENDS} else set())
+    complete |= frequencies if frequencies & case.keys() else set()
     hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
     absent = [
         hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in complete
@@ -431,10 +435,10 @@ def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *mo
     """The case that was understood, in the units that were typed, and ``more`` of it."""
     parts = []
     for name, value in case.items():
-        if name == "std":
+        if name.startswith("std_") or name == ENDS[1]:
             continue
-        field = "k" if name == "k_range" else name
-        ends = value if isinstance(value, tuple) else (value,)
+        ends = (value, case[ENDS[1]]) if name == ENDS[0] else (value,)
+        field = "k" if name == ENDS[0] else name
         if math.isinf(ends[-1]):
             parts.append("k rigid")
             continue

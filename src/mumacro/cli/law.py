@@ -84,7 +84,7 @@ def run(words: Sequence[str]) -> str:
     count = common.count_for(options, surrogate, {**case, along: middle}, kind)
     units = common.units_in(options.words, **{along: ends})
     unit = Unit.of(along, middle, units, options.digits)
-    of_k = ", for the geometric middle of k" if law.k_range else ""
+    of_k = ", for the geometric middle of k" if law.k_ends else ""
     notes = [
         f"{c.name} at {along} = {unit.shown(c.value, count, options.digits)} {unit.name}{of_k}"
         for c in law.border

@@ -28,19 +28,17 @@ def run(words: Sequence[str], description: str) -> str:
     arguments = parser.parse_intermixed_args(words)
     kind = common.kind_in(arguments)
     case = read_case(arguments.words, kind, deviations=True)
-    surrogate, std = open_table(arguments.table), case.pop("std", None)
+    surrogate = open_table(arguments.table)
     include = (*common.included(arguments), *(["gradient"] if arguments.gradient else []))
-    options: dict[str, Any] = {**kind.names, "include": include, "std": std}
+    options: dict[str, Any] = {**kind.names, "include": include}
     answer: Any = surrogate.evaluate(case, **options)
     if arguments.json:
-        middle = common.middle_of(case)
         members = answer.to_dict()
-        ends = {name: members.pop(name) for name in BAND if "k_range" in case}
-        result = {name: members.pop(name) for name in DEFAULT}
+        result = {name: members.pop(name) for name in (*DEFAULT, *BAND) if name in members}
         result |= {"v_tilde": answer.v_tilde, "y_tilde": answer.y_tilde, **members}
-        result |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
+        result["inputs"] = case
         if arguments.model:
-            result["model"] = model_rows(surrogate, middle, **kind.names)
+            result["model"] = model_rows(surrogate, common.middle_of(case), **kind.names)
         result |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**result, "table": common.table_members(surrogate)})
     rows, notes, error = words_of_one_case(

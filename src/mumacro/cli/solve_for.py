@@ -22,7 +22,7 @@ from mumacro.cli.common import (
     open_table,
     read_case,
 )
-from mumacro.inputs.fields import NAMES
+from mumacro.inputs.fields import ENDS, NAMES
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import read_one
@@ -150,7 +150,7 @@ def _solutions_by_k(solution: Solution, case: Mapping[str, Any]) -> dict[Any, So
     middle = common.middle_of(case).get("k")
     if solution.ends is None:
         return {middle: solution}
-    low, high = case["k_range"]
+    low, high = (case[name] for name in ENDS)
     return {low: solution.ends[0], middle: solution, high: solution.ends[1]}
 
 

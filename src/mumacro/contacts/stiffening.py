@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import check, real
-from mumacro.inputs.k_range import ENDS
+from mumacro.inputs.fields import ENDS
 from mumacro.inputs.kind import CONTACTS, SPRINGS_OF, Kind
 from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array

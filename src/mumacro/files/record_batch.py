@@ -18,9 +18,8 @@ from mumacro.files.errors import FilesError
 from mumacro.files.text_columns import numbers_of
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases
 from mumacro.inputs.doubts import Remark
-from mumacro.inputs.fields import GAP, LIKE, SI, refusal
+from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
 from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
-from mumacro.inputs.k_range import ENDS
 from mumacro.inputs.kind import AMPLITUDE, AMPLITUDES, SPRING, UNREADABLE, Kind, kind_of
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
@@ -311,9 +310,6 @@ def _field_and_reason(error: InputError) -> tuple[str, str]:
     name, value = error.field, error.value
     if name in KIND:
         return name, f"must be {error.bound}"
-    if isinstance(value, tuple):  # of an interval the end that is missing, or the lower one
-        end = int(math.isnan(value[1]) and not math.isnan(value[0]))
-        name, value = ENDS[end], value[end]
     number = float(value)  # type: ignore[arg-type]  # a number of the row
     if math.isnan(number):
         return name, GAP if name == "k" else "is missing"

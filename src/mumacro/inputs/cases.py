@@ -16,6 +16,7 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.fields import (
     BOUNDS,
+    ENDS,
     FIELDS,
     LIFTS_OFF,
     POSITIVE,
@@ -25,7 +26,6 @@ from mumacro.inputs.fields import (
     field_of,
     refusal,
 )
-from mumacro.inputs.k_range import BOUND, ENDS
 from mumacro.inputs.kind import (
     AMPLITUDE,
     AMPLITUDES,
@@ -36,7 +36,7 @@ from mumacro.inputs.kind import (
     code_of,
     kind_of,
 )
-from mumacro.inputs.names import suggestion, unit_in_name, unknown_name
+from mumacro.inputs.names import in_place_of, suggestion
 from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, in_unit, read
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
@@ -64,7 +64,7 @@ DEVIATIONS = {f"std_{name}": name for name in (*ALL_FIELDS, "f")}
 #: what a data frame or a file may hold
 COLUMNS = (*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS)
 #: what a mapping may hold, too: options of one call
-OPTIONS = ("k_range", "std", "include", "gradient", "groups", "illegal")
+OPTIONS = ("include", "gradient", "illegal")
 EXACT = "finite and >= 0, 0 where the input is exact"  # the bound of a deviation
 # what stands for one number alone, without a deviation of its own
 A_DEVIATION = "one number: the deviation itself"
@@ -200,14 +200,16 @@ class Cases(NamedTuple):
             {name: at(x) for name, x in part.items()}
             for part in (self.columns, self.std, self.given)
         )
-        ends = self.ends and tuple(float(end[index]) for end in self.ends)
+        ends = None
+        if self.ends is not None:
+            ends = float(self.ends[0][index]), float(self.ends[1][index])
         try:
             kind = self.kind or kind_of(others["contact"], others["direction"])
             for name in AMPLITUDES:
                 if np.broadcast_to(self._strange(name), max(self.size, 1))[index]:
                     raise _no_such_amplitude(name, float({**columns, **others}[name]), kind)
             if ends and math.isnan(columns["k"]):
-                raise InputError("k_range", ends, BOUND)
+                raise no_interval(*ends)
             for name, deviation in std.items():
                 if name in kind.fields and not 0.0 <= deviation < math.inf:
                     raise InputError(f"std_{name}", float(deviation), EXACT)
@@ -276,11 +278,10 @@ def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
 
     Of a mapping every name must be one of :data:`COLUMNS` or :data:`OPTIONS`; of a data frame, an
     Arrow table or a Dataset other columns are ignored, and refused only where one resembles an
-    input that is missing.  Columns of Arrow are arrays; the option std becomes std_k and so on,
-    k_range k_low and k_high.  InputError for a name given twice.
+    input that is missing.  Columns of Arrow become arrays.  InputError for a name given twice.
 
-    >>> named({"mu0": 0.3, "contact": "ball"}, {"k_range": (1e6, 2e6), "std": {"mu0": 0.1}})
-    {'mu0': 0.3, 'contact': 'ball', 'std_mu0': 0.1, 'k_low': 1000000.0, 'k_high': 2000000.0}
+    >>> named({"mu0": 0.3, "contact": "ball"}, {"k": 1e6})
+    {'mu0': 0.3, 'contact': 'ball', 'k': 1000000.0}
     """
     values = dict(keywords)
     if cases is not None:
@@ -290,43 +291,26 @@ def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
             raise InputError(name, keywords[name], "given once: in the cases or as a keyword")
         values = {**columns, **keywords}
         _refuse_similar(rest, values)
-    if "std" in values:
-        values |= _spread(values.pop("std"), values)
-    if "k_range" in values:
-        values = as_ends(values)
     for name, value in values.items():
         if type(value) not in _UNLABELLED and not library_of(value) and _of_arrow(value):
             values[name] = np.asarray(value)  # NaN where it is null
     return values
 
 
-def _spread(option: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The deviations of the option ``std`` as columns; none of them says that all inputs are
-    exact."""
-    if not isinstance(option, Mapping):
-        raise InputError("std", option, "a mapping of inputs to their deviations")
-    for name in option:
-        if f"std_{name}" not in DEVIATIONS:
-            raise InputError("std", name, f"of {', '.join(DEVIATIONS.values())}")
-        if f"std_{name}" in values:
-            raise InputError(f"std_{name}", option[name], "given once")
-    return {f"std_{name}": value for name, value in option.items()} or {"std_mu0": 0.0}
-
-
 def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
     """What ``cases`` hold by known names, and the names of the rest."""
     if isinstance(cases, Mapping) and not library_of(cases):  # a Dataset is a mapping, too
         for name in cases.keys() - {*COLUMNS, *OPTIONS}:
-            raise unknown(str(name), cases[name])
+            raise no_such_input(str(name), cases[name])
         return dict(cases), []
     columns, present = _columns_in("cases", cases, COLUMNS)
     return columns, [name for name in present if name not in columns]
 
 
-def unknown(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
+def no_such_input(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
     """The error for a name that is none of ``allowed``."""
     names = [name for name in allowed if name not in DEVIATIONS]
-    if (bound := unit_in_name(name, allowed)) is not None:
+    if (bound := in_place_of(name, allowed)) is not None:
         return InputError(name, value, bound)
     similar = suggestion(name)
     advice = f"; did you mean {similar}?" if similar in names else ""
@@ -336,7 +320,7 @@ def unknown(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputErr
 def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
     """Refuse a column that resembles an input while that input is missing."""
     present = {*values}
-    if present & {*ENDS, "k_range"}:
+    if present & {*ENDS}:
         present.add("k")
     for pair in (("omega", "f"), AMPLITUDES):
         if present & {*pair}:
@@ -429,18 +413,17 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
     if unknown not in kind.columns:
         raise InputError("unknown", unknown, f"one of {', '.join(kind.columns)}")
     field = field_of(unknown)[0]
-    for name in ("k_range", *ENDS):
+    for name in ENDS:
         if case.get(name) is not None:
             bound = (
                 "left out: over an interval of k a target has an interval of roots; solve for "
                 "both ends of it"
             )
             raise InputError(name, case[name], bound)
-    for name in case.keys() & {"std", *DEVIATIONS}:
+    for name in case.keys() & DEVIATIONS.keys():
         raise InputError(name, case[name], NO_DEVIATION)
-    for name in case.keys() - {*kind.columns, *AMPLITUDES, "k_range", *ENDS}:
-        bound = f"one of {', '.join(kind.columns)}; {unknown_name(name, kind.columns)}"
-        raise InputError(name, case[name], bound)
+    for name in case.keys() - {*kind.columns, *AMPLITUDES, *ENDS}:
+        raise no_such_input(name, case[name], kind.columns)
     inputs = {
         name: value for name, value in case.items() if value is not None or name == "k" != unknown
     }
@@ -458,42 +441,19 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
 # --- an interval of k -----------------------------------------------------------------------------
 
 
-def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Inputs with ``k_low`` and ``k_high`` for ``k_range``; InputError for k beside it, for one end
-    without the other, and where it is no pair."""
-    values = dict(inputs)
-    if "k_range" in values:
-        if conflicting := [name for name in ("k", *ENDS) if name in values]:
-            raise InputError(conflicting[0], values[conflicting[0]], "left out beside k_range")
-        pair = values.pop("k_range")
-        values["k_low"], values["k_high"] = _pair(pair)
-    if missing := [name for name in ENDS if name not in values]:
+def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:
+    """Return lowest and highest k, each one number or an array, where an interval is given.
+
+    Raise InputError for one end without the other, for k beside them, and for one pair that is no
+    interval.
+    """
+    missing = [name for name in ENDS if name not in values]
+    if len(missing) == len(ENDS):
+        return None
+    if missing:
         raise InputError(missing[0], None, "given [N/m] beside the other end of the interval")
     if "k" in values:
         raise InputError("k", values["k"], "left out beside an interval of it")
-    return values
-
-
-def _pair(pair: Any) -> tuple[Any, Any]:
-    """Both ends of an interval, of a text such as 0.8..1.2 N/um or of a pair."""
-    if isinstance(pair, str):
-        reading = read("k_range", pair)
-        if reading.low is None:
-            raise InputError("k_range", pair, BOUND)
-        return reading.low, reading.high
-    try:
-        low, high = pair
-    except (TypeError, ValueError) as error:
-        raise InputError("k_range", pair, BOUND) from error
-    return low, high
-
-
-def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:
-    """Lowest and highest k, each one number or an array, where an interval is given; InputError for
-    one interval that is none."""
-    if values.keys().isdisjoint(("k_range", *ENDS)):
-        return None
-    values = as_ends(values)
     of_ends = [read(name, values[name]) for name in ENDS]
     for name, end in zip(ENDS, of_ends, strict=True):
         if end.std is not None:
@@ -503,10 +463,18 @@ def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:
         legal = is_interval(low, high)
     except ValueError as error:
         shapes = np.shape(low), np.shape(high)
-        raise InputError("k_range", shapes, "of shapes that broadcast together") from error
+        raise InputError("k_low", shapes, "of a shape that broadcasts with k_high") from error
     if not np.ndim(legal) and not legal:
-        raise InputError("k_range", (low, high), BOUND)
+        raise no_interval(float(low), float(high))
     return low, high
+
+
+def no_interval(low: float, high: float, index: int | None = None) -> InputError:
+    """Return the error for two stiffnesses that are not the ends of an interval."""
+    for name, end in zip(ENDS, (low, high), strict=True):
+        if not 0.0 < end < math.inf:
+            return InputError(name, end, BOUNDS[name], index)
+    return InputError("k_low", low, "at most k_high", index)
 
 
 def is_interval(low: Any, high: Any) -> Any:
@@ -537,8 +505,8 @@ def without_interval(
     if ends is None:
         return case, {}
     if along == "k":
-        raise InputError("k_range", ends, "left out where k is the swept input")
-    rest = {name: x for name, x in inputs.items() if name not in ("k_range", *ENDS)}
+        raise InputError("k_low", ends[0], "left out where k is the swept input")
+    rest = {name: x for name, x in inputs.items() if name not in ENDS}
     return {**rest, "k": middle(*ends)}, dict(zip(ENDS, ends, strict=True))
 
 
@@ -553,7 +521,7 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     amplitude of another direction.
     """
     _strange_amplitude(values, kind, refuse=True)
-    for name in values.keys() & {"std", *DEVIATIONS}:
+    for name in values.keys() & DEVIATIONS.keys():
         raise InputError(name, values[name], NO_DEVIATION)
     inputs = _inputs(values, kind.fields)
     for name in inputs.std:
@@ -685,7 +653,7 @@ def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> t
     if strict:
         for index in np.flatnonzero(~is_interval(low, high) & ~np.isinf(low)).tolist():
             where = index if shape else None
-            raise InputError("k_range", (float(low[index]), float(high[index])), BOUND, where)
+            raise no_interval(float(low[index]), float(high[index]), where)
     return low, high
 
 

@@ -82,6 +82,7 @@ _ROWS = (
         "Highest stiffness of an interval, beside k_low", ABOVE_ZERO, (1.0, 1e12), "1.2N/um", "k",
     ),
 )  # fmt: skip
+ENDS = ("k_low", "k_high")  # of an interval of k
 #: every input by its name
 INPUTS = {row.name: row for row in _ROWS}
 
@@ -119,7 +120,6 @@ QUANTITY_OF = {row.name: row.quantity for row in _ROWS} | {
     "normal": "force",
     "phase": "angle",
     "v_rest": "speed",
-    "k_range": "stiffness",
     "stiffness": "stiffness",
 }
 

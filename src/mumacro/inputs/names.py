@@ -61,6 +61,12 @@ _SYNONYMS = {
     "slidingvelocity": "v0",
 }
 _SYNONYMS |= {name.lower(): name for name in NAMES}
+#: names that said the same before -> what says it now
+_FORMER = {
+    "k_range": 'written as k_low and k_high, or in k as an interval such as "0.8..1.2 N/um"',
+    "std": "written as std_k, std_mu0 and so on: one name for each deviation",
+    "groups": 'written as include="groups"',
+}
 
 
 def suggestion(name: str, *, loosely: bool = True) -> str | None:
@@ -81,13 +87,15 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
     return None
 
 
-def unit_in_name(name: str, allowed: Iterable[str]) -> str | None:
-    """What to write in place of a name with a unit, which is the head of a column; None for another
-    name.
+def in_place_of(name: str, allowed: Iterable[str]) -> str | None:
+    """Return what to write in place of a former name, or of one with a unit, which is the head of
+    a column; None for another name.
 
-    >>> unit_in_name("y0 [um]", ["y0"])
-    'named y0, with the unit in the value, as in "2 um"'
+    >>> in_place_of("y0 [um]", ["y0"]), in_place_of("groups", [])
+    ('named y0, with the unit in the value, as in "2 um"', 'written as include="groups"')
     """
+    if name in _FORMER:
+        return _FORMER[name]
     field, unit = split_unit(name[:80])
     if unit is None or field not in allowed:
         return None
@@ -101,7 +109,7 @@ def unknown_name(name: str, allowed: Iterable[str]) -> str:
     'unknown field; did you mean omega? allowed: omega, f'
     """
     names = list(allowed)
-    if (bound := unit_in_name(name, names)) is not None:
+    if (bound := in_place_of(name, names)) is not None:
         return f"must be {bound}"
     nearest = suggestion(name[:80], loosely=False)
     if nearest not in names:

@@ -16,7 +16,6 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.fields import GAP, QUANTITY_OF, STIFFNESS, is_rigid
-from mumacro.inputs.k_range import BOUND
 from mumacro.inputs.numbers import split_number, tidy
 from mumacro.inputs.units import (
     QUANTITIES,
@@ -37,7 +36,7 @@ LONGEST = 200  # characters of a value
 _DEVIATIONS = ("±", "+/-", "+-")
 # may be written as the word rigid, as an interval
 _OR_RIGID = ("stiffness", "pressure")
-_INTERVALS = ("k", "k_range")
+_INTERVAL = "two stiffnesses [N/m] with 0 < low <= high, both finite"
 _IN_RANGE = "at most 1.8e308, the largest number there is"
 _GAPS = ("NAType", "NaTType")  # of pandas, by the name of the type
 _ONE_NUMBER = "one number: k alone may be an interval; ask for both ends, one after the other"
@@ -594,8 +593,7 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
         else:
             if not behind or scale_in(quantity, behind):
                 ends = f"{number:.12g}..{high:.12g}{behind}"
-                interval = name in _INTERVALS
-                bound = f"a number; write an interval as {ends}" if interval else _ONE_NUMBER
+                bound = f"a number; write an interval as {ends}" if name == "k" else _ONE_NUMBER
                 raise InputError(name, raw, bound)
     if (last := _LAST_DIGITS.fullmatch(tidy(raw))) is not None:
         deviation = f"{int(last['std']) / 10 ** len(last['part'] or ''):.12g}"
@@ -634,7 +632,7 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
 
 def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
     """``0.8..1.2 N/um``; a unit behind the second end holds for both."""
-    if name not in _INTERVALS:
+    if name != "k":
         raise InputError(name, raw, _ONE_NUMBER)
     left, _, right = text.partition("..")
     low, unit = split_number(left.strip())
@@ -644,6 +642,6 @@ def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
         _scale_or_refuse(name, quantity, raw, high, behind or unit).si(high),
     )
     if not 0.0 < ends[0] <= ends[1] < math.inf:
-        raise InputError(name, raw, BOUND)
+        raise InputError(name, raw, _INTERVAL)
     middle = min(max(math.sqrt(ends[0]) * math.sqrt(ends[1]), ends[0]), ends[1])
     return Value(middle, None, *ends, raw, unit_in(quantity, behind or unit) or None)

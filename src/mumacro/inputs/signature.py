@@ -1,7 +1,7 @@
 """What functions take, for type checkers and in their signatures: numbers, an oscillation; one case
 of ``evaluate``, one case with an interval of k, many."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Literal, Required, TypedDict
 
 from numpy.typing import ArrayLike
@@ -26,8 +26,6 @@ _Value = float | str  # a text is read as a person types it
 
 class _Options(TypedDict, total=False):
     include: Iterable[str]
-    std: Mapping[str, Any] | None
-    groups: bool
     illegal: Literal["nan", "raise"]
 
 
@@ -41,6 +39,14 @@ class _One(_Options, total=False):
     v0: Required[_Value]
     contact: ContactName
     direction: DirectionName
+    std_mu0: _Value
+    std_Fz: _Value
+    std_k: _Value
+    std_y0: _Value
+    std_Fz_amplitude: _Value
+    std_omega: _Value
+    std_f: _Value
+    std_v0: _Value
 
 
 class OneCase(_One):
@@ -52,7 +58,8 @@ class OneCase(_One):
 class OneInterval(_One):
     """One case whose k is an interval."""
 
-    k_range: tuple[float, float]
+    k_low: Required[_Value]
+    k_high: Required[_Value]
 
 
 class ManyCases(_Options, total=False):
@@ -61,7 +68,6 @@ class ManyCases(_Options, total=False):
     mu0: ArrayLike
     Fz: ArrayLike
     k: ArrayLike
-    k_range: ArrayLike
     k_low: ArrayLike
     k_high: ArrayLike
     y0: ArrayLike
@@ -71,6 +77,14 @@ class ManyCases(_Options, total=False):
     v0: ArrayLike
     contact: ArrayLike
     direction: ArrayLike
+    std_mu0: ArrayLike
+    std_Fz: ArrayLike
+    std_k: ArrayLike
+    std_y0: ArrayLike
+    std_Fz_amplitude: ArrayLike
+    std_omega: ArrayLike
+    std_f: ArrayLike
+    std_v0: ArrayLike
 
 
 class AnyCases(TypedDict, total=False):
@@ -79,7 +93,6 @@ class AnyCases(TypedDict, total=False):
     mu0: Any
     Fz: Any
     k: Any
-    k_range: Any
     k_low: Any
     k_high: Any
     y0: Any
@@ -90,7 +103,13 @@ class AnyCases(TypedDict, total=False):
     contact: Any
     direction: Any
     include: Any
-    std: Any
+    std_mu0: Any
+    std_Fz: Any
+    std_k: Any
+    std_y0: Any
+    std_Fz_amplitude: Any
+    std_omega: Any
+    std_f: Any
+    std_v0: Any
     gradient: bool
-    groups: bool
     illegal: str

@@ -67,7 +67,9 @@ def bent(cases: Evaluated, total: float) -> list[Remark]:
     return remarks
 
 
-_ONE_K = "it needs one k: give k with its standard deviation, or k_range without std"
+_ONE_K = (
+    "it needs one k: give k with its standard deviation, or an interval of k without deviations"
+)
 STD = Output(
     "std",
     std,
@@ -78,5 +80,5 @@ STD = Output(
     | {f"std_share.{name}": Member("-", f"Share of {name}") for name in ALL_FIELDS},
     cost=8,
     gradient=True,
-    lacks={"k_range": _ONE_K},
+    lacks={"interval": _ONE_K},
 )

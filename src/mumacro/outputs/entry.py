@@ -29,7 +29,7 @@ class Output(NamedTuple):
     #: the same of a ball, where it is not that of a spring
     cost_of_ball: float | None = None
     gradient: bool = False  #: whether it needs the slopes of mu_macro
-    #: a direction, or k_range for an interval of k, for which the output does not exist -> why
+    #: a direction, or "interval" for an interval of k, for which the output does not exist -> why
     lacks: Mapping[str, str] = {}
 
     def paths(self, fields: tuple[str, ...]) -> list[str]:

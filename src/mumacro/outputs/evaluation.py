@@ -61,8 +61,8 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
     if not names and not cases.std:
         return ()
     if "std" in names and not cases.std:
-        bound = "given if include has std: the deviation of at least one input"
-        raise InputError("std", None, bound)
+        bound = "without std where no input has a deviation: give one, such as std_k"
+        raise InputError("include", "std", bound)
     if cases.std:
         names.add("std")
     outputs = tuple(output for name, output in OUTPUTS.items() if name in names)
@@ -237,7 +237,7 @@ def _lacked(
         for word, why in output.lacks.items():
             if word in words:
                 yield output, word, why, True
-            elif word == "k_range" and cases.ends is not None:
+            elif word == "interval" and cases.ends is not None:
                 low, high = cases.ends
                 wide = np.asarray(low != high)  # a number is an interval of itself
                 if wide.any():

@@ -398,7 +398,7 @@ def test_cycles_are_the_librarys(best: Any, table: Surrogate) -> None:
     x = cases(5000)
     result = ask(best.cycles, x.shape[1], 6, x).T
     with np.errstate(all="ignore"):
-        answer = table.evaluate(dict(zip(FIELDS, x, strict=True)), groups=True)
+        answer = table.evaluate(dict(zip(FIELDS, x, strict=True)), include="groups")
         v, y, length = answer.v_tilde, answer.y_tilde, answer.length_scale
         mu0, load, stiffness, y0, omega, _ = x
         legal = answer.source_code >= 0

@@ -79,7 +79,9 @@ def test_a_simulation_follows_its_inputs(
         start_values={"Fz": 20.0, "mu0": 0.2},
     )
     assert len(simulated) >= 41
-    answer = table.evaluate({**CASE, "Fz": 20.0, "mu0": 0.2, "v0": simulated["v0"]}, groups=True)
+    answer = table.evaluate(
+        {**CASE, "Fz": 20.0, "mu0": 0.2, "v0": simulated["v0"]}, include="groups"
+    )
     for name in outputs[:5]:
         expected = getattr(answer, name)
         assert np.allclose(
@@ -179,7 +181,7 @@ def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path,
     assert model.get(*kind, whole=True) == list(kind.values())
     for v0 in 10.0 ** np.linspace(-4.0, 1.0, 21):
         model.put(v0=v0)
-        answer = table.evaluate({**case, "v0": v0}, **words, groups=True)
+        answer = table.evaluate({**case, "v0": v0}, **words, include="groups")
         expected = [answer.mu_macro, answer.y_tilde, answer.mu_macro * CASE["Fz"]]
         assert model.get("mu_macro", "y_tilde", "force") == close(expected, rel=1e-13)
     model.put(v0=CASE["v0"])

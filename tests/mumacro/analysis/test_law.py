@@ -22,7 +22,7 @@ from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
 from tests.support.refusals import refused
 
-INTERVAL: Case = {"k_range": (0.8e6, 1.2e6)}
+INTERVAL: Case = {"k_low": 0.8e6, "k_high": 1.2e6}
 LINE = without({**CASE, "y0": 4e-6}, "v0")
 SPEEDS = sweep_values("v0", 1e-4, 2.0, 25, "log")
 
@@ -193,7 +193,7 @@ def test_the_articles_formulas_are_refused_for_another_contact(
     ("along", "case", "direction", "place"),
     [
         ("v0", {**LINE, **INTERVAL}, "across", "k"),
-        ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range"),
+        ("v0", {**without(LINE, "k"), "k_low": 2e6, "k_high": 1e6}, "across", "k_low"),
         ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high"),
         ("v0", {**LINE, "step": 9}, "across", "step"),
         ("v0", {**LINE, "std_v0": 1e-3}, "across", "std_v0"),
@@ -204,7 +204,7 @@ def test_the_articles_formulas_are_refused_for_another_contact(
             "k",
             {**without(LINE, "k"), "v0": 0.01, **INTERVAL},
             "across",
-            "k_range",
+            "k_low",
         ),
         (
             "Fz_amplitude",
@@ -252,7 +252,7 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
     pytest.importorskip("matplotlib").use("Agg")
     law, _, _ = law_of(surrogate, pair, INTERVAL, refine=True)
     axes = law.plot()
-    k_title = plotting.in_words({"k": law.k_range})
+    k_title = plotting.in_words({"k": law.k_ends})
     assert (" to " in k_title, k_title in axes.get_title(loc="left")) == (True, True)
     (band,) = axes.collections
     corners = band.get_paths()[0].vertices

@@ -63,7 +63,7 @@ def test_power_stick_slip_and_decay_are_those_of_the_table(
     for v0, size in ((0.02, 2e-6), (0.1, 6e-6), (2.0, 3e-6)):
         part: Any = {"y" if direction == "across" else "x": size}
         marched = motion(**{**SCENE, "v0": v0}, **part, contact=contact)
-        answer = surrogate.evaluate(**{**SCENE, "v0": v0}, y0=size, groups=True, **kind)
+        answer = surrogate.evaluate(**{**SCENE, "v0": v0}, y0=size, include="groups", **kind)
         groups = answer.v_tilde, answer.y_tilde
         unit = 0.3 * 10.0 * L0 * 2.0 * math.pi * 20e3
         assert marched.power == close(unit * surrogate.power(*groups, **kind), abs=2e-6 * unit)

@@ -99,13 +99,13 @@ def test_what_is_left_out_is_hertz_for_a_ball_and_constant_for_a_spring(
 
 def test_an_interval_of_stiffness_grows_as_a_whole(surrogate: Surrogate) -> None:
     ends = (0.8e6, 1.3e6)
-    case = {**without(CASE, "k"), "k_range": ends}
+    case = {**without(CASE, "k"), "k_low": ends[0], "k_high": ends[1]}
     law = friction_law(surrogate, "Fz", values=LOADS, stiffness_exponent=0.5, **case)
     scale = (LOADS / CASE["Fz"]) ** 0.5
     assert law.band is not None
     for i in (0, 20, 40):
         one = surrogate.evaluate(
-            **{**without(CASE, "k"), "Fz": LOADS[i], "k_range": [x * scale[i] for x in ends]}
+            **{**case, "Fz": LOADS[i], "k_low": ends[0] * scale[i], "k_high": ends[1] * scale[i]}
         )
         assert law.band[0][i] == close(one.mu_macro_low, rel=1e-12)
         assert law.band[1][i] == close(one.mu_macro_high, rel=1e-12)

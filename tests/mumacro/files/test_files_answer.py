@@ -148,7 +148,7 @@ def test_a_bad_cell_is_named_with_value_and_reason(
     assert answers.column("mu_macro").null_count == answers.column("source").null_count == 1
 
 
-ORDER = "must be two stiffnesses [N/m] with 0 < low <= high, both finite"
+ORDER, END = "must be at most k_high", "must be finite and > 0"
 LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
 
 
@@ -163,9 +163,9 @@ LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
                 ("", "1.2", ("k_low", "is missing")),
                 ("0.8", "", ("k_high", "is missing")),
                 ("1.2", "0.8", ("k_low", ORDER)),
-                ("0", "1", ("k_low", ORDER)),
-                ("rigid", "2", ("k_low", ORDER)),
-                ("0.8", "inf", ("k_low", ORDER)),
+                ("0", "1", ("k_low", END)),
+                ("rigid", "2", ("k_low", END)),
+                ("0.8", "inf", ("k_high", END)),
             )
         ),
         *(

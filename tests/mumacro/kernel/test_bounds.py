@@ -104,7 +104,7 @@ def test_a_regime_that_is_certain_is_that_of_a_fresh_solve(table: Surrogate, swe
     y, distance = 10.0 ** rng.uniform(-4.0, 6.0, n), 10.0 ** rng.uniform(-16.0, -2.0, n)
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
     v = crit * (1.0 + rng.choice([-1.0, 1.0], n) * distance)
-    answer = table.evaluate({**UNIT, "y0": y, "v0": v}, groups=True)
+    answer = table.evaluate({**UNIT, "y0": y, "v0": v}, include="groups")
     np.testing.assert_array_equal(answer.v_tilde, v)
     right = (answer.regime_code == CONTINUOUS) == (v >= crit)
     assert np.all(right[answer.regime_certain])

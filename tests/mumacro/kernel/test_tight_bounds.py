@@ -24,7 +24,7 @@ from mumacro.table.atlas import (
     ROUNDING,
     SOURCES,
 )
-from tests.support.cases import UNIT, Array, Case, opened, tables
+from tests.support.cases import UNIT, Array, Case, flat, opened, tables
 from tests.support.comparing import close
 from tests.support.hard_points import NAMES as BALL_NAMES
 from tests.support.hard_points import hard_points, rows_of
@@ -136,7 +136,7 @@ def test_the_bound_of_the_standard_deviation_may_not_be_halved(client: Any, name
             "y0": y.tolist(),
             "v0": v.tolist(),
             "include": ["std"],
-            "std": {name: 1e-3},
+            f"std_{name}": 1e-3,
         }
         reply = client.post("/v1/mu-macro/batch", json={**columns, "tolerance": s.tolerance})
         assert reply.status_code == 200, reply.text
@@ -217,7 +217,9 @@ def test_a_regime_is_uncertain_within_the_bound_of_the_border(
     y = np.geomspace(1e-4, 1e6, 200)
     for side in (-share, share):
         v = table.v_tilde_crit(y) * (1.0 + side * table.border.max_rel_error)
-        assert np.all(table.evaluate(**UNIT, y0=y, v0=v, groups=True).regime_certain == certain)
+        assert np.all(
+            table.evaluate(**UNIT, y0=y, v0=v, include="groups").regime_certain == certain
+        )
 
 
 # --- closed forms ---------------------------------------------------------------------------------
@@ -438,7 +440,8 @@ def test_the_standard_deviation_adds_the_inputs_in_squares(client: Any, case: Ca
 
     def answer_to(std: Case) -> Any:
         return client.post(
-            "/v1/mu-macro", json={**case, "include": ["std", "gradient"], "std": std}
+            "/v1/mu-macro",
+            json={**case, "include": ["std", "gradient"]} | flat(std),
         ).json()
 
     alone, together = (
