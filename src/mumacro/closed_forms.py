@@ -37,6 +37,7 @@ def _float(x: ArrayLike) -> Array:
 # --- mu~ over the plane ---
 
 
+@np.errstate(all="ignore")
 def agm(b: ArrayLike) -> Any:
     """Arithmetic-geometric mean of 1 and ``b`` >= 1 [-], to rounding."""
     a, g = np.ones(np.shape(b)), _float(b)
@@ -45,6 +46,7 @@ def agm(b: ArrayLike) -> Any:
     return 0.5 * (a + g)
 
 
+@np.errstate(all="ignore")
 def outer(r: ArrayLike) -> Any:
     """(2/pi) K(i r) with r = y~/v~ [-], eqs. (35), (37): rigid contact, and the limit v~ ->
     infinity at fixed r.
@@ -61,6 +63,7 @@ def outer(r: ArrayLike) -> Any:
     return 1.0 / agm(np.hypot(1.0, _float(r)))
 
 
+@np.errstate(all="ignore")
 def second_order(r: ArrayLike) -> Any:
     """Coefficient of 1/v~^2 at fixed r = y~/v~ [-], the first correction to eq. (35).
 
@@ -73,6 +76,7 @@ def second_order(r: ArrayLike) -> Any:
     return kernels[-1].outer_expansion(r.ravel())[:, 1].reshape(r.shape)[()]
 
 
+@np.errstate(all="ignore")
 def static_limit(y: ArrayLike) -> Any:
     """mu~ for v~ -> 0 [-]: sqrt(1 - y~^2) for y~ < 1, else 0, eqs. (16), (38).  Exact; error O(v~)
     for y~ != 1.
@@ -84,6 +88,7 @@ def static_limit(y: ArrayLike) -> Any:
     return np.sqrt((1.0 - inside) * (1.0 + inside))
 
 
+@np.errstate(all="ignore")
 def small_angle(v: ArrayLike, y: ArrayLike) -> Any:
     """mu~ of continuous sliding for y~ << 1 [-]: <cos(kappa cos tau)>, kappa = y~ / sqrt(1 + v~^2),
     eqs. (29), (30).
@@ -97,6 +102,7 @@ def small_angle(v: ArrayLike, y: ArrayLike) -> Any:
     return np.cos(kappa[..., None] * quarter).mean(axis=-1)
 
 
+@np.errstate(all="ignore")
 def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
     """mu~ of continuous sliding for y~ << 1 [-]: 1 - y~^2 / (4 (1 + v~^2)), eq. (31).  Error
     O(y~^4).
@@ -107,6 +113,7 @@ def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
     return 1.0 - _float(y) ** 2 / (4.0 * (1.0 + _float(v) ** 2))
 
 
+@np.errstate(all="ignore")
 def continuous(v: ArrayLike, y: ArrayLike) -> Any:
     """(2/pi) K(i y~ / sqrt(1 + v~^2)) [-]: this project's one formula for continuous sliding.
 
@@ -116,6 +123,7 @@ def continuous(v: ArrayLike, y: ArrayLike) -> Any:
     return outer(_float(y) / np.hypot(1.0, _float(v)))
 
 
+@np.errstate(all="ignore")
 def critical(y: ArrayLike) -> Any:
     """mu~ at the border for y~ << 1 [-]: 1 - y~^2 / 4, eqs. (32), (40).
 
@@ -124,6 +132,7 @@ def critical(y: ArrayLike) -> Any:
     return 1.0 - 0.25 * _float(y) ** 2
 
 
+@np.errstate(all="ignore")
 def critical_next(y: ArrayLike) -> Any:
     """mu~ at the border with one term more than eq. (32) [-]: 1 - y~^2 / 4 + (5/64) y~^4.  Error
     O(y~^6).
@@ -137,6 +146,7 @@ def critical_next(y: ArrayLike) -> Any:
 # --- the master curve of stick-slip at small amplitudes ---
 
 
+@np.errstate(all="ignore")
 def master_curve(x: ArrayLike) -> Any:
     """(mu~ - static) / (critical - static) at x = v~/v~crit for y~ << 1 [-], eq. (28); NaN for x >
     1.
@@ -155,6 +165,7 @@ def master_curve(x: ArrayLike) -> Any:
         return np.where(x <= 1.0, 1.0 - square * (0.75 + 0.25 * square), np.nan)
 
 
+@np.errstate(all="ignore")
 def master_curve_limit(x: ArrayLike) -> Any:
     """Limit of the master curve for y~ -> 0, exact [-]: N_0(x), of which eq. (28) is a fit; 1 for x
     >= 1.
@@ -200,6 +211,7 @@ def _minus_sine(d: Any) -> Any:
 # --- the border of continuous sliding ---
 
 
+@np.errstate(all="ignore")
 def border_23(y: ArrayLike) -> Any:
     """v~crit for y~ << 1 [-]: the root of y~^2 = 2 v~ (1 + v~^2) (sqrt(1 + v~^2) + v~), eq. (23).
 
@@ -217,6 +229,7 @@ def border_23(y: ArrayLike) -> Any:
     return np.where(y < 1e50, 0.5 * d / np.sqrt(1.0 + d), np.sqrt(0.5 * y))
 
 
+@np.errstate(all="ignore")
 def border_24(y: ArrayLike) -> Any:
     """v~crit for y~ << 1 [-]: sqrt(1/4 + y~^2/2) - 1/2, eqs. (24), (39).
 
@@ -230,12 +243,14 @@ def border_24(y: ArrayLike) -> Any:
     return 0.5 * y * (y / (root + 0.5))
 
 
+@np.errstate(all="ignore")
 def border_26(y: ArrayLike) -> Any:
     """v~crit for y~ >> 1 [-]: sqrt(y~ / 4.5), eq. (26).  Off by -1.08 % for y~ -> infinity, -5 % at
     y~ = 2.25."""
     return np.sqrt(_float(y) / 4.5)
 
 
+@np.errstate(all="ignore")
 def border_27(y: ArrayLike) -> Any:
     """v~crit for every y~ [-]: 0.47 y~^(5/2) / (y~^2 + 0.94 y~^(1/2) / (1 + y~^2)), eq. (27).
 
@@ -248,6 +263,7 @@ def border_27(y: ArrayLike) -> Any:
         return 0.47 * root / (1.0 + 0.94 / (root * y * (1.0 + y * y)))
 
 
+@np.errstate(all="ignore")
 def border_small_amplitude(y: ArrayLike) -> Any:
     """v~crit for y~ -> 0, exact to two terms [-]: (y~^2 / 2)(1 - 5 y~^2 / 12).  Relative error
     O(y~^4).
@@ -258,12 +274,14 @@ def border_small_amplitude(y: ArrayLike) -> Any:
     return 0.5 * square * (1.0 - 5.0 / 12.0 * square)
 
 
+@np.errstate(all="ignore")
 def border_large_amplitude(y: ArrayLike) -> Any:
     """v~crit for y~ -> infinity [-]: sqrt(y~ / 4.402914), eq. (26) with the exact constant.
     Relative error 0.07/y~."""
     return np.sqrt(_float(y) / BORDER_CONSTANT)
 
 
+@np.errstate(all="ignore")
 def border_blend(y: ArrayLike) -> Any:
     """v~crit for every y~ [-] by one formula of this project, relative error below 0.6 percent.
 
@@ -278,6 +296,7 @@ def border_blend(y: ArrayLike) -> Any:
     return 0.5 * w * fraction**-0.75 * np.sqrt(np.maximum(y / 1e60, 1.0))
 
 
+@np.errstate(all="ignore")
 def corner_root(v: ArrayLike, eta: ArrayLike) -> Any:
     """Positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to O(mu~^3).
     eta = y~ - 1."""

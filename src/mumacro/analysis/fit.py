@@ -28,6 +28,7 @@ _SOFT = {"across": 1e-4, "along": 1e-6, "normal": 1e-6}
 _NARROW = 1e-6  # width in logarithms of an interval in which chi2 is a parabola
 
 
+@np.errstate(all="ignore")
 def fit(
     data: Any,
     unknowns: str | Sequence[str] | None = None,
@@ -81,10 +82,9 @@ def fit(
         (unknowns,) if isinstance(unknowns, str) else None if unknowns is None else tuple(unknowns)
     )
     problem = _Problem(data, names, contact, direction, surrogate or _bundled_surrogate(), fixed)
-    with np.errstate(all="ignore"):  # a value that the points do not determine is infinite
-        result = problem.solve()
+    result = problem.solve()
     for text in result.warnings:
-        warnings.warn(text, stacklevel=2)
+        warnings.warn(text, stacklevel=3)  # errstate wraps this function
     return result
 
 

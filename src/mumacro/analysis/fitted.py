@@ -93,6 +93,7 @@ class Fit:
     points: dict[str, Array]
     _problem: Measured = field(repr=False, compare=False)
 
+    @np.errstate(all="ignore")
     def predict(self, cases: Any = None, /, **inputs: Any) -> Prediction:
         """mu_macro of the fit and its standard deviation, at the points or at other inputs.
 
@@ -134,6 +135,7 @@ class Fit:
             return Prediction(float(mu), float(std))
         return Prediction(np.asarray(mu), std)
 
+    @np.errstate(all="ignore")
     def curve(self) -> dict[str, Array] | None:
         """The fitted law over v0 with its 95 % band: v0 [m/s], mu_macro, low and high [-], (n,);
         None where other inputs vary, too, or v0 is 0 everywhere."""

@@ -193,6 +193,7 @@ def _apart(case: Mapping[str, Any], swept: str) -> tuple[dict[str, Any], dict[st
     return inputs, deviations
 
 
+@np.errstate(all="ignore")
 def law(
     surrogate: Surrogate,
     along: str = "v0",

@@ -270,6 +270,7 @@ class Motion:
         return html_of_rows(self._heading(), rows, self.warnings)
 
 
+@np.errstate(all="ignore")
 def motion(
     *,
     mu0: Any = ABSENT,

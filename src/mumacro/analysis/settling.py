@@ -55,6 +55,7 @@ class Settling:
         return html_of("<Settling>", self.columns)
 
 
+@np.errstate(all="ignore")
 def settling(
     surrogate: Surrogate,
     *,

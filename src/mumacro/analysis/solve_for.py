@@ -183,6 +183,7 @@ class Solution:
         return html_of(self._heading(), self.columns, self._notes()[:4])
 
 
+@np.errstate(all="ignore")
 def solve_for(
     surrogate: Surrogate,
     unknown: str,

@@ -211,6 +211,7 @@ def quantity_of_unknown(unknown: str) -> str:
     return "angle" if member == "phase" else QUANTITY_OF[part]
 
 
+@np.errstate(all="ignore")
 def solve_motion(
     unknown: str,
     target: Numbers = 0.0,

@@ -87,10 +87,29 @@ static mu_answer mu_any_case(const mumacro_data *data, int contact, int directio
  * ln y~, and the bounds of all three. */
 enum { MU_OF_MU, MU_OF_V, MU_OF_Y, MU_OF_BOUND, MU_OF_BOUND_V, MU_OF_BOUND_Y, MU_TERMS };
 
+/* Whether a product of two numbers has all its digits; zero has them where a factor is zero. */
+MU_INLINE int mu_is_plain(double product) {
+    return fabs(product) > 1e-290 && fabs(product) < 1e290;
+}
+
+/* mu0 slope / input, whose product may leave the range of numbers where the result does not. */
+static double mu_chain(double mu0, double slope, double input) {
+    const double product = mu0 * slope, size = fabs(slope);
+    if (mu_is_plain(product) || !(size > 0.0 && size < HUGE_VAL && input > 0.0))
+        return product / input;
+    return (slope < 0.0 ? -1.0 : 1.0) * mu_quotient(mu0, size, input, 1.0, 1.0);
+}
+
 /* sign mu0 slope / input. */
 static void mu_chain_row(int n, double sign, const double *mu0, const double *slope,
                          const double *input, double *out) {
-    for (int i = 0; i < n; ++i) out[i] = sign * mu0[i] * slope[i] / input[i];
+    int odd = 0;
+    for (int i = 0; i < n; ++i) {
+        const double product = sign * mu0[i] * slope[i];
+        odd |= !mu_is_plain(product);
+        out[i] = product / input[i];
+    }
+    for (int i = 0; odd && i < n; ++i) out[i] = sign * mu_chain(mu0[i], slope[i], input[i]);
 }
 
 /* d mu_macro / d input of cases without zeros and infinities, and the
@@ -127,6 +146,15 @@ static void mu_set_terms(mu_answer answer, mu_slopes at, double terms[MU_TERMS][
     terms[MU_OF_BOUND_Y][i] = at.bound_y;
 }
 
+/* slope k / (Fz omega) of slope >= 0. */
+static double mu_per_speed(double slope, const mu_inputs *in) {
+    const double per_force = in->k / in->Fz, unit = per_force / in->omega;
+    if ((mu_is_plain(per_force) && mu_is_plain(unit) && mu_is_plain(slope * unit)) ||
+        !(slope > 0.0 && slope < HUGE_VAL))
+        return slope > 0.0 ? slope * unit : slope;
+    return mu_quotient(slope, in->k, in->Fz, in->omega, 1.0);
+}
+
 /* The same of any case; `slopes` is NULL where they are still to be found.  One-sided at the edges:
  * d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0,
  * infinite on y~ = 1 and for rigid contact.  Relative to k the slope is 0 for rigid contact. */
@@ -142,11 +170,10 @@ static void mu_gradient(const mumacro_data *data, int contact, int direction, co
         for (int i = 0; i < 6; ++i) inputs[i][0] = six[i];
         mu_set_terms(answer, at, terms, 0);
         mu_chain_rule(direction, 1, inputs, terms, out, stride);
-        if (!(v > 0.0)) {
-            const double unit = (in->k / in->Fz) / in->omega;
-            double bound;
-            out[5 * stride] = mu_speed_slope_as(data, contact, direction, y, &bound) * unit;
-            error[5 * stride] = bound * unit;
+        if (!(v > 0.0)) { /* mu0 over l0 omega */
+            double bound, slope = mu_speed_slope_as(data, contact, direction, y, &bound);
+            out[5 * stride] = mu_per_speed(slope, in);
+            error[5 * stride] = mu_per_speed(bound, in);
         }
         return;
     }
@@ -161,8 +188,8 @@ static void mu_gradient(const mumacro_data *data, int contact, int direction, co
         const int oscillates = answer.value < 1.0 || in->y0 * in->omega > 0.0;
         const double along = oscillates ? mu_rigid_slope(direction, mu_amplitude_ratio(in)) : 0.0;
         for (int i = 3; i < 6; ++i) {
-            out[i * stride] = (i < 5 ? mu0 : -mu0) * along / six[i];
-            error[i * stride] = mu0 * all / six[i];
+            out[i * stride] = (i < 5 ? 1.0 : -1.0) * mu_chain(mu0, along, six[i]);
+            error[i * stride] = mu_chain(mu0, all, six[i]);
         }
     }
 }

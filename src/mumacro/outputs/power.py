@@ -1,27 +1,99 @@
 """The mean powers of the shaker and of the drive."""
 
 import math
+from typing import Any
 
+import numpy as np
+
+from mumacro.kernel.arrays import Array
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
 from mumacro.table.atlas import ROUNDING
+
+_LEAST, _MOST = 1e-290, 1e290  # products between them have all their digits
+_FAST = (
+    1e100  # a v~ that stands for the limit of fast sliding, where p is v~ times a function of y~/v~
+)
+_DENORMAL = 1e-323  # two of the least numbers
 
 
 def power(cases: Evaluated) -> Values:
     """mu0 Fz l0 omega <y~ cos tau u_y> of the shaker, (mu0 - mu_macro) Fz v0 saved by the drive."""
     mu0, load, omega, v0 = (cases.columns[name] for name in ("mu0", "Fz", "omega", "v0"))
-    unit = where(cases.usable, mu0 * load * (cases.length_scale * omega), math.nan)
     v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
-    shaker, bound = (
-        where(cases.moving, number * unit, 0.0) for number in cases.quantity("power", v, y)
+    number, bound = cases.quantity("power", v, y)
+    with np.errstate(all="ignore"):
+        force, rate = mu0 * load, cases.length_scale * omega
+        unit = where(cases.usable, force * rate, math.nan)
+        shaker, shaker_bound = (where(cases.moving, x * unit, 0.0) for x in (number, bound))
+        saved = (mu0 - cases.mu_macro) * load * v0
+        saved_bound = cases.error_bound * load * v0 + ROUNDING * abs(saved)
+        size: Any = abs(saved)
+        plain = (v < math.inf) & ((cases.mu_macro == mu0) | (size > _LEAST)) & (size < _MOST)
+        products: tuple[Any, ...] = mu0, force, cases.length_scale, rate, unit, shaker
+        for product in products:
+            plain = plain & (product > _LEAST) & (product < _MOST)
+    values = [shaker, saved, shaker_bound, saved_bound]
+    if not np.all(plain):
+        here = np.flatnonzero(~np.broadcast_to(plain, np.size(cases.mu_ratio)))
+        for i, whole in enumerate(_at_the_ends(cases, here, v, y, number, bound)):
+            column = np.array(np.broadcast_to(values[i], np.size(cases.mu_ratio)))
+            column[here] = np.where(np.isnan(whole), column[here], whole)
+            values[i] = column if cases.cases.shape else float(column[0])
+    return dict(zip(POWER.members, values, strict=True))
+
+
+def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Array, Array, Array]:
+    """The same where a group or a product may leave the range of numbers though the result does
+    not: products as a whole; NaN where the power is 0 or does not exist."""
+    size = np.size(cases.mu_ratio)
+    mu0, load, k, y0, omega, v0 = (np.broadcast_to(x, size)[here] for x in cases.columns.values())
+    v, y, number, bound, ratio, error, elastic = (
+        np.broadcast_to(x, size)[here]
+        for x in (*of_table, cases.mu_ratio, cases.error_bound, cases.usable & cases.moving)
     )
-    saved = (mu0 - cases.mu_macro) * load * v0
-    return {
-        "power.oscillation": shaker,
-        "power.saved": saved,
-        "power_bound.oscillation": bound,
-        "power_bound.saved": cases.error_bound * load * v0 + ROUNDING * abs(saved),
-    }
+    with np.errstate(all="ignore"):
+        fast = (v == math.inf) & elastic
+        steep = np.where(fast, _product((y0, omega), (v0,)), 1.0)
+        sliding = cases.tabulated.values("power", np.full(v.size, _FAST), _FAST * steep, cases.kind)
+        value, value_bound = (
+            np.where(
+                fast,
+                _product((mu0, load, v0, at_speed / _FAST)),
+                _product((mu0, mu0, load, load, omega, row), (k,)),
+            )
+            for row, at_speed in zip((number, bound), sliding[:2], strict=True)
+        )
+        # groups that underflow: p is below y~^2, and below v~
+        value_bound += np.where((y == 0.0) & (y0 > 0.0), _product((k, y0, y0, omega)), 0.0)
+        value_bound += np.where((v == 0.0) & (v0 > 0.0), _product((mu0, load, v0)), 0.0)
+        value, value_bound = (
+            np.where(elastic, x, math.nan) for x in (value, value_bound + _DENORMAL)
+        )
+        saved = _product((mu0, 1.0 - ratio, load, v0))
+        # of a ratio that is rounded to the next number below 1
+        rounding = _product((mu0, np.full(v.size, 2.0**-53), load, v0))
+        saved_bound = _product((error, load, v0)) + ROUNDING * saved + rounding + _DENORMAL
+        # of mu_macro and its bound where they are subnormal
+        lost = _product((np.full(v.size, _DENORMAL), load, v0))
+        saved_bound += np.where(mu0 < _LEAST, lost, 0.0)
+        saved_bound = np.where((v0 == 0.0) & (saved == 0.0), 0.0, saved_bound)
+    return value, saved, value_bound, saved_bound
+
+
+def _product(factors: tuple[Array, ...], divisors: tuple[Array, ...] = ()) -> Array:
+    """A product whose parts may leave the range of numbers, rounded to it at the end."""
+    mantissa, exponent = np.ones(factors[0].size), np.zeros(factors[0].size, np.int64)
+    for x in factors:
+        part, power_of_two = np.frexp(x)
+        mantissa, exponent = mantissa * part, exponent + power_of_two
+    for x in divisors:
+        part, power_of_two = np.frexp(x)
+        mantissa, exponent = mantissa / part, exponent - power_of_two
+    # in two steps, of which the first is exact
+    half = np.clip(exponent, -1000, 1000)
+    rest = np.clip(exponent - half, -2000, 2000).astype(np.int32)
+    return np.asarray(np.ldexp(np.ldexp(mantissa, half.astype(np.int32)), rest))
 
 
 POWER = Output(

@@ -132,6 +132,7 @@ def _along_rays(
     return springs, places, np.argmin(springs.of_small, axis=1)
 
 
+@np.errstate(all="ignore")
 def decay(cases: Evaluated, remaining: float = REMAINING) -> tuple[Any, Any, Any, Any, Any]:
     """Periods until a small disturbance has fallen to ``remaining``, and until any has, the time of
     the former [s], the slip path of a period over l0, and the bound of the error of the first; for
