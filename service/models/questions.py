@@ -23,9 +23,9 @@ from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS, described
 from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.reading import no_number, read_one, reason_of
 from mumacro.inputs.signs import THOUSANDS
-from mumacro.inputs.text_tables import SEPARATORS, Dialect
 
 from .inputs import (
     EXAMPLE,

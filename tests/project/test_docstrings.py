@@ -8,7 +8,8 @@ import pytest
 
 import mumacro
 
-NO_PYTHON = {"mumacro.__main__", "mumacro._kernel"}  # no module of Python
+# no module of Python, or one of PyInstaller
+NO_PYTHON = {"mumacro.__main__", "mumacro._kernel", "mumacro._pyinstaller.hook-mumacro"}
 MODULES = sorted(
     {"mumacro", *(one.name for one in pkgutil.walk_packages(mumacro.__path__, "mumacro."))}
     - NO_PYTHON

@@ -12,9 +12,10 @@ from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, s
 from mumacro.inputs.doubts import UNITS, Remark, remarks
 from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
+from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import NO_DEVIATION, read
-from mumacro.inputs.text_tables import ColumnNames, Dialect, Most, Table, read_table
+from mumacro.inputs.text_tables import Most, Table, read_table
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.surrogate import Surrogate

@@ -23,10 +23,10 @@ from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import A_DEVIATION, EXACT, KIND, check, without_interval
 from mumacro.inputs.fields import ENDS, INPUTS, RAD_PER_CYCLE, in_help, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
+from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import NO_DEVIATION, read, read_one
 from mumacro.inputs.signs import THOUSANDS
-from mumacro.inputs.text_tables import SEPARATORS, Dialect
 from mumacro.inputs.units import Scale, belongs_to_value, scale_of, suited
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
@@ -163,6 +163,18 @@ def add_format(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(f"--{name}", choices=choices, metavar="SIGN", help=words)
     parser.add_argument("--encoding", metavar="NAME", help="such as utf-16; default: found out")
     parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out N lines")
+    text = "the first and the last line of data, as 4..12"
+    parser.add_argument("--rows", type=_lines, metavar="A..B", help=text)
+    text = "of a workbook; default: the one that has the names of the columns"
+    parser.add_argument("--sheet", metavar="NAME", help=text)
+
+
+def _lines(text: str) -> tuple[int, int]:
+    """The numbers of two lines; argparse says the fault of another text."""
+    first, dots, last = text.partition("..")
+    if not (dots and first.isdecimal() and last.isdecimal() and 0 < int(first) <= int(last)):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be two numbers of lines, as 4..12")
+    return int(first), int(last)
 
 
 def dialect_in(options: argparse.Namespace) -> Dialect:
@@ -175,6 +187,8 @@ def dialect_in(options: argparse.Namespace) -> Dialect:
         None if options.thousands is None else THOUSANDS[options.thousands],
         options.encoding,
         options.skip,
+        rows=options.rows,
+        sheet=options.sheet,
     )
 
 

@@ -26,16 +26,14 @@ _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
-  for k also k_low and k_high; for y0, where the direction is normal, Fz_amplitude [N]; amplitudes
-  are half of peak to peak; also contact, direction, deviations std_k, ...; others are copied
-in text the head is the first line that has these names; a row of units may stand below it
+  also k_low and k_high; Fz_amplitude [N]; contact, direction, std_k, ...; others are copied
+in text the head is the first line with these names; units may stand beside it, or in a legend
 added: mu_macro, mu_ratio, regime, error_bound, source; mu_macro_low, _high; power.saved, ...
 rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 
 examples:
   mumacro eval rig.txt -o out.csv --decimal ,
   mumacro eval - -o - < cases.csv > out.csv
-The output appears whole or not at all.
 exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments, 130 interrupted
 """
 
@@ -78,7 +76,7 @@ def _parser() -> OneLineParser:
     parser = OneLineParser(
         prog="mumacro eval",
         description="Evaluate every case of files: Parquet, NDJSON, text (.csv, .tsv, .txt, ...), "
-        ".xlsx; also .gz.",
+        ".xlsx; also .gz. The output appears whole or not at all.",
         epilog=_COLUMNS,
     )
     parser.add_argument(

@@ -28,12 +28,9 @@ from mumacro.validity import digits
 
 EXAMPLE = 'mumacro fit measured.csv "Fz=10N y0=2um f=20kHz" -o fit.png'
 _COLUMNS = f"""\
-columns by name, in SI or with a unit as in v0 [mm/s], which may stand below the name; others are
-  ignored, and so are lines before the names:
-  v0 and mu_macro, of each point; what varies of Fz, y0 (or {AMPLITUDE}), omega or f;
-  {STD}: of mu_macro, if known
-  mu0, if it is known at each point, such as from the force without oscillation: then k
-  alone is fitted
+columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:
+  v0 and mu_macro, or Ft [N] over Fz; what varies of Fz, y0 (or {AMPLITUDE}), omega or f;
+  {STD}: of mu_macro, if known; mu0, if it is known at each point: then k alone is fitted
 what is neither a column nor unknown is given as name=value
 
 examples:

@@ -19,7 +19,7 @@ import pyarrow.dataset
 from mumacro.files.errors import FilesError
 from mumacro.files.text_source import Block, TextTable, excerpt
 from mumacro.inputs.decoding import TextError, file_pieces
-from mumacro.inputs.text_tables import ColumnNames, Dialect
+from mumacro.inputs.layout import ColumnNames, Dialect
 
 #: endings of files that are written, and their format
 WRITTEN = {
@@ -140,24 +140,24 @@ class ParquetSource:
 class TextSource:
     """Tables as text, whose heads name the same columns.
 
-    ``verbatim``, rows come out as they came in: as lines where ``sep``, the separator of the
-    output, is that of every file, else as cells.  FilesError where heads differ.
+    ``to_text``, rows come out as they came in: as lines where the separator of the output is that
+    of every file, else as cells.  FilesError where heads differ.
     """
 
     def __init__(
-        self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, verbatim: bool
+        self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, to_text: bool
     ) -> None:
         self.tables = [TextTable(path, column_names, dialect) for path in files]
         first = self.tables[0]
         for table in self.tables:
             if table.layout.heads != first.layout.heads:
                 raise FilesError(f"{table.path}: its header differs from that of {first.path}")
-            if verbatim and table.decimal != first.decimal:
+            if to_text and table.decimal != first.decimal:
                 raise FilesError(
                     f"{table.path}: its decimal sign differs from that of {first.path}; give the "
-                    "files one by one, or write Parquet or NDJSON"
+                    "files one by one, or write Parquet"
                 )
-        self.texts = "lines" * verbatim
+        self.to_text, self.as_lines = to_text, to_text
         self.sep, self.decimal = first.sep, first.decimal
         self.head = first.layout.heads
         self.schema = pa.schema([(head, pa.string()) for head in self.head])
@@ -174,23 +174,23 @@ class TextSource:
         return f"{self.tables[0].path}: line {self.tables[0].layout.head}: "
 
     def describe(self, say: Callable[[str], None]) -> None:
-        """Say how the files are read, where they are no plain CSV: once where all are alike."""
+        """Say how the files were read, once where all are alike, and what was left out."""
         by_form: dict[str, list[str]] = {}
         for table in self.tables:
-            if table.read_as:
-                by_form.setdefault(table.read_as, []).append(table.path.name)
+            by_form.setdefault(table.read_as, []).append(table.path.name)
         for form, names in by_form.items():
             where = "" if len(names) == len(self.tables) else f"{', '.join(names[:3])} "
             say(f"{where}read as: {form}")
 
-    def write_with(self, sep: str) -> None:
-        """Give rows as they are needed for an output with the separator ``sep``."""
-        if self.texts and any(table.sep != sep for table in self.tables):
-            self.texts = "cells"
+    def write_with(self, sep: str) -> bool:
+        """Prepare for an output with the separator ``sep``; return whether rows come as lines."""
+        self.as_lines = self.to_text and all(table.sep == sep for table in self.tables)
+        return self.as_lines
 
     def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
         """The blocks of a file, of the columns ``names``."""
-        return self.tables[file].blocks(names, self.texts)
+        numbers = self.as_lines or not self.to_text
+        return self.tables[file].blocks(names, lines=self.as_lines, numbers=numbers)
 
 
 class NdjsonSource:

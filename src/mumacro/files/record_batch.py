@@ -21,9 +21,9 @@ from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
 from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
 from mumacro.inputs.kind import AMPLITUDE, AMPLITUDES, SPRING, UNREADABLE, Kind, kind_of
+from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
-from mumacro.inputs.text_tables import ColumnNames
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS

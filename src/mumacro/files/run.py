@@ -24,7 +24,7 @@ from mumacro.files.text_source import Block
 from mumacro.files.writing import Output, csv_lines, written_as
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.kind import Kind, kind_of
-from mumacro.inputs.text_tables import Dialect
+from mumacro.inputs.layout import Dialect
 from mumacro.surrogate import Surrogate
 from mumacro.table.atomic import growing, to_disk
 
@@ -70,7 +70,7 @@ def evaluate_files(
     surrogate : Surrogate
     rigid, include, contact, direction
         As in :func:`mumacro.files.answer`.
-    dialect : mumacro.inputs.text_tables.Dialect
+    dialect : mumacro.inputs.layout.Dialect
         How tables as text are written, as far as it is known; the rest is found in the files.  A
         separator and a decimal sign hold for an output as text, too.
     force : bool
@@ -173,13 +173,12 @@ class _Run:
         self.output = Output(
             output_format, is_compressed, sep, decimal, headings.get("k", (None,))[0]
         )
+        self.to_text, self.say = self.verbatim and input_format == "text", say
         if isinstance(self.source, reading.TextSource):
-            self.source.write_with(sep)
-            self.source.describe(say)
+            self.verbatim = self.source.write_with(sep)
+        as_numbers = input_format != "parquet" and (self.verbatim or not self.to_text)
         input_fields = [
-            field.with_type(pa.float64())
-            if field.name in input_headings and input_format != "parquet"
-            else field
+            field.with_type(pa.float64()) if field.name in input_headings and as_numbers else field
             for field in self.source.schema
         ]
         case_headings = [*input_headings, *self.columns.words.values()]
@@ -234,7 +233,7 @@ class _Run:
         state = _State()
         if self.output.format == "text":
             headings = [*(self.source.head if self.verbatim else ()), *self.schema.names]
-            mark = "\ufeff" if self.verbatim and self.source.has_mark else ""
+            mark = "\ufeff" if self.to_text and self.source.has_mark else ""
             yield state, self.output.pack(mark + csv_lines([headings], self.output.sep)), 0.0
         for file in range(len(self.files)):
             state = state._replace(file=file)
@@ -242,6 +241,8 @@ class _Run:
                 state, text = self._piece(state, block)
                 yield state, text, (file + block.share) / len(self.files)
         self._refuse_changed()
+        if isinstance(self.source, reading.TextSource):
+            self.source.describe(self.say)
 
     def _refuse_changed(self) -> None:
         for path, beginning in zip(self.files, self.states_at_start, strict=True):
@@ -252,9 +253,11 @@ class _Run:
 
     def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
-        answers, rejects, by_heading, remarks = answer_columns(
-            block.batch, self.surrogate, self.columns, block.signs
-        )
+        answered = answer_columns(block.batch, self.surrogate, self.columns, block.signs)
+        if answered.rejects and block.as_text is not None:  # which has the cells, and why
+            block = block.as_text()
+            answered = answer_columns(block.batch, self.surrogate, self.columns, block.signs)
+        answers, rejects, by_heading, remarks = answered
         for remark in remarks:
             add(self.remarks, remark)
         faults = {row: reason for row, *reason in rejects}
@@ -272,7 +275,9 @@ class _Run:
         if faults:
             keep = np.ones(len(batch), np.bool_)
             keep[[*faults]] = False
-            batch, texts = batch.filter(pa.array(keep)), [*compress(texts, keep)]
+            batch = batch.filter(pa.array(keep))
+            is_array = isinstance(texts, pa.Array)
+            texts = texts.filter(pa.array(keep)) if is_array else [*compress(texts, keep)]
         file = [self.files[state.file]] * (len(self.files) > 1)
         reject_lines = csv_lines([*file, block.lines[i], *reason] for i, reason in faults.items())
         n, rejected = len(block.batch), state.rejected + len(faults)

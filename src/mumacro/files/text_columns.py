@@ -6,16 +6,22 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from mumacro.inputs.fields import RIGID
+from mumacro.inputs.fields import LIKE, RIGID
+from mumacro.inputs.layout import GAPS
 from mumacro.inputs.signs import Signs
-from mumacro.inputs.text_tables import GAPS, read_cell
+from mumacro.inputs.text_tables import read_cell
 from mumacro.inputs.units import Scale
 from mumacro.kernel.arrays import Array
 
 _NUMBER = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$"
 _THOUSANDS = r"^[+-]?[1-9][0-9]{0,2}(%s[0-9]{3})+(%s[0-9]*)?$"
 _FORTRAN = r"^([+-]?[0-9.]+)[dD]([+-]?[0-9]+)$"
-_ENDS = "must be one number; the ends of an interval of k are columns k_low and k_high"
+
+
+def like_of(name: str) -> str:
+    """The input whose units a column of numbers has: that of its deviation, or of its ends."""
+    field = name.removeprefix("std_")
+    return LIKE.get(field, field)
 
 
 def numbers_of(
@@ -38,12 +44,8 @@ def numbers_of(
     for i in np.flatnonzero(others | np.isinf(si)).tolist():
         si[i] = values[i] = math.nan
         try:
-            value = read_cell(name, column[i].as_py(), signs, scale)
-            if value.low is not None:
-                raise ValueError(_ENDS)
-            if value.std is not None:
-                raise ValueError(f"must be one number; its deviation is a column std_{name}")
-            si[i], values[i] = value.si, value.si * scale.over / scale.times
+            si[i] = read_cell(like_of(name), column[i].as_py(), signs, scale)
+            values[i] = si[i] * scale.over / scale.times
         except ValueError as error:
             faults[i] = str(error)
     return values, si, faults

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet
 
-from mumacro.inputs.text_tables import BLANKS, Dialect
+from mumacro.inputs.layout import BLANKS, Dialect
 
 
 def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
@@ -58,13 +58,15 @@ class Output(NamedTuple):
         input records, the columns stand behind them."""
         if self.format == "parquet":
             return batch
+        if isinstance(texts, pa.Array):
+            return self.pack(self._joined(texts, batch))
         cells = [
             self._cells(name, column)
             for name, column in zip(batch.schema.names, batch.columns, strict=True)
         ]
         rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
         if self.format == "text":
-            return self.pack(self._lines(rows, texts))
+            return self.pack(csv_lines(rows, self.sep))
         line = (
             ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names)
             + "}\n"
@@ -79,22 +81,35 @@ class Output(NamedTuple):
             "".join(start + line % row for start, row in zip(first, rows, strict=True))
         )
 
-    def _lines(self, rows: Iterable[Sequence[Any]], texts: Sequence[Any] | None) -> str:
-        """Rows of cells as lines, behind ``texts``, which are lines or lists of cells."""
-        if texts is None:
-            return csv_lines(rows, self.sep)
-        if not texts or not isinstance(texts[0], str) or self.sep == self.decimal:
-            of_cells = (
-                [*(next(csv.reader([x], delimiter=self.sep)) if isinstance(x, str) else x), *row]
-                for x, row in zip(texts, rows, strict=True)
+    def _joined(self, lines: pa.Array, batch: pa.RecordBatch) -> str:
+        """Lines as they came in, with the columns behind them."""
+        columns = [self._texts(name, batch.column(name)) for name in batch.schema.names]
+        if self.sep == self.decimal:
+            columns = [
+                pc.if_else(
+                    pc.match_substring(column, self.sep),
+                    pc.binary_join_element_wise('"', column, '"', ""),
+                    column,
+                )
+                for column in columns
+            ]
+        last = pc.binary_join_element_wise(columns.pop(), "\n", "")
+        rows = pc.binary_join_element_wise(lines, *columns, last, self.sep)
+        return "".join(rows.to_pylist())
+
+    def _texts(self, name: str, column: pa.Array) -> pa.Array:
+        """A column as texts, nothing where it is null."""
+        if pa.types.is_dictionary(column.type):
+            column = column.dictionary_decode()
+        text = pc.cast(column, pa.string())
+        if pa.types.is_floating(column.type):
+            rigid = "rigid" if name == self.stiffness else None
+            text = pc.if_else(
+                pc.is_finite(column), text, pc.if_else(pc.is_inf(column), rigid, None)
             )
-            return csv_lines(of_cells, self.sep)
-        # numbers and words need no quotes
-        sep = self.sep
-        return "".join(
-            f"{text}{sep}{sep.join([cell or '' for cell in row])}\n"
-            for text, row in zip(texts, rows, strict=True)
-        )
+            if self.decimal != ".":
+                text = pc.replace_substring(text, ".", self.decimal)
+        return pc.fill_null(text, "")
 
     def _cells(self, name: str, column: pa.Array) -> list[str | None]:
         """A column as cells of text."""

@@ -1,4 +1,4 @@
-"""The first sheet of a workbook (.xlsx) as text, a line for each row; needs openpyxl.
+"""A sheet of a workbook (.xlsx) as text, a line for each row; needs openpyxl.
 
 openpyxl reads row by row.  A reader that holds the whole rectangle of a sheet is no choice here: a
 file of 5 kB with one cell in the last corner asks it for 512 GB, and ends the process.
@@ -6,8 +6,12 @@ file of 5 kB with one cell in the last corner asks it for 512 GB, and ends the p
 
 import datetime
 import io
+import re
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from itertools import islice, repeat
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from mumacro.errors import missing
@@ -24,36 +28,117 @@ _ROWS = 1_048_576  # rows of a sheet of Excel, at most
 _SHEETS, _TEXTS, _OTHERS = 512 * 2**20, 64 * 2**20, 4 * 2**20
 # parts that openpyxl does not open here
 _UNREAD = tuple(f"xl/{name}" for name in ("media/", "charts/", "drawings/", "embeddings/", "pivot"))
-_LINES = 4096  # lines of a piece
+_LOOKED_AT = 2_000  # rows of a sheet, in which the names must stand
+_LARGEST = 100 * 2**20  # characters of a sheet as text
+_FORMULA = re.compile(rb"<f[ />]")
+# what a number format adds to a number: texts in quotes, or signs behind a backslash
+_LITERAL = re.compile(r'"([^"]*)"|\\(.)')
 
 
-def sheet_pieces(stream: BinaryIO) -> Iterator[bytes]:
-    """The first sheet as UTF-8 in pieces, with tabs between the cells and decimal points.
+def read_sheet(
+    source: Path | bytes,
+    sheet: str | None,
+    decimal: str | None,
+    has_names: Callable[[list[str]], bool],
+) -> tuple[bytes, str]:
+    """Return a sheet as UTF-8, a line for each row with tabs between the cells, and what is to be
+    said of it.
 
-    TextError where it is no workbook, or openpyxl is missing.
+    It is the one of the name ``sheet``, else the visible one in whose first lines ``has_names``
+    finds the names that are needed.  TextError where there is none or several, where it is no
+    workbook, or openpyxl is missing.
     """
-    _refuse_no_workbook(stream)
-    try:
-        import openpyxl  # type: ignore[import-untyped]
-    except ModuleNotFoundError as error:
-        remedy = f"{missing('files', error)}; or save it as CSV"
-        raise TextError(f"it is a workbook (.xlsx), and {remedy}") from None
-    try:
-        _weigh(stream)
-        sheet: Any = openpyxl.load_workbook(stream, read_only=True, data_only=True).worksheets[0]
-        sheet.reset_dimensions()
-        lines: list[str] = []
-        for row, _ in zip(sheet.iter_rows(), range(_ROWS), strict=False):
-            lines.append(SEP.join(map(_text, row)))
-            if len(lines) == _LINES:
-                yield "\n".join([*lines, ""]).encode()
-                lines = []
-        yield "\n".join([*lines, ""]).encode()
-    except TextError:
-        raise
-    except Exception as error:  # openpyxl raises what a damaged file makes it to
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise TextError(f"it is no workbook, or a damaged one ({reason})") from None
+    with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as stream:
+        _refuse_no_workbook(stream)
+        try:
+            import openpyxl  # type: ignore[import-untyped]
+        except ModuleNotFoundError as error:
+            remedy = f"{missing('files', error)}; or save it as CSV"
+            raise TextError(f"it is a workbook (.xlsx), and {remedy}") from None
+        try:
+            _weigh(stream)
+            book: Any = openpyxl.load_workbook(stream, read_only=True, data_only=True)
+            one = _chosen(book.worksheets, sheet, decimal, has_names)
+            formulas: Any = None
+            if _has_formulas(stream):
+                formulas = openpyxl.load_workbook(stream, read_only=True)[one.title]
+            text = _as_text(one, formulas, decimal)
+        except TextError:
+            raise
+        except Exception as error:  # openpyxl raises what a damaged file makes it to
+            reason = " ".join(str(error).split())[:200] or type(error).__name__
+            raise TextError(f"it is no workbook, or a damaged one ({reason})") from None
+    rest = [repr(other.title) for other in book.worksheets if other.title != one.title]
+    left_out = f", not {', '.join(rest[:10])}" if rest else ""
+    return text.encode(), f"sheet {one.title!r}{left_out}, " if rest else ""
+
+
+def _chosen(
+    sheets: Sequence[Any],
+    sheet: str | None,
+    decimal: str | None,
+    has_names: Callable[[list[str]], bool],
+) -> Any:
+    """The sheet of a name, or the one that has the names of the columns."""
+    titles = ", ".join(repr(one.title) for one in sheets[:10])
+    if sheet is not None:
+        named = next((one for one in sheets if one.title == sheet), None)
+        if named is None:
+            raise TextError(f"there is no sheet {sheet!r}; there are {titles}")
+        return named
+    if not sheets:
+        raise TextError("it is a workbook without a sheet")
+    visible = [one for one in sheets if one.sheet_state == "visible"] or [*sheets]
+    if len(sheets) == 1:
+        return sheets[0]
+    for group in (visible, [one for one in sheets if one not in visible]):
+        with_names = []
+        for one in group:
+            one.reset_dimensions()
+            rows = islice(one.iter_rows(), _LOOKED_AT)
+            with suppress(TextError):  # an empty sheet, or units that cannot be assigned
+                if has_names([SEP.join(_text(cell, decimal) for cell in row) for row in rows]):
+                    with_names.append(one)
+        if len(with_names) > 1:
+            names = " and ".join(repr(one.title) for one in with_names[:5])
+            raise TextError(f"the sheets {names} all have the names; choose one (--sheet)")
+        if with_names:
+            return with_names[0]
+    return visible[0]
+
+
+def _as_text(sheet: Any, formulas: Any, decimal: str | None) -> str:
+    """The rows of a sheet as lines; a formula without a value is its text."""
+    sheet.reset_dimensions()
+    if formulas is not None:
+        formulas.reset_dimensions()
+    rows_of_formulas = repeat(()) if formulas is None else formulas.iter_rows()
+    lines, size = list[str](), 0
+    for row, formula_row, _ in zip(sheet.iter_rows(), rows_of_formulas, range(_ROWS), strict=False):
+        cells = [_text(cell, decimal) for cell in row]
+        for i, formula in enumerate(formula_row):
+            if i < len(cells) and not cells[i] and str(formula.value or "").startswith("="):
+                cells[i] = _quoted(" ".join(str(formula.value).split()))
+        lines.append(SEP.join(cells).rstrip(SEP))
+        size += len(lines[-1]) + 1
+        if size > _LARGEST:
+            raise TextError(f"it has a sheet of more than {_LARGEST >> 20} MiB; save it as CSV")
+    return "\n".join([*lines, ""])
+
+
+def _has_formulas(stream: BinaryIO) -> bool:
+    """Whether a sheet has a formula."""
+    with zipfile.ZipFile(stream) as parts:
+        for name in parts.namelist():
+            if not name.lower().lstrip("/").startswith("xl/worksheets/"):
+                continue
+            with parts.open(name) as part:
+                before = b""
+                while data := part.read(2**20):
+                    if _FORMULA.search(before + data):
+                        return True
+                    before = data[-3:]
+    return False
 
 
 def _weigh(stream: BinaryIO) -> None:
@@ -91,21 +176,27 @@ def _refuse_no_workbook(stream: BinaryIO) -> None:
         raise TextError(f"it is a zip file with {members or 'nothing in it'}; unpack it")
 
 
-def sheet_of(data: bytes) -> Iterator[bytes]:
-    """As :func:`sheet_pieces`, from the bytes of a file."""
-    return sheet_pieces(io.BytesIO(data))
-
-
-def _text(cell: Any) -> str:
-    """A cell as it would be typed."""
+def _text(cell: Any, decimal: str | None) -> str:
+    """A cell as it would be typed: with the decimal sign that is given, and with the unit that its
+    number format shows."""
     value = cell.value
     if value is None:
         return ""
     if isinstance(value, (datetime.date, datetime.time)):
         return value.isoformat()
     if isinstance(value, (int, float)) and not isinstance(value, bool):
+        form = cell.number_format or ""
         # the sheet shows 7 % where it holds 0.07
-        return f"{100 * value:.15g}%" if "%" in (cell.number_format or "") else repr(value)
+        number = f"{100 * value:.15g}%" if "%" in form else repr(value)
+        shown = "".join(a or b for a, b in _LITERAL.findall(form.partition(";")[0])).strip()
+        unit = f" {shown}" if any(map(str.isalpha, shown)) else ""
+        return (number.replace(".", decimal) if decimal else number) + unit
     text = " ".join(str(value).split())
-    # a text that may be one of two numbers is none of them
-    return f"'{text}" if evidence(text) in ((".", False), (",", False)) else text
+    # a text that may be one of two numbers is none of them, unless the sign is given
+    doubtful = not decimal and evidence(text) in ((".", False), (",", False))
+    return _quoted(f"'{text}" if doubtful else text)
+
+
+def _quoted(text: str) -> str:
+    """A text as a cell."""
+    return '"' + text.replace('"', '""') + '"' if '"' in text else text

@@ -196,9 +196,7 @@ def test_ends_of_k_and_amplitudes_are_refused(
         assert low < middle < high or (low == middle == high and "1" in columns.values())
 
 
-@pytest.mark.parametrize(
-    "cell", ["1,5", "1,234.5", "1,000", "1.000", "0,5 mm/s", "٣", "三", "1'000"]
-)
+@pytest.mark.parametrize("cell", ["1,5", "1,234.5", "1,000", "1.000", "٣", "三", "1'000"])
 def test_text_in_a_column_without_layout_is_read_as_by_keyword(
     surrogate: Surrogate, cell: str
 ) -> None:

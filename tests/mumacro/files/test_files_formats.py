@@ -211,7 +211,7 @@ def test_standard_input_output(
         )
         assert main(["eval", "-", "-o", "-"]) == 3
         assert written.getvalue() == expected.read_bytes()
-    assert capfdbinary.readouterr().err.startswith(rejects.read_bytes() + b"49 of 50 rows")
+    assert rejects.read_bytes() + b"49 of 50 rows" in capfdbinary.readouterr().err
 
 
 def with_k(cell: Any) -> Any:
@@ -251,7 +251,7 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
         assert [row["k"] for row in read(out)] == [1e6, math.inf, math.inf, 1e6]
     assert rejects_of(out) == [
         (3, "mu0", "must be finite and > 0"),
-        (4, "mu0", "must be a number [-], or with a unit such as %"),
+        (4, "mu0", "must be a number"),
         (5, "v0", "is missing"),
         (6, "", "has 5 cells, the head has 6"),
         (7, "", "has 7 cells, the head has 6"),

@@ -22,16 +22,9 @@ from mumacro.analysis.measured_points import read_points
 from mumacro.errors import InputError
 from mumacro.inputs.decoding import Text, TextError, encoding_of
 from mumacro.inputs.headings import absent
+from mumacro.inputs.layout import BLANKS, GAPS, ColumnNames, Dialect
 from mumacro.inputs.signs import Signs, evidence
-from mumacro.inputs.text_tables import (
-    BLANKS,
-    GAPS,
-    ColumnNames,
-    Dialect,
-    Table,
-    read_cell,
-    read_table,
-)
+from mumacro.inputs.text_tables import Table, read_cell, read_table
 from mumacro.inputs.units import Scale
 from tests.support.comparing import close
 
@@ -43,12 +36,12 @@ RIGS = {
     "excel_de.csv": "semicolon, decimal comma, point between thousands, head in line 2",
     "finite_elements.txt": "blanks, head in line 6",
     "labview.lvm": "tab, decimal comma, head in line 23, units in line 18",
-    "oscilloscope.csv": "units in line 2",
-    "preamble.csv": "head in line 8",
+    "oscilloscope.csv": "comma, units in line 2",
+    "preamble.csv": "comma, head in line 8",
     "rheometer.txt": "tab, head in line 10, units in line 11",
     "rheometer_utf16.csv": "UTF-16, tab, decimal comma, head in line 6, units in line 8",
     "savetxt.dat": "blanks, head in line 2",
-    "testing_machine.csv": "head in line 7, units in line 8",
+    "testing_machine.csv": "comma, head in line 7, units in line 8",
     "windows_1252.csv": "Windows-1252, semicolon, decimal comma",
 }
 POINTS = ColumnNames({"v0": "v0", "mu_macro": "mu0", "note": "mu0"}, [["v0"], ["mu_macro"]])
@@ -81,7 +74,7 @@ def test_what_rigs_write_is_read_and_said(rigs: Path, name: str) -> None:
     points = read_points(rigs / name)
     assert points.columns["v0"].tolist() == close(V0, rel=1e-12)
     assert points.columns["mu_macro"].tolist() == close(MU, rel=1e-12)
-    assert points.read_as == RIGS[name]
+    assert points.read_as.partition("; ")[0] == RIGS[name]
     same = read_points((rigs / name).read_bytes())
     assert same.columns["v0"].tolist() == points.columns["v0"].tolist()
 
@@ -90,7 +83,7 @@ def test_what_rigs_write_is_read_and_said(rigs: Path, name: str) -> None:
     ("name", "line", "parts"),
     [
         ("ambiguous.txt", 2, ("'1.000'", "may be 1 or 1000", "--decimal .", "--decimal ,")),
-        ("recorder.csv", 6, ("has 1 cell", "the head has 4")),
+        ("recorder.csv", 6, ("neither a row nor a comment",)),
         ("two_steps.csv", 8, ("another head",)),
     ],
 )
@@ -278,24 +271,23 @@ def test_what_is_no_encoding_of_texts_is_refused(name: str) -> None:
         ("12 345", 12.345),
         ("12\u202f345.5", 12.3455),
         ("1'000", 1.0),
-        ("5 um/s", 5e-6),
         (" 7 ", 7e-3),
     ],
 )
 def test_numbers_in_cells(cell: str, si: float) -> None:
     value = read_cell("v0", cell, Signs(".", None), Scale(over=1e3))
-    assert value.si == close(si, rel=1e-15)
+    assert value == close(si, rel=1e-15)
 
 
 def test_per_cent_in_a_cell_comes_before_the_unit_of_the_column() -> None:
     for scale in (Scale(), Scale(over=1e2)):
-        assert read_cell("mu_macro", "7 %", Signs(".", None), scale).si == close(0.07, rel=1e-15)
+        assert read_cell("mu_macro", "7 %", Signs(".", None), scale) == close(0.07, rel=1e-15)
 
 
 @pytest.mark.parametrize("gap", sorted(GAPS))
 def test_every_spelling_of_a_gap_is_missing(gap: str) -> None:
     for text in (gap, gap.upper(), f" {gap} "):
-        assert np.isnan(read_cell("v0", text, Signs(".", None)).si)
+        assert np.isnan(read_cell("v0", text, Signs(".", None)))
     if gap.strip("-–—−"):  # a row of dashes is one of units
         assert "line 3: v0 is missing" in str(refused(f'v0;mu_macro\n1;0,2\n"{gap}";0,3\n'))
 
@@ -310,6 +302,12 @@ def test_what_is_no_number_is_refused_with_its_line_and_name(cell: str) -> None:
 def test_a_deviation_or_an_interval_is_no_point() -> None:
     assert "std" in str(refused("v0,mu_macro\n1,0.2 ± 0.1\n"))
     assert "line 2: v0" in str(refused("v0,mu_macro\n1..2,0.2\n"))
+
+
+@pytest.mark.parametrize("cell", ["5 um/s", "5um/s", "2,5 mm/s", "3 N"])
+def test_a_unit_in_a_cell_is_refused_with_its_place(cell: str) -> None:
+    fault = str(refused(f"v0;mu_macro\n{cell};0,2\n1,5;0,3\n"))
+    assert fault.startswith("line 2: v0 must be a number alone: write its unit into the head")
 
 
 # --- units ----------------------------------------------------------------------------------------
