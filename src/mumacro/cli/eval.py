@@ -75,8 +75,8 @@ def _parser() -> OneLineParser:
     """The arguments of the command."""
     parser = OneLineParser(
         prog="mumacro eval",
-        description="Evaluate every case of files: Parquet, NDJSON, text (.csv, .tsv, .txt, ...), "
-        ".xlsx; also .gz. The output appears whole or not at all.",
+        description="Evaluate every case of files: Parquet, NDJSON, text, .xlsx. The output appears "
+        "whole or not.",
         epilog=_COLUMNS,
     )
     parser.add_argument(
