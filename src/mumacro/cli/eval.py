@@ -31,9 +31,8 @@ in text the head is the first line with these names; units may stand beside it, 
 added: mu_macro, mu_ratio, regime, error_bound, source; mu_macro_low, _high; power.saved, ...
 rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 
-examples:
+example:
   mumacro eval rig.txt -o out.csv --decimal ,
-  mumacro eval - -o - < cases.csv > out.csv
 exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments, 130 interrupted
 """
 
@@ -75,8 +74,8 @@ def _parser() -> OneLineParser:
     """The arguments of the command."""
     parser = OneLineParser(
         prog="mumacro eval",
-        description="Evaluate every case of files: Parquet, NDJSON, text, .xlsx. The output appears "
-        "whole or not.",
+        description="Evaluate every case of files: Parquet, NDJSON, text, .xlsx. "
+        "The output appears whole or not.",
         epilog=_COLUMNS,
     )
     parser.add_argument(
