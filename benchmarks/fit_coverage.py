@@ -22,10 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import InputError, Surrogate, fit
+from tests.support.fits import least_chi2, random_points
 
 Array = NDArray[np.float64]
 CACHE = ROOT / "build" / "fit_coverage"
 DRAWS, PROCESSES = 400, 2
+_MINIMA = 5000  # random sets of points
 _EXACT = 400  # fits of exact points, of each contact and direction
 REGULAR = 0.95  # share of draws with one solution and closed intervals, in a set-up that has these
 _CODE = b"".join(
@@ -278,7 +280,26 @@ def coverage() -> str:
     return "\n".join(text)
 
 
-SECTIONS = sections(coverage, exact)
+def minima() -> str:
+    """Whether a fit has the least chi2: random points along against an independent search."""
+    table, missed, refused, worst = Surrogate.open(1e-10), 0, 0, 0.0
+    for seed in range(_MINIMA):
+        points, rig = random_points(table, seed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                found = fit(points, **rig, surrogate=table)
+            except InputError:
+                refused += 1
+                continue
+        excess = found.chi2 / least_chi2(table, points, rig) - 1.0
+        worst = max(worst, excess)
+        missed += excess > 1e-6
+    rows = [[f"{_MINIMA:,}", f"{refused:,}", f"{missed:,}", f"{worst:.1e}"]]
+    return markdown(("sets", "refused", "chi2 above the least by more than 1e-6", "most"), rows)
+
+
+SECTIONS = sections(coverage, exact, minima)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS)

@@ -23,7 +23,9 @@ class Prediction(NamedTuple):
     """Friction that a fit predicts, in the shape of the inputs."""
 
     mu_macro: Any  #: [-]
-    std: Any  #: its standard deviation, from the covariance of the fit [-]
+    #: its standard deviation, from the covariance of the fit [-].  Where the points had no ``std``
+    #: it is known from their scatter alone: a 95 % interval takes Student's factor of it
+    std: Any
 
     def to_dict(self) -> dict[str, Any]:
         """Both by name: arrays as lists."""
@@ -108,7 +110,9 @@ class Fit:
         Returns
         -------
         Prediction
-            ``mu_macro`` and ``std``; numbers for one case.
+            ``mu_macro`` and ``std``; numbers for one case.  A 95 % interval has 1.96 of ``std`` to
+            either side, but where the points had no ``std`` Student's factor for as many degrees of
+            freedom as points exceed unknowns: 2.45 for 6, as the band of the picture has it.
 
         Raises
         ------

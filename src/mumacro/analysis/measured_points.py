@@ -26,6 +26,7 @@ FORCE = "Ft"  # the mean friction force [N], which over Fz is mu_macro
 #: how far a point may lie outside of 0 <= mu_macro <= mu0: in standard deviations; where the
 #: points have none, as a share of mu0
 _SCATTER, _SHARE = 5.0, 0.05
+MOST_POINTS = 10_000  # of a fit
 _PERCENT = 1.5  # mu_macro from which on it is asked if per cent are meant
 _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
 
@@ -166,6 +167,12 @@ class Measured:
         self.n = n
 
     def _check(self) -> None:
+        if self.n > MOST_POINTS:
+            bound = (
+                f"at most {MOST_POINTS:,}: average them, those at the same inputs to one point "
+                "with the std of its mean"
+            )
+            raise InputError("data", f"{self.n:,} points", bound)
         if "mu0" in self.columns:
             _refuse("mu0", self.columns["mu0"], self.columns["mu0"] <= _MOST, f"<= {_MOST:g}")
         if self.std is not None:

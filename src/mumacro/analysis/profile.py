@@ -27,6 +27,8 @@ _NARROWEST = 1e-6  # in s: a shorter chord is not halved
 _RIPPLE = 1e-9
 _FINE = 0.1
 _ZOOM, _ZOOMS = 9, 3  # places and rounds of the search for the end of an interval
+_LOWEST_ROUNDS = 14  # of the search for the least chi2: its interval becomes 4^14 times as narrow
+_SAME = 1e-12  # a smaller relative fall of chi2 is rounding
 _INSIDE = 32  # places, at least, in the ranges that are allowed
 
 #: s (m,), whether slopes are asked for -> friction over its standard deviation, and its slope along
@@ -34,6 +36,11 @@ _INSIDE = 32  # places, at least, in the ranges that are allowed
 Model = Callable[[Array, bool], tuple[Array, Array]]
 #: places, factors and half widths of the factors (m,) -> what is to be as large as possible (m,)
 Goal = Callable[[Array, Array, Array], Array]
+
+
+def _dots(a: Array, b: Array) -> Array:
+    """The products of the rows of two arrays (m, n), (m,), without an array of this size."""
+    return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
 class Samples(NamedTuple):
@@ -78,6 +85,7 @@ class Profile:
         self._refine()
         self._insert(self._minima())
         self._refine()
+        self._insert(self._lowest_places())
 
     @property
     def limit(self) -> float:
@@ -87,7 +95,7 @@ class Profile:
     def samples(self, s: Array, slopes: bool = True) -> Samples:
         """The curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""
         rows, steps = self._model(s, slopes)
-        squares = (rows**2).sum(axis=1)
+        squares = _dots(rows, rows)
         factor: Array = np.ones(s.size)
         rise: Array = np.full(s.size, np.inf)
         if self._has_factor:
@@ -95,8 +103,8 @@ class Profile:
             along = np.maximum(rows @ self._measured, 0.0)
             factor = np.divide(along, squares, out=np.zeros(s.size), where=squares > 0.0)
         off = self._measured - factor[:, None] * rows
-        chi2 = np.nan_to_num((off**2).sum(axis=1), nan=np.inf)
-        tilt = -2.0 * factor * (off * steps).sum(axis=1)
+        chi2 = np.nan_to_num(_dots(off, off), nan=np.inf)
+        tilt = -2.0 * factor * _dots(off, steps)
         return Samples(s, rows, steps, factor, chi2, tilt, rise)
 
     def lowest(self) -> Places:
@@ -142,21 +150,24 @@ class Profile:
         with np.errstate(all="ignore"):
             if self._has_factor:
                 am, cm = a @ m, chord @ m
-                aa, ac, cc = ((x * y).sum(axis=1) for x, y in ((a, a), (a, chord), (chord, chord)))
+                aa, ac, cc = (_dots(x, y) for x, y in ((a, a), (a, chord), (chord, chord)))
                 t = (cm * aa - am * ac) / (am * cc - cm * ac)
             else:
-                t = ((m - a) * chord).sum(axis=1) / (chord**2).sum(axis=1)
+                t = _dots(m - a, chord) / _dots(chord, chord)
             inner = a + np.clip(np.nan_to_num(t), 0.0, 1.0)[:, None] * chord
             factor: Array = np.ones(width.size)
             if self._has_factor:
-                factor = np.nan_to_num(np.maximum(inner @ m, 0.0) / (inner**2).sum(axis=1))
-            near = np.sqrt(((m - factor[:, None] * inner) ** 2).sum(axis=1))
+                factor = np.nan_to_num(np.maximum(inner @ m, 0.0) / _dots(inner, inner))
+            inner *= factor[:, None]
+            inner -= m
+            near = np.sqrt(_dots(inner, inner))
             near = np.fmin(near, np.sqrt(np.minimum(self.at.chi2[:-1], self.at.chi2[1:])))
             # a corner between straight ends leaves the chord by half of the larger difference
-            off = [
-                np.sqrt(((width[:, None] * end - chord) ** 2).sum(axis=1))
-                for end in (self.at.slopes[:-1], self.at.slopes[1:])
-            ]
+            off = []
+            for end in (self.at.slopes[:-1], self.at.slopes[1:]):
+                way = width[:, None] * end
+                way -= chord
+                off.append(np.sqrt(_dots(way, way)))
             largest = np.maximum(self.at.factor[:-1], self.at.factor[1:])
             error = 0.5 * largest * np.fmax(*off)
         width = np.where(np.isfinite(width), width, 0.0)
@@ -170,6 +181,23 @@ class Profile:
         turns = (depth[0] < -ripple) & (depth[1] > ripple)
         turns &= near - error < np.sqrt(self.limit)
         return self._zeros(np.flatnonzero(turns), lambda at: at.tilt, 1e-13, slopes=True)
+
+    def _lowest_places(self) -> Array:
+        """Where chi2 is least beside each sample that is a minimum and allowed: the curve may bend
+        between two samples, and its slope jump, so their slopes say nothing of it."""
+        s, here = self.at.s, self.lowest()
+        here = here[(self.at.chi2[here] <= self.limit) & np.isfinite(s[here])]
+        ends = np.flatnonzero(np.isfinite(s))[[0, -1]]
+        low, high = (s[np.clip(here + side, *ends)] for side in (-1, 1))
+        best, least, each = s[here].copy(), self.at.chi2[here].copy(), np.arange(here.size)
+        for _ in range(_LOWEST_ROUNDS if here.size else 0):
+            places = np.linspace(low, high, _ZOOM, axis=1)
+            chi2 = self.samples(places.ravel(), slopes=False).chi2.reshape(places.shape)
+            j = np.argmin(chi2, axis=1)
+            better = chi2[each, j] < least
+            best, least = np.where(better, places[each, j], best), np.minimum(chi2[each, j], least)
+            low, high = (places[each, np.clip(j + side, 0, _ZOOM - 1)] for side in (-1, 1))
+        return best[least < self.at.chi2[here] * (1.0 - _SAME)]
 
     def _zeros(
         self, chords: Places, quantity: Callable[[Samples], Array], tolerance: float, slopes: bool

@@ -12,6 +12,7 @@ from mumacro import InputError, Surrogate, fit
 from mumacro.inputs.kind import CONTACTS
 from tests.support.cases import Case
 from tests.support.comparing import close
+from tests.support.fits import least_chi2, random_points
 from tests.support.refusals import refused
 from tests.support.scripts import script
 
@@ -550,3 +551,36 @@ def test_extreme_points_are_refused_or_give_no_nan(seed: int) -> None:
         ]
         assert not np.isnan([*numbers, estimate.chi2, *estimate.residuals]).any(), (name, size)
         assert min(low for low, _ in estimate.interval.values()) >= 0.0
+
+
+def test_a_minimum_where_the_curve_bends_is_found(surrogate: Surrogate) -> None:
+    """chi2 falls towards a place between two samples at which its slope jumps."""
+    points = {
+        "v0": [0.2731185, 0.0693925, 2.2318e-4, 4.9130e-4, 0.4362558],
+        "mu_macro": [0.2829535, 0.2846352, 0.00841034, 0.00632732, 0.2851833],
+        "std": [0.00385934, 0.00209501, 0.00678778, 0.00274079, 0.0125773],
+    }
+    rig: Case = {"Fz": 10.0, "omega": 1.2e5, "y0": 4e-7, "direction": "along"}
+    found = fit(points, **rig, surrogate=surrogate)
+    arrays = {name: np.array(values) for name, values in points.items()}
+    assert found.chi2 <= least_chi2(surrogate, arrays, rig) * (1.0 + 1e-6)
+
+
+@pytest.mark.slow
+def test_a_fit_has_the_least_chi2(surrogate: Surrogate) -> None:
+    tried = 0
+    for seed in range(60):
+        points, rig = random_points(surrogate, seed)
+        try:
+            found = fit(points, **rig, surrogate=surrogate)
+        except InputError:
+            continue
+        tried += 1
+        assert found.chi2 <= least_chi2(surrogate, points, rig) * (1.0 + 1e-6), seed
+    assert tried > 40
+
+
+def test_more_points_than_a_fit_takes_are_refused_with_the_remedy(surrogate: Surrogate) -> None:
+    v0 = np.geomspace(1e-3, 1.0, 10_001)
+    with refused("data", "average"):
+        fit({"v0": v0, "mu_macro": np.full(v0.size, 0.2)}, **RIG, surrogate=surrogate)
