@@ -582,5 +582,6 @@ def test_a_fit_has_the_least_chi2(surrogate: Surrogate) -> None:
 
 def test_more_points_than_a_fit_takes_are_refused_with_the_remedy(surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-3, 1.0, 10_001)
-    with refused("data", "average"):
+    with refused("data") as caught:
         fit({"v0": v0, "mu_macro": np.full(v0.size, 0.2)}, **RIG, surrogate=surrogate)
+    assert "average them" in str(caught.value)
