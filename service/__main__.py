@@ -147,12 +147,23 @@ def _allow_files(connections: int) -> str | None:
     )
 
 
+def _open_standard_files() -> None:
+    """Open what was closed (``>&-``) as the null device: else a connection may get its number, and
+    the log be written to it."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
+
+
 def _at_a_stop(do: Callable[[int, FrameType | None], None]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, do)
 
 
 def _serve(settings: Settings) -> int:
+    _open_standard_files()
     _at_a_stop(lambda *_: os._exit(0))  # also from the command mumacro, which has not set it
 
     if _is_taken(settings):
@@ -178,7 +189,9 @@ def _serve(settings: Settings) -> int:
     # default would end the process with the signal's exit status.  From here on there are things to
     # clean up: the rest of the log, and the folder that several workers share.
     _at_a_stop(lambda *_: sys.exit(0))
-    if sys.stdout.isatty() and settings.port:  # 0: any free port, which the log names
+    if (
+        sys.stdout is not None and sys.stdout.isatty() and settings.port
+    ):  # 0: any free port, which the log names
         threading.Thread(target=_announce, args=(settings,), daemon=True).start()
     try:
         with shared_counters(settings.workers) if settings.workers > 1 else nullcontext():
@@ -198,7 +211,8 @@ def _serve(settings: Settings) -> int:
                 access_log=False,
                 server_header=False,
                 proxy_headers=False,
-                timeout_graceful_shutdown=settings.shutdown_grace_s,
+                # long work is ended after the grace, with an answer
+                timeout_graceful_shutdown=settings.shutdown_grace_s + 1,
                 # on a busy machine a worker may need more than 5 s to start
                 timeout_worker_healthcheck=30,
             )

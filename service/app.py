@@ -23,9 +23,8 @@ from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
-from .admission import Admission, Admitted
+from .admission import Admission, Admitted, Thread
 from .guide_pages import GuidePages
-from .limits import Work
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.inputs import without_null
@@ -80,9 +79,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     gc.freeze()
     # The description takes half as long as the rest of the start; FastAPI keeps it, and no request
     # waits until it is made.
-    app.state.work.questions.threads.submit(app.openapi)
-    yield {"settings": app.state.settings, "observer": app.state.observer}
-    app.state.work.close()
+    Thread(app.openapi)
+    state = app.state
+    yield {"settings": state.settings, "observer": state.observer, "admission": state.admission}
+    app.state.admission.end()
 
 
 class Service(FastAPI):
@@ -161,8 +161,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         open_paths.add("/guide")
     state = app.state
     state.methods = _methods_of_paths(app)
-    state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
-    state.admission = Admission(settings.max_held_bytes)
+    state.settings, state.tables = settings, Tables(settings.tables)
+    state.admission = Admission(settings)
     state.metrics = Metrics({*state.methods, *page.OPEN})
     state.observer = Observer(state.metrics)
     keys = settings.keys()
@@ -174,9 +174,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Admitted)
     app.add_middleware(Failures)
     app.add_middleware(HeadAsGet)
-    app.add_middleware(
-        Observe, observer=state.observer, trusted_proxies=list(settings.trusted_proxies)
-    )
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,
@@ -191,6 +188,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             ],
             expose_headers=["ETag", "X-Request-ID", "Retry-After"],
         )
+    app.add_middleware(
+        Observe, observer=state.observer, trusted_proxies=list(settings.trusted_proxies)
+    )
     return app
 
 

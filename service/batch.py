@@ -93,7 +93,7 @@ class Batch:
 
     @property
     def cost(self) -> float:
-        """The cost of all cases together, see :mod:`service.limits`."""
+        """The cost of all cases together, see :mod:`service.admission`."""
         return self.cases.size * cost(self.outputs, self.cases)
 
     def write(self) -> Iterator[bytes]:

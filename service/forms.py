@@ -24,6 +24,7 @@ from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
 from mumacro.inputs.fields import ENDS, field_of
 from mumacro.inputs.kind import SPRING, kind_of
 from mumacro.inputs.reading import Value
+from mumacro.stopping import look
 
 from .models.inputs import MAX_REASONS
 from .models.options import Case, CaseColumns
@@ -287,6 +288,7 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     reasons: dict[int, Reason] = {}
     used = set[str]()
     for i, row in enumerate(rows):
+        look()
         try:
             values = _row(row).values
             if twice := values.keys() & words.keys():

@@ -13,12 +13,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from difflib import get_close_matches
 from enum import Enum
 from typing import Any, NoReturn
 
 import orjson
-from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
@@ -33,7 +31,6 @@ from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.reading import no_number
 
-from . import API_VERSION
 from .understood import UNDERSTOOD, is_wanted, understood
 
 MAX_FIELD_FAULTS = 100
@@ -202,6 +199,19 @@ def names_of(model: type[BaseModel]) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*inputs, *fields]))
 
 
+def _place(path: tuple[str | int, ...], body: Any) -> tuple[str | int, ...]:
+    """A place as far as the body has it: within a value that stands for a list of one, such as a
+    target, there is none."""
+    for i, step in enumerate(path):
+        if isinstance(step, int) and not isinstance(body, list):
+            return path[:i]
+        try:
+            body = body[step]
+        except (LookupError, TypeError):
+            body = None
+    return path
+
+
 def invalid(
     error: ValidationError,
     model: type[BaseModel],
@@ -209,8 +219,11 @@ def invalid(
     parameter: bool | None = None,
 ) -> "RequestError":
     """The error that reports what a model refuses in the members of a body or query."""
-    faults = faults_of(error.errors(include_url=False), names_of(model), parameter)
-    if "mu0" in model.model_fields and model.model_fields["mu0"].is_required():
+    errors = [
+        {**fault, "loc": _place(fault["loc"], members)} for fault in error.errors(include_url=False)
+    ]
+    faults = faults_of(errors, names_of(model), parameter)
+    if {"mu0", "y0"} <= model.model_fields.keys() and model.model_fields["mu0"].is_required():
         paths = {fault.path for fault in faults}
         faults += [fault for fault in _absent_in(members) if fault.path not in paths]
     return refused(faults, **_understood(members))
@@ -298,27 +311,6 @@ def path_in(scope: Scope) -> str:
 # --- exceptions of the application ----------------------------------------------------------------
 
 
-def _of_fastapi(error: RequestValidationError, scope: Scope) -> RequestError:
-    """What FastAPI refuses: a body, or a query, that is not as its endpoint declares it."""
-    dependant = scope["route"].dependant
-    model = (dependant.body_params or dependant.query_params)[0].field_info.annotation
-    errors = [{**fault, "loc": _place(fault["loc"][1:], error.body)} for fault in error.errors()]
-    return refused(faults_of(errors, names_of(model)), **_understood(error.body))
-
-
-def _place(path: tuple[str | int, ...], body: Any) -> tuple[str | int, ...]:
-    """A place as far as the body has it: within a value that stands for a list of one, such as a
-    target, there is none."""
-    for i, step in enumerate(path):
-        if isinstance(step, int) and not isinstance(body, list):
-            return path[:i]
-        try:
-            body = body[step]
-        except (LookupError, TypeError):
-            body = None
-    return path
-
-
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:
     """What Starlette refuses: no such path, method or part of a file."""
     if error.status_code == 405:  # Starlette names the methods of one route of the path
@@ -338,16 +330,10 @@ _NO_GUIDE = (
 
 
 def _no_such_path(scope: Scope) -> str:
-    """What to do about a path that is not there; its case, and "_" for "-", do not matter."""
-    path = path_in(scope)[:_MAX_TEXT].lower().replace("_", "-").rstrip("/")
-    guide = scope["app"].state.settings.guide
-    if guide is None and (path == "/guide" or path.startswith("/guide/")):
+    """What to do about a path that is not there."""
+    path = path_in(scope)
+    if scope["app"].state.settings.guide is None and (path + "/").startswith("/guide/"):
         return _NO_GUIDE
-    version = f"/v{API_VERSION}"  # in which paths that have nothing else in common agree
-    methods = scope["app"].state.methods
-    paths = {each.removeprefix(version): each for each in methods if "{" not in each}
-    for near in get_close_matches(path.removeprefix(version), paths, n=1, cutoff=0.8):
-        return f"no such path; did you mean {paths[near]}? /docs describes all of them"
     return "no such path; /docs describes all of them"
 
 
@@ -383,7 +369,6 @@ def _of_memory(_error: MemoryError, _: Scope) -> RequestError:
 #: exception -> what it means for its request
 _MEANINGS: dict[type[Exception], Any] = {
     RequestError: lambda error, _: error,
-    RequestValidationError: _of_fastapi,
     HTTPException: _of_http,
     InputError: lambda error, _: of_input(error),
     TableError: _of_table,

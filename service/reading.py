@@ -1,33 +1,38 @@
-"""How a request becomes the model that its endpoint declares.
+"""How a request becomes the model that its endpoint declares, and JSON becomes Python.
 
-FastAPI reads body and query from a request; :class:`StrictRequest` is one of our own, as FastAPI's
-chapter on custom requests has it.  A member or a parameter that is given twice is refused, numbers
-of a query are read as people type them, and limits hold.  :class:`DirectRoute` reads one model and
-solves nothing else: FastAPI's own reading of a case takes longer than its answer
-(docs/decisions.md).
+:class:`DirectRoute` reads one model from body or query and solves nothing else: FastAPI's own
+reading of a case takes longer than its answer (docs/decisions.md).  A member or a parameter that is
+given twice is refused, numbers of a query are read as people type them, and limits hold.
 """
 
+import asyncio
 import json
 import string
 from collections import Counter
-from collections.abc import Callable, Coroutine, Iterable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterable, Mapping
+from contextlib import asynccontextmanager
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import parse_qsl
 
 import orjson
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import ValidationError
-from starlette.datastructures import ImmutableMultiDict
+from starlette.requests import ClientDisconnect
 from starlette.routing import BaseRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from .admission import ticket_of
-from .limits import JSON, SMALL_BODY, Work, only_json, read_body
-from .problems import FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
+from .admission import Ticket, compute, ticket_of
+from .problems import ABORT, FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
 
+T = TypeVar("T")
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+JSON = b"application/json"
+SMALL_BODY = 64 * 1024  # bytes of the body of a question, at most
+AT_ONCE = 16 * 1024  # bytes of a body that is checked without a thread, at most
+_BYTES_PER_UNIT = 1.0  # bytes of such a body whose check has the cost 1, see service/admission.py
+_CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
 # the characters of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _LISTS = frozenset(("include",))
@@ -134,7 +139,98 @@ class Json(Response):
         ]
 
 
-# --- requests -------------------------------------------------------------------------------------
+# --- time -----------------------------------------------------------------------------------------
+
+
+async def from_client(move: Awaitable[T], limit: int) -> T:
+    """Wait for the client to send or to read."""
+    try:
+        async with asyncio.timeout(limit):
+            return await move
+    except TimeoutError:
+        raise _late(ProblemKind.SLOW_CLIENT, limit) from None
+
+
+@asynccontextmanager
+async def within(limit: int) -> AsyncIterator[None]:
+    """A time limit of a whole answer: its reading, computing and sending."""
+    try:
+        async with asyncio.timeout(limit):
+            yield
+    except TimeoutError:
+        raise _late(ProblemKind.TOOK_TOO_LONG, limit) from None
+
+
+def _late(kind: ProblemKind, limit: int) -> RequestError:
+    return RequestError(kind, f"this may take up to {limit} s")
+
+
+# --- bodies ---------------------------------------------------------------------------------------
+
+
+def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
+    """Refuse a body that is not JSON in UTF-8, or is compressed; no Content-Type says JSON."""
+    media_type = headers.get(b"content-type", JSON).lower()
+    media, _, parameters = media_type.decode("latin-1").partition(";")
+    if media.strip().encode() != JSON or not _is_utf8(parameters):
+        text = media_type[:80].decode("latin-1")
+        detail = f"send {JSON.decode()}, not {text}{remedy and f'; {remedy}'}"
+        raise RequestError(
+            ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Post": JSON.decode()}
+        )
+    if headers.get(b"content-encoding", b"identity").lower() != b"identity":
+        detail = "send the body without Content-Encoding"
+        raise RequestError(
+            ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"}
+        )
+
+
+def _is_utf8(parameters: str) -> bool:
+    """Whether the parameters of a media type name no other character set.
+
+    >>> _is_utf8('version=1; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
+    (True, False)
+    """
+    pairs = (parameter.partition("=") for parameter in parameters.split(";"))
+    return all(
+        value.strip(' \t"') in _CHARSETS for name, _, value in pairs if name.strip() == "charset"
+    )
+
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
+async def read_body(
+    headers: Mapping[bytes, bytes],
+    receive: Receive,
+    limit: int,
+    ticket: Ticket,
+) -> bytearray:
+    """The body of a request, which its ``ticket`` holds."""
+    length = headers.get(b"content-length", b"0").strip()
+    size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
+    body, more = bytearray(), True
+    while True:
+        if size > limit:
+            remedy = (
+                "send many cases to /v1/mu-macro/batch, more in several requests, or give "
+                "`mumacro eval` a file"
+            )
+            raise RequestError(
+                ProblemKind.BODY_TOO_LARGE,
+                f"a body may have up to {limit} bytes: {remedy}",
+                max_bytes=limit,
+            )
+        ticket.weigh(size)
+        if not more:
+            return body.removeprefix(_BYTE_ORDER_MARK)  # RFC 8259, 8.1
+        message = await receive()
+        if message["type"] != "http.request":
+            raise ClientDisconnect
+        body += message.get("body", b"")
+        more = message.get("more_body", False)
+        size = len(body)
+        ticket.hold(size)
 
 
 async def small_body(request: Request) -> bytes:
@@ -142,10 +238,13 @@ async def small_body(request: Request) -> bytes:
     headers = dict(request.scope["headers"])
     if headers.get(b"content-type") != JSON or b"content-encoding" in headers:
         only_json(headers)
-    limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
-    work: Work = request.app.state.work
+    settings = request.app.state.settings
+    limit = min(SMALL_BODY, settings.max_body_bytes)
     reading = read_body(headers, request.receive, limit, ticket_of(request.scope))
-    body = bytes(await work.small_body(reading, request.scope))
+    if ABORT in request.scope.get("state", ()):  # our own server limits this wait (server.py)
+        body = bytes(await reading)
+    else:
+        body = bytes(await from_client(reading, settings.client_timeout_s))
     query = request.scope["query_string"]
     if query and (pairs := _pairs(query)):
         refuse(
@@ -171,29 +270,6 @@ def members_of(query: bytes) -> dict[str, Any]:
     if repeats:
         refuse([FieldFault((name,), "is given more than once", parameter=True) for name in repeats])
     return members
-
-
-class StrictRequest(Request):
-    """A request whose body and query say nothing twice."""
-
-    _json: Any
-    _body: bytes
-
-    async def read(self) -> None:
-        """Read all that the endpoint may need, so that FastAPI finds it."""
-        if self.method == "POST":
-            self._body = await small_body(self)
-            self._json = decode(self._body)
-            if not isinstance(self._json, dict):
-                refuse([FieldFault((), "must be a JSON object", self._json)])
-        else:
-            # FastAPI takes lists apart again
-            pairs = [
-                (name, one)
-                for name, value in members_of(self.scope["query_string"]).items()
-                for one in (value if name in _LISTS else [value])
-            ]
-            self._query_params: Any = ImmutableMultiDict(pairs)
 
 
 def _pairs(query: bytes) -> list[tuple[str, str]]:
@@ -226,21 +302,6 @@ def _number(text: str) -> Any:
 # --- routes ---------------------------------------------------------------------------------------
 
 
-class StrictRoute(APIRoute):
-    """FastAPI's own handling of a :class:`StrictRequest`."""
-
-    def get_route_handler(self) -> Handler:
-        """FastAPI's handler, with the request read before."""
-        answer = super().get_route_handler()
-
-        async def read_and_answer(request: Request) -> Response:
-            strict = StrictRequest(request.scope, request.receive)
-            await strict.read()
-            return await answer(strict)
-
-        return read_and_answer
-
-
 class DirectRoute(APIRoute):
     """A route for ``async def answer(request, model)``: the model is read straight from the bytes
     of the body, or from the query.
@@ -256,8 +317,13 @@ class DirectRoute(APIRoute):
         answer: Any = self.endpoint
 
         async def of_body(request: Request) -> Response:
-            case = validated(model, await small_body(request))
-            response: Response = await answer(request, case)
+            request._body = body = await small_body(request)  # for those who read it as JSON
+            if len(body) <= AT_ONCE:
+                asked = validated(model, body)
+            else:
+                check = partial(validated, model, body)
+                asked = await compute(request, check, len(body) / _BYTES_PER_UNIT)
+            response: Response = await answer(request, asked)
             return response
 
         async def of_query(request: Request) -> Response:

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from .admission import Admission
 from .observe import Observer
 from .problems import ABORT, FULL, REFUSED, ProblemKind, RequestError, problem_of
 
@@ -85,12 +86,14 @@ class Connection(HttpToolsProtocol):
     _due = _end = math.inf  # when the client must have moved, and the answer be complete
     _bytes = 0  # since the last answer
     _in_head = _second = False
+    _trailers = 0  # fields behind the body
     _refusal: RequestError | None = None
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._settings = self.app_state["settings"]
         self._observer: Observer = self.app_state["observer"]
+        self._admission: Admission = self.app_state["admission"]
         self.headers, self.url = [], b""
         self._begun = self.loop.time()
 
@@ -145,6 +148,22 @@ class Connection(HttpToolsProtocol):
         self._observer.name(scope)
         self._observer.record(scope, status, self.loop.time() - self._begun)
         return scope
+
+    def shutdown(self) -> None:
+        """Refuse new work; uvicorn calls this for every connection when it is to stop."""
+        self._admission.begin_stop()
+        super().shutdown()
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """Take a field of a head; those behind a body say nothing of the request (RFC 9110,
+        6.5.1)."""
+        if self._in_head:
+            super().on_header(name, value)
+            return
+        self._trailers += 1
+        if self._trailers > MAX_FIELDS:
+            self._refusal = _TOO_LARGE
+            raise _TOO_LARGE
 
     def abort(self) -> None:
         """End the connection without the rest of an answer."""
@@ -241,6 +260,7 @@ class Connection(HttpToolsProtocol):
             self._second, self.cycle.keep_alive = True, False
             raise ValueError("a second request")
         self._in_head, self._due, self._begun = True, math.inf, self.loop.time()
+        self._trailers = 0
         super().on_message_begin()
 
     def on_headers_complete(self) -> None:

@@ -118,10 +118,11 @@ class Settings(BaseSettings):
     max_body_bytes: int = _whole(16 * 2**20, 1024, 2**31)
     max_held_bytes: int = _whole(32 * 2**20, 1024, 2**40)
     max_batch: int = _whole(100_000, 1, 10_000_000)
-    max_batches: int = _whole(4, 1, 1024)
+    max_computations: int = _whole(8, 1, 1024)
     max_connections: int = _whole(1000, 1, 1_000_000)
     keep_alive_s: int = _whole(75, 1, 3600)
     client_timeout_s: int = _whole(30, 1, 3600)
+    compute_limit_s: int = _whole(30, 1, 86400)
     time_limit_s: int = _whole(300, 1, 86400)
     api_key: Key | None = Field(
         None, description=f"1 to 512 printable ASCII characters without spaces; {_NO_KEY}"

@@ -1,18 +1,19 @@
 """The loaded tables.  Each is opened and its checksum and a known answer are checked before the
 service is ready."""
 
+import asyncio
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
-
-from fastapi import Depends, Request
+from typing import Any
 
 from mumacro import Surrogate, TableError
 
 from . import API_VERSION
+from .admission import Thread
 from .problems import FieldFault, ProblemKind, RequestError, refuse
 
+_PATIENCE_S = 2.0  # for a look at the files
 _log = logging.getLogger("mumacro.tables")
 
 
@@ -71,6 +72,7 @@ class Tables:
         self.paths = tuple(paths)
         self.loaded: tuple[LoadedTable, ...] = ()
         self.fault: str | None = "the tables are not loaded yet"
+        self._checking: asyncio.Future[None] | None = None  # the last look at the files
 
     def load(self) -> None:
         """Load all tables.  A refused table makes the service not ready; it never stops the
@@ -97,9 +99,21 @@ class Tables:
                 extra={"fields": {"tables": [table.label for table in self.loaded]}},
             )
 
-    def check(self) -> None:
-        """Check every table again; TableError, or RequestError where none is loaded."""
+    async def check(self) -> None:
+        """Check every table again; TableError, or RequestError where none is loaded.
+
+        The files are looked at in a thread, one for all who ask at the same time: a file system
+        that hangs stops nobody else.
+        """
         self.pick()
+        if self._checking is None or self._checking.done():
+            self._checking = Thread(self._check_files).done
+        checking = self._checking
+        if not (await asyncio.wait([checking], timeout=_PATIENCE_S))[0]:
+            raise RequestError(ProblemKind.NOT_READY, "the files of the tables do not answer")
+        checking.result()
+
+    def _check_files(self) -> None:
         for table in self.loaded:
             table.check()
 
@@ -120,12 +134,3 @@ class Tables:
                 tightest_available=tightest,
             )
         return min(fit, key=lambda table: (table.stamp[0], -table.surrogate.tolerance))
-
-
-async def _tables(request: Request) -> Tables:
-    tables: Tables = request.app.state.tables
-    return tables
-
-
-#: the tables of the application, for endpoints
-Loaded = Annotated[Tables, Depends(_tables)]

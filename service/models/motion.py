@@ -42,7 +42,7 @@ MAX_TERMS = 10  # harmonics of one part of the motion
 # every turn of the motion
 MOST_OF_A_BALL, LEAST_OF_A_BALL = 20, 1e-7
 MOTIONS_OF_A_SEARCH = 150  # that solve_motion computes, about
-# costs, see service/limits.py: found with random motions, right to a factor of 10
+# costs, see service/admission.py: found with random motions, right to a factor of 10
 _COST, _COST_OF_A_TERM, _SPRINGS_OF_A_BALL = 4000.0, 400.0, 250.0
 
 
@@ -139,8 +139,8 @@ FORMS = (
 
 
 def cost_of(contact: str, *parts: Any) -> float:
-    """The cost of a motion, see :mod:`service.limits`: each term is followed through every turn of
-    the highest harmonic."""
+    """The cost of a motion, see :mod:`service.admission`: each term is followed through every turn
+    of the highest harmonic."""
     terms = [one for part in parts if isinstance(part, list) for one in part]
     plain = sum(isinstance(part, (float, tuple)) for part in parts)
     highest: int = max([1, *(harmonic for harmonic, *_ in terms)])
@@ -210,7 +210,7 @@ class MotionRequest(Strict):
 
     @property
     def cost(self) -> float:
-        """The cost of the answer, see :mod:`service.limits`."""
+        """The cost of the answer, see :mod:`service.admission`."""
         return cost_of(self.contact, self.x, self.y, self.normal)
 
     @property

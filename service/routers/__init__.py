@@ -11,9 +11,12 @@ from starlette.responses import FileResponse
 from starlette.types import Message, Receive, Scope, Send
 
 from ..problems import ProblemKind
+from ..reading import DirectRoute
 
 
-def router_of(tag: str, route_class: type[APIRoute], prefix: str = "/v1") -> APIRouter:
+def router_of(
+    tag: str, route_class: type[APIRoute] = DirectRoute, prefix: str = "/v1"
+) -> APIRouter:
     """A router whose operations have the names of their functions."""
     return APIRouter(
         prefix=prefix,

@@ -1,33 +1,33 @@
 """Many cases at once: ``POST /v1/mu-macro/batch``, JSON columns or rows; the answer has the same
 form.
 
-A body is read whole, evaluated and answered in slices.  A slot is taken when more than a small
-body, or a large computation, is at hand.  Computing and reading happen in threads.
+A body is read whole, evaluated and answered in slices.  What is not small is read and computed in
+threads, with a slot that is kept until the last piece is sent.
 """
 
-import asyncio
 import math
-from collections.abc import Iterator
-from typing import Annotated, Any
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Query, Request, Response
 from starlette.types import Receive, Scope, Send
 
 from mumacro.inputs.cases import KIND
 
-from ..admission import ticket_of
+from ..admission import AT_ONCE, ticket_of
 from ..batch import Batch
 from ..forms import MORE_CASES, read
-from ..limits import AT_ONCE, JSON, Work, only_json, read_body, within
 from ..models.inputs import EXAMPLE
 from ..models.options import BatchOptions
 from ..problems import ProblemKind, RequestError
-from ..reading import DirectRoute
+from ..reading import JSON, from_client, only_json, read_body, within
 from . import POST_PROBLEMS, router_of
 
-router = router_of("answers", DirectRoute)
+router = router_of("answers")
+T = TypeVar("T")
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
-_BYTES_PER_UNIT = 16  # bytes of a body whose reading has the cost 1, see service/limits.py
+_BYTES_PER_UNIT = 16  # bytes of a body whose reading has the cost 1, see service/admission.py
 # costs of reading a row, and a text or a null, where Python reads them one by one
 _ROW, _WORD = 400.0, 160.0
 
@@ -40,75 +40,60 @@ class _Answer(Response):
     def __init__(self, request: Request, options: BatchOptions) -> None:
         self._state, self._options = request.app.state, options
         self._fields: dict[bytes, bytes] = dict(request.scope["headers"])
-        self._work: Work = self._state.work
-        settings = self._state.settings
-        self._limit, self._most = settings.max_body_bytes, settings.max_batch
         self._ticket = ticket_of(request.scope)
+        self._patience: int = self._state.settings.client_timeout_s
         # HTTP/1.0 knows no answer in pieces
         self._piece = math.inf if request.scope["http_version"] == "1.0" else _PIECE
-        self._placed = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, and give the slot back if one was taken."""
+        """Answer within the time limit."""
         del scope
-        try:
-            async with within(self._state.settings.time_limit_s):
-                await self._answer(receive, send)
-        finally:
-            if self._placed:
-                self._work.batches.give_back()
-
-    def _place(self) -> None:
-        if not self._placed:
-            self._work.batches.take()
-            self._placed = True
-
-    async def _run(self, work: Any, cost: float) -> Any:
-        """Do the work at once if it is small, else in a thread, so that it delays no other
-        request."""
-        if cost <= AT_ONCE:
-            return work()
-        self._place()
-        return await asyncio.wrap_future(self._work.batches.threads.submit(work))
+        async with within(self._state.settings.time_limit_s):
+            await self._answer(receive, send)
 
     async def _answer(self, receive: Receive, send: Send) -> None:
+        async def run(work: Callable[[], T], cost: float) -> T:
+            """Do the work at once if it is small, else in a thread, so that it delays no other
+            request."""
+            return work() if cost <= AT_ONCE else await self._ticket.run(work, cost, receive)
+
+        async def give(piece: bytes, more: bool) -> None:
+            message = {"type": "http.response.body", "body": piece, "more_body": more}
+            await from_client(send(message), self._patience)
+
         only_json(self._fields, f"for more cases than a batch may have {MORE_CASES}")
-        reading = read_body(self._fields, receive, self._limit, self._ticket, self._place)
-        text = await self._work.client(reading)
+        limit = self._state.settings.max_body_bytes
+        text = await from_client(
+            read_body(self._fields, receive, limit, self._ticket), self._patience
+        )
         if not text:
             raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
         # Reading costs by the byte, computing by the case: a small body can request much
         # computation.
         cost = len(text) / _BYTES_PER_UNIT
-        if self._placed or cost + _by_one(text) <= AT_ONCE:
-            batch = await self._run(lambda: self._batch(text), cost)
-        else:  # a small body of many rows or words: its reading needs no slot
-            threads = self._work.questions.threads
-            batch = await asyncio.wrap_future(threads.submit(self._batch, text))
+        batch = await run(partial(self._batch, text), cost + _by_one(text))
         self._ticket.hold(0)  # the text is gone
         cost += batch.cost
         pieces = _gathered(batch.write(), self._piece)
-        piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
+        piece, following = await run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [(b"content-type", JSON), (b"x-table", batch.table.id.encode("latin-1"))]
         if following is None:
             headers.append((b"content-length", b"%d" % len(piece)))
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         while following is not None:
-            await self._work.client(
-                send({"type": "http.response.body", "body": piece, "more_body": True})
-            )
-            piece, following = following, await self._run(lambda: next(pieces, None), cost)
-        await self._work.client(
-            send({"type": "http.response.body", "body": piece, "more_body": False})
-        )
+            await give(piece, more=True)
+            piece, following = following, await run(lambda: next(pieces, None), cost)
+        self._ticket.leave()
+        await give(piece, more=False)
 
     def _batch(self, text: bytearray) -> Batch:
         state, options = self._state, self._options
         words = {name: x for name, x in options.members.items() if name in KIND}
         words |= options.deviations
-        body = read(text, self._most, words)
+        most = state.settings.max_batch
+        body = read(text, most, words)
         text.clear()
-        return Batch.of(body, options, state.tables, self._most, count=state.metrics.cases)
+        return Batch.of(body, options, state.tables, most, count=state.metrics.cases)
 
 
 def _by_one(text: bytearray) -> float:

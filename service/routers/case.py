@@ -12,17 +12,18 @@ from mumacro.inputs.cases import Cases
 from mumacro.outputs.evaluation import chosen, cost
 from mumacro.validity import digits, k_effect, model_rows
 
+from ..admission import compute
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseRequest, TextQuery
 from ..problems import of_input
-from ..reading import DirectRoute, Json, dump
+from ..reading import Json, dump
 from ..understood import UNDERSTOOD, understood
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
-router = router_of("answers", DirectRoute)
+router = router_of("answers")
 #: members of a case of which nothing but the default is asked
 _PLAIN = frozenset(("mu0", "Fz", "k", "y0", "omega", "f", "v0", "tolerance", "value"))
-_LARGE = 100  # cost, see service/limits.py, from which one case is computed in a thread
+_LARGE = 100  # cost, see service/admission.py, from which one case is computed in a thread
 _CACHED: Any = {
     "model": CaseAnswer,
     "headers": {
@@ -49,10 +50,10 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
             outputs = chosen(case.outputs, cases)
             work = partial(table.surrogate.answer, cases, outputs)
             large = cost(outputs, cases) > _LARGE
-            answer = await state.work.question(work) if large else work()
+            answer = await compute(request, work) if large else work()
         if case.model:
             work = partial(_of_model, table.surrogate, inputs, case.kind.names)
-            more |= await state.work.question(work)
+            more |= await compute(request, work)
     except InputError as error:  # as with_members has it, which is a function more
         raise of_input(error, **more) from None
     state.metrics.case(table, answer.source_code)

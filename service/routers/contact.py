@@ -17,16 +17,16 @@ from mumacro.inputs.text_tables import Most, Table
 from mumacro.inputs.workbooks import BEGIN as WORKBOOK
 
 from .. import API_VERSION
-from ..limits import Working
+from ..admission import compute
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
 from ..problems import FieldFault, refuse, with_members
-from ..reading import Json, StrictRoute
-from ..tables import Loaded, LoadedTable
+from ..reading import Json
+from ..tables import LoadedTable
 from ..understood import understood_in
 from . import POST_PROBLEMS, router_of
 
-router = router_of("answers", StrictRoute)
+router = router_of("answers")
 _FAULTS = 100  # lines of a table that an answer names
 #: the largest table of points: so many columns, and characters in a cell
 MOST = Most(MAX_POINTS, columns=200, cell=200)
@@ -54,10 +54,11 @@ async def post_stiffness(request: Request, contact: StiffnessRequest) -> Respons
     responses={200: {"model": FitAnswer | PointsAnswer}, **POST_PROBLEMS},
     summary="k and mu0 from measured points",
 )
-async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Response:
+async def post_fit(request: Request, measured: FitRequest) -> Response:
     """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word
     rigid."""
-    columns, source, table = measured.columns, measured.table, tables.pick(measured.tolerance)
+    columns, source = measured.columns, measured.table
+    table = request.app.state.tables.pick(measured.tolerance)
 
     def answer() -> Response:
         points = None if source is None else _points(*source, measured)
@@ -65,7 +66,7 @@ async def post_fit(measured: FitRequest, tables: Loaded, work: Working) -> Respo
             return Json(_as_read(points))
         return Json(_fitted(table, measured, columns, points))
 
-    return await work.question(answer)
+    return await compute(request, answer)
 
 
 def _points(member: str, data: bytes, measured: FitRequest) -> Table:

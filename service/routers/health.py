@@ -11,7 +11,6 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from .. import API_VERSION, __version__
 from ..models.answers import Health
 from ..reading import Json
-from ..tables import Loaded
 from . import problems, router_of
 
 router = router_of("health", APIRoute, prefix="")
@@ -27,18 +26,19 @@ async def livez() -> Response:
 
 
 @router.get("/readyz", responses=_READY, summary="The service is ready")
-async def readyz(tables: Loaded) -> Response:
+async def readyz(request: Request) -> Response:
     """Check that every table is loaded, has the right checksum, gives its known answer and has an
     unchanged file."""
-    tables.check()
+    tables = request.app.state.tables
+    await tables.check()
     labels = [table.label for table in tables.loaded]
     return Json({"status": "ready", "tables": labels, **_VERSIONS}, headers=_NO_STORE)
 
 
 @router.get("/healthz", responses=_READY, summary="As /readyz")
-async def healthz(tables: Loaded) -> Response:
+async def healthz(request: Request) -> Response:
     """Answer as /readyz."""
-    return await readyz(tables)
+    return await readyz(request)
 
 
 _COUNTERS: dict[int | str, Any] = {

@@ -9,14 +9,14 @@ import mumacro
 from mumacro.errors import InputError
 
 from .. import API_VERSION
-from ..limits import Working
+from ..admission import compute
 from ..models.motion import MotionAnswer, MotionRequest
 from ..problems import FieldFault, reason_of, refuse, with_members
-from ..reading import Json, StrictRoute
+from ..reading import Json
 from ..understood import understood_in
 from . import POST_PROBLEMS, router_of
 
-router = router_of("answers", StrictRoute)
+router = router_of("answers")
 _NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnswer.model_fields]
 
 
@@ -25,12 +25,12 @@ _NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnsw
     responses={200: {"model": MotionAnswer}, **POST_PROBLEMS},
     summary="The mean friction of any periodic motion",
 )
-async def post_motion(request: Request, scene: MotionRequest, work: Working) -> Response:
+async def post_motion(request: Request, scene: MotionRequest) -> Response:
     """Compute the steady cycle of a contact that is shaken obliquely, in an ellipse, with harmonics
     or with an oscillating load."""
     more = await understood_in(request, bool(scene.include))
     with with_members(**more):
-        return await work.question(lambda: Json(_answered(scene) | more), scene.cost)
+        return await compute(request, lambda: Json(_answered(scene) | more), scene.cost)
 
 
 def _answered(scene: MotionRequest) -> dict[str, Any]:

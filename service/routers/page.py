@@ -11,10 +11,9 @@ from fastapi import APIRouter, HTTPException, Request, Response
 from mumacro.inputs.kind import SPRING, kind_of
 
 from .. import __version__
-from ..limits import Working
+from ..admission import compute
 from ..page_data import POLICY, map_of, names
 from ..reading import Json
-from ..tables import Loaded
 from . import file_answer
 
 STATIC = Path(__file__).resolve().parent.parent / "static"
@@ -55,16 +54,16 @@ async def get_names(request: Request) -> Response:
 
 
 @router.get("/static/page/map.json")
-async def get_map(request: Request, tables: Loaded, work: Working) -> Response:
+async def get_map(request: Request) -> Response:
     """The data of the map of a contact and a direction, see ``page_data.map_of``."""
-    surrogate = tables.pick().surrogate
+    surrogate = request.app.state.tables.pick().surrogate
     words = [request.query_params.get(name, word) for name, word in SPRING.names.items()]
     kind = kind_of(*words)
     etag = f'"{surrogate.checksum[:32]}-{__version__}-{"-".join(words)}"'
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
-    return await work.question(lambda: Json(map_of(surrogate, **kind.names), headers=headers))
+    return await compute(request, lambda: Json(map_of(surrogate, **kind.names), headers=headers))
 
 
 # .js, .css

@@ -23,19 +23,19 @@ from mumacro.outputs.evaluation import chosen
 from mumacro.validity import load_rows
 
 from .. import API_VERSION
+from ..admission import compute
 from ..forms import listed
-from ..limits import Working
 from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
 from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
 from ..models.questions import LawRequest, SolveForRequest
 from ..problems import with_members
-from ..reading import Json, StrictRoute
-from ..tables import Loaded, LoadedTable, Tables
+from ..reading import Json
+from ..tables import LoadedTable, Tables
 from ..understood import UNDERSTOOD, understood_in
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
-router = router_of("answers", StrictRoute)
+router = router_of("answers")
 
 
 # --- friction law ---------------------------------------------------------------------------------
@@ -100,14 +100,12 @@ def _remarks_on(
     responses={200: {"model": LawAnswer}, **POST_PROBLEMS},
     summary="mu_macro over a range of one input",
 )
-async def post_law(
-    request: Request, question: LawRequest, tables: Loaded, work: Working
-) -> Response:
+async def post_law(request: Request, question: LawRequest) -> Response:
     """Return the law in columns, with its static limit and its border."""
     more = await understood_in(request, question.understood)
 
     def answer() -> Response:
-        table = tables.pick(question.tolerance)
+        table = request.app.state.tables.pick(question.tolerance)
         law, columns = _law(question, table)
         along = question.along
         axis = {"along": along, "unit": unit_of(along), "values": law.values}
@@ -117,7 +115,7 @@ async def post_law(
         return Json({**axis, **nested(columns), "border": border, **remarks, **table.signature})
 
     with with_members(**more):
-        return await work.question(answer)
+        return await compute(request, answer)
 
 
 _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
@@ -129,16 +127,14 @@ _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "s
     responses={200: _CSV, **GET_PROBLEMS},
     summary="mu_macro over a range of one input, as a table",
 )
-async def get_law_csv(
-    question: Annotated[LawRequest, Query()], tables: Loaded, work: Working
-) -> Response:
+async def get_law_csv(request: Request, question: Annotated[LawRequest, Query()]) -> Response:
     """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their
     units."""
 
     def answer() -> Response:
         if question.understood:
             raise InputError("include", UNDERSTOOD, f"without {UNDERSTOOD}, which JSON has")
-        law, columns = _law(question, tables.pick(question.tolerance))
+        law, columns = _law(question, request.app.state.tables.pick(question.tolerance))
         along = question.along
         heads = {f"{along} [{unit_of(along)}]": law.values.tolist()}
         for path in sorted(columns, key=lambda path: path in _TEXTS):  # texts last
@@ -155,7 +151,7 @@ async def get_law_csv(
         kind = "text/csv; charset=utf-8; header=present"
         return Response(text.getvalue(), media_type=kind, headers=headers)
 
-    return await work.question(answer)
+    return await compute(request, answer)
 
 
 _TEXTS = ("regime", "source")
@@ -177,19 +173,17 @@ def unit_at(path: str) -> str:
     responses={200: {"model": SolveForAnswer | SolveMotionAnswer}, **POST_PROBLEMS},
     summary="The value of one input that gives a wanted mu_macro",
 )
-async def post_solve_for(
-    request: Request, question: SolveForRequest, tables: Loaded, work: Working
-) -> Response:
+async def post_solve_for(request: Request, question: SolveForRequest) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the
     range of mu_macro.  With ``x``, ``y`` or ``normal`` the question is about any motion."""
     more = await understood_in(request, question.understood)
     with with_members(**more):
         if question.is_motion:
-            cost = MOTIONS_OF_A_SEARCH * cost_of(
-                question.contact, question.x, question.y, question.normal
-            )
-            return await work.question(lambda: Json(_solved_motion(question) | more), cost)
-        return await work.question(lambda: Json(_solved(question, tables) | more))
+            one = cost_of(question.contact, question.x, question.y, question.normal)
+            cost = len(question.target) * MOTIONS_OF_A_SEARCH * one
+            return await compute(request, lambda: Json(_solved_motion(question) | more), cost)
+        tables: Tables = request.app.state.tables
+        return await compute(request, lambda: Json(_solved(question, tables) | more))
 
 
 def _solved_motion(question: SolveForRequest) -> dict[str, Any]:

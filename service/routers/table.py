@@ -11,11 +11,10 @@ from .. import __version__
 from ..models.answers import TableAnswer
 from ..models.inputs import Strict
 from ..models.values import Positive
-from ..reading import Json, StrictRoute
-from ..tables import Loaded
+from ..reading import Json
 from . import GET_PROBLEMS, file_answer, problems, router_of
 
-router = router_of("table", StrictRoute)
+router = router_of("table")
 
 
 class TableQuery(Strict):
@@ -32,8 +31,9 @@ Chosen = Annotated[TableQuery, Query()]
     responses={200: {"model": TableAnswer}, **GET_PROBLEMS},
     summary="Properties of a table",
 )
-async def get_table(query: Chosen, tables: Loaded) -> Response:
+async def get_table(request: Request, query: Chosen) -> Response:
     """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
+    tables = request.app.state.tables
     table = tables.pick(query.tolerance)
     surrogate = table.surrogate
     answer = {
@@ -63,11 +63,12 @@ _PARTS: dict[int | str, Any] = {
     responses={**_PARTS, **GET_PROBLEMS, **problems(416)},
     summary="The table as a netCDF-4 file",
 )
-async def get_table_file(request: Request, query: Chosen, tables: Loaded) -> Response:
+async def get_table_file(request: Request, query: Chosen) -> Response:
     """Stream the file from disk; ranges are supported.  It is the file that the answers come
     from."""
+    tables = request.app.state.tables
     table = tables.pick(query.tolerance)
-    table.check()  # a file that was replaced after loading holds another table with the same name
+    await tables.check()  # a file that was replaced has another table of the same name
     path = table.surrogate.path
     headers = {"ETag": f'"{table.surrogate.checksum}"', "Cache-Control": "no-cache"}
     try:

@@ -10,7 +10,6 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-import orjson
 import pytest
 
 from mumacro import Surrogate
@@ -31,14 +30,14 @@ def columns(n: int, **more: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def strict(serving: Any, surrogate: Surrogate) -> Any:
-    """A service with short times, few connections, and two batches at a time."""
+    """A service with short times, few connections, and two long computations at a time."""
     with serving(
         surrogate.path,
         MUMACRO_CLIENT_TIMEOUT_S=str(WAIT_S),
         MUMACRO_TIME_LIMIT_S="4",
         MUMACRO_KEEP_ALIVE_S="60",
         MUMACRO_MAX_CONNECTIONS=str(FULL),
-        MUMACRO_MAX_BATCHES="2",
+        MUMACRO_MAX_COMPUTATIONS="4",
     ) as server:
         yield server
 
@@ -219,27 +218,6 @@ def test_a_refusal_of_a_head_lets_its_sender_go_on_sending(strict: Any) -> None:
     assert content == b""
 
 
-def test_large_batches_have_slots_and_small_ones_take_none(strict: Any) -> None:
-    large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
-    compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
-    assert len(compact) < 64 * 1024
-    with ExitStack() as connections:
-        assert strict.ask("POST", BATCH, large)[0] == 200
-        for _ in range(2):  # which are being sent
-            sending = connections.enter_context(connect(strict))
-            sending.sendall(head(BATCH, 5_000_000) + b"[" + b" " * 100_000)
-        status, headers, _ = strict.ask("POST", BATCH, large)
-        assert (status, headers["retry-after"], headers["connection"]) == (503, "1", "close")
-        unread = connections.enter_context(connect(strict))
-        unread.sendall(head(BATCH, 10_000_000))
-        assert answer(unread)[0] == 503
-        assert strict.ask("POST", BATCH, iter([large]), encode_chunked=True)[0] == 503
-        assert strict.ask("POST", BATCH, compact)[0] == 503  # it asks for much
-        # questions have their own
-        assert strict.ask("POST", "/v1/law", orjson.dumps(law))[0] == 200
-        assert strict.ask("POST", BATCH, json.dumps([CASE]))[0] == 200
-
-
 @pytest.mark.parametrize("path", [SINGLE, BATCH, "/v1/fit"])
 def test_the_bytes_of_all_bodies_together_are_limited(
     serving: Any, surrogate: Surrogate, path: str
@@ -349,7 +327,9 @@ def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(
     rows = json.dumps([{**CASE, "v0": 1e-7 * i} for i in range(1, n + 1)]).encode()
     assert len(rows) > 8_000_000
     with (
-        serving(surrogate.path, MUMACRO_MAX_BATCHES=str(places)) as server,
+        serving(
+            surrogate.path, MUMACRO_MAX_COMPUTATIONS="16", MUMACRO_MAX_HELD_BYTES="100000000"
+        ) as server,
         ThreadPoolExecutor(places) as pool,
     ):
         base = server.memory("VmHWM")
@@ -360,3 +340,22 @@ def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(
         # slice at hand, as objects and as text, up to 4 MB.
         each = len(rows) + 90 * n + 4_000_000
         assert 1e6 * (server.memory("VmHWM") - base) < places * each + 20_000_000
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 99])
+def test_fields_behind_a_body_are_no_headers(
+    serving: Any, surrogate: Surrogate, pieces: int
+) -> None:
+    fields = b"X-API-Key: secret\r\nX-Forwarded-For: 10.9.8.7\r\nX-Request-ID: mine\r\n"
+    text = head(SINGLE, None) + chunk(json.dumps(CASE).encode()) + b"0\r\n" + fields + b"\r\n"
+    with serving(surrogate.path, MUMACRO_API_KEY="secret") as server, connect(server) as raw:
+        size = -(-len(text) // pieces)
+        for i in range(0, len(text), size):
+            raw.sendall(text[i : i + size])
+            time.sleep(0.3 / pieces)
+        raw.settimeout(PATIENCE_S)
+        received = raw.recv(65536)
+        assert received.startswith(b"HTTP/1.1 401")
+        assert b"mine" not in received
+        server.stop()
+    assert not any("10.9.8.7" in line for line in server.lines)

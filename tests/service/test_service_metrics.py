@@ -4,11 +4,10 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
@@ -162,14 +161,19 @@ def test_a_slot_is_given_back_when_its_thread_cannot_start_and_counters_need_non
 ) -> None:
     law = {**CASE, "start": 1e-3, "stop": 1.0}
     del law["v0"]
+    start, name = threading.Thread.start, "work"
+
+    def refuse(self: threading.Thread) -> None:
+        if self.name == name:
+            raise RuntimeError("can't start new thread")
+        start(self)
+
     with monkeypatch.context() as without_threads:
-        without_threads.setattr(
-            ThreadPoolExecutor, "submit", Mock(side_effect=RuntimeError("can't start new thread"))
-        )
+        without_threads.setattr(threading.Thread, "start", refuse)
         for _ in range(20):
-            assert fresh.post("/v1/law", json=law).status_code in (500, 503)
+            assert fresh.post("/v1/law", json=law).status_code == 503
+    assert fresh.app.state.admission.slots == 0
     assert fresh.post("/v1/law", json=law).status_code == 200
-    slots = fresh.app.state.work.questions
-    monkeypatch.setattr(slots, "used", slots.number)
+    monkeypatch.setattr(type(fresh.app.state.admission), "slots", 8)
     assert fresh.post("/v1/law", json=law).status_code == 503
     assert [fresh.get(path).status_code for path in ("/metrics", "/livez", "/readyz")] == [200] * 3

@@ -3,17 +3,13 @@
 import json
 import math
 import re
-import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 
 import mumacro
-from mumacro.kernel.threads import processors
-from service.limits import LONG_QUESTIONS
-from service.models.motion import LEAST_OF_A_BALL, MAX_TERMS, MOST_OF_A_BALL, MotionRequest
+from service.models.motion import LEAST_OF_A_BALL, MAX_TERMS, MOST_OF_A_BALL
 from tests.support.cases import Case
 from tests.support.serving import asking
 
@@ -163,72 +159,6 @@ def test_numbers_beyond_the_range_and_members_given_twice_are_refused(client: An
 
 
 HARD = [{"harmonic": n, "amplitude": 2e-6, "phase": 70.0 * n} for n in range(11, 21)]
-LONG_ONES: list[dict[str, Any]] = [
-    {"y": 2e-6, "contact": "ball"},
-    {"y": [{"harmonic": 1000, "amplitude": 1e-6}], "x": HARD},
-]
-
-
-@pytest.mark.parametrize("long_one", LONG_ONES)
-def test_long_motions_have_slots_that_hold_nobody_else(
-    client: Any, monkeypatch: pytest.MonkeyPatch, long_one: dict[str, Any]
-) -> None:
-    """Four are computed, the fifth is refused; everything else is answered meanwhile, and so are
-    motions of one spring."""
-    begun, end, real = threading.Semaphore(0), threading.Event(), mumacro.motion
-
-    def slow_motion(**scene: Any) -> Any:
-        if MotionRequest(**RIG, **long_one).case.items() <= scene.items():
-            begun.release()
-            assert end.wait(60)
-        return real(**{**scene, "contact": "spring"})
-
-    monkeypatch.setattr(mumacro, "motion", slow_motion)
-    work = client.app.state.work
-    body, threads = {**RIG, **long_one}, processors()
-    with ThreadPoolExecutor(LONG_QUESTIONS) as clients:
-        try:
-            answers = [clients.submit(client.post, PATH, json=body) for _ in range(LONG_QUESTIONS)]
-            for _ in range(min(threads, LONG_QUESTIONS)):
-                assert begun.acquire(timeout=60)
-            while work.long_questions.used < LONG_QUESTIONS:
-                time.sleep(0.01)
-            refused = client.post(PATH, json=body)
-            assert (refused.status_code, refused.headers["retry-after"]) == (503, "1")
-            assert client.get("/livez").status_code == 200
-            assert client.post(PATH, json={**RIG, "y": 2e-6}).status_code == 200
-            law = {**RIG, "v0": None, "y0": 2e-6, "start": 1e-3, "stop": 1.0}
-            assert client.post("/v1/law", json=law).status_code == 200
-            large = {**RIG, "y0": 2e-6, "v0": [0.01] * 20_000}
-            assert client.post("/v1/mu-macro/batch", json=large).status_code == 200
-            assert (work.questions.used, work.batches.used) == (0, 0)
-        finally:
-            end.set()
-        assert [answer.result().status_code for answer in answers] == [200] * LONG_QUESTIONS
-    assert client.post(PATH, json=body).status_code == 200
-    assert work.long_questions.used == 0
-
-
-def test_a_motion_beyond_the_time_limit_is_answered_and_keeps_its_slot_until_it_is_done(
-    started: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    end, real = threading.Event(), mumacro.motion
-
-    def slow_motion(**scene: Any) -> Any:
-        assert end.wait(60)
-        return real(**{**scene, "contact": "spring"})
-
-    monkeypatch.setattr(mumacro, "motion", slow_motion)
-    with started(time_limit_s=1) as client:
-        slots = client.app.state.work.long_questions
-        late = client.post(PATH, json={**RIG, **LONG_ONES[0]})
-        assert (late.status_code, late.json()["type"].split(":")[-1]) == (503, "took-too-long")
-        assert slots.used == 1
-        end.set()
-        until = time.monotonic() + 60
-        while slots.used:
-            assert time.monotonic() < until
-            time.sleep(0.01)
 
 
 @pytest.mark.slow

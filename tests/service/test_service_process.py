@@ -408,7 +408,9 @@ def test_a_client_that_does_not_read_its_answer_is_no_error_of_the_service(
             assert time.monotonic() < deadline
             time.sleep(0.1)
     lines = fields_of(strict_server.lines)
-    assert [line["status"] for line in lines if line.get("path") == BATCH] == [408]
+    of_batch = [line for line in lines if line.get("path") == BATCH]
+    assert [line.get("status") for line in of_batch] == [None, 408]
+    assert of_batch[0]["message"] == "a long request begins"
     assert not [line for line in lines if line["level"] == "error"]
 
 
