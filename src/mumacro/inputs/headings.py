@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from mumacro.inputs.fields import INPUTS, QUANTITY_OF
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, scale_of, split_unit
+from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, canonical, scale_of, split_unit
 
 # heads that a message lists, and that are compared with misspelt names
 _LISTED, _COMPARED = 20, 100
@@ -176,13 +176,18 @@ def _is_whole(head: str, field: str) -> bool:
 
 
 def _unit_of(head: str, field: str) -> str | None:
-    """The unit that a head has in brackets, or as its last word.
+    """The unit that a head has in brackets, or as its last words.
 
     >>> _unit_of("Amplitude [um]", "y0"), _unit_of("Amplitude µm", "y0"), _unit_of("speed", "v0")
     ('um', 'µm', None)
+    >>> _unit_of("v0_um_s", "v0"), _unit_of("k_N_per_mm", "k")
+    ('um/s', 'N/mm')
     """
     unit = split_unit(head)[1]
     if unit is not None:
         return unit
-    _, _, last = re.sub(r"[\s_]+", " ", head[:80].strip()).rpartition(" ")
-    return last if last and scale_of(field, last) is not None else None
+    words = re.sub(r"[\s_]+", " ", head[:80].strip()).split(" ")
+    for ratio in (" ".join(words[-3:]), "/".join(words[-2:])):
+        if len(words) > 2 and scale_of(field, ratio) is not None:
+            return canonical(ratio)
+    return words[-1] if words[-1] and scale_of(field, words[-1]) is not None else None

@@ -15,7 +15,7 @@ from mumacro.inputs.decoding import NAMES, Piece, TextError
 from mumacro.inputs.fields import is_rigid
 from mumacro.inputs.headings import find_heads, heading, meant_by, unit_in_si
 from mumacro.inputs.signs import Signs
-from mumacro.inputs.units import QUANTITIES, canonical, scale_of, split_unit
+from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of, split_unit
 
 BLANKS = " "  #: the separator where any number of blanks stands between the cells
 #: separators of the cells, by the name that an option has
@@ -44,6 +44,7 @@ _SEP_LINE = re.compile(r'\ufeff?"?sep=(.)"?', re.IGNORECASE | re.DOTALL)
 END_OF_HEADER = "***End_of_Header***"
 # words before the units in their row, or before the names in a comment
 _LABEL = re.compile(r"(?:units?|einheit(?:en)?|unités?|[a-z]+_units)\W*", re.IGNORECASE)
+_LABEL_BEFORE = re.compile(r"(?:units?|einheit(?:en)?|unités?)\s*[:=]\s*", re.IGNORECASE)
 _OF_NAMES = re.compile(r"[^\W\d]\w{0,19}:\s+")
 # units of columns that are no inputs
 _ELSEWHERE = {"s", "ms", "us", "min", "h", "°C", "C", "K", "degC", "V", "mV", "A", "mA", "W", "mW"}
@@ -175,7 +176,7 @@ def find_layout(
         label_line = split(lines[preamble.units], head.sep)
         found.take_row(preamble.units, ["", *label_line[1:]])
     elif is_known(heads, column_names):
-        _find_units(found, start, head, dialect.skip)
+        _find_units(found, start, head, dialect)
     heads = found.heads()
     data = head.end
     in_units = {preamble.units, *found.lines}
@@ -250,6 +251,10 @@ def _find_head(
         for one in candidates:
             if one.at < head.at:
                 _refuse_rows_between(one, head, start, dialect)
+    for one in candidates:  # the names in a comment may stand above the head itself
+        between = lines[head.at : one.at]
+        if between and all(is_comment(line) or not line.strip() for line in between):
+            return one
     return head
 
 
@@ -422,25 +427,40 @@ class _Units:
             if text and not _LABEL.fullmatch(text):
                 self.take(i, text, index)
 
+    def refuse_unassigned(self, what: str, unit: str, index: int) -> None:
+        """Refuse a line that has a unit, other than that of SI, for something that may be a column
+        whose unit is not known."""
+        field = meant_by(what.replace("unit", "").strip(" :="), loosely=False)
+        for i, name in enumerate(self.names):
+            like = self.like.get(name)
+            if like is None or i in self._units or scale_of(like, unit) in (None, Scale()):
+                continue
+            if field == name or "unit" in what.lower():
+                raise TextError(
+                    f"line {self._number + index}: {what!r} has the unit {unit}, and {name} has "
+                    f"none: write it behind the name, as in {name} [{unit}]"
+                )
+
     def take_name(self, name: str, unit: str, index: int) -> None:
         """Take the unit of the column of a name."""
         if name in self.names:
             self.take(self.names.index(name), unit, index)
 
 
-def _find_units(found: _Units, start: Piece, head: _Head, skip: int) -> None:
+def _find_units(found: _Units, start: Piece, head: _Head, dialect: Dialect) -> None:
     """Find the units beside the head and in legends; the first row behind it may be theirs."""
-    lines = start.lines
+    lines, skip = start.lines, dialect.skip
+    end = dialect.rows[0] - start.first if dialect.rows else len(lines)
     above = [i for i in range(head.at - 1, skip - 1, -1) if lines[i].strip()][:_BESIDE]
     for i in above:
         if cells := units_in(lines[i], head.sep, found.names, found.like, start.first + i):
             found.take_row(i, cells)
             break
-    for i in range(head.end, len(lines)):
+    for i in range(head.end, min(end, len(lines))):
         text = lines[i]
         if not text.strip(f" \t{head.sep}"):
             continue
-        if is_comment(text) and not _is_whole_row(text, head, found):
+        if dialect.rows or (is_comment(text) and not _is_whole_row(text, head, found)):
             if cells := units_in(text, head.sep, found.names, found.like, start.first + i):
                 found.take_row(i, cells)
             else:
@@ -494,31 +514,40 @@ def units_in(
     if len(line) > 100_000:
         return None
     text = uncommented(line)
+    if is_comment(line) and (label := _LABEL_BEFORE.match(text)):
+        text = text[label.end() :]
     if sep == BLANKS:
-        joined = re.sub(r"(?<=\w) ?/ ?(?=\w)", "/", text[:10_000])
-        cells = _UNIT_CELL.findall(joined)
+        cells = _UNIT_CELL.findall(re.sub(r"(?<=\w) ?/ ?(?=\w)", "/", text[:10_000]))
         if cells and _LABEL.fullmatch(cells[0]) and len(cells) != len(names):
             cells = cells[1:]
     else:
         cells = split(text, sep)
     texts = [cell.strip(" []()") for cell in cells]
     units = [one for one in texts if one and not _LABEL.fullmatch(one)]
+    known = [one for one in units if is_unit(one) and one not in _NO_UNIT]
     is_sure = any("/" in one or "%" in one for one in units) or len(units) > 1 or "[" in text
-    if not is_sure or not all(map(is_unit, units)) or not {*units}.difference(_NO_UNIT):
+    if not is_sure or not known or 2 * len(known) <= len(units) - units.count("-"):
+        return None
+    if any(map(_is_value, units)):  # a setting with its unit
         return None
     if len(cells) > len(names) and not any(texts[len(names) :]):
         cells = cells[: len(names)]
-    fits = len(cells) <= len(names) and all(
-        name not in like or not text or scale_of(like[name], text) is not None
+    fits = len(cells) in (range(2, len(names) + 1) if sep != BLANKS else (len(names),)) and all(
+        not text or name not in like or scale_of(like[name], text) is not None
         for name, text in zip(names, texts, strict=False)
     )
-    if not fits or (sep == BLANKS and len(cells) != len(names)):
+    if not fits or not all(is_unit(one) or len(one) < 8 for one in units):
         shown = " ".join(line.split())[:60]
         raise TextError(
             f"line {number}: {shown!r} has units that cannot be assigned to the columns "
             f"{', '.join(names[:8])}: write each behind its name, as in v0 [mm/s]"
         )
     return cells
+
+
+def _is_value(text: str) -> bool:
+    """Whether a cell is a number, other than the unit 1."""
+    return text != "1" and is_number(text)
 
 
 def is_row_of_units(
@@ -543,14 +572,18 @@ def is_row_of_units(
     for i in places:
         if scales[i] is None:
             what = f"{texts[i][:40]!r} is neither a number nor a unit of {names[i]}"
-            raise TextError(f"line {number}: {what}")
+            raise TextError(f"line {number}: {what}; --rows A..B says which lines are data")
     return True
 
 
 def _take_legend(found: _Units, line: str, index: int) -> None:
     """Take the units that a line of a legend has, behind the names of columns."""
-    for name, unit in legend(line, [name for name in found.names if name in found.like]):
+    names = [name for name in found.names if name in found.like]
+    found_here = [*legend(line, names)]
+    for name, unit in found_here:
         found.take_name(name, unit, index)
+    if not found_here and (one := _OF_ANOTHER_NAME.fullmatch(" ".join(line[:100].split()))):
+        found.refuse_unassigned(one["what"], one["unit"] or one["last"], index)
 
 
 def legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -589,6 +622,13 @@ def _unit_in_legend(behind: str) -> str | None:
         return bare
     last = _LAST_WORD.search(behind)
     return last[1] if last and is_unit(last[1]) and last[1] not in _NO_UNIT else None
+
+
+# "speed unit: mm/s", "# Sliding speed [mm/s]": with a name that no column has
+_OF_ANOTHER_NAME = re.compile(
+    r"[#%!/\s]*(?P<what>[^\W\d][^\d\[\](),;|]{0,60}?)\s*"
+    r"(?:[\[(](?P<unit>[^\[\]()]{1,20})[\])]|[:=] ?(?P<last>[^\s\[\]()]{1,20}))"
+)
 
 
 def _take_ecsv(found: _Units, lines: Sequence[str], before: range) -> None:

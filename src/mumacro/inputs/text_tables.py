@@ -178,8 +178,11 @@ class Account:
         if self._has_units(line, text):
             return False
         width = len(self._layout.heads)
-        if len(cells) not in (width, width - 1) and not any(
-            is_number(cell) or (cell and cell.strip().lower() in GAPS) for cell in cells[:1000]
+        is_whole = len(cells) in (width, width - self._layout.without_comments)
+        filled = [cell for cell in map(str.strip, cells[:1000]) if cell]
+        is_title = len(filled) == 1 and width > 1 and not is_number(first)
+        if is_title or (
+            not is_whole and not any(is_number(cell) or cell.lower() in GAPS for cell in filled)
         ):
             shown = " ".join(text.split())[:60]
             remedy = self._layout.without(line)

@@ -251,7 +251,7 @@ SIMILAR = "{!r} is similar: rename that column to {}"
             (f"mu0,Fz,{name},y0,omega,v0", {}, [SIMILAR.format(name, "k")])
             for name in ("stiffness", "K [N/mm]")
         ),
-        ("mu0,Fz,k_N_per_mm,y0,f,v0", {}, [SIMILAR.format("k_N_per_mm", "k [N/m]")]),
+        ("mu0,Fz,k_N_per_mm,y0,f,v0", {}, [SIMILAR.format("k_N_per_mm", "k [N/mm]")]),
         ("mu0,Fz,k,y0,frequency,v0", {}, [SIMILAR.format("frequency", "f [Hz]")]),
         (
             "mu0,Fz,k [psi],y0,omega [Hz],v0",

@@ -251,6 +251,114 @@ def test_the_first_sheet_of_a_workbook_is_read(tmp_path: Path, workbook: Path) -
     assert "head in line 3, units in line 4" in said[0]
 
 
+def sheets(path: Path, **rows_of: Any) -> Path:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for title, rows in rows_of.items():
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+CASE_ROWS: list[list[Any]] = [HEAD.split(","), [0.3, 10, 1e6, 2e-6, 20000, 0.01]]
+
+
+def test_the_sheet_that_has_the_names_is_taken_and_the_others_are_named(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    path = sheets(tmp_path / "c.xlsx", Cover=[["Rig 7"], []], Hidden=CASE_ROWS, Data=CASE_ROWS)
+    book = openpyxl.load_workbook(path)
+    book["Hidden"].sheet_state = "hidden"
+    book.save(path)
+    said = list[str]()
+    evaluate_files([path], tmp_path / "out.csv", TABLE, say=said.append)
+    assert friction(tmp_path / "out.csv") == close(MU[:1], rel=1e-12)
+    assert "sheet 'Data', not 'Cover', 'Hidden'" in said[0]
+    twice = sheets(tmp_path / "d.xlsx", a=CASE_ROWS, b=[*CASE_ROWS, CASE_ROWS[1]])
+    with pytest.raises(FilesError, match=r"'a' and 'b' all have the names; choose one \(--sheet\)"):
+        evaluate_files([twice], tmp_path / "o.csv", TABLE)
+    named = evaluate_files([twice], tmp_path / "o.csv", TABLE, dialect=Dialect(sheet="b"))
+    assert named.answered == 2
+    with pytest.raises(FilesError, match="there is no sheet 'c'; there are 'a', 'b'"):
+        evaluate_files([twice], tmp_path / "p.csv", TABLE, dialect=Dialect(sheet="c"))
+
+
+@pytest.mark.parametrize(
+    ("cell", "form", "reason"),
+    [
+        (2.0, '0.0 "um"', "write its unit into the head, as in y0 [um]"),
+        (2.0, "0.0\\ \\u\\m", "write its unit into the head, as in y0 [um]"),
+        ("=A2*2", "General", "is a formula without a value"),
+    ],
+)
+def test_a_unit_in_a_number_format_and_a_formula_without_a_value_are_rejected(
+    tmp_path: Path, cell: Any, form: str, reason: str
+) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    path = sheets(tmp_path / "c.xlsx", Data=CASE_ROWS)
+    book = openpyxl.load_workbook(path)
+    book["Data"]["D2"] = cell
+    book["Data"]["D2"].number_format = form
+    book.save(path)
+    assert evaluate_files([path], tmp_path / "out.csv", TABLE).rejected == 1
+    (row,) = rows_of(tmp_path / "out.csv.rejects.csv")
+    assert (row["line"], row["field"]) == ("2", "y0")
+    assert reason in row["reason"]
+
+
+def test_options_count_for_workbooks(tmp_path: Path) -> None:
+    cells: list[Any] = ["0,3", 10, 1e6, 2e-6, "20.000", 0.01]
+    path = sheets(tmp_path / "c.xlsx", Data=[["v0", "mu0"], *CASE_ROWS[:1], cells, ["mean"]])
+    dialect = Dialect(decimal=",", skip=1, rows=(3, 3))
+    evaluate_files([path], tmp_path / "out.csv", TABLE, dialect=dialect)
+    assert friction(tmp_path / "out.csv", ";") == close(MU[:1], rel=1e-12)
+
+
+@pytest.mark.parametrize("quote", ["", '"'])
+@pytest.mark.parametrize(
+    ("more", "line", "part"),
+    [
+        (HEAD.replace("v0", "v0 [mm/s]"), 4, "another head"),
+        ("Mean,10,1e6,2e-6,20000,0.01", 4, "statistics"),
+        ("Segment 2", 4, "neither a row nor a comment"),
+        ("-,N,N/m,m,Hz,mm/s", 4, "v0 is in mm/s"),
+        ("# v0: speed [mm/s]", 4, "v0 is in mm/s"),
+    ],
+)
+def test_what_is_no_row_ends_the_run_in_either_reader(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quote: str, more: str, line: int, part: str
+) -> None:
+    monkeypatch.setattr(decoding, "PIECE", 60)
+    quoted = ROWS.replace("0.3", f"{quote}0.3{quote}")
+    (tmp_path / "cases.csv").write_text(f"{HEAD}\n{quoted}{more}\n{quoted}")
+    with pytest.raises(FilesError, match=f"line {line}.*{part}"):
+        evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
+    only = evaluate_files(
+        [tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE, dialect=Dialect(rows=(2, 3))
+    )
+    assert (only.answered, only.rejected) == (2, 0)
+    assert friction(tmp_path / "out.csv") == close(MU, rel=1e-12)
+
+
+def test_both_readers_give_the_same_rows_and_rejects(tmp_path: Path) -> None:
+    cells = ["0.3", "-1", "", "1e400", "x", "rigid", "nan", "1.0D-1", "1,5", "2 um", "+0.3"]
+    lines = [f"a,{cell if ',' not in cell else '0.3'},10,{k},2e-6,2e4,0.01,µ" for cell in cells
+             for k in ("1e6", "rigid", "inf", "1e400", "")]  # fmt: skip
+    head = "a,mu0,Fz,k,y0,f,v0,note"
+    for name, last in (("plain", "b"), ("quoted", '"b"')):
+        text = "\n".join([head, *lines, f"{last},0.3,10,1e6,2e-6,2e4,0.01,b", "0,1"])
+        (tmp_path / f"{name}.csv").write_text(text, "utf-8")
+        evaluate_files([tmp_path / f"{name}.csv"], tmp_path / f"{name}.out.csv", TABLE)
+    for ending in ("out.csv", "out.csv.rejects.csv"):
+        plain, quoted = (
+            (tmp_path / f"{name}.{ending}").read_text("utf-8") for name in ("plain", "quoted")
+        )
+        assert plain == quoted.replace('"b"', "b")
+
+
 def test_a_text_that_may_be_two_numbers_is_none_in_a_workbook(
     tmp_path: Path, workbook: Path
 ) -> None:

@@ -43,6 +43,16 @@ RIGS = {
     "savetxt.dat": "blanks, head in line 2",
     "testing_machine.csv": "comma, head in line 7, units in line 8",
     "windows_1252.csv": "Windows-1252, semicolon, decimal comma",
+    "astronomers.ecsv": "blanks, head in line 9, units in line 4",
+    "controller_recorder.csv": "comma, head in line 4, units in line 3",
+    "data_logger.csv": "comma, head in line 7",
+    "hydraulic.txt": "blanks, head in line 5, units in line 4",
+    "joined.csv": "comma",
+    "pruefstand_legende.csv": "Windows-1252, semicolon, decimal comma, head in line 4, units in "
+    "line 2",
+    "simulator.csv": "comma",
+    "statistics_r.csv": "comma",
+    "worksheet_origin.txt": "tab, units in line 2",
 }
 POINTS = ColumnNames({"v0": "v0", "mu_macro": "mu0", "note": "mu0"}, [["v0"], ["mu_macro"]])
 
@@ -84,7 +94,13 @@ def test_what_rigs_write_is_read_and_said(rigs: Path, name: str) -> None:
     [
         ("ambiguous.txt", 2, ("'1.000'", "may be 1 or 1000", "--decimal .", "--decimal ,")),
         ("recorder.csv", 6, ("neither a row nor a comment",)),
-        ("two_steps.csv", 8, ("another head",)),
+        ("two_steps.csv", 8, ("another head", "--rows 4..7")),
+        ("catalogue.dat", 1, ("v0", "mu_macro")),
+        ("plc_scope.csv", 13, ("'EOF'", "--rows 5..12")),
+        ("rheometer_steps.txt", 11, ("'[step]'", "--rows 6..10")),
+        ("rock_mechanics.txt", 1, ("'v0_um_s' to v0 [um/s]", "'mu' to mu_macro")),
+        ("testing_machine_statistics.csv", 10, ("'Mean'", "statistics", "--rows 2..9")),
+        ("worksheet_origin_comments.txt", 3, ("'mean of 3'", "--rows")),
     ],
 )
 def test_what_can_be_read_in_two_ways_is_refused_with_its_line(
@@ -94,6 +110,34 @@ def test_what_can_be_read_in_two_ways_is_refused_with_its_line(
         read_points(rigs / name)
     assert str(refusal.value).startswith(f"line {line}")
     assert all(part in str(refusal.value) for part in parts)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        ("plc_scope.csv", (5, 12)),
+        ("testing_machine_statistics.csv", (2, 9)),
+        ("worksheet_origin_comments.txt", (4, 11)),
+    ],
+)
+def test_the_rows_that_are_named_are_read(rigs: Path, name: str, rows: tuple[int, int]) -> None:
+    points = read_points(rigs / name, Dialect(rows=rows))
+    assert points.columns["v0"].tolist() == close(V0, rel=1e-12)
+    assert points.lines == [*range(rows[0], rows[1] + 1)]
+
+
+def test_each_of_two_segments_is_read_with_its_own_units(rigs: Path) -> None:
+    parts = [
+        read_points(rigs / "rheometer_steps.txt", Dialect(rows=rows)).columns["v0"].tolist()
+        for rows in ((6, 9), (15, 18))
+    ]
+    assert parts == [close(V0[:4], rel=1e-12), close(V0[4:], rel=1e-12)]
+
+
+def test_two_forces_of_a_tribometer_are_read(rigs: Path) -> None:
+    points = read_points(rigs / "tribometer_forces.csv")
+    assert points.columns["Ft"].tolist() == close([10.0 * mu for mu in MU], rel=1e-12)
+    assert points.read_as.endswith("v0 [mm/s], Ft [mN], Fz [N]")
 
 
 def test_the_advice_for_an_ambiguous_number_works(rigs: Path) -> None:
@@ -320,6 +364,100 @@ def test_a_row_of_units_is_checked() -> None:
     assert "line 2" in str(refused("v0 [m/s],mu_macro\nmm/s,\n1,7\n"))
     assert "line 2" in str(refused("v0,mu_macro\nfurlong,pct\n1,7\n"))
     assert read("v0 / (mm/s),mu_macro in %\n1,7\n").columns["mu_macro"].tolist() == [0.07]
+
+
+TWO = "1,0.069\n2,0.097\n"
+IN_MM = [1e-3, 2e-3]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# mm/s,-\nv0,mu_macro\n",
+        "mm/s,-\nv0,mu_macro\n",
+        "v0,mu_macro\n# mm/s,-\n",
+        "v0,mu_macro\n# units: mm/s,-\n",
+        "mm/s,-\nv0 [mm/s],mu_macro\nmm/s,-\n",
+        "# v0: speed [mm/s]\nv0,mu_macro\n",
+        "v0,mu_macro\n# v0: speed [mm/s]\n",
+        "# v0 in mm/s, mu_macro\n\nv0,mu_macro\n",
+        "# column 1: v0 (mm/s)\nv0,mu_macro\n",
+        "# v0 = sliding speed, mm/s\nv0,mu_macro\n",
+        "Speed,Friction\nv0,mu_macro\nmm/s,-\n",
+    ],
+)
+def test_units_stand_beside_the_names_or_in_a_legend(text: str) -> None:
+    table = read(text + TWO)
+    assert table.columns["v0"].tolist() == close(IN_MM, rel=1e-15)
+    assert "v0 [mm/s]" in table.read_as
+    # a value with its unit, and prose, are no legends
+    assert read("# v0 max: 3 mm/s\n# v0 was measured\nv0,mu_macro\n" + TWO).units["v0"] == "m/s"
+    in_blanks = read(f"# v0 mu_macro\n# mm / s  -\n{TWO.replace(',', ' ')}")
+    assert in_blanks.columns["v0"].tolist() == table.columns["v0"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "part"),
+    [
+        ("x,mm/s,%\nv0,mu_macro\n" + TWO, 1, "cannot be assigned"),
+        ("# mm/s\nv0,mu_macro\n" + TWO, 1, "cannot be assigned"),
+        ("# v0: speed [furlong/h]\nv0,mu_macro\n" + TWO, 1, "no unit of v0"),
+        ("# v0: [N]\nv0,mu_macro\n" + TWO, 1, "no unit of v0"),
+        ("# speed unit: mm/s\nv0,mu_macro\n" + TWO, 1, "v0 [mm/s]"),
+        ("# Sliding speed [mm/s]\nv0,mu_macro\n" + TWO, 1, "v0 [mm/s]"),
+        ("v0,mu_macro\nmm/s,-,N\n" + TWO, 2, "3 units"),
+        ("mm/s,-\nv0,mu_macro\nm/s,-\n" + TWO, 3, "line 1 says mm/s"),
+        (f"v0,mu_macro\n{TWO}# v0: speed [mm/s]\n", 4, "not in the head"),
+    ],
+)
+def test_units_that_cannot_be_assigned_are_refused(text: str, line: int, part: str) -> None:
+    fault = str(refused(text))
+    assert fault.startswith(f"line {line}: ")
+    assert part in fault
+
+
+@pytest.mark.parametrize(
+    ("head", "more", "line"),
+    [
+        ("v0 [mm/s],mu_macro\n", "v0 [m/s],mu_macro\n", 4),
+        ("v0 [mm/s],mu_macro\n", "v0,mu_macro\n", 4),
+        ("v0 [mm/s],mu_macro\n", "# v0 [m/s],mu_macro\n", 4),
+        ("v0,mu_macro\nmm/s,-\n", "v0,mu_macro\nm/s,-\n", 6),
+        ("v0,mu_macro\nmm/s,-\n", "m/s,-\n", 5),
+        ("v0 [mm/s],mu_macro\n", "mu_macro,v0 [mm/s]\n", 4),
+        ("v0 [mm/s],mu_macro\n", "\nSegment 2\n", 5),
+        ("v0 [mm/s],mu_macro\n", "Segment 2,\n", 4),
+        ("v0 [mm/s],mu_macro\n", "Std. Dev.,0.2\n", 4),
+        ("v0 [mm/s],mu_macro\n", ",Mittelwert:\n", 4),
+    ],
+)
+def test_what_is_no_row_among_the_rows_is_refused_with_those_before_it(
+    head: str, more: str, line: int
+) -> None:
+    fault = str(refused(head + TWO + more + TWO))
+    assert fault.startswith(f"line {line}")
+    first = head.count("\n") + 1
+    assert f"--rows {first}..{line - 1}" in fault
+    table = read(head + TWO + more + TWO, rows=(first, first + 1))
+    assert table.columns["v0"].tolist() == close(IN_MM, rel=1e-15)
+
+
+def test_a_first_segment_with_a_longer_row_of_units_is_not_lost() -> None:
+    text = f"v0,mu_macro\nmm/s,-,N\n{TWO}\nv0,mu_macro\n{TWO}"
+    assert "between the heads of lines 1 and 6: --skip 5" in str(refused(text))
+    assert read(text, skip=5).lines == [7, 8]
+
+
+@pytest.mark.parametrize("head", ["v0 [mm/s],mu_macro\n", "v0,mu_macro\nmm/s,-\n"])
+def test_the_same_head_again_is_left_out_and_said(head: str) -> None:
+    table = read(head + TWO + head + TWO)
+    assert table.columns["v0"].tolist() == close([*IN_MM, *IN_MM], rel=1e-15)
+    assert "the head again in line" in table.read_as
+    assert len(table.skipped) == head.count("\n")
+
+
+def test_a_formula_without_a_value_is_refused() -> None:
+    assert "line 2: v0 is a formula without a value" in str(refused("v0,mu_macro\n=A1*2,0.1\n"))
 
 
 # --- bad input ------------------------------------------------------------------------------------
