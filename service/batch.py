@@ -14,7 +14,7 @@ import numpy as np
 
 from mumacro.answer import Answer, add
 from mumacro.errors import InputError
-from mumacro.inputs.cases import Cases, named
+from mumacro.inputs.cases import Cases, named, other_amplitude
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.reading import Value
 from mumacro.kernel.arrays import Codes
@@ -69,6 +69,11 @@ class Batch:
         if beside := model.beside:
             raise InputError("include", beside[0], f"without {beside[0]}, which is for one case")
         values, reasons = model.columns, dict(body.reasons)
+        other = model.kind.other_amplitude
+        if isinstance(column := body.members.get(other), (list, np.ndarray)):
+            if filled := [x for x in column if x is not None]:
+                raise other_amplitude(other, filled[0], model.kind)
+            del values[other]  # a list of nulls
         # the first bad input of a case, in the order of the inputs, is told
         for name, column in [*values.items()]:
             if isinstance(column, Column):

@@ -21,8 +21,8 @@ from pydantic import ValidationError
 from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
-from mumacro.inputs.fields import ENDS, field_of
-from mumacro.inputs.kind import SPRING, kind_of
+from mumacro.inputs.fields import ENDS, FIELDS, field_of
+from mumacro.inputs.kind import AMPLITUDE, DIRECTIONS, SPRING, kind_of
 from mumacro.inputs.reading import Value
 from mumacro.stopping import look
 
@@ -283,7 +283,7 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     columns: dict[str, Any] = {name: np.full(len(rows), np.nan) for name in (*ALL_FIELDS, *ENDS)}
     columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
     usual = {name: words.get(name, word) for name, word in SPRING.names.items()}
-    columns |= {name: np.full(len(rows), word, object) for name, word in usual.items()}
+    of_kind: dict[str, list[str]] = {name: [] for name in KIND if name not in words}
     in_query = {field_of(DEVIATIONS[name])[0] for name in words.keys() & DEVIATIONS.keys()}
     reasons: dict[int, Reason] = {}
     used = set[str]()
@@ -302,15 +302,17 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
         ends: Any = one.ends or ((k,), (k,))  # a number, or rigid, is an interval of itself
         filled = {name: end[0] for name, end in zip(ENDS, ends, strict=True)} | one.columns
         filled |= {f"std_{name}": x for name, x in one.std.items() if name not in in_query}
-        filled |= {name: values[name] for name in KIND if name in values}
+        for name, column in of_kind.items():
+            column.append(values.get(name, usual[name]))
         for name, value in filled.items():
             columns[name][i] = value
         used |= {name for name in filled if name not in ENDS} | ({*ENDS} if one.ends else set())
     if {*ENDS} <= used:
         columns["k"] = Value(columns["k"], None, *(columns[name] for name in ENDS))
-    # both amplitudes only beside a column of directions
-    fields = ALL_FIELDS if "direction" in used else kind_of(direction=usual["direction"]).fields
-    members = {name: columns[name] for name in (*fields, *(name for name in KIND if name in used))}
+    normal = AMPLITUDE in used or usual["direction"] == DIRECTIONS[-1]
+    fields = kind_of(direction=DIRECTIONS[-1]).fields if normal else FIELDS
+    members = {name: columns[name] for name in fields}
+    members |= {name: each for name, each in of_kind.items() if {*each} - {usual[name]}}
     members |= {name: columns[name] for name in DEVIATIONS if name in used}
     return Body(members, reasons, True)
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NoReturn
 
+import numpy as np
 import orjson
 from pydantic import BaseModel, ValidationError
 from starlette.exceptions import HTTPException
@@ -239,11 +240,10 @@ def _understood(members: Any) -> dict[str, Any]:
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
     """The faults of inputs of which one of several is required: the library would tell the first
     of them, when everything else is right."""
-    direction = members.get("direction", "across")
-    one = isinstance(direction, str)  # else there is one for each case
-    amplitudes = ("y0", AMPLITUDE) if not one else ("y0",)
-    if one and direction == "normal":
-        amplitudes = (AMPLITUDE,)
+    directions = members.get("direction", "across")
+    words = directions if isinstance(directions, (list, np.ndarray)) else [directions]
+    normal = any(isinstance(word, str) and word == "normal" for word in words)
+    amplitudes = (AMPLITUDE,) if normal else ("y0",)
     for names in (("k", *ENDS), amplitudes, ("omega", "f")):
         if all(members.get(name) is None for name in names):
             yield FieldFault.of(names[0], _ALTERNATIVES.get(names[0], "is required"))

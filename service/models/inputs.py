@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     PlainValidator,
@@ -20,9 +21,9 @@ from pydantic import (
 )
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import A_DEVIATION, AN_END, DEVIATIONS, EXACT
+from mumacro.inputs.cases import A_DEVIATION, AN_END, DEVIATIONS, EXACT, one_word
 from mumacro.inputs.fields import BOUNDS, ENDS, MOST_HZ, POSITIVE, described, refusal
-from mumacro.inputs.kind import AMPLITUDES, CONTACTS, DIRECTIONS, UNREADABLE
+from mumacro.inputs.kind import ContactName, DirectionName
 from mumacro.inputs.reading import Value, no_number, read, reason_of
 
 from .values import (
@@ -257,8 +258,6 @@ def column(name: str, values: Sequence[Any]) -> Column:
     read_values, reasons = [], dict[int, str]()
     for i, value in enumerate(values):
         one, reason = entry(name, value)
-        if reason is not None and name in AMPLITUDES and value is not None:
-            one = Value(UNREADABLE)  # null is a gap: another direction has no such amplitude
         read_values.append(one)
         if reason is not None and len(reasons) < MAX_REASONS:
             reasons[i] = reason
@@ -295,16 +294,14 @@ def _of_cases(value: Any, info: ValidationInfo) -> float | str | Column | None:
     return cells(info.field_name or "", value)
 
 
-def _words(value: Any, info: ValidationInfo) -> Any:
-    """One word for all cases, or a list with one for each, which the library reads."""
-    if isinstance(value, list):
-        return np.array([*value, None], object)[:-1]  # an array of lists is none of words
-    if isinstance(value, np.ndarray):
+def _one_word(value: Any, info: ValidationInfo) -> Any:
+    """Return the one word that a list of words holds, and another value as it is."""
+    if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
         return value
-    names = CONTACTS if info.field_name == "contact" else DIRECTIONS
-    if not isinstance(value, str) or value not in names:
-        raise fault(f"must be one of {', '.join(names)}")
-    return value
+    try:
+        return one_word(info.field_name or "", value)
+    except InputError as error:
+        raise fault(reason_of(error.bound)) from None
 
 
 def _or_listed(one: dict[str, Any], *texts: dict[str, Any]) -> WithJsonSchema:
@@ -324,9 +321,9 @@ StiffnessColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, POSITIVE_TEXT, 
 
 
 DeviationColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO, PLAIN_TEXT)]
-_WORDS = PlainValidator(_words)
-ContactColumn = Annotated[Any, _WORDS, _or_listed({"type": "string", "enum": [*CONTACTS]})]
-DirectionColumn = Annotated[Any, _WORDS, _or_listed({"type": "string", "enum": [*DIRECTIONS]})]
+#: one for all cases; a list of one word repeated is that word
+ContactColumn = Annotated[ContactName, BeforeValidator(_one_word)]
+DirectionColumn = Annotated[DirectionName, BeforeValidator(_one_word)]
 
 
 class InputColumns(Strict):

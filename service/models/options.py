@@ -39,7 +39,6 @@ _CONTACT = "One spring of stiffness k, or a ball on a flat (Hertz) whose stiffne
 _DIRECTION = (
     "Of the oscillation, to that of sliding: across it, along it, or normal: the force oscillates"
 )
-_EACH = "; a list has one for each case"
 _TOLERANCE = "Error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
 
 
@@ -153,7 +152,7 @@ class Case(Deviations, CaseInputs):
         return self.inputs | members | self.deviations
 
 
-class CaseColumns(DeviationColumns, Outputs, InputColumns):
+class CaseColumns(DeviationColumns, Outputs, Choice, InputColumns):
     """Cases as columns and the options of their answers: lists of one length; a number holds for
     every case."""
 
@@ -164,13 +163,8 @@ class CaseColumns(DeviationColumns, Outputs, InputColumns):
         }
     )
 
-    contact: ContactColumn = Field(
-        "spring", description=f"{_CONTACT}; a list has one for each case"
-    )
-    direction: DirectionColumn = Field(
-        "across", description=f"{_DIRECTION}; a list has one for each case"
-    )
-    tolerance: Positive | None = optional(_TOLERANCE)
+    contact: ContactColumn = Field("spring", description=_CONTACT)
+    direction: DirectionColumn = Field("across", description=_DIRECTION)
 
     @property
     def columns(self) -> dict[str, Any]:

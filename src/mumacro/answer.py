@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple
 import numpy as np
 
 from mumacro import plotting
-from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.doubts import remarks as doubts
@@ -50,9 +49,9 @@ class PlainCase(NamedTuple):
         return dict(zip(self.kind.fields, map(float, self.six), strict=True))
 
     @property
-    def given(self) -> dict[str, float]:
-        """f, where it was given."""
-        return {"f": self.six[4] / RAD_PER_CYCLE} if self.with_f else {}
+    def f(self) -> float | None:
+        """f [Hz], where it was given."""
+        return self.six[4] / RAD_PER_CYCLE if self.with_f else None
 
     @property
     def units(self) -> dict[str, str]:
@@ -61,7 +60,7 @@ class PlainCase(NamedTuple):
 
     def as_cases(self) -> Cases:
         """The same in the one form of all cases."""
-        return Cases(self.kind, self.kind.fields, self.columns, (), given=self.given)
+        return Cases(self.kind, self.columns, (), f=self.f)
 
 
 class Answer(Generic[Number]):
@@ -202,10 +201,8 @@ class Answer(Generic[Number]):
         bool; as v_tilde."""
         if self._groups is None:
             raise AttributeError('regime_certain needs the groups: evaluate(..., include="groups")')
-        cases, shape = self.cases, np.shape(np.asarray(self.mu_macro))
-        kind = cases.kind if cases.codes is None else cases.codes.reshape(shape)
-        certain = self._surrogate.tabulated.certain(*self._groups[:2], kind)
-        return certain if shape else bool(certain)
+        certain = self._surrogate.tabulated.certain(*self._groups[:2], self.cases.kind)
+        return certain if self._shape else bool(certain)
 
     @property
     def _always(self) -> tuple[str, ...]:
@@ -253,7 +250,7 @@ class Answer(Generic[Number]):
         cases = self._cases
         if cases is None:
             return [*self.remarks_on_outputs]
-        on_inputs = doubts(cases.columns, "f" in cases.given, {**cases.units, **units})
+        on_inputs = doubts(cases.columns, cases.f is not None, {**cases.units, **units})
         return [*on_inputs, *self.remarks_on_outputs]
 
     # --- other forms ------------------------------------------------------------------------------
@@ -264,20 +261,11 @@ class Answer(Generic[Number]):
 
         A rigid contact, and whatever else lies beyond the map, stands at its edge with a word that
         says why; an interval of k is a line through its middle.  ``ax`` are axes of matplotlib, or
-        new ones, and are returned; where the cases are of several contacts or directions, an array
-        with axes for each, in the order of ``mumacro.inputs.kind.KINDS``.
+        new ones, and are returned.
         """
-        kinds = self._on_map()
-        if not kinds:
-            raise InputError("contact", None, "that of at least one case that has an answer")
-        panels = plotting.Panels(columns=len(kinds), size=(6.4 * len(kinds), 4.8))
-        axes = plotting.axes_for(ax, panels if len(kinds) > 1 else plotting.Panels())
-        if len(kinds) > 1 and np.size(axes) != len(kinds):
-            raise InputError("ax", np.size(axes), f"{len(kinds)} axes, one for each kind")
-        for one, (kind, marks) in zip(np.ravel(np.asarray(axes, object)), kinds, strict=True):
-            title = ", ".join(kind.names.values()) if self.cases.shape else self._title()
-            self._surrogate.draw_map(one, kind, title, marks=marks)
-        return axes
+        kind = self.cases.kind
+        title = ", ".join(kind.names.values()) if self.cases.shape else self._title()
+        return self._surrogate.draw_map(ax, kind, title, marks=self._on_map())
 
     def _title(self) -> str:
         """The answer to one case with the digits of a picture, and the case."""
@@ -286,36 +274,29 @@ class Answer(Generic[Number]):
             case["k"] = [float(end[0]) for end in cases.ends]
         low, high = (getattr(self, name, None) for name in BAND)
         band = "" if low is None or high is None else f" ({low:.4g} to {high:.4g})"
-        words = plotting.in_words(case, cases.one_kind.names)
+        words = plotting.in_words(case, cases.kind.names)
         return rf"$\mu_\mathrm{{macro}}$ = {self.mu_macro:.4g}{band}; {words}"
 
-    def _on_map(self) -> list[tuple[Kind, plotting.Marks]]:
-        """The cases of each kind as marks of its map."""
+    def _on_map(self) -> plotting.Marks:
+        """The cases as marks of the map."""
         cases = self.cases
         groups = self._groups or self._surrogate.answer(cases, groups=True)._groups
-        size = max(cases.size, 1)
         v, y = (np.ravel(np.asarray(x, np.float64)) for x in groups[:2])
-        regimes = np.ravel(np.asarray(self.regime, object))
         ends = None
         if cases.ends is not None:
-            k = np.broadcast_to(cases.columns["k"], size)
+            k = np.broadcast_to(cases.columns["k"], v.size)
             with np.errstate(all="ignore"):
-                low, high = (np.broadcast_to(np.ravel(end), size) / k for end in cases.ends)
+                low, high = (np.broadcast_to(np.ravel(end), v.size) / k for end in cases.ends)
             ends = low, high
-        kinds = []
-        for where, part in cases.by_kind():
-            kind = part.one_kind
-            amplitude = AMPLITUDE if kind.normal else "y0"
-            marks = plotting.Marks(
-                v[where],
-                y[where],
-                _ray(part.columns, amplitude, v[where].size),
-                regimes[where],
-                _edge_words(part.columns, amplitude, v[where], y[where]),
-                None if ends is None else (ends[0][where], ends[1][where]),
-            )
-            kinds.append((kind, marks))
-        return kinds
+        amplitude = AMPLITUDE if cases.kind.normal else "y0"
+        return plotting.Marks(
+            v,
+            y,
+            _ray(cases.columns, amplitude, v.size),
+            np.ravel(np.asarray(self.regime, object)),
+            _edge_words(cases.columns, amplitude, v, y),
+            ends,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
@@ -348,8 +329,7 @@ class Answer(Generic[Number]):
     def _kind_words(self) -> str:
         if self._cases is None:
             return ""
-        kinds = ["; ".join(", ".join(kind.names.values()) for kind in self.cases.kinds)]
-        return f": {kinds[0]}" if kinds[0] else ""
+        return f": {', '.join(self.cases.kind.names.values())}"
 
     def _heading(self) -> str:
         shape = self._shape

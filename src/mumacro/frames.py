@@ -13,7 +13,7 @@ import numpy as np
 
 from mumacro.answer import BAND, DEFAULT, GROUPS, Answer, IntervalAnswer, add
 from mumacro.errors import InputError
-from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, codes_of, library_of
+from mumacro.inputs.cases import DEVIATIONS, KIND, Cases, library_of
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import ENDS
 from mumacro.inputs.kind import kind_of
@@ -92,15 +92,13 @@ class LabelledAnswer(IntervalAnswer[Any]):
     @property
     def regime_certain(self) -> Any:
         """As in :class:`mumacro.Answer`."""
-        tabulated, kinds = self._surrogate.tabulated, self._kinds
-        columns = {name: x for name, x in kinds.items() if not isinstance(x, str)}
+        tabulated, kind = self._surrogate.tabulated, kind_of(**self._kinds)
 
-        def certain(v: Any, y: Any, *arrays: Any) -> Any:
-            words = {**kinds, **dict(zip(columns, arrays, strict=True))}
-            return tabulated.certain(v, y, codes_of(words, v.shape) if arrays else kind_of(**words))
+        def certain(v: Any, y: Any) -> Any:
+            return tabulated.certain(v, y, kind)
 
         groups = {"v_tilde": self.v_tilde, "y_tilde": self.y_tilde}
-        return self._apply(certain, {**groups, **columns}, "regime_certain")
+        return self._apply(certain, groups, "regime_certain")
 
 
 def evaluate_labelled(
@@ -215,8 +213,7 @@ def _of_chunks(
     constants = {name: x for name, x in values.items() if name not in arguments}
     deviations = any(name in DEVIATIONS for name in values)
     outputs = tuple(OUTPUTS[x] for x in OUTPUTS if x in include or (x == "std" and deviations))
-    direction = values.get("direction", "across")
-    fields = kind_of(direction=direction).fields if isinstance(direction, str) else ALL_FIELDS
+    fields = kind_of(direction=values.get("direction", "across")).fields
     paths = paths_of(outputs, fields)
     gradient = any(output.name == "gradient" for output in outputs)
     band = BAND if {*ENDS} & values.keys() else ()

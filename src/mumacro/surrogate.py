@@ -493,10 +493,11 @@ class Surrogate:
             Frequency of the oscillation [Hz], >= 0, in its place.
         v0 : array_like
             Sliding speed [m/s], >= 0.
-        contact : str or array_like
+        contact : str
             "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip
-            is k = 8 a G*.  An array has one for each case, as has that of directions.
-        direction : str or array_like
+            is k = 8 a G*.  A call has one; a column that holds one value is that value, as is one
+            of directions.
+        direction : str
             "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the
             force is Fz + Fz_amplitude cos(omega t), for a spring only.
         include : sequence of str

@@ -36,7 +36,7 @@ def of_one_case(
     the one that suits them; with ``shown`` that many digits, in SI.
     """
     surrogate, cases = answer._surrogate, answer.cases
-    kind, case = cases.one_kind, cases.columns
+    kind, case = cases.kind, cases.columns
     ends = cases.ends and tuple(float(end[0]) for end in cases.ends)
     asked = {**case} if ends is None else {**_without_k(case), **dict(zip(ENDS, ends, strict=True))}
     effect = k_effect(surrogate, asked, *kind.names.values()) if shown is None else 0.0

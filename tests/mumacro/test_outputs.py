@@ -2,6 +2,7 @@
 every entrance; deviations; what a kind does not have."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -79,68 +80,53 @@ def test_one_interval_is_answered_in_plain_numbers(table: Surrogate, kind: Kind)
         assert type(answer[path]) is (str if path in TEXTS else float), path
 
 
-def test_cases_of_several_kinds_are_answered_in_their_places(table: Surrogate) -> None:
-    parts = [draw(kind, 6) for kind in KINDS]
-    n = 6 * len(KINDS)
-    order = np.random.default_rng(1).permutation(n)
-    columns: Case = {}
-    for name in ("mu0", "Fz", "k", "y0", "Fz_amplitude", "omega", "v0"):
-        gap = np.full(6, math.nan)
-        columns[name] = np.concatenate([part.get(name, gap) for part in parts])[order]
-    for name in ("contact", "direction"):
-        words = np.array([kind.names[name] for kind in KINDS for _ in range(6)], object)
-        columns[name] = words[order]
-    mixed = table.evaluate(columns, include=[name for name in OUTPUTS if name != "std"])
-    for i, (kind, part) in enumerate(zip(KINDS, parts, strict=True)):
-        alone = table.evaluate(part, **kind.names, include=names_for(kind))
-        mine = np.argsort(order)[6 * i : 6 * i + 6]
-        for path in alone.paths:
-            np.testing.assert_array_equal(mixed[path][mine], alone[path], err_msg=path)
-        assert alone.gradient is not None
-        assert mixed.gradient is not None
-        np.testing.assert_array_equal(mixed.gradient["v0"][mine], alone.gradient["v0"])
-        np.testing.assert_array_equal(mixed.regime_certain[mine], alone.regime_certain)
-        for name in OUTPUTS.keys() - {*names_for(kind)}:
-            lacked = [path for path in mixed.paths if path.partition(".")[0] == name]
-            assert all(np.isnan(mixed[path][mine]).all() for path in lacked)
-    said = {(remark["row"], remark["field"]): remark["cases"] for remark in mixed.remarks}
-    assert said["include", "power"] == 6
-    assert said["include", "settling"] == 18
+COLUMNS: dict[str, Callable[[list[Any]], Any]] = {
+    "list": list,
+    "array": np.array,
+    "series": pd.Series,
+    "categories": lambda words: pd.Series(pd.Categorical(words)),
+    "arrow": lambda words: pytest.importorskip("pyarrow").array(words),
+}
 
 
-def test_a_case_that_does_not_agree_with_its_kind_is_alone_and_told(table: Surrogate) -> None:
-    columns = {
-        **CASE,
-        "contact": ["spring", "cone", "ball", None, "spring"],
-        "direction": ["across", "across", "normal", "across", "normal"],
-        "y0": [2e-6, 2e-6, 2e-6, 2e-6, 2e-6],
-    }
-    answer = table.evaluate(columns, Fz_amplitude=1.0)
-    assert np.isnan(answer.mu_macro).tolist() == [False, True, True, True, True]
-    fields = [answer.cases.reason(i).field for i in range(1, 5)]
-    assert fields == ["contact", "direction", "contact", "y0"]
-    with pytest.raises(InputError) as caught:
-        table.evaluate(columns, Fz_amplitude=1.0, illegal="raise")
-    assert (caught.value.field, caught.value.index) == ("contact", 1)
-    only_across = table.evaluate({**CASE, "direction": ["across", "along"]})
-    assert not np.isnan(only_across.mu_macro).any()
-    with pytest.raises(InputError) as caught:
-        table.evaluate({**CASE, "direction": ["across", "normal"]})
-    assert caught.value.field == "Fz_amplitude"
+@pytest.mark.parametrize("form", COLUMNS)
+def test_a_call_has_one_contact_and_one_direction(table: Surrogate, form: str) -> None:
+    column, v0 = COLUMNS[form], COLUMNS[form]([0.01, 0.02])
+    for name, words in (("contact", ["spring", "ball"]), ("direction", ["across", "along"])):
+        one = table.evaluate({**CASE, "v0": v0, name: column(words[1:] * 2)})
+        assert np.array_equal(
+            one["mu_macro"], table.evaluate({**CASE, "v0": v0, name: words[1]})["mu_macro"]
+        )
+        for more in ({}, {"illegal": "raise"}):
+            with pytest.raises(InputError, match="groupby") as caught:
+                table.evaluate({**CASE, "v0": v0, name: column(words)}, **more)
+            assert caught.value.field == name
 
 
-def test_an_amplitude_of_another_direction_is_refused_where_it_has_a_value(
+def test_a_frame_of_several_contacts_is_split_as_the_refusal_says(table: Surrogate) -> None:
+    frame = pd.DataFrame({**CASE, "contact": ["ball", "spring", "ball"]})
+    frame["direction"], frame["Fz_amplitude"] = ["across", "normal", "along"], [math.nan, 3.0, None]
+    frame.loc[1, "y0"] = math.nan
+    parts = [
+        table.evaluate(part)["mu_macro"] for _, part in frame.groupby(["contact", "direction"])
+    ]
+    for i, mu in pd.concat(parts).items():
+        row = {name: x for name, x in frame.loc[i].items() if not pd.isna(x)}
+        assert mu == table.evaluate(row).mu_macro
+
+
+def test_the_amplitude_of_another_direction_is_refused_where_it_has_a_value(
     table: Surrogate,
 ) -> None:
-    with pytest.raises(InputError) as caught:
-        table.evaluate({**CASE, "Fz_amplitude": 3.0})
-    assert caught.value.field == "Fz_amplitude"
     frame = pd.DataFrame({**CASE, "Fz_amplitude": [math.nan, 3.0]})
-    assert table.evaluate(frame)["mu_macro"].isna().tolist() == [False, True]
+    for cases in ({**CASE, "Fz_amplitude": 3.0}, frame):
+        with pytest.raises(InputError) as caught:
+            table.evaluate(cases)
+        assert caught.value.field == "Fz_amplitude"
 
 
 def test_a_part_of_cases_is_answered_as_the_whole(table: Surrogate) -> None:
-    columns = {**draw(KINDS[0]), "contact": ["ball", "spring"] * (N // 2), "std_k": np.full(N, 1e5)}
+    columns = {**draw(KINDS[0]), "contact": "ball", "std_k": np.full(N, 1e5)}
     columns["v0"][5] = -1.0
     cases = Cases.of(named(None, columns))
     whole = table.answer(cases, (OUTPUTS["std"], OUTPUTS["power"]))
@@ -272,12 +258,3 @@ def test_what_computes_no_deviation_refuses_one_by_name(table: Surrogate) -> Non
         with pytest.raises(InputError) as caught:
             ask()
         assert caught.value.field == field
-
-
-def test_an_interval_and_a_deviation_stand_in_one_column(table: Surrogate) -> None:
-    case = without(CASE, "k")
-    answer: Any = table.evaluate(k=["0.8..1.2 N/um", "1 ± 0.1 N/um", "rigid"], **case)
-    assert np.isnan(answer["std"]).tolist() == [True, False, False]
-    assert answer.mu_macro_low[0] < answer.mu_macro[0] < answer.mu_macro_high[0]
-    assert answer.mu_macro_low[1:].tolist() == answer.mu_macro_high[1:].tolist()
-    assert [r["cases"] for r in answer.remarks if r["row"] == "include"] == [1]

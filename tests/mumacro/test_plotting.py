@@ -11,7 +11,6 @@ import mumacro
 from mumacro import Surrogate, plotting
 from mumacro.analysis.fitted import Fit
 from mumacro.analysis.law import Law
-from mumacro.errors import InputError
 from mumacro.inputs.kind import KINDS, Kind
 from tests.support.cases import Case
 from tests.support.comparing import close
@@ -65,7 +64,6 @@ PICTURES: dict[str, Callable[[Surrogate], Any]] = {
     "interval": lambda s: s.evaluate(**case_of(KINDS[0], k=None, k_low=3e5, k_high=3e6)),
     "array": lambda s: s.evaluate(**{**CASE, "v0": SPEEDS}, direction="along"),
     "normal": lambda s: s.evaluate(**case_of(Kind(0, 2), v0=SPEEDS)),
-    "two kinds": lambda s: s.evaluate(**CASE, contact=["spring", "ball"]),
     "map": lambda s: s,
     "law": a_law,
     "motion": lambda _: mumacro.motion(
@@ -109,7 +107,7 @@ def test_nothing_is_cut_off_and_the_style_stays(
 @pytest.mark.parametrize("name", PICTURES)
 def test_axes_that_are_given_are_drawn_on_and_returned(surrogate: Surrogate, name: str) -> None:
     drawn = PICTURES[name](surrogate)
-    several = name in ("two kinds", "motion") or name.startswith("fit")
+    several = name == "motion" or name.startswith("fit")
     figure = pyplot.figure(layout="constrained")
     axes = figure.subplots(1, 1 + several)
     returned = drawn.plot(ax=axes)
@@ -202,17 +200,6 @@ def test_a_rigid_case_stands_where_its_ray_leaves_the_map(surrogate: Surrogate) 
         (place,) = data(answer.plot().lines[-1])
         assert place[1] / place[0] == close(2e-6 * 2.0 * math.pi * 20e3 / v0, rel=1e-12)
         assert surrogate.mu_ratio(*place) == close(answer.mu_ratio, abs=1e-3)
-
-
-def test_several_kinds_have_a_map_each(surrogate: Surrogate) -> None:
-    answer = surrogate.evaluate(**CASE, contact=["spring", "ball", "spring"])
-    axes = answer.plot()
-    assert [one.get_title(loc="left") for one in axes] == ["spring, across", "ball, across"]
-    with pytest.raises(InputError):
-        answer.plot(pyplot.figure().subplots())
-    nothing = surrogate.evaluate(**CASE, contact=["ring", "ring"])
-    with pytest.raises(InputError):
-        nothing.plot()
 
 
 def test_an_interval_of_k_is_a_line_on_the_map(surrogate: Surrogate) -> None:

@@ -220,7 +220,7 @@ STIFFNESSES = st.sampled_from(
         {"k_low": "0.8 N/um", "k_high": 1.2e6},
         {"k": None},
         {"k_low": "1 ± 0.1 N/um", "k_high": 2e6},
-        {"k": 1e6, "contact": "ball"},
+        {"k": 1e6},
     ]
 )
 OTHERS = st.sampled_from(
@@ -234,19 +234,18 @@ OTHERS = st.sampled_from(
             {"f": 10**400},
             {"Fz_amplitude": "three"},
             {"Fz_amplitude": 3.0},
-            {"contact": "ball", "Fz_amplitude": 3.0},
-            {"contact": "ball", "Fz_amplitude": "three"},
-            {"direction": "along"},
         )
     ]
 )
-CASES = st.builds(
-    lambda case, more: {**case, **more}, st.sampled_from([SPRING, LIFTED]), STIFFNESSES | OTHERS
+CASES = st.sampled_from([SPRING, LIFTED, {**SPRING, "contact": "ball"}]).flatmap(
+    lambda case: st.lists(
+        (STIFFNESSES | OTHERS).map(lambda more: {**case, **more}), min_size=1, max_size=5
+    )
 )
 
 
 @settings(max_examples=60)
-@given(rows=st.lists(CASES, min_size=1, max_size=5))
+@given(rows=CASES)
 def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows: Any) -> None:
     answer = client.post(BATCH, json=rows).json()
     faults = {fault["index"]: (fault["field"], fault["reason"]) for fault in answer["errors"]}
@@ -276,9 +275,25 @@ def test_an_amplitude_of_another_direction_is_left_out_or_null(client: Any, numb
     amplitudes = [None, number]
     columns = {**SPRING, "k": 1e6, "v0": [0.01, 0.01], "Fz_amplitude": amplitudes}
     rows = [{**SPRING, "k": 1e6, "Fz_amplitude": one} for one in amplitudes]
-    for body in (columns, rows):
-        (fault,) = client.post(BATCH, content=json.dumps(body)).json()["errors"]
-        assert (fault["index"], fault["field"]) == (1, "Fz_amplitude")
+    (fault,) = client.post(BATCH, content=json.dumps(rows)).json()["errors"]
+    assert (fault["index"], fault["field"]) == (1, "Fz_amplitude")
+    answer = client.post(BATCH, content=json.dumps(columns))
+    assert answer.status_code == 422
+    assert [fault["field"] for fault in answer.json()["errors"]] == ["Fz_amplitude"]
+
+
+@pytest.mark.parametrize("name", ["contact", "direction"])
+def test_a_request_has_one_contact_and_one_direction(client: Any, problem: Any, name: str) -> None:
+    words = {"contact": ["ball", "spring"], "direction": ["along", "across"]}[name]
+    case = {**SPRING, "k": 1e6}
+    expected = of_one(client, {**case, name: words[0]})["mu_macro"]
+    answer = client.post(BATCH, json={**case, name: words[:1] * 2, "v0": [0.01, 0.01]}).json()
+    assert answer["mu_macro"] == [expected] * 2
+    columns = {**case, name: words, "v0": [0.01, 0.02]}
+    for body in (columns, [{**case, name: word} for word in words]):
+        (fault,) = problem(client.post(BATCH, json=body), 422)["errors"]
+        assert fault["field"] == name
+        assert "split" in fault["reason"]
 
 
 @pytest.mark.parametrize(

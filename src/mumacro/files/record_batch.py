@@ -16,11 +16,11 @@ from mumacro.answer import BAND, DEFAULT, TEXTS
 from mumacro.errors import InputError
 from mumacro.files.errors import FilesError
 from mumacro.files.text_columns import numbers_of
-from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases
+from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
 from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
-from mumacro.inputs.kind import AMPLITUDE, AMPLITUDES, SPRING, UNREADABLE, Kind, kind_of
+from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
@@ -65,8 +65,8 @@ def answer(
         ``v0`` [m/s], with another unit where the heading has it in brackets; numbers or text.  An
         infinite k, or the word ``rigid``, is a rigid contact.  A null, a NaN or an empty cell is
         missing, in k as elsewhere.  ``k_low`` and ``k_high`` may stand for k; ``Fz_amplitude`` [N]
-        stands for y0 in direction normal.  ``contact`` and ``direction`` have those of each case,
-        ``std_k`` and so on standard deviations.  Other columns are copied unchanged.
+        stands for y0 in direction normal.  ``contact`` and ``direction`` hold one
+        value each, ``std_k`` and so on standard deviations.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
         Left out, the tightest table that comes with the library.
     rigid : bool
@@ -98,7 +98,8 @@ def answer(
     >>> rejects.to_pylist()
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
     """
-    columns = find_columns(batch.schema.names, rigid, include, kind_of(contact, direction))
+    kind = kind_in(batch, kind_of(contact, direction))
+    columns = find_columns(batch.schema.names, rigid, include, kind)
     result = answer_columns(batch, surrogate or Surrogate.open(), columns)
     schema = pa.schema([*batch.schema, *answer_fields(columns.answer_names)], batch.schema.metadata)
     answers = pa.RecordBatch.from_arrays([*batch.columns, *result.columns], schema=schema)
@@ -112,8 +113,8 @@ class Columns(NamedTuple):
 
     #: by input, or ``std_k`` and so on: the heading, and the scale of its unit
     headings: dict[str, tuple[str, Scale]]
-    words: dict[str, str]  #: heading of the column of contacts, of directions
-    kind: Kind  #: of all cases, where there is no column of it
+    words: list[str]  #: the columns of contacts and directions that there are
+    kind: Kind
     include: tuple[str, ...]
     answer_names: list[str]  #: names of the columns with answers
 
@@ -146,10 +147,7 @@ def find_columns(
     like = {name: LIKE.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
     like |= {column: LIKE.get(name, name) for column, name in DEVIATIONS.items()}
     heads, faults = find_heads(names, like)
-    words = {name: name for name in KIND if name in names}
-    for name, word in kind.names.items():
-        if name in words and word != SPRING.names[name]:
-            faults.append(f"--{name} {word} is given, but there is a column {name}; leave one out")
+    words = [name for name in KIND if name in names]
     all_names = {*heads, *words}
     other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in all_names)
     counts = Counter(names)
@@ -165,11 +163,8 @@ def find_columns(
     if "k" in heads and (end := [name for name in ENDS if name in heads]):
         faults.append(f"there are both k and {end[0]}; leave one out")
     ends = ENDS if heads.keys() & {*ENDS} else () if rigid else ("k",)
-    fields = ALL_FIELDS if "direction" in words else kind.fields
+    fields = kind.fields
     necessary = [name for field in fields for name in (ends if field == "k" else (field,))]
-    if "direction" in words:  # each case has one of both amplitudes
-        spare = {"y0", AMPLITUDE} - heads.keys()
-        necessary = [name for name in necessary if name not in spare or spare == {"y0", AMPLITUDE}]
     faults += _absent(
         [name for name in necessary if name not in heads and (name != "omega" or "f" not in heads)],
         names,
@@ -188,6 +183,36 @@ def find_columns(
         raise FilesError(where + "; ".join(faults))
     headings = {name: (names[heads[name][0]], heads[name][1]) for name in like if name in heads}
     return Columns(headings, words, kind, tuple(include), answer_names)
+
+
+def kind_in(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
+    """Return the contact and the direction of a batch: those of its columns, else ``kind``.
+
+    Raise FilesError, after ``where``, for a column with several values, with an unknown one, or
+    beside an option.
+    """
+    words = dict(kind.names)
+    for name in KIND:
+        if name not in batch.schema.names:
+            continue
+        if words[name] != SPRING.names[name]:
+            raise FilesError(
+                f"{where}--{name} {words[name]} is given, but there is a column {name}; "
+                "leave one out"
+            )
+        cells = pc.unique(batch.column(name)).to_pylist()
+        found = sorted({cell.strip() if isinstance(cell, str) else "" for cell in cells})
+        if len(found) > 1:
+            several = " and ".join(word or "an empty cell" for word in found[:2])
+            raise FilesError(
+                f"{where}the column {name} holds {several}: it is one for a file; write a file "
+                "for each"
+            )
+        words[name] = found[0] if found else words[name]
+    try:
+        return kind_of(**words)
+    except InputError as error:
+        raise FilesError(f"{where}{error}") from None
 
 
 def names_of_columns(rigid: bool = False) -> ColumnNames:
@@ -216,21 +241,25 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
 def answer_columns(
     batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs | None = None
 ) -> AnswerColumns:
-    """The answers to a batch; ``signs`` are those of numbers as text."""
+    """The answers to a batch; ``signs`` are those of numbers as text.
+
+    Raise FilesError where it has another contact or direction than the batches before it.
+    """
+    if columns.words and (kind := kind_in(batch, SPRING)) != columns.kind:
+        both = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
+        raise FilesError(f"the file holds {both}: it is one for a file; write a file for each")
     by_heading: dict[str, Array] = {}
     values: dict[str, Any] = {} if {"k", *ENDS} & columns.headings.keys() else {"k": math.inf}
     faults: dict[str, dict[int, str]] = {}
     for name, (heading, scale) in columns.headings.items():
-        by_heading[heading], values[name], faults[name] = numbers(
-            batch.column(heading), name, signs or Signs(None, None), scale
-        )
-    for name in AMPLITUDES:  # an empty cell is a gap, one that cannot be read is none
-        if unread := [*faults.get(name, ())]:
-            values[name] = values[name].copy()
-            values[name][unread] = UNREADABLE
-    values |= columns.kind.names
-    values |= {name: _words(batch.column(heading)) for name, heading in columns.words.items()}
-    cases = Cases.of(values)
+        column, si, unread = numbers(batch.column(heading), name, signs or Signs(None, None), scale)
+        if name == columns.kind.other_amplitude:
+            if unread or not np.isnan(si).all():
+                error = other_amplitude(name, None, columns.kind)
+                raise FilesError(f"the column {heading!r} must be {error.bound}")
+            continue
+        by_heading[heading], values[name], faults[name] = column, si, unread
+    cases = Cases.of(values, columns.kind)
     result = surrogate.answer(cases, chosen(columns.include, cases))
     is_rejected = result.source_code < 0
     mask = is_rejected if is_rejected.any() else None
@@ -248,8 +277,7 @@ def answer_columns(
     rejects = []
     for i in np.flatnonzero(is_rejected).tolist():
         name, reason = _field_and_reason(cases.reason(i))
-        heading = columns.words.get(name) or columns.headings[name][0]
-        cell = batch.column(heading)[i].as_py()
+        cell = batch.column(columns.headings[name][0])[i].as_py()
         reason = faults.get(name, {}).get(i, reason)
         rejects.append((i, name, None if cell is None else str(cell), reason))
     in_heads = {name: split_unit(heading)[1] for name, (heading, _) in columns.headings.items()}
@@ -257,12 +285,6 @@ def answer_columns(
     return AnswerColumns(
         [arrays[path] for path in columns.answer_names], rejects, by_heading, remarks
     )
-
-
-def _words(column: pa.Array) -> Any:
-    """A column of contacts or directions, without blanks around the words."""
-    words = [x.strip() if isinstance(x, str) else x for x in column.to_pylist()]
-    return np.array([*words, None], object)[:-1]
 
 
 def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
@@ -308,8 +330,6 @@ def numbers(
 def _field_and_reason(error: InputError) -> tuple[str, str]:
     """The input of a row that has no result, and why."""
     name, value = error.field, error.value
-    if name in KIND:
-        return name, f"must be {error.bound}"
     number = float(value)  # type: ignore[arg-type]  # a number of the row
     if math.isnan(number):
         return name, GAP if name == "k" else "is missing"

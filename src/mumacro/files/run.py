@@ -18,10 +18,12 @@ from mumacro.files.record_batch import (
     answer_columns,
     answer_fields,
     find_columns,
+    kind_in,
     names_of_columns,
 )
 from mumacro.files.text_source import Block
 from mumacro.files.writing import Output, csv_lines, written_as
+from mumacro.inputs.cases import KIND
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.kind import Kind, kind_of
 from mumacro.inputs.layout import Dialect
@@ -164,7 +166,11 @@ class _Run:
         if isinstance(self.source, reading.TextSource):
             where = self.source.where
         self.surrogate, self.remarks = surrogate, list[Remark]()
-        self.columns = find_columns(self.source.schema.names, rigid, include, kind, where)
+        names = self.source.schema.names
+        if words := [name for name in KIND if name in names]:
+            first = next(self.source.blocks(0, words), None)
+            kind = kind if first is None else kind_in(first.batch, kind, where)
+        self.columns = find_columns(names, rigid, include, kind, where)
         headings = self.columns.headings
         sep, decimal = written_as(
             reading.ending_of(out), self.source.sep, self.source.decimal, dialect
@@ -181,7 +187,7 @@ class _Run:
             field.with_type(pa.float64()) if field.name in input_headings and as_numbers else field
             for field in self.source.schema
         ]
-        case_headings = [*input_headings, *self.columns.words.values()]
+        case_headings = [*input_headings, *self.columns.words]
         self.columns_read = case_headings if self.verbatim else self.source.schema.names
         fields = [
             *([] if self.verbatim else input_fields),

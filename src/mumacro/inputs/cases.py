@@ -8,7 +8,7 @@ Keywords, a mapping, a data frame, Arrow columns, rows of a file or of JSON beco
 
 import enum
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,16 +30,14 @@ from mumacro.inputs.kind import (
     AMPLITUDE,
     AMPLITUDES,
     DIRECTIONS,
-    KINDS,
     SPRING,
     Kind,
-    code_of,
     kind_of,
 )
 from mumacro.inputs.names import in_place_of, suggestion
 from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, in_unit, read
 from mumacro.inputs.units import split_unit
-from mumacro.kernel.arrays import Array, Codes, Places, common_shape, flat
+from mumacro.kernel.arrays import Array, Places, common_shape, flat
 
 
 class Absent(enum.Enum):
@@ -55,10 +53,9 @@ class Absent(enum.Enum):
 ABSENT: Final = Absent.ABSENT
 _UNLABELLED = NUMBERS | {np.ndarray, list, tuple, type(None), dict, str}
 _FLOAT = np.dtype(np.float64)
-#: the fields where the direction is a column
+#: the fields of all directions
 ALL_FIELDS = (*FIELDS[:4], AMPLITUDE, *FIELDS[4:])
 KIND = ("contact", "direction")
-_NORMAL = np.array([kind.normal for kind in KINDS])
 #: columns of deviations -> the input
 DEVIATIONS = {f"std_{name}": name for name in (*ALL_FIELDS, "f")}
 #: what a data frame or a file may hold
@@ -72,14 +69,11 @@ AN_END = "one number: an end of the interval"
 
 
 class Cases(NamedTuple):
-    """Cases as they are evaluated, of one contact and direction, or of one for each case."""
+    """Cases as they are evaluated, all of one contact and direction."""
 
-    #: of all cases; None where each has its own, see ``codes``
-    kind: Kind | None
-    #: the names of the inputs; both amplitudes where the direction is a column
-    fields: tuple[str, ...]
-    #: by these names and in their order one number for all cases, or an array (n,); k is infinite
-    #: where rigid, and the geometric middle of an interval
+    kind: Kind
+    #: by ``kind.fields`` and in their order one number for all cases, or an array (n,); k is
+    #: infinite where rigid, and the geometric middle of an interval
     columns: dict[str, float | Array]
     #: of the inputs, broadcast: () for one case alone
     shape: tuple[int, ...]
@@ -87,10 +81,8 @@ class Cases(NamedTuple):
     ends: tuple[Array, Array] | None = None
     #: standard deviations of inputs, in their units, by name as in ``columns``; without an entry 0
     std: dict[str, float | Array] = {}  # noqa: RUF012 - never changed
-    #: place in ``kind.KINDS`` of each case, -1 for a contact or a direction that does not exist
-    codes: Codes | None = None
-    #: what messages name as it came in: f, contact and direction, an amplitude of another direction
-    given: dict[str, Any] = {}  # noqa: RUF012 - never changed
+    #: f [Hz] where it was given in place of omega: messages name what came in
+    f: float | Array | None = None
     #: units that values carried, by the input as it came in
     units: dict[str, str] = {}  # noqa: RUF012 - never changed
 
@@ -98,176 +90,94 @@ class Cases(NamedTuple):
     def of(
         cls, values: Mapping[str, Any], kind: Kind | None = None, strict: bool = False
     ) -> "Cases":
-        """Cases from names and values, see :func:`named`; ``kind`` where the values do not tell.
+        """Return cases from names and values, see :func:`named`; ``kind`` where the values do not
+        tell.
 
-        InputError where an input is missing, is no real number, or shapes do not broadcast.  A
-        value out of bounds is one where ``strict``, and for a case alone.
+        Raise InputError where an input is missing, is no real number, or shapes do not broadcast;
+        for a value out of bounds where ``strict``, and for a case alone.
 
         >>> inputs = dict(mu0=0.3, Fz=10.0, k="rigid", y0=[1e-6, 2e-6], omega=1e5, v0=0.01)
         >>> cases = Cases.of(inputs)
         >>> cases.shape, cases.columns["k"]
         ((2,), inf)
-        >>> Cases.of({**inputs, "contact": ["ball", "spring"]}).codes.tolist()
-        [1, 0]
         """
-        texts = {} if kind is not None else _texts(values)
-        if kind is None and not any(isinstance(text, np.ndarray) for text in texts.values()):
-            kind, texts = kind_of(**texts), {}
-        of_direction = _of_direction(texts) if kind is None else kind
-        fields = ALL_FIELDS if of_direction is None else of_direction.fields
-        strange = _strange_amplitude(values, of_direction)
-        columns, std, ends, units, others = _inputs(values, fields)
-        std |= _deviations(values, fields, std)
-        others |= strange | texts
-        shape = _shape_of(columns, std, others)
-        for part in (columns, std, others):
+        if kind is None:
+            kind = kind_of(*(values.get(name, word) for name, word in SPRING.names.items()))
+        _refuse_other_amplitude(values, kind)
+        columns, std, ends, units, f = _inputs(values, kind.fields)
+        std |= _deviations(values, kind.fields, std)
+        shape = _shape_of(columns, std)
+        for part in (columns, std):
             for name, x in part.items():
                 if isinstance(x, np.ndarray):
                     part[name] = flat(x, shape) if x.size != 1 else x.item()
+        if isinstance(f, np.ndarray):
+            f = flat(f, shape) if f.size != 1 else f.item()
         if ends is not None:
             ends = _flat_ends(ends, shape, strict)
-        codes = codes_of(others, (math.prod(shape),)) if texts else None
-        cases = cls(kind, fields, columns, shape, ends, std, codes, others, units)
-        if std or strange or texts:
-            return cases._where_they_agree(values, strict or not shape)
+        cases = cls(kind, columns, shape, ends, std, f, units)
         if strict or not shape:
-            check(columns, others.get("f"), (cases.size,) if shape else ())
-        return cases
+            check(columns, f, (cases.size,) if shape else ())
+        return cases._with_legal_deviations(strict or not shape) if std else cases
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The names of the inputs."""
+        return self.kind.fields
 
     @property
     def size(self) -> int:
         """How many cases."""
         return math.prod(self.shape)
 
-    @property
-    def kinds(self) -> tuple[Kind, ...]:
-        """The contacts and directions among the cases."""
-        if self.codes is None:
-            return () if self.kind is None else (self.kind,)
-        return tuple(KINDS[code] for code in np.unique(self.codes).tolist() if code >= 0)
-
-    @property
-    def one_kind(self) -> Kind:
-        """The contact and direction of all cases; TypeError where each has its own."""
-        if self.kind is None:
-            raise TypeError("the cases are of several kinds: see by_kind")
-        return self.kind
-
     def part(self, which: slice | Places) -> "Cases":
-        """Some of many cases, (m,)."""
+        """Return some of many cases, (m,)."""
 
-        def cut(columns: Mapping[str, Any]) -> dict[str, Any]:
-            return {
-                name: x[which] if isinstance(x, np.ndarray) else x for name, x in columns.items()
-            }
+        def cut(x: Any) -> Any:
+            return x[which] if isinstance(x, np.ndarray) else x
 
         size = len(range(*which.indices(self.size))) if isinstance(which, slice) else which.size
         return self._replace(
-            columns=cut(self.columns),
+            columns={name: cut(x) for name, x in self.columns.items()},
             shape=(size,),
             ends=self.ends and (self.ends[0][which], self.ends[1][which]),
-            std=cut(self.std),
-            codes=None if self.codes is None else self.codes[which],
-            given=cut(self.given),
+            std={name: cut(x) for name, x in self.std.items()},
+            f=cut(self.f),
         )
-
-    def by_kind(self) -> Iterator[tuple[slice | Places, "Cases"]]:
-        """The cases of each contact and direction, and where they stand."""
-        if self.codes is None:
-            yield slice(None), self
-            return
-        for kind in self.kinds:
-            where, fields = np.flatnonzero(self.codes == KINDS.index(kind)), kind.fields
-            part = self.part(where)
-            yield (
-                where,
-                part._replace(
-                    kind=kind,
-                    fields=fields,
-                    columns={name: part.columns[name] for name in fields},
-                    std={name: part.std[name] for name in fields if name in part.std},
-                    codes=None,
-                ),
-            )
 
     def reason(self, index: int) -> InputError:
-        """Why the case at ``index`` has no answer."""
+        """Return why the case at ``index`` has no answer."""
 
-        def at(column: Any) -> Any:
-            return column[index] if isinstance(column, np.ndarray) else column
+        def at(x: Any) -> float:
+            return float(x[index] if isinstance(x, np.ndarray) else x)
 
-        columns, std, others = (
-            {name: at(x) for name, x in part.items()}
-            for part in (self.columns, self.std, self.given)
-        )
-        ends = None
-        if self.ends is not None:
-            ends = float(self.ends[0][index]), float(self.ends[1][index])
+        k = at(self.columns["k"])
         try:
-            kind = self.kind or kind_of(others["contact"], others["direction"])
-            for name in AMPLITUDES:
-                if np.broadcast_to(self._strange(name), max(self.size, 1))[index]:
-                    raise _no_such_amplitude(name, float({**columns, **others}[name]), kind)
-            if ends and math.isnan(columns["k"]):
-                raise no_interval(*ends)
-            for name, deviation in std.items():
-                if name in kind.fields and not 0.0 <= deviation < math.inf:
-                    raise InputError(f"std_{name}", float(deviation), EXACT)
-            check({name: float(columns[name]) for name in kind.fields}, others.get("f"))
+            if self.ends is not None and math.isnan(k):
+                raise no_interval(at(self.ends[0]), at(self.ends[1]))
+            for name, deviation in self.std.items():
+                if not 0.0 <= at(deviation) < math.inf:
+                    raise InputError(f"std_{name}", at(deviation), EXACT)
+            f = None if self.f is None else at(self.f)
+            check({name: at(x) for name, x in self.columns.items()}, f)
         except InputError as error:
             return error
-        raise AssertionError(f"the case {columns} has an answer")
+        raise AssertionError(f"the case {self.columns} has an answer")
 
-    # --- relations between inputs -----------------------------------------------------------------
-
-    def _has(self, name: str) -> Any:
-        """Whether a case has an amplitude of this name, () or (n,)."""
-        if self.codes is None:
-            return np.bool_(name in self.fields)
-        return (_NORMAL[self.codes] == (name == AMPLITUDE)) & (self.codes >= 0)
-
-    def _strange(self, name: str) -> Any:
-        """Whether a case is given an amplitude that it does not have, () or (n,).  One number is
-        for those cases that have it."""
-        column, has = self.given.get(name, self.columns.get(name, math.nan)), self._has(name)
-        one_for_all = self.codes is not None and not isinstance(column, np.ndarray)
-        return ~has & ~np.isnan(column) & (not (one_for_all and has.any()))
-
-    def _where_they_agree(self, values: Mapping[str, Any], refuse: bool) -> "Cases":
-        """The same, with NaN in v0 where contact, direction, amplitudes and deviations do not go
-        together; where ``refuse``, InputError for the first case that is not legal."""
+    def _with_legal_deviations(self, refuse: bool) -> "Cases":
+        """Return the same with NaN in v0 where a deviation is illegal, so that the case has no
+        answer; where ``refuse``, raise InputError for the first one."""
         bad = np.zeros(self.size if self.shape else 1, np.bool_)
-        for name in AMPLITUDES:
-            if name not in self.columns and self.codes is not None and self._has(name).any():
-                raise _missing(
-                    values, tuple(x for x in self.fields if x not in AMPLITUDES or x == name)
-                )
-            bad |= self._strange(name)
-        for name, deviation in self.std.items():
-            legal = (np.asarray(deviation) >= 0.0) & (np.asarray(deviation) < math.inf)
-            bad |= ~legal if name not in AMPLITUDES else ~legal & self._has(name)
-        if self.codes is not None:
-            bad |= self.codes < 0
-        if refuse:
-            self._refuse_first(np.flatnonzero(bad).tolist()[:1])
+        for deviation in self.std.values():
+            bad |= ~((np.asarray(deviation) >= 0.0) & (np.asarray(deviation) < math.inf))
         if not bad.any():
             return self
-        return self._replace(
-            columns={**self.columns, "v0": np.where(bad, math.nan, self.columns["v0"])}
-        )
-
-    def _refuse_first(self, bad: list[int]) -> None:
-        """Refuse the first case that is ``bad``, or has a number out of bounds."""
-        for places, part in self.by_kind():
-            try:
-                check(part.columns, part.given.get("f"), (part.size,) if part.shape else ())
-            except InputError as error:
-                index = error.index or 0
-                bad.append(index if isinstance(places, slice) else int(places[index]))
-        if bad:
-            reason = self.reason(min(bad))
-            where = min(bad) if self.shape else None
-            raise InputError(reason.field, reason.value, reason.bound, where)
+        if refuse:
+            first = int(np.flatnonzero(bad)[0])
+            error = self.reason(first)
+            raise InputError(error.field, error.value, error.bound, first if self.shape else None)
+        v0 = np.where(bad, math.nan, self.columns["v0"])
+        return self._replace(columns={**self.columns, "v0": v0})
 
 
 # --- from inputs of any form to names and values --------------------------------------------------
@@ -291,10 +201,29 @@ def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
             raise InputError(name, keywords[name], "given once: in the cases or as a keyword")
         values = {**columns, **keywords}
         _refuse_similar(rest, values)
+    for name in KIND:
+        if name in values and type(values[name]) is not str:
+            values[name] = one_word(name, values[name])
     for name, value in values.items():
         if type(value) not in _UNLABELLED and not library_of(value) and _of_arrow(value):
             values[name] = np.asarray(value)  # NaN where it is null
     return values
+
+
+def one_word(name: str, column: Any) -> Any:
+    """Return the one word that a column of contacts or directions holds; where it is empty, the
+    usual one.
+
+    Raise InputError for several words, with the way to split the cases.
+
+    >>> one_word("contact", ["ball", "ball"])
+    'ball'
+    """
+    words = {str(word): word for word in np.asarray(column, object).ravel().tolist()}
+    if len(words) > 1:
+        bound = f'one for a call: split the cases, as cases.groupby("{name}") does'
+        raise InputError(name, " and ".join([*words][:2]), bound)
+    return next(iter(words.values()), SPRING.names[name])
 
 
 def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
@@ -520,7 +449,7 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     InputError where one is missing, is given twice, is no real number, has a deviation, or is the
     amplitude of another direction.
     """
-    _strange_amplitude(values, kind, refuse=True)
+    _refuse_other_amplitude(values, kind)
     for name in values.keys() & DEVIATIONS.keys():
         raise InputError(name, values[name], NO_DEVIATION)
     inputs = _inputs(values, kind.fields)
@@ -541,7 +470,7 @@ class _Inputs(NamedTuple):
     std: _Numbers
     ends: tuple[Any, Any] | None
     units: dict[str, str]
-    others: dict[str, Any]  #: f, where it was given
+    f: float | Array | None  #: where it was given
 
 
 def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
@@ -549,7 +478,7 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
     columns: _Numbers = {}
     units: dict[str, str] = {}
     std: _Numbers = {}
-    others: dict[str, Any] = {}
+    f: float | Array | None = None
     ends = ends_in(values)
     for name in fields:
         source = name if name != "omega" else _frequency_in(values, fields)
@@ -557,8 +486,6 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
             columns[name] = middle(*ends)
             continue
         if source not in values:
-            if name in AMPLITUDES and fields is ALL_FIELDS:
-                continue
             raise _missing(values, fields)
         value = values[source]
         if type(value) is not float and not (
@@ -573,10 +500,10 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
             if quantity.low is not None:
                 ends = quantity.low, quantity.high
         if source == "f":
-            others["f"] = value
+            f = value
             value = _angular(value)
         columns[name] = value
-    return _Inputs(columns, std, ends, units, others)
+    return _Inputs(columns, std, ends, units, f)
 
 
 def _deviations(
@@ -601,49 +528,19 @@ def _deviations(
     return std
 
 
-def _strange_amplitude(
-    values: Mapping[str, Any], kind: Kind | None, refuse: bool = False
-) -> dict[str, Any]:
-    """The amplitude of another direction, where there is a column of it: a case is refused where
-    it has a value.  InputError for one value of all cases."""
-    if kind is None:
-        return {}
-    name = AMPLITUDES[not kind.normal]
-    if name not in values:
-        return {}
-    value = values[name]
-    column = math.nan if value is None else read(name, value).si
-    if refuse or not isinstance(column, np.ndarray):
-        if not np.isnan(column).all() or value is None:
-            raise _no_such_amplitude(name, value, kind)
-        return {}
-    return {name: column}
+def _refuse_other_amplitude(values: Mapping[str, Any], kind: Kind) -> None:
+    """Raise InputError for the amplitude of another direction, unless its column is empty."""
+    name = kind.other_amplitude
+    if name in values and (values[name] is None or not np.isnan(read(name, values[name]).si).all()):
+        raise other_amplitude(name, values[name], kind)
 
 
-def _no_such_amplitude(name: str, value: Any, kind: Kind) -> InputError:
+def other_amplitude(name: str, value: Any, kind: Kind) -> InputError:
+    """Return the error for the amplitude of another direction."""
     bound = (
-        f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is "
-        f"{AMPLITUDES[kind.normal]}"
+        f"left out for direction {DIRECTIONS[kind.direction]}, whose amplitude is {kind.amplitude}"
     )
     return InputError(name, value, bound)
-
-
-def _texts(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Contact and direction: one text each, or arrays of them."""
-    texts = SPRING.names
-    for name in values.keys() & texts.keys():
-        text = values[name]
-        if not isinstance(text, str):
-            column = np.asarray(text, dtype=object)
-            text = column if column.ndim else column.item()
-        texts[name] = text
-    return texts
-
-
-def _of_direction(texts: Mapping[str, Any]) -> Kind | None:
-    """One spring in the direction of all cases; None where the direction is a column."""
-    direction = texts["direction"]
-    return kind_of(direction=direction) if isinstance(direction, str) else None
 
 
 def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> tuple[Array, Array]:
@@ -665,20 +562,6 @@ def _shape_of(*parts: Mapping[str, Any]) -> tuple[int, ...]:
     except ValueError as error:
         shapes = {name: x.shape for name, x in columns.items()}
         raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
-
-
-def codes_of(words: Mapping[str, Any], shape: tuple[int, ...]) -> Codes:
-    """The kind of each case by its place in KINDS, -1 where there is no such kind; contact and
-    direction are texts or arrays of them."""
-    pairs = []
-    for name, usual in SPRING.names.items():
-        word = words.get(name, usual)
-        one = np.empty((), object)
-        one[()] = word  # which may be a list: no word
-        column = word if isinstance(word, np.ndarray) else one
-        pairs.append(np.broadcast_to(column, shape).ravel().tolist())
-    codes = [code_of(*pair) for pair in zip(*pairs, strict=True)]
-    return np.array(codes, np.int8).reshape(shape)
 
 
 def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:

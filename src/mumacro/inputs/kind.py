@@ -8,7 +8,6 @@ Fz_amplitude cos(omega t).  The formulas are in ``kernel/contact.c`` and ``kerne
 here are the names.
 """
 
-import math
 from typing import Any, Literal, NamedTuple
 
 from mumacro.errors import InputError
@@ -36,8 +35,6 @@ SPRINGS_OF: dict[str, Springs] = {
 }
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
 AMPLITUDES = ("y0", AMPLITUDE)
-#: in a column of amplitudes a value that cannot be read: no gap, and legal in no direction
-UNREADABLE = -math.inf
 # by code of the direction
 _FIELDS = (
     FIELDS,
@@ -56,6 +53,16 @@ class Kind(NamedTuple):
     def normal(self) -> bool:
         """Whether the normal force oscillates."""
         return DIRECTIONS[self.direction] == "normal"
+
+    @property
+    def amplitude(self) -> str:
+        """The input that says how far it oscillates."""
+        return AMPLITUDES[self.normal]
+
+    @property
+    def other_amplitude(self) -> str:
+        """The input that says so for other directions."""
+        return AMPLITUDES[not self.normal]
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -107,15 +114,3 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
         "radius, not modelled"
     )
     raise InputError("direction", direction, bound)
-
-
-def code_of(contact: object, direction: object) -> int:
-    """The place of a contact and a direction in :data:`KINDS`, -1 where there is none.
-
-    >>> code_of("ball", "across"), code_of("ball", "normal")
-    (1, -1)
-    """
-    try:
-        return KINDS.index(_KINDS[contact, direction])  # type: ignore[index]
-    except (KeyError, TypeError):
-        return -1

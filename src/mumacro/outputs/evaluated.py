@@ -15,7 +15,7 @@ from mumacro.outputs.tabulated import Tabulated
 
 
 class Evaluated:
-    """Cases of one kind with their answer: plain numbers for one case, columns (n,) for many.
+    """Cases with their answer: plain numbers for one case, columns (n,) for many.
 
     k is infinite where the contact is rigid.  What is not legal is NaN, with the source code -1.
     The groups of columns are there for the details "groups" and "gradient", the slopes for
@@ -32,7 +32,7 @@ class Evaluated:
     gradient_bound: dict[str, Any]
 
     def __init__(self, tabulated: Tabulated, cases: Cases, detail: Detail = "values") -> None:
-        self.tabulated, self.cases, self.kind = tabulated, cases, cases.one_kind
+        self.tabulated, self.cases, self.kind = tabulated, cases, cases.kind
         self.columns, self.words = cases.columns, self.kind.names
         one = not cases.shape
         detail = "groups" if one and detail == "values" else detail

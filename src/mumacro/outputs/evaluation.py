@@ -1,9 +1,9 @@
 """Cases become their answer: the one place where outputs are computed."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +13,10 @@ from mumacro.answer import (
     Answer,
     AnswerWithGradient,
     IntervalAnswer,
-    add,
 )
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.doubts import Remark
 from mumacro.inputs.kind import BALL, Kind
-from mumacro.kernel.arrays import Bools
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.deviation import STD, bent
@@ -55,7 +52,7 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
     """The outputs of these names, each once, in their order; with those of deviations where the
     cases have some.
 
-    InputError for an unknown name, one that all of the cases lack, and std without a deviation.
+    InputError for an unknown name, one that the cases lack, and std without a deviation.
     """
     names = {*names_in(include)} if include else set()
     if not names and not cases.std:
@@ -66,11 +63,11 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
     if cases.std:
         names.add("std")
     outputs = tuple(output for name, output in OUTPUTS.items() if name in names)
-    if cases.kind is not None:
-        for output, word, why, where in _lacked(outputs, cases):
-            if where is True:
-                bound = f"without {output.name} for {word}: {why}"
-                raise InputError("include", output.name, bound)
+    lacking = {*cases.kind.names.values()} | ({"interval"} if cases.ends is not None else set())
+    for output in outputs:
+        for word in lacking & output.lacks.keys():
+            bound = f"without {output.name} for {word}: {output.lacks[word]}"
+            raise InputError("include", output.name, bound)
     return outputs
 
 
@@ -86,11 +83,11 @@ def _paths(names: tuple[str, ...], fields: tuple[str, ...]) -> tuple[str, ...]:
 
 def cost(outputs: Iterable[Output], cases: Cases) -> float:
     """The time of one of the cases with these outputs, about, in times of mu_macro alone for one
-    spring across; of several kinds that of the slowest."""
-    ball = any(kind.contact == BALL.contact for kind in cases.kinds)
+    spring across."""
+    ball = cases.kind.contact == BALL.contact
     costs = ((ball and output.cost_of_ball) or output.cost for output in outputs)
-    slowest = max(map(_cost_of, cases.kinds), default=1.0)
-    return (1.0 + sum(costs)) * slowest * (_INTERVAL if cases.ends is not None else 1.0)
+    over_interval = _INTERVAL if cases.ends is not None else 1.0
+    return (1.0 + sum(costs)) * _cost_of(cases.kind) * over_interval
 
 
 @cache
@@ -103,15 +100,12 @@ def _cost_of(kind: Kind) -> float:
 def answer(
     tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
 ) -> Answer[Any]:
-    """The answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too.
-
-    In a column of several kinds an output is NaN where a kind does not have it, with a remark.
-    """
+    """The answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too."""
     gradient = any(output.gradient for output in outputs)
     detail: Detail = "gradient" if gradient else "groups" if outputs or groups else "values"
     if not cases.shape:
         return _of_one(Evaluated(tabulated, cases, detail), outputs)
-    if not outputs and cases.codes is None and cases.ends is None:
+    if not outputs and cases.ends is None:
         rows = tabulated.rows(cases, detail)  # the kernel's arrays are the answer
         group_values = (rows.v_tilde, rows.y_tilde, rows.length_scale) if groups else None
         numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
@@ -157,26 +151,14 @@ def _of_many(
     tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...], detail: Detail
 ) -> Answer[Any]:
     """The answer to cases in columns, in their shape."""
-    remarks: list[Remark] = []
-    columns: Values = {}
-    for where, part in cases.by_kind():
-        evaluated = Evaluated(tabulated, part, detail)
-        for name, column in _columns(evaluated, outputs, remarks).items():
-            if cases.codes is None:
-                columns[name] = column
-            else:
-                none = -1 if name == "source" else math.nan
-                columns.setdefault(name, np.full(cases.size, none))[where] = column
+    columns = _columns(Evaluated(tabulated, cases, detail), outputs)
 
     def shaped(name: str) -> Any:
-        if name not in columns:
-            return np.full(cases.shape, math.nan)
         return columns[name].reshape(cases.shape)
 
-    source = columns["source"] if columns else np.full(cases.size, -1)
     answer: Answer[Any] = _type_of(cases, outputs)(
         *map(shaped, _ALWAYS[:3]),
-        np.asarray(source, np.int8).reshape(cases.shape),
+        np.asarray(columns["source"], np.int8).reshape(cases.shape),
         None if detail == "values" else (*map(shaped, GROUPS),),
         cases,
     )
@@ -187,7 +169,6 @@ def _of_many(
         answer.gradient, answer.gradient_bound = (
             {field: shaped(f"{name} {field}") for field in cases.fields} for name in _SLOPES
         )
-    answer.remarks_on_outputs = remarks
     return answer
 
 
@@ -196,25 +177,13 @@ _ALWAYS = ("mu_macro", "mu_ratio", "error_bound", "source")
 _SLOPES = ("gradient", "gradient_bound")
 
 
-def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Remark]) -> Values:
-    """All that is computed of cases of one kind in columns: outputs by path, and what stands beside
-    them by name; NaN where a case lacks an output, or is not legal."""
-    gaps: dict[str, Any] = {}
-    for output, word, why, where in _lacked(outputs, evaluated.cases):
-        gaps[output.name] = where
-        number = evaluated.cases.size if where is True else int(np.count_nonzero(where))
-        text = f"there is no {output.name} for {word}: {why}"
-        add(remarks, {"row": "include", "field": output.name, "cases": number, "text": text})
+def _columns(evaluated: Evaluated, outputs: tuple[Output, ...]) -> Values:
+    """All that is computed of cases in columns: outputs by path, and what stands beside them by
+    name; NaN where a case is not legal."""
     columns: Values = {}
     with np.errstate(all="ignore"):
         for output in outputs:
-            absent = gaps.get(output.name)
-            if absent is True:
-                continue
-            part = output.compute(evaluated)
-            if absent is not None:
-                part = {path: np.where(absent, math.nan, x) for path, x in part.items()}
-            columns |= part
+            columns |= output.compute(evaluated)
     illegal = evaluated.source < 0
     all_legal = not illegal.any()
     for path, x in columns.items():
@@ -225,20 +194,3 @@ def _columns(evaluated: Evaluated, outputs: tuple[Output, ...], remarks: list[Re
     for name in _SLOPES:
         columns |= {f"{name} {field}": x for field, x in members.get(name, {}).items()}
     return columns
-
-
-def _lacked(
-    outputs: tuple[Output, ...], cases: Cases
-) -> Iterator[tuple[Output, str, str, Bools | Literal[True]]]:
-    """The outputs that cases of one kind lack, for which direction or interval, why, and which
-    cases do: all of them, or these."""
-    words = cases.one_kind.names.values()
-    for output in outputs:
-        for word, why in output.lacks.items():
-            if word in words:
-                yield output, word, why, True
-            elif word == "interval" and cases.ends is not None:
-                low, high = cases.ends
-                wide = np.asarray(low != high)  # a number is an interval of itself
-                if wide.any():
-                    yield output, word, why, True if wide.all() else wide

@@ -16,7 +16,7 @@ from mumacro import closed_forms
 from mumacro.contacts.quadrature import prepare_driven
 from mumacro.errors import TableError
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import CONTACTS, KINDS, SPRING, Kind
+from mumacro.inputs.kind import CONTACTS, SPRING, Kind
 from mumacro.kernel import threads as slices
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
@@ -102,16 +102,10 @@ class Tabulated:
         """v~crit at amplitudes (n,)."""
         return _KERNEL.border(self._springs, y, kind)
 
-    def certain(self, v_tilde: Any, y_tilde: Any, kind: Kind | Codes = SPRING) -> Bools:
+    def certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Bools:
         """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~
-        together, in the shape of both; ``kind`` may be one for each, by its place in KINDS."""
+        together, in the shape of both."""
         v, y = np.asarray(v_tilde), np.asarray(y_tilde)
-        if not isinstance(kind, Kind):
-            certain = np.zeros(v.shape, np.bool_)
-            for code in np.unique(kind[kind >= 0]).tolist():
-                here = kind == code
-                certain[here] = self.certain(v[here], y[here], KINDS[code])
-            return certain
         crit = self.crit(np.ravel(y).astype(np.float64), kind).reshape(y.shape)
         margin = self.border.max_rel_error + 4.0 * atlas.ROUNDING
         with np.errstate(all="ignore"):
@@ -128,7 +122,7 @@ class Tabulated:
 
     def rows(self, cases: Cases, detail: Detail = "values") -> CaseRows:
         """Answers to cases of one kind, in their shape, (1,) for one case."""
-        kind, shape = cases.one_kind, cases.shape or (1,)
+        kind, shape = cases.kind, cases.shape or (1,)
         six = [*cases.columns.values()]
         return slices.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
 
@@ -137,7 +131,7 @@ class Tabulated:
         if cases.ends is None:
             raise TypeError("the cases have one k each")
         low, high = cases.ends
-        six, kind = [*{**cases.columns, "k": low}.values()], cases.one_kind
+        six, kind = [*{**cases.columns, "k": low}.values()], cases.kind
         return slices.intervals(self.data(kind=kind), six, high, self.threads, kind)
 
 

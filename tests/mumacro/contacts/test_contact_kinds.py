@@ -182,21 +182,6 @@ def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(
         table.quantity("mu_ratio", 0.1, 1.0, **NORMAL)
 
 
-def test_an_amplitude_of_another_direction_is_refused_beside_a_column_of_contacts(
-    table: Surrogate,
-) -> None:
-    both = {**CASE, "contact": ["ball", "spring"]}
-    answer = table.evaluate(**both, Fz_amplitude=[3.0, math.nan])
-    assert answer.source_code.tolist() == [-1, SOURCES.index("stick_slip_low")]
-    normal = {**without(both, "y0"), **NORMAL, "contact": ["spring", "spring"]}
-    lifted = table.evaluate(**normal, Fz_amplitude=3.0, y0=[math.nan, 2e-6])
-    assert lifted.source_code.tolist() == [SOURCES.index("normal_stick_slip"), -1]
-    with refused("Fz_amplitude"):
-        table.evaluate(**both, Fz_amplitude=3.0)
-    with refused("Fz_amplitude[0]"):
-        table.evaluate(**both, Fz_amplitude=[3.0, math.nan], illegal="raise")
-
-
 @pytest.mark.parametrize("end", ["1 ± 0.1 N/um", ["1 ± 0.1 N/um", "1 N/um"]], ids=str)
 def test_an_end_of_an_interval_has_no_deviation(table: Surrogate, end: Any) -> None:
     with refused("k_low"):
