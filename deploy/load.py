@@ -20,7 +20,7 @@ from contextlib import suppress
 from http.client import HTTPConnection, HTTPException
 from urllib.parse import urlsplit
 
-CASES, SLOTS = 100_000, 4  # MUMACRO_MAX_BATCH, MUMACRO_MAX_BATCHES
+CASES, SLOTS = 100_000, 4  # MUMACRO_MAX_BATCH, half of MUMACRO_MAX_COMPUTATIONS
 LARGEST = 16 * 2**20  # MUMACRO_MAX_BODY_BYTES
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 BATCH = "/v1/mu-macro/batch"

@@ -3,20 +3,25 @@ the same time.
 
     python fuzz/attacks.py [--only attacks] [--share 0.2] [--write]
 
-Beside each attack another client asks ``/livez``, one new connection after another.  Seen are the
-most memory of the process, and the longest of these waits.
+Beside each attack ``/livez`` is asked, one new connection after another, and another client asks
+a case, a law, a motion and ``/metrics`` in turn.  Seen are the most memory of the process, the
+longest of these waits, and the processor time that is taken when the attack is over.
 """
 
 import io
 import json
 import resource
+import threading
 import time
 import zipfile
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
-from http.client import HTTPException
+from contextlib import ExitStack, contextmanager, suppress
+from http.client import HTTPConnection, HTTPException
+from itertools import cycle
+from multiprocessing import get_context
+from typing import NamedTuple
 
 from mumacro.outputs import OUTPUTS
 from tests.support.measuring import main, markdown, sections
@@ -24,6 +29,7 @@ from tests.support.serving import CASE, Server, asking, connect, head, serving
 
 # the defaults; a few connections are left
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20
+AFTER_S = 3.0  # after an attack its work has ended
 EVERYTHING = [name for name in OUTPUTS if name != "std"]
 
 
@@ -176,6 +182,37 @@ def workbook(_: int) -> bytes:
     return json.dumps({"points_base64": b64encode(pieces.getvalue()).decode()}).encode()
 
 
+def at_once(number: int, path: str, body: bytes) -> Attack:
+    """One client asks the same on so many connections at the same time."""
+
+    def ask(server: Server, share: float) -> None:
+        def one(_: int) -> None:
+            with suppress(OSError, HTTPException):  # a server that reads no more
+                server.ask("POST", path, body, {"Content-Type": "application/json"})
+
+        with ThreadPoolExecutor(clients := max(2, round(number * share))) as pool:
+            list(pool.map(one, range(clients)))
+
+    return ask
+
+
+def fit_of(points: int) -> bytes:
+    v0 = [round(1e-3 * 1.005**i, 7) for i in range(points)]
+    rig = {"Fz": 10.0, "y0": 4e-7, "f": 2e4, "unknowns": ["k"], "mu0": 0.3}
+    mu = [round(0.3 * min(1.0, 20.0 * v) ** 0.4, 5) for v in v0]
+    return json.dumps({**rig, "v0": v0, "mu_macro": mu}, separators=(",", ":")).encode()
+
+
+def search(targets: int) -> bytes:
+    rig = {"mu0": 0.3, "Fz": 10.0, "f": 2e4, "v0": 0.01, "contact": "ball", "unknown": "k"}
+    wanted = [round(0.01 + 0.28 * i / targets, 5) for i in range(targets)]
+    shaken = {"harmonic": 20, "amplitude": 1e-6}
+    return json.dumps({**rig, "x": shaken, "target": wanted}).encode()
+
+
+SLOW_RIG = {"mu0": 0.0362, "Fz": 0.139, "k": 4.08e10, "f": 313.0, "v0": 8.64e-6}
+SLOW_PARTS = {"x": [9.92e-7, 122.11], "y": [4.64e-5, 320.02], "contact": "ball", "tolerance": 1e-7}
+SLOW = json.dumps({**SLOW_RIG, **SLOW_PARTS}).encode()
 ROW = json.dumps(CASE).encode()
 TYPED = ROW.replace(b"1000000.0", b'"' + b"x" * 60 + b'"')
 STRANGE_ROW = ROW[:-1] + b"".join(b',"%c":0' % (97 + i) for i in range(12)) + b"}"
@@ -199,6 +236,15 @@ ATTACKS: dict[str, Attack] = {
     ),
     "Heads of tables with as many brackets as a body has room for": fits(60, table_of_brackets),
     "A workbook whose styles unpack to 30 MiB": fits(4, workbook),
+    "200 batches of rows without a member, 64 KiB each": at_once(
+        200, "/v1/mu-macro/batch", b"[" + b"{}," * 21_000 + b"{}]"
+    ),
+    "200 fits of 1,000 points": at_once(200, "/v1/fit", fit_of(1000)),
+    "Searches with 1,000 targets over a ball, on 50 connections": at_once(
+        50, "/v1/solve-for", search(1000)
+    ),
+    "The same on 4 connections": at_once(4, "/v1/solve-for", search(1000)),
+    "A motion of a ball that takes a minute without a limit": at_once(4, "/v1/motion", SLOW),
     "Rows without a member": batches_of(
         repeated(b"[", b"{},", b"{}]", CASES), repeated(b"[", b"{},", b"{}]")
     ),
@@ -221,23 +267,96 @@ ATTACKS: dict[str, Attack] = {
 }
 
 
-def cost_of(attack: Attack, share: float) -> tuple[float, float]:
-    """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve
-    afterwards."""
+class Cost(NamedTuple):
+    """What an attack took: memory [MB], waits of others [s], processor time after its end [s]."""
+
+    memory: float
+    livez: float
+    metrics: float
+    other: float  #: the longest wait of another client's case, law or motion
+    refused: int  #: how many of these were not answered with 200
+    after: float
+
+
+OTHER = "127.0.0.2"  # the address of another client
+LAW = {name: value for name, value in CASE.items() if name != "v0"} | {"start": 1e-4, "stop": 1}
+MOTION = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 2e4, "v0": 0.01, "x": [1e-6, 90.0], "y": 2e-6}
+QUESTIONS = (
+    ("POST", "/v1/mu-macro", CASE),
+    ("POST", "/v1/law", LAW),
+    ("POST", "/v1/motion", MOTION),
+    ("GET", "/metrics", None),
+)
+
+
+@contextmanager
+def neighbour(server: Server) -> Iterator[list[tuple[str, int, float]]]:
+    """Another client, which asks in turn until the context ends: path, status and wait [s]."""
+    stop, seen = threading.Event(), list[tuple[str, int, float]]()
+
+    def ask() -> None:
+        for method, path, question in cycle(QUESTIONS):
+            if stop.wait(0.05) and seen:
+                return
+            body = None if question is None else json.dumps(question)
+            started, status = time.perf_counter(), 0
+            with suppress(OSError, HTTPException):
+                connection = HTTPConnection("127.0.0.1", server.port, 60, source_address=(OTHER, 0))
+                connection.request(method, path, body)
+                status = connection.getresponse().status
+                connection.close()
+            seen.append((path, status, time.perf_counter() - started))
+
+    with ThreadPoolExecutor(1) as pool:
+        loop = pool.submit(ask)
+        try:
+            yield seen
+        finally:
+            stop.set()
+        loop.result()
+
+
+def cost_of(attack: Attack, share: float) -> Cost:
+    """What an attack on a new service takes; it must serve afterwards."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(8192, most), most))
     with serving() as server:
-        with asking(server) as waits:
-            attack(server, share)
+        with asking(server) as waits, neighbour(server) as seen:
+            # in a process of its own, so that its clients delay no wait that is measured
+            attacker = get_context("fork").Process(target=attack, args=(server, share))
+            attacker.start()
+            attacker.join()
+        assert attacker.exitcode == 0
+        time.sleep(AFTER_S)
+        before = server.busy()
+        time.sleep(1.0)
+        after = server.busy() - before
         assert server.ask("POST", "/v1/mu-macro", json.dumps(CASE))[0] == 200
         assert not server.errors(), server.errors()[:1]
-        return server.memory("VmHWM"), max(waits)
+        memory = server.memory("VmHWM")
+    metrics = [(status, wait) for path, status, wait in seen if path == "/metrics"]
+    others = [(status, wait) for path, status, wait in seen if path != "/metrics"]
+    refused = sum(status != 200 for status, _ in (*metrics, *others))
+    longest = [max([0.0, *(wait for _, wait in each)]) for each in (metrics, others)]
+    return Cost(memory, max(waits), longest[0], longest[1], refused, after)
 
 
 def attacks(share: float) -> str:
-    costs = {name: cost_of(attack, share) for name, attack in ATTACKS.items()}
-    rows = [(name, f"{memory:.0f}", f"{1e3 * wait:.0f}") for name, (memory, wait) in costs.items()]
-    return markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
+    rows = []
+    for name, attack in ATTACKS.items():
+        cost = cost_of(attack, share)
+        waits = (f"{1e3 * wait:.0f}" for wait in (cost.livez, cost.metrics, cost.other))
+        rows.append((name, f"{cost.memory:.0f}", *waits, cost.refused, f"{1e3 * cost.after:.0f}"))
+    head = (
+        "attack",
+        "most memory [MB]",
+        "longest wait of /livez [ms]",
+        "of /metrics",
+        "of another client",
+        "of these not 200",
+        f"processor time {AFTER_S:g} s after it [ms/s]",
+    )
+    return markdown(head, rows)
 
 
 if __name__ == "__main__":

@@ -97,6 +97,8 @@ class Admission:
         self.queue: list[_Waiting] = []
         self.running: set[Thread[Any]] = set()
         self.is_stopping = False
+        #: how many connections are open, as our own server says
+        self.connections: Callable[[], int] = lambda: 0
         self._seconds = 0.1  # that a slot is held, in the mean of the last ones
         # the client that asked last, and the last other one, each with the time
         self._last = self._before = ("", -math.inf)

@@ -4,6 +4,7 @@ The import of this module does no work.  ``uvicorn --factory service.app:create_
 an argument the settings are read from the environment.
 """
 
+import asyncio
 import gc
 import logging
 import re
@@ -18,6 +19,7 @@ from fastapi.middleware.asyncexitstack import AsyncExitStackMiddleware
 from fastapi.openapi.constants import REF_TEMPLATE
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
+from starlette.datastructures import State
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -29,7 +31,7 @@ from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.inputs import without_null
 from .models.options import Case, CaseColumns, CaseRequest
-from .observe import Observe, Observer
+from .observe import LogLines, Observe, Observer
 from .problems import Failures
 from .reading import Direct
 from .routers import batch, case, contact, health, motion, page, questions, table
@@ -62,9 +64,30 @@ _TAGS = [
     {"name": "table", "description": "The verified table that the answers come from"},
     {"name": "health", "description": "For those who run the service: probes and counters"},
 ]
+_LOOK_EVERY_S = 1.0  # seconds between two looks at what the process holds
 # held while a description is made: FastAPI cannot make two at the same time
 _DESCRIBING = threading.Lock()
 _log = logging.getLogger("mumacro.app")
+
+
+def see_now(state: State) -> None:
+    """Tell the metrics what this process holds now."""
+    admission, lines = state.admission, LogLines.running
+    state.metrics.now(
+        connections=admission.connections(),
+        slots_in_use=admission.slots,
+        slots=state.settings.max_computations,
+        waiting=len(admission.queue),
+        held_bytes=admission.held_bytes,
+        overloaded=admission.refused,
+        log_lines_lost=lines.lost if lines else 0,
+    )
+
+
+async def _look(state: State) -> None:
+    while True:
+        see_now(state)
+        await asyncio.sleep(_LOOK_EVERY_S)
 
 
 @asynccontextmanager
@@ -81,7 +104,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     # waits until it is made.
     Thread(app.openapi)
     state = app.state
+    looking = asyncio.create_task(_look(state))
     yield {"settings": state.settings, "observer": state.observer, "admission": state.admission}
+    looking.cancel()
     app.state.admission.end()
 
 

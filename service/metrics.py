@@ -16,6 +16,8 @@ from prometheus_client import (
     Counter,
     Gauge,
     Histogram,
+    PlatformCollector,
+    ProcessCollector,
     disable_created_metrics,
     generate_latest,
     values,
@@ -28,7 +30,7 @@ from .tables import LoadedTable, Tables
 
 _SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
 # the files of prometheus_client for one worker, and their size with the labels below
-_FILES = ("counter", "histogram", "gauge_mostrecent")
+_FILES = ("counter", "histogram", "gauge_mostrecent", "gauge_livesum")
 _FILE_BYTES = 2**19
 _METHODS = frozenset({"GET", "HEAD", "POST"})
 _log = logging.getLogger("mumacro.metrics")
@@ -81,6 +83,26 @@ def _reserve() -> None:
         _log.warning("no room for shared counters, this worker has its own: %s", error)
 
 
+def forget_the_dead() -> None:
+    """Remove what workers that have been killed held."""
+    for file in Path(os.environ[_SHARED]).glob("gauge_livesum_*.db"):
+        number = file.stem.rpartition("_")[2]
+        if not Path("/proc", number).exists() and Path("/proc/self").exists():
+            file.unlink(missing_ok=True)
+
+
+#: what is there now, as gauges: names and meanings
+NOW = {
+    "connections": "Open connections",
+    "slots_in_use": "Computations that have a slot",
+    "slots": "Slots of computations",
+    "waiting": "Requests that wait for a slot",
+    "held_bytes": "Bytes of bodies that are held",
+    "overloaded": "Requests that were refused since the start because too much was at hand",
+    "log_lines_lost": "Lines of the log that could not be written since the start",
+}
+
+
 class Metrics:
     """Counters of requests and cases."""
 
@@ -109,6 +131,13 @@ class Metrics:
         bad = Counter(
             "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=registry
         )
+        # what is there now, by name: set at every look of the loop, and before they are shown
+        self._now = {
+            name: Gauge(f"mumacro_{name}", meaning, registry=registry, multiprocess_mode="livesum")
+            for name, meaning in NOW.items()
+        }
+        PlatformCollector(registry=registry)
+        ProcessCollector(registry=registry)
         labels = ["id", "tolerance"]
         self._info = Gauge(
             "mumacro_table_info",
@@ -155,10 +184,16 @@ class Metrics:
             if number:
                 self.case(table, code - 1, number)
 
+    def now(self, **values: float) -> None:
+        """Set what is there now, by the names of :data:`NOW`."""
+        for name, value in values.items():
+            self._now[name].set(value)
+
     def text(self) -> bytes:
         """The exposition format of Prometheus; with several workers, the sum over all."""
         registry = self.registry
         if _SHARED in os.environ:
             registry = CollectorRegistry()
+            forget_the_dead()
             MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
         return generate_latest(registry)

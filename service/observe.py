@@ -12,7 +12,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any, ClassVar
@@ -28,6 +27,7 @@ from .security import HEALTH_PATHS, NOSNIFF
 
 _GONE = 499  # the usual status for a client that disconnected before the answer
 _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs
+_TRACE = re.compile(rb"[0-9a-f]{2}-[0-9a-f]{32}-[0-9a-f]{16}-[0-9a-f]{2}")
 _OF_PROXIES = (b"x-forwarded-for", b"x-forwarded-proto")
 # characters that are shown of a client's address, which behind a proxy is a header of any length
 _MOST_SHOWN = 64
@@ -94,6 +94,11 @@ class LogLines(logging.Handler):
         threading.Thread(target=self._write, name="log", daemon=True).start()
         LogLines.running = self
 
+    @property
+    def lost(self) -> int:
+        """How many lines could not be written."""
+        return self._dropped
+
     def put(self, line: dict[str, Any]) -> None:
         """Keep a line if there is room."""
         if len(self._waiting) < _MOST_WAITING:
@@ -131,10 +136,17 @@ class LogLines(logging.Handler):
                 _log.warning(
                     "%d lines of the log were dropped: standard output was not read in time", more
                 )
-            with suppress(Exception):  # such as OSError: the reader is gone
-                rest = memoryview(b"".join(_written(line, form) for line in lines))
+            texts = [_written(line, form) for line in lines]
+            sizes, sent = [*itertools.accumulate(map(len, texts))], 0
+            rest = memoryview(b"".join(texts))
+            try:
                 while rest:
-                    rest = rest[os.write(1, rest) :]
+                    written = os.write(1, rest)
+                    rest, sent = rest[written:], sent + written
+            except OSError:  # the reader is gone, or the disk is full
+                lost = sum(size > sent for size in sizes)
+                self._dropped += lost
+                losses += lost  # a line about them would be lost, too
             self._writes = False
 
     def flush(self) -> None:
@@ -154,6 +166,14 @@ def log_config(level: str) -> dict[str, Any]:
         "root": {"level": "WARNING", "handlers": ["out"]},
         "loggers": {name: {"level": level.upper()} for name in ("mumacro", "uvicorn")},
     }
+
+
+def _trace_in(scope: Scope) -> dict[str, str]:
+    """The trace that a request belongs to, if it says so (W3C Trace Context)."""
+    for name, value in scope["headers"]:
+        if name == b"traceparent" and _TRACE.fullmatch(value):
+            return {"traceparent": value.decode()}
+    return {}
 
 
 class Observer:
@@ -200,6 +220,7 @@ class Observer:
                 "duration_ms": round(1e3 * seconds, 3),
                 "client": client[0][:_MOST_SHOWN] if client else None,
                 **({"key": holder} if holder else {}),
+                **_trace_in(scope),
             }
         )
 

@@ -175,6 +175,7 @@ class Connection(HttpToolsProtocol):
         """Make room, and wait for a request."""
         super().connection_made(transport)
         self.transport: Any = _Transport(transport, self.loop)
+        self._admission.connections = self.connections.__len__
         if len(self.connections) > self._settings.max_connections and self.waiting:
             oldest = next(iter(self.waiting))
             del self.waiting[oldest]

@@ -4,9 +4,9 @@ members.
 A member whose value can be missing is null there; what ``include`` did not ask for is left out.
 """
 
-from typing import Any, Generic, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeAlias, TypeVar
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, WithJsonSchema
 
 from mumacro.inputs.kind import ContactName, DirectionName
 from mumacro.outputs import MEMBERS
@@ -406,7 +406,9 @@ class StiffnessAnswer(BaseModel):
 
 # --- fit ------------------------------------------------------------------------------------------
 
-_Stiffness = float | Literal["rigid"] | None
+# an enumeration: a client of openapi-python-client takes a constant for the only value there is
+_Rigid = Annotated[Literal["rigid"], WithJsonSchema({"type": "string", "enum": ["rigid"]})]
+_Stiffness = float | _Rigid | None
 
 
 class FittedValues(BaseModel):
@@ -461,7 +463,7 @@ class FitAnswer(Answered):
     )
     contact: ContactName
     direction: DirectionName
-    points: dict[str, list[float | Literal["rigid"] | None]] = Field(
+    points: dict[str, list[_Stiffness]] = Field(
         description="What was fitted to, in SI: the known inputs of each point, mu_macro, and std "
         "where it was given"
     )

@@ -28,11 +28,11 @@ import sys
 
 from mumacro_client import Client
 from mumacro_client.api.answers import (
-    get_mu_macro, post_mu_macro, post_mu_macro_batch, post_solve_for
+    get_mu_macro, post_fit, post_mu_macro, post_mu_macro_batch, post_solve_for
 )
 from mumacro_client.models import (
-    Case, CaseAnswer, CaseColumns, CaseRequest, CaseRequestIncludeItem, ColumnsAnswer,
-    Power, Problem, RowsAnswer, SolveForAnswer, SolveForRequest, SolveForRequestUnknown,
+    Case, CaseAnswer, CaseColumns, CaseRequest, CaseRequestIncludeItem, ColumnsAnswer, FitAnswer,
+    FitRequest, Power, Problem, RowsAnswer, SolveForAnswer, SolveForRequest, SolveForRequestUnknown,
 )
 
 client = Client(base_url=sys.argv[1])
@@ -56,6 +56,10 @@ assert isinstance(rows, RowsAnswer) and rows.results[0] is not None
 solved = post_solve_for.sync(client=client, body=SolveForRequest(
     unknown=SolveForRequestUnknown.V0, target=mu, mu0=0.3, fz=10.0, k=1e6, y0=2e-6, omega=1.3e5))
 assert isinstance(solved, SolveForAnswer)
+fitted = post_fit.sync(client=client, body=FitRequest(  # docs/http.md
+    v0=[0.001, 0.005, 0.02, 0.1], mu_macro=[0.069, 0.174, 0.247, 0.289], fz=10.0, y0=0.4e-6,
+    f=20e3))
+assert isinstance(fitted, FitAnswer) and fitted.values.k > 1e6
 print(json.dumps([
     mu, one.power.saved, one.regime.value, rigid.mu_macro, refused.errors[0].field,
     columns.mu_macro, rows.results[0].mu_macro, solved.results[0].roots[0].value,

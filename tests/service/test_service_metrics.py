@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -13,6 +14,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from mumacro import Surrogate
+from service.app import see_now
+from service.metrics import NOW, forget_the_dead
 from tests.support.cases import CASE, Case
 
 PATH = "/v1/mu-macro"
@@ -153,7 +156,7 @@ def test_without_room_for_shared_counters_a_worker_has_its_own(
         counted = 'mumacro_requests_total{method="GET",route="/livez",status="200"} 1.0'
         assert counted in done.stdout.splitlines()
     files = [path.name for path in tmp_path.iterdir()]
-    assert len(files) == 3, files
+    assert len(files) == 4, files
 
 
 def test_a_slot_is_given_back_when_its_thread_cannot_start_and_counters_need_none(
@@ -177,3 +180,39 @@ def test_a_slot_is_given_back_when_its_thread_cannot_start_and_counters_need_non
     monkeypatch.setattr(type(fresh.app.state.admission), "slots", 8)
     assert fresh.post("/v1/law", json=law).status_code == 503
     assert [fresh.get(path).status_code for path in ("/metrics", "/livez", "/readyz")] == [200] * 3
+
+
+def test_what_is_held_now_is_shown(fresh: Any) -> None:
+    see_now(fresh.app.state)
+    values = {name: x for (name, *labels), x in scrape(fresh).items() if not labels}
+    assert {f"mumacro_{name}" for name in NOW} <= values.keys()
+    assert values["mumacro_slots"] == 8
+    assert values["process_resident_memory_bytes"] > 1e7
+    admission = fresh.app.state.admission
+    admission.hold("a", 1000)
+    see_now(fresh.app.state)
+    assert scrape(fresh)["mumacro_held_bytes",] == 1000
+    admission.hold("a", -1000)
+
+
+def test_a_worker_that_was_killed_holds_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    file = tmp_path / f"gauge_livesum_{dead.pid}.db"
+    file.write_bytes(bytes(100))
+    alive = tmp_path / f"gauge_livesum_{os.getpid()}.db"
+    alive.write_bytes(bytes(100))
+    monkeypatch.setenv("PROMETHEUS_MULTIPROC_DIR", str(tmp_path))
+    forget_the_dead()
+    assert (file.exists(), alive.exists()) == (False, True)
+
+
+def test_every_alert_asks_for_metrics_that_there_are(fresh: Any, repository: Path) -> None:
+    text = (repository / "deploy" / "alerts.yaml").read_text()
+    see_now(fresh.app.state)
+    fresh.post(PATH, json=CASE)
+    names = {name for name, *_ in scrape(fresh)}
+    asked = {*re.findall(r"\b(?:mumacro|process)_[a-z_]+\b", text)}
+    assert asked <= names, asked - names

@@ -1,6 +1,7 @@
 """The service as a process: its start and end, its health check, and its log, which no client and
 no reader harms."""
 
+import errno
 import http.client
 import json
 import os
@@ -13,7 +14,7 @@ import threading
 import time
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ import pytest
 from mumacro import Surrogate
 from service.observe import LogLines, for_people
 from tests.support.cases import Case
-from tests.support.serving import CASE, connect, head, to_end
+from tests.support.serving import CASE, ROOT, connect, head, to_end
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 #: texts that a client behind a proxy can send in place of its address
@@ -426,3 +427,66 @@ def test_the_log_goes_on_after_a_line_that_cannot_be_written(capfd: Any) -> None
     written = capfd.readouterr().out.splitlines()
     assert len(written) == 4
     assert "the last" in written[-1]
+
+
+def test_lines_that_cannot_be_written_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines, real = LogLines(), os.write
+
+    def full(number: int, data: Any) -> int:
+        if number == 1:
+            raise OSError(errno.ENOSPC, "no space left on device")
+        return real(number, data)
+
+    monkeypatch.setattr(os, "write", full)
+    for i in range(3):
+        lines.put({"time": datetime.now(UTC), "level": "info", "logger": "x", "message": str(i)})
+    lines.flush()
+    assert lines.lost == 3
+    LogLines.running = None
+
+
+def test_a_trace_is_in_the_line_of_its_request(strict_server: Any) -> None:
+    trace = f"00-{'ab' * 16}-{'cd' * 8}-01"
+    values = {"trace-1": trace, "trace-2": "00-no-trace", "trace-3": trace.upper()}
+    for name, value in values.items():
+        headers = {"traceparent": value, "X-Request-ID": name}
+        strict_server.ask("GET", "/v1/table", headers=headers)
+    until, told = time.monotonic() + 60, dict[str, Any]()
+    while len(told) < len(values):
+        assert time.monotonic() < until
+        time.sleep(0.1)
+        lines = (line for line in accesses(strict_server.lines) if line["request_id"] in values)
+        told = {line["request_id"]: line.get("traceparent") for line in lines}
+    assert told == {"trace-1": trace, "trace-2": None, "trace-3": None}
+
+
+def test_a_service_without_standard_output_serves_and_writes_to_nobody(
+    surrogate: Surrogate,
+) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = f"exec {sys.executable} -m service --port {port} --tables {surrogate.path} >&- 2>&-"
+    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(["sh", "-c", command], cwd=ROOT, env=variables)
+
+    def ready() -> bytes:
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+        try:
+            connection.request("GET", "/readyz")
+            return connection.getresponse().read()
+        finally:
+            connection.close()
+
+    try:
+        until, answer = time.monotonic() + 120, b""
+        while not answer.startswith(b'{"status":"ready"'):
+            assert process.poll() is None
+            assert time.monotonic() < until
+            time.sleep(0.1)
+            with suppress(OSError):
+                answer = ready()
+        process.terminate()
+        assert process.wait(60) == 0
+    finally:
+        process.kill()

@@ -71,7 +71,8 @@ export function fromAddress(hash) {
   const state = startState();
   const unknown = [];
   for (const [name, value] of new URLSearchParams(hash.slice(1))) {
-    if (name in CHOICES ? CHOICES[name].includes(value) : name in state) state[name] = value;
+    const choices = Object.hasOwn(CHOICES, name) ? CHOICES[name] : [value];
+    if (Object.hasOwn(state, name) && choices.includes(value)) state[name] = value;
     else unknown.push(`${name}=${value}`);
   }
   if (state.k.trim().toLowerCase() === "rigid")

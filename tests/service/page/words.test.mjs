@@ -84,6 +84,10 @@ describe("the address holds the case", () => {
       assert.equal(state.toAddress(again), state.toAddress(first));
     });
   test("what the page does not know is named", () => {
+    for (const name of ["constructor", "toString", "__proto__"]) {
+      const { unknown: names } = state.fromAddress(`#${name}=1&mu0=0.4`);
+      assert.deepEqual(names, [`${name}=1`]);
+    }
     const { state: read, unknown } = state.fromAddress("#mu0=0.4&omega=3&contact=box");
     assert.equal(read.mu0, "0.4");
     assert.deepEqual(unknown, ["omega=3", "contact=box"]);
