@@ -204,12 +204,14 @@ async def read_body(
     headers: Mapping[bytes, bytes],
     receive: Receive,
     limit: int,
-    ticket: Ticket,
+    scope: Scope,
 ) -> bytearray:
-    """The body of a request, which its ``ticket`` holds."""
+    """The body of a request, which its ticket holds, unless it is small and there at once: then it
+    is answered before anything else is read."""
     length = headers.get(b"content-length", b"0").strip()
     size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
     body, more = bytearray(), True
+    ticket: Ticket | None = None
     while True:
         if size > limit:
             remedy = (
@@ -221,7 +223,10 @@ async def read_body(
                 f"a body may have up to {limit} bytes: {remedy}",
                 max_bytes=limit,
             )
-        ticket.weigh(size)
+        if size > AT_ONCE or (body and more):
+            ticket = ticket or ticket_of(scope)
+            ticket.weigh(size)
+            ticket.hold(len(body))
         if not more:
             return body.removeprefix(_BYTE_ORDER_MARK)  # RFC 8259, 8.1
         message = await receive()
@@ -230,7 +235,6 @@ async def read_body(
         body += message.get("body", b"")
         more = message.get("more_body", False)
         size = len(body)
-        ticket.hold(size)
 
 
 async def small_body(request: Request) -> bytes:
@@ -240,7 +244,7 @@ async def small_body(request: Request) -> bytes:
         only_json(headers)
     settings = request.app.state.settings
     limit = min(SMALL_BODY, settings.max_body_bytes)
-    reading = read_body(headers, request.receive, limit, ticket_of(request.scope))
+    reading = read_body(headers, request.receive, limit, request.scope)
     if ABORT in request.scope.get("state", ()):  # our own server limits this wait (server.py)
         body = bytes(await reading)
     else:

@@ -86,7 +86,6 @@ class Connection(HttpToolsProtocol):
     _due = _end = math.inf  # when the client must have moved, and the answer be complete
     _bytes = 0  # since the last answer
     _in_head = _second = False
-    _trailers = 0  # fields behind the body
     _refusal: RequestError | None = None
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -153,17 +152,6 @@ class Connection(HttpToolsProtocol):
         """Refuse new work; uvicorn calls this for every connection when it is to stop."""
         self._admission.begin_stop()
         super().shutdown()
-
-    def on_header(self, name: bytes, value: bytes) -> None:
-        """Take a field of a head; those behind a body say nothing of the request (RFC 9110,
-        6.5.1)."""
-        if self._in_head:
-            super().on_header(name, value)
-            return
-        self._trailers += 1
-        if self._trailers > MAX_FIELDS:
-            self._refusal = _TOO_LARGE
-            raise _TOO_LARGE
 
     def abort(self) -> None:
         """End the connection without the rest of an answer."""
@@ -261,7 +249,6 @@ class Connection(HttpToolsProtocol):
             self._second, self.cycle.keep_alive = True, False
             raise ValueError("a second request")
         self._in_head, self._due, self._begun = True, math.inf, self.loop.time()
-        self._trailers = 0
         super().on_message_begin()
 
     def on_headers_complete(self) -> None:
@@ -282,6 +269,8 @@ class Connection(HttpToolsProtocol):
             self.scope["state"][FULL] = True
         self.scope["state"][ABORT] = self.abort
         super().on_headers_complete()
+        # fields behind a body say nothing of the request (RFC 9110, 6.5.1)
+        self.headers = []
         self._end = self.loop.time() + self._settings.time_limit_s + _MARGIN_S
 
     def on_message_complete(self) -> None:

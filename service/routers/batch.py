@@ -40,7 +40,7 @@ class _Answer(Response):
     def __init__(self, request: Request, options: BatchOptions) -> None:
         self._state, self._options = request.app.state, options
         self._fields: dict[bytes, bytes] = dict(request.scope["headers"])
-        self._ticket = ticket_of(request.scope)
+        self._scope = request.scope
         self._patience: int = self._state.settings.client_timeout_s
         # HTTP/1.0 knows no answer in pieces
         self._piece = math.inf if request.scope["http_version"] == "1.0" else _PIECE
@@ -55,7 +55,9 @@ class _Answer(Response):
         async def run(work: Callable[[], T], cost: float) -> T:
             """Do the work at once if it is small, else in a thread, so that it delays no other
             request."""
-            return work() if cost <= AT_ONCE else await self._ticket.run(work, cost, receive)
+            return (
+                work() if cost <= AT_ONCE else await ticket_of(self._scope).run(work, cost, receive)
+            )
 
         async def give(piece: bytes, more: bool) -> None:
             message = {"type": "http.response.body", "body": piece, "more_body": more}
@@ -64,7 +66,7 @@ class _Answer(Response):
         only_json(self._fields, f"for more cases than a batch may have {MORE_CASES}")
         limit = self._state.settings.max_body_bytes
         text = await from_client(
-            read_body(self._fields, receive, limit, self._ticket), self._patience
+            read_body(self._fields, receive, limit, self._scope), self._patience
         )
         if not text:
             raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
@@ -72,7 +74,7 @@ class _Answer(Response):
         # computation.
         cost = len(text) / _BYTES_PER_UNIT
         batch = await run(partial(self._batch, text), cost + _by_one(text))
-        self._ticket.hold(0)  # the text is gone
+        ticket_of(self._scope).hold(0)  # the text is gone
         cost += batch.cost
         pieces = _gathered(batch.write(), self._piece)
         piece, following = await run(lambda: (next(pieces, b""), next(pieces, None)), cost)
@@ -83,7 +85,7 @@ class _Answer(Response):
         while following is not None:
             await give(piece, more=True)
             piece, following = following, await run(lambda: next(pieces, None), cost)
-        self._ticket.leave()
+        ticket_of(self._scope).leave()
         await give(piece, more=False)
 
     def _batch(self, text: bytearray) -> Batch:
