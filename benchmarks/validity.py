@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from mumacro import Surrogate
-from mumacro.analysis.settling import settling
 from mumacro.plotting import INK, Panels, save
 from mumacro.stiffness import Material, ball_on_flat, flat_punch
 
@@ -66,7 +65,7 @@ def rigs() -> str:
                 "omega": 4e4 * math.pi,
                 "v0": v0,
             }
-            answer, decay = s.evaluate(**case), settling(s, **case)
+            answer = s.evaluate(**case, include=("groups", "settling"))
             places.append((answer.v_tilde, answer.y_tilde))
             cells = [
                 f"{contact.k:.2g}",
@@ -80,7 +79,7 @@ def rigs() -> str:
                 f"{answer.mu_ratio:.3f}",
                 answer.regime,
             ]
-            rows.append([name, *cells, *groups, f"{decay.periods:.2g}"])
+            rows.append([name, *cells, *groups, f"{answer['settling.periods']:.2g}"])
 
     def draw(axes: Any) -> None:
         s.plot(axes)

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from builder.approximations import approximations, border_speeds
 from mumacro import MumacroError, Surrogate, closed_forms, motion, plotting
-from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.law import law as friction_law
 from mumacro.kernel.arrays import Array
 

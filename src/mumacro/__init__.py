@@ -21,7 +21,6 @@ if _TYPE_CHECKING:
     from mumacro.analysis.harmonics import Harmonics, harmonics
     from mumacro.analysis.law import law
     from mumacro.analysis.motion import Motion, motion
-    from mumacro.analysis.settling import settling
     from mumacro.analysis.solve_for import solve_for
     from mumacro.analysis.solve_motion import MotionSolution, solve_motion
     from mumacro.answer import Answer
@@ -44,7 +43,6 @@ _PLACES = {
     "law": "analysis.law",
     "Motion": "analysis.motion",
     "motion": "analysis.motion",
-    "settling": "analysis.settling",
     "solve_for": "analysis.solve_for",
     "MotionSolution": "analysis.solve_motion",
     "solve_motion": "analysis.solve_motion",
@@ -77,7 +75,6 @@ __all__ = [
     "motion",
     "open",
     "plotting",
-    "settling",
     "solve_for",
     "solve_motion",
     "stiffness",

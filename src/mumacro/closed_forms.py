@@ -4,7 +4,7 @@ beside them.
 Every function takes and returns dimensionless arrays that broadcast: ``v`` = v~ = v0/(l0 omega),
 ``y`` = y~ = y0/l0, l0 = mu0 Fz/k.  With mu0 and l0 omega as factors they are the paper's
 dimensional equations: (37) is :func:`outer`, (38) is :func:`static_limit`, (39) is
-:func:`border_24`, (40) is :func:`critical`.  :mod:`mumacro.analysis.approximations` offers them in
+:func:`border_24`, (40) is :func:`critical`.  ``builder.approximations`` offers them in
 SI units by their numbers.
 
 "Off by" is the largest deviation from the full model.  docs/validation.md has all deviations with

@@ -132,7 +132,7 @@ def stepped(s: Surrogate) -> Any:
 
 def settled(s: Surrogate) -> Any:
     return [
-        mumacro.settling(s, **{**CASE, "v0": EDGES[:-2]}, contact=contact).to_dict()
+        s.evaluate({**CASE, "v0": EDGES[:-2]}, contact=contact, include="settling").to_dict()
         for contact in ("spring", "ball")
     ]
 

@@ -17,7 +17,7 @@ def test_modules_of_the_face_are_imported_by_its_names() -> None:
 def test_the_face_is_what_users_need() -> None:
     assert {name for name in dir(mumacro) if not name.startswith("__")} == {
         *("open", "Surrogate", "Answer", "Fit", "Element", "Motion", "MotionSolution"),
-        *("law", "solve_for", "settling", "fit", "motion", "solve_motion"),
+        *("law", "solve_for", "fit", "motion", "solve_motion"),
         *("harmonics", "Harmonics"),
         *("stiffness", "closed_forms", "validity", "plotting"),
         *("InputError", "MumacroError", "TableError", "REGIMES", "SOURCES"),

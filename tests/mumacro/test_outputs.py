@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mumacro import InputError, Surrogate, settling, solve_for
+from mumacro import InputError, Surrogate, solve_for
 from mumacro.analysis.motion import motion
 from mumacro.answer import TEXTS
 from mumacro.contacts.element import Element
@@ -249,7 +249,6 @@ def test_what_computes_no_deviation_refuses_one_by_name(table: Surrogate) -> Non
     five, doubt = without(CASE, "v0", "mu0"), "0.3 ± 0.1"
     calls: list[tuple[str, Any]] = [
         ("mu0", lambda: solve_for(table, "v0", 0.2, mu0=doubt, **five)),
-        ("mu0", lambda: settling(table, mu0=doubt, v0=0.01, **five)),
         ("mu0", lambda: motion(mu0=doubt, v0=0.01, y=2e-6, **without(five, "y0"))),
         ("mu0", lambda: Element(doubt, 10.0, 1e6)),
         ("std_mu0", lambda: solve_for(table, "v0", 0.2, mu0=0.3, std_mu0=0.1, **five)),

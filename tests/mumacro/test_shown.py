@@ -59,9 +59,6 @@ RESULTS: dict[str, Callable[[Surrogate, int], Any]] = {
     "solution of a motion": lambda _, n: mumacro.solve_motion(
         "v0", np.linspace(-0.2, 0.2, n), **MOTION
     ),
-    "settling": lambda s, n: mumacro.settling(
-        s, **without("v0"), v0=np.geomspace(1e-3, 1.0, n)
-    ),
     "prediction": lambda _, n: fit_of(9).predict(v0=np.geomspace(1e-3, 1.0, n)),
     "fit": lambda _, n: fit_of(n + 3),
 }  # fmt: skip
@@ -73,7 +70,6 @@ ONE: dict[str, Callable[[Surrogate], Any]] = {
     "motion": lambda _: mumacro.motion(**MOTION, v0=0.01),
     "solution of a motion": lambda _: mumacro.solve_motion("v0", 0.0, **MOTION),
     "solution without a root": lambda s: mumacro.solve_for(s, "y0", 0.5, **without("y0")),
-    "settling": lambda s: mumacro.settling(s, **CASE),
     "prediction": lambda _: fit_of(9).predict(v0=0.01),
     "fit with warnings": lambda _: fit_of(12, warn=True),
     "surrogate": lambda s: s,

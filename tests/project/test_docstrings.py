@@ -33,7 +33,6 @@ def test_there_are_examples() -> None:
     used = {
         "answer.Answer",
         "table.bundled.bundled_tables",
-        "analysis.settling.settling",
         "analysis.fit.fit",
         "contacts.element.Element",
     }

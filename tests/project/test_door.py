@@ -1,7 +1,6 @@
 """Kinds of values by entrances: every cell is the right number, or a refusal that names what it
 refuses."""
 
-import csv
 import datetime
 import decimal
 import fractions
@@ -10,7 +9,6 @@ import importlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -307,10 +305,6 @@ def solved(case: Read) -> Any:
     return keywords({**_plain(rest), "mu0": root.value})
 
 
-def settled(case: Read) -> Any:
-    return mumacro.settling(surrogate(), **case).periods
-
-
 def moved(case: Read) -> Any:
     rest = {name: x for name, x in case.items() if name != "y0"}
     return mumacro.motion(**rest, y=case["y0"]).mu_macro
@@ -351,7 +345,6 @@ PYTHON = {
     "mapping": mapping,
     "law": law,
     "solve_for": solved,
-    "settling": settled,
     "motion": moved,
     "Element": stepped,
     "fit": predicted,
@@ -408,7 +401,7 @@ def _importable(module: str) -> None:
     pytest.importorskip(module, reason=f"{module} of requirements/peers.txt is not installed")
 
 
-@pytest.mark.parametrize("entrance", ["keywords", "mapping", "settling", "motion"])
+@pytest.mark.parametrize("entrance", ["keywords", "mapping", "motion"])
 @pytest.mark.parametrize("kind", by_package(ARRAYS))
 def test_arrays_of_any_kind_are_understood_or_refused(kind: str, entrance: str) -> None:
     module, of_kind = ARRAYS[kind]
@@ -443,35 +436,6 @@ def test_the_command_understands_or_refuses(capsys: Capture, kind: str, quoted: 
         assert meant.split()[0] in err  # blanks separate what is typed
     else:
         assert json.loads(out)["mu_macro"] == close(keywords({**BASE, **meant}), rel=1e-9)
-
-
-#: a table has one decimal sign, and copies columns that are no inputs
-_OF_FILES = {"decimal comma", "ambiguous", "misspelt name", "name with a unit"}
-
-
-@pytest.mark.parametrize("kind", [kind for kind in TEXTS if kind not in _OF_FILES])
-def test_a_cell_is_understood_or_rejected(capsys: Capture, tmp_path: Path, kind: str) -> None:
-    make, meant = TEXTS[kind]
-    row = {**BASE, **make()}
-    table, result = tmp_path / "cases.csv", tmp_path / "out.csv"
-    with table.open("w", encoding="utf-8", newline="") as stream:
-        rows = csv.writer(stream)
-        rows.writerows([row, row.values(), [BASE[name] for name in row]])
-    code = main(["eval", str(table), "-o", str(result), "--table", "1e-7"])
-    capsys.readouterr()
-    with result.open(encoding="utf-8", newline="") as stream:
-        answers = [float(one["mu_macro"]) for one in csv.DictReader(stream)]
-    if isinstance(meant, str):
-        assert code == 3
-        assert answers == [close(keywords(BASE), rel=1e-9)]
-        [rejects] = tmp_path.glob("*rejects*")
-        [[_, field, _, reason]] = [*csv.reader(rejects.read_text("utf-8").splitlines())][1:]
-        assert field == meant
-        assert reason
-    else:
-        assert code == 0
-        right = [keywords({**BASE, **meant}), keywords(BASE)]
-        assert answers == close(right, rel=1e-9)
 
 
 def _asked(server: Any, change: Read, form: str) -> tuple[int, Any]:
@@ -560,17 +524,3 @@ def test_a_deviation_or_an_interval_is_understood_everywhere(
         assert status == 200, answer
         one = answer["results"][0] if form == "rows" else answer
         assert _spread(one) == close(right, rel=1e-9)
-
-
-@pytest.mark.parametrize("kind", SPREADS)
-def test_a_cell_with_two_numbers_says_which_columns_have_them(
-    capsys: Capture, tmp_path: Path, kind: str
-) -> None:
-    row = {**BASE, **{name: text.replace(",", ".") for name, text in SPREADS[kind][0].items()}}
-    table, [name] = tmp_path / "cases.csv", SPREADS[kind][0]
-    table.write_text(f"{','.join(row)}\n{','.join(map(str, row.values()))}\n", "utf-8")
-    assert main(["eval", str(table), "-o", str(tmp_path / "out.csv"), "--table", "1e-7"]) == 3
-    capsys.readouterr()
-    [rejects] = tmp_path.glob("*rejects*")
-    columns = "k_low and k_high" if "k_low" in SPREADS[kind][1] else f"std_{name}"
-    assert columns in rejects.read_text("utf-8")

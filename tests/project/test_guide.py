@@ -108,10 +108,6 @@ ELSEWHERE = {
         "tests/builder/test_builder_cli.py",
         'here(*words, "--write")',
     ),
-    "mumacro law --approximations": (
-        "tests/mumacro/cli/test_command.py",
-        '*words, "--approximations")',
-    ),
     "python benchmarks/tables_readme.py": (
         "tests/project/test_benchmarks.py",
         '"benchmarks.tables_readme").tables(',

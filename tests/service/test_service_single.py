@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mumacro import Surrogate
-from mumacro.analysis.settling import settling
 from service import reading
 from tests.support.cases import Case, flat
 from tests.support.comparing import close
+from tests.support.settling import settling
 
 DEFAULT = {"mu_macro", "mu_ratio", "regime", "error_bound", "source", "table", "api_version"}
 REMARKS = ("remarks",)  # only where something is doubtful

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mumacro.analysis.approximations import approximations
 from mumacro.analysis.law import law as friction_law
 from mumacro.cli import common
 from mumacro.cli.common import (
@@ -39,9 +38,6 @@ def _parser() -> OneLineParser:
     )
     parser.add_argument("--points", type=int, help="number of values; default: 25, in pictures 400")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
-    parser.add_argument(
-        "--approximations", action="store_true", help="also the approximations of the article"
-    )
     common.add_exponent(parser)
     return parser
 
@@ -69,7 +65,7 @@ def run(words: Sequence[str]) -> str:
         **case,
     )
     model = load_rows(along, law.case, options.contact, law.stiffening)
-    columns = law.columns | (approximations(surrogate, law) if options.approximations else {})
+    columns = law.columns
     if options.json:
         members = {
             "along": along,

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mumacro import InputError, Surrogate, closed_forms, plotting
-from mumacro.analysis.approximations import (
+from builder.approximations import (
     APPROXIMATIONS,
     BORDERS,
     approximations,
     border_speeds,
 )
+from mumacro import InputError, Surrogate, closed_forms, plotting
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.law import sweep_values
 from mumacro.inputs.fields import FIELDS

@@ -9,11 +9,11 @@ import pytest
 
 from builder.solver.steady import solve, solve_raw, workspace
 from mumacro import Surrogate, motion
-from mumacro.analysis.settling import settling
 from tests.support import naive
 from tests.support.cases import CASE, UNIT, log_uniform, opened
 from tests.support.comparing import close
 from tests.support.refusals import refused
+from tests.support.settling import settling
 
 STEPS = 40_000
 SLIDING = [(0.3, 0.3), (0.1, 0.2), (0.6, 1.0), (1.0, 0.5)]
@@ -156,26 +156,6 @@ def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> 
     assert not np.isnan(decay.periods).any()
     assert not np.isnan(decay.time).any()
     assert decay.periods[2, 1] == settling(surrogate, **CASE).periods
-
-
-@pytest.mark.parametrize(
-    ("changed", "place"),
-    [
-        *(({"remaining": x}, "remaining") for x in (0.0, 1.0, -1.0, math.nan, 2.0)),
-        ({"Fz": -1.0}, "Fz"),
-        *(({"direction": x}, "direction") for x in ("along", "normal")),
-    ],
-)
-def test_bad_input_is_named(surrogate: Surrogate, changed: Any, place: str) -> None:
-    with refused(place):
-        settling(surrogate, **{**CASE, **changed})
-
-
-@pytest.mark.parametrize("name", ["mu0", "Fz", "k", "y0", "v0"])
-def test_a_missing_input_is_named(surrogate: Surrogate, name: str) -> None:
-    case = {key: value for key, value in CASE.items() if key != name}
-    with refused(name):
-        settling(surrogate, **case)
 
 
 def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:

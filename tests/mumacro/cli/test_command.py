@@ -238,8 +238,7 @@ def test_a_law_along_the_frequency_is_one_along_omega_and_marks_the_border(capsy
     assert over_f["mu_macro"] == close(over_omega["mu_macro"], rel=1e-13)
     assert np.array(over_f["f"]) * math.tau == close(np.array(over_omega["omega"]), rel=1e-15)
     assert over_f["border"][0]["f"] * math.tau == close(over_omega["border"][0]["omega"], rel=1e-14)
-    text = output_of(capsys, 0, *words, "--approximations")
-    assert "small_amplitude" in text
+    text = output_of(capsys, 0, *words)
     assert "border of continuous sliding at f" in text
 
 
@@ -367,7 +366,6 @@ UNFIT = {
     ("law", NORMAL, "--along", "Fz_amplitude", "1", "2"): "the swept input is one of mu0",
     ("law", CASE, "--along", "v", "1", "2"): "--along v: the swept input is one of mu0",
     (*ALONG, "1s", "2s"): "'2s'",
-    (*ALONG, "1", "2", "--contact", "ball", "--approximations"): "one spring",
 }
 
 

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from builder.approximations import approximations, border_speeds
 from mumacro import Surrogate
-from mumacro.analysis.approximations import approximations, border_speeds
 from mumacro.analysis.borders import border_crossings
 from mumacro.analysis.law import law as friction_law
 from mumacro.analysis.solve_for import solve_for

@@ -14,7 +14,6 @@ from builder.solver.sweep import Sweep
 from builder.tables.draws import DRAWS, fast_from
 from builder.tables.quantities import solver_noise
 from mumacro import Surrogate, solve_for
-from mumacro.analysis.settling import settling
 from mumacro.table.atlas import (
     BLOCK_NAMES,
     CONTINUOUS,
@@ -28,6 +27,7 @@ from tests.support.cases import UNIT, Array, Case, flat, opened, tables
 from tests.support.comparing import close
 from tests.support.hard_points import NAMES as BALL_NAMES
 from tests.support.hard_points import hard_points, rows_of
+from tests.support.settling import settling
 
 KINDS = list(DRAWS["spring"].cases)
 Ask = Callable[[Surrogate, Array, Array], Any]  # values and bounds
