@@ -218,13 +218,15 @@ static void mu_take_slip(mu_march *march, const mu_shaken *m, double tolerance, 
     march->step = length < march->step ? mu_max(march->step, factor * length) : factor * length;
     if (*ends && mu_slip_falls(m, &start, &slip, &fall)) {
         const double shorter = length * mu_slip_end(m, &start, &slip, &fall);
+        if (start.tau + shorter > start.tau &&
+            !mu_slip_step(m, &start, ex, ey, shorter, start.tau + shorter, &slip)) {
+            /* the step has passed a turn that its stages do not see */
+            march->step = MU_STEP_FAILED * length;
+            return;
+        }
         march->slips = 0;
         march->began = start.tau + shorter;
         if (!(start.tau + shorter > start.tau)) return;
-        if (!mu_slip_step(m, &start, ex, ey, shorter, start.tau + shorter, &slip)) {
-            march->failed = 1;
-            return;
-        }
     }
     *ends = 1;
     for (int i = 0; i < 3; ++i) {
@@ -751,6 +753,7 @@ static mu_steady mu_spring_motion(const mu_shaken *m, double tolerance, int leve
         if (level > 0 && steps->left < 0) return last; /* what was reached */
         out.level = level;
         out.error = MU_MOTION_UNKNOWN * limit;
+        if (level == 0 && out.failed) return out; /* its steps are those of a part of a period */
         if (level > 0)
             out.error = of_difference * mu_difference(&out, &last, m->marks) +
                         MU_MOTION_OF_DISTANCE * out.distance + rounding;

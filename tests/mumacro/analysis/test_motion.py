@@ -781,3 +781,25 @@ def test_a_motion_ends_when_another_thread_asks_for_it() -> None:
         with pytest.raises(StopError):
             right.cycle()
     assert motion(**RIG, x=1e-6).warnings == []
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+def test_a_turn_within_one_step_ends_no_period(tolerance: float) -> None:
+    """An ellipse so flat, and 4e8 l0 long, that the velocity turns within a few thousandths of a
+    period: friction is the mean direction of the velocity.  A step that passed the turn ended the
+    period, and the estimate was that of the part before."""
+    x, y, v0, omega = (9.92e-7, 122.11), (4.64e-5, 320.02), 8.64e-6, 2.0 * math.pi * 313.0
+    tau = (np.arange(400_000) + 0.5) * (2.0 * math.pi / 400_000)
+    wx, wy = (
+        omega * size * np.cos(tau + math.radians(phase)) + drag
+        for (size, phase), drag in ((x, v0), (y, 0.0))
+    )
+    speed = np.hypot(wx, wy)
+    for load in (0.0695, 0.139, 0.2085, 1.39):
+        result = motion(
+            mu0=0.0362, Fz=load, k=4.08e10, f=313.0, v0=v0, x=x, y=y, tolerance=tolerance
+        )
+        off = result.error_estimate + 1e-8  # of rigid contact
+        assert abs(result.mu_macro - 0.0362 * np.mean(wx / speed)) <= off
+        assert abs(result.mu_lateral - 0.0362 * np.mean(wy / speed)) <= off
+        assert result.error_estimate <= 0.0362 * tolerance
