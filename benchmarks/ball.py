@@ -8,7 +8,7 @@ that has one spring alone, and interpolators on plain log-log grids of solved ba
 
 Points are log-uniform over v~, y~ in [1e-3, 1e3].  Times are of one thread, best of interleaved
 rounds; errors are against fresh quadratures that are cut where a spring begins or ceases to slip.
-A full run draws build/results/ball_speed_against_error.png.
+A full run draws docs/img/ball_speed_against_error.png.  speed_against_error.py runs this, too.
 """
 
 # isort: split
@@ -24,7 +24,7 @@ from benchmarks.speed_against_error import Contender, Line, draw, grid_axis, on_
 from builder.solver.ball import Ball, Springs
 from mumacro import Surrogate
 from mumacro.table.atlas import MIDDLE
-from tests.support.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity
+from tests.support.measuring import IMAGES, ROOT, best_of, main, markdown, progress, quantity
 
 Array = NDArray[np.float64]
 FULL_GRIDS, QUICK_GRIDS = (64, 128, 256), (16, 24)
@@ -121,7 +121,7 @@ def ball_speed_against_error(points: int, rounds: int, quick: bool) -> str:
             rows.append([c.name, c.size, *map(quantity, (ns, largest, most))])
             lines[-1][1].append((largest, ns))
     if not quick:
-        plot(lines, RESULTS / "ball_speed_against_error.png")
+        plot(lines, IMAGES / "ball_speed_against_error.png")
     text = (
         f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread, best of "
         f"{rounds} rounds, processor time. Tables also give the bound. Errors of mu~ are against "

@@ -2,26 +2,43 @@
 
     python benchmarks/hard_cases.py [--write]
 
-Each case computes the naive number too.
+Each case computes the naive number too.  The section gallery draws docs/img/hard-*.png: the true
+curve, the finest table, and a cubic spline on a log grid.
 """
 
-from tests.support.measuring import main, markdown, progress, quantity, sections  # isort: split
+from tests.support.measuring import (  # isort: split
+    FINEST,
+    IMAGES,
+    main,
+    markdown,
+    progress,
+    quantity,
+    sections,
+)
 
 import math
 from collections.abc import Callable
+from functools import cache, partial
+from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.interpolate import RectBivariateSpline
 
 from benchmarks.solver import march
 from benchmarks.validation import interpolant, orbit, reference
+from builder.solver.ball import Ball, Springs
 from builder.solver.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, stick_slip
 from builder.solver.slip import FALL, OK, SIGMA, STEPS, SUM_UX, slip
 from builder.solver.steady import border, continuous, solve, workspace
 from builder.solver.stick import stick_excess
-from mumacro import closed_forms
+from builder.solver.sweep import Sweep
+from mumacro import Surrogate, closed_forms
+from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.plotting import Panels, save
+from mumacro.table import atlas
 from mumacro.table.polynomials import chebyshev_coefficients, interpolation_matrix, nodes
 
 Array = NDArray[np.float64]
@@ -279,8 +296,230 @@ def stiffness() -> str:
     return markdown(("v~ = y~", "explicit steps (DOP853, rtol 1e-9)", "steps here"), rows, 0)
 
 
+# --- the gallery ----------------------------------------------------------------------------------
+
+NODES = 256  # of the log grid of the spline, along v~ and y~ from 1e-3 to 1e3
+
+
+class Shown(NamedTuple):
+    """One picture: points on a line through a hard place, and what is shown along it.
+
+    ``values`` at (v~, y~): fresh solves, ours, its bound, and the spline.
+    """
+
+    title: str
+    along: str  #: the axis of ``x``
+    x: Array
+    v: Array
+    y: Array
+    what: str  #: the axis of the values
+    values: Callable[[Array, Array], tuple[Array, Array, Array, Array]]
+    marks: tuple[float, ...] = ()  #: of ``x``, where blocks meet
+    logarithmic: bool = True  #: ``x``
+    many_decades: bool = False  #: the values
+
+
+@cache
+def _grid(ball: bool) -> RectBivariateSpline:
+    """The cubic spline of scipy through solved nodes; those of a ball are of the finest table."""
+    axis, x = np.geomspace(1e-3, 1e3, NODES), np.linspace(math.log(1e-3), math.log(1e3), NODES)
+    if ball:
+        values = _table().quantity("mu_ratio", axis[:, None], axis, **BALL.names)[0]
+        return RectBivariateSpline(x, x, values)
+    with Sweep(1) as sweep:
+        return RectBivariateSpline(x, x, sweep.solve("full", axis[:, None], axis)["mu_ratio"])
+
+
+@cache
+def _table() -> Surrogate:
+    return Surrogate.open(FINEST, threads=1)
+
+
+def _ratio(v: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    with Sweep(1) as sweep:
+        truth = sweep.solve("full", v, y)["mu_ratio"]
+    ours, bound, _ = _table().quantity("mu_ratio", v, y)
+    return truth, ours, bound, np.asarray(_grid(ball=False).ev(np.log(v), np.log(y)))
+
+
+def _deficit(v: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    """1 - mu~; that of mu~ as a number of 64 bits has no digits left where y~ is small."""
+    with Sweep(1) as sweep:
+        truth = sweep.solve("full", v, y)["deficit"]
+    ours, bound, _ = _table().quantity("mu_ratio", v, y)
+    spline = _grid(ball=False).ev(np.log(v), np.log(y))
+    return truth, 1.0 - ours, bound, np.asarray(1.0 - spline)
+
+
+def _slope_of_ball(v: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    """d mu~/d ln v~ of a ball: differences of fresh quadratures of sixth order beside ours."""
+    step, weights = 2e-3, np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+    solved = Ball(Springs(_table()))
+    truth = np.zeros_like(v)
+    for k, weight in zip((-3, -2, -1, 1, 2, 3), weights, strict=True):
+        at = v * math.exp(k * step) / atlas.MIDDLE
+        truth += weight / step * solved.solve(at, y / atlas.MIDDLE)["mu_ratio"]
+    _, ours, _, bound, _ = _table().tabulated.slopes("mu_ratio", v, y, BALL)
+    return truth, ours, bound, np.asarray(_grid(ball=True).ev(np.log(v), np.log(y), dx=1))
+
+
+def _shown() -> dict[str, Shown]:
+    """The pictures by what is hard."""
+    n, ratio = 400, r"$\tilde\mu$"
+    s, one = _table(), np.ones(n)
+
+    def on_border(y: float, rho: Array, kind: Kind = SPRING) -> Array:
+        return rho * float(s.v_tilde_crit(y, **kind.names))
+
+    around = np.linspace(0.9, 1.1, n)
+    corner, creep = np.linspace(0.94, 1.1, n), np.geomspace(1e-12, 1.0, n)
+    ends, small = np.geomspace(1e-9, 1e9, n), np.geomspace(1e-7, 1.0, n)
+    across, far = np.geomspace(0.5, 50.0, n), np.geomspace(10.0, 1e9, n)
+    fold = np.linspace(0.35, 0.65, n)
+    speed, amplitude = r"$\tilde v$", r"$\tilde y$"
+    to_border = r"$\tilde v/\tilde v_\mathrm{crit}$"
+    return {
+        "border": Shown(
+            "Border: a window of stick opens",
+            to_border,
+            around,
+            on_border(3.0, around),
+            3.0 * one,
+            ratio,
+            _ratio,
+            (1.0,),
+            logarithmic=False,
+        ),
+        "corner": Shown(
+            r"Corner: $\tilde v$ = 0.001 at $\tilde y$ = 1",
+            amplitude,
+            corner,
+            1e-3 * one,
+            corner,
+            ratio,
+            _ratio,
+            logarithmic=False,
+        ),
+        "creep": Shown(
+            r"Creep at $\tilde y$ = 0.5", speed, creep, creep, 0.5 * one, ratio, _ratio, (1e-3,)
+        ),
+        "ends": Shown(
+            r"Both ends of the speed, $\tilde y$ = 2",
+            speed,
+            ends,
+            ends,
+            2.0 * one,
+            ratio,
+            _ratio,
+            (1e-3, 1e3),
+            many_decades=True,
+        ),
+        "small": Shown(
+            r"Small amplitude, $\tilde v$ = 2",
+            amplitude,
+            small,
+            2.0 * one,
+            small,
+            r"$1 - \tilde\mu$",
+            _deficit,
+            (1e-3,),
+            many_decades=True,
+        ),
+        "seams": Shown(
+            r"Seams of blocks along $\tilde y$, $\tilde v$ = 0.3",
+            amplitude,
+            across,
+            0.3 * one,
+            across,
+            ratio,
+            _ratio,
+            (atlas.Y_STICK_LO, atlas.Y_CONT, atlas.Y_MID, atlas.Y_HIGH),
+        ),
+        "folds": Shown(
+            r"A ball, where a coordinate is folded, $\tilde y$ = 0.6",
+            f"{to_border} of the middle spring",
+            fold,
+            on_border(0.6 / atlas.MIDDLE, fold) * atlas.MIDDLE,
+            0.6 * one,
+            r"$\mathrm{d}\tilde\mu/\mathrm{d}\ln\tilde v$",
+            _slope_of_ball,
+            (0.5,),
+            logarithmic=False,
+        ),
+        "tails": Shown(
+            "Tails: half of the speed of the border",
+            amplitude,
+            far,
+            0.5 * s.v_tilde_crit(far),
+            far,
+            ratio,
+            _ratio,
+            (1e3, atlas.Y_TAIL),
+            many_decades=True,
+        ),
+    }
+
+
+def gallery() -> str:
+    """Each hard place as a picture: the true curve, the finest table, and a cubic spline on a log
+    grid."""
+    rows = []
+    for name, shown in _shown().items():
+        progress(name)
+        values = shown.values(shown.v, shown.y)
+        truth, ours, bound, spline = values
+        draw = partial(_draw, shown, values)
+        save(IMAGES / f"hard-{name}.png", draw, Panels(columns=2, size=(9.0, 3.2)), dpi=100)
+        errors = [np.abs(x - truth).max() for x in (ours, spline)]
+        numbers = (errors[0], bound.max(), errors[1])
+        covered = f"{100.0 * np.mean(np.abs(ours - truth) <= bound + 4e-15 * np.abs(truth)):.0f}"
+        rows.append([name, *(quantity(float(x)) for x in numbers), covered])
+    header = ("picture", "largest error", "largest bound", "of the spline", "% within the bound")
+    return (
+        f"{_table().id} beside the cubic spline of scipy on {NODES} x {NODES} solved nodes, v~ and "
+        f"y~ from 1e-3 to 1e3 in logarithms:\n\n{markdown(header, rows)}"
+    )
+
+
+def _draw(shown: Shown, values: tuple[Array, Array, Array, Array], panels: Any) -> None:
+    truth, ours, bound, spline = values
+    curve, errors = panels
+    curve.plot(shown.x, truth, color="#9aa3ad", lw=5.0, label="solved anew")
+    curve.plot(shown.x, spline, "--", color="#1f5fa8", lw=1.5, label="spline on a log grid")
+    curve.plot(shown.x, ours, color="#c1272d", lw=1.2, label="this table")
+    curve.set(title=shown.title, ylabel=shown.what)
+    if shown.many_decades:
+        curve.set_yscale("log")
+    curve.legend(fontsize=8)
+    for value, look, label in (
+        (
+            np.abs(spline - truth),
+            {"color": "#1f5fa8", "ls": "--", "lw": 1.5},
+            "error of the spline",
+        ),
+        (bound, {"color": "#222222", "ls": ":", "lw": 1.2}, "bound of this table"),
+        (np.abs(ours - truth), {"color": "#c1272d", "lw": 1.0}, "error of this table"),
+    ):
+        errors.plot(shown.x, np.maximum(value, 1e-20), label=label, **look)
+    errors.set(yscale="log", ylim=(1e-19, 1e6), ylabel="error")
+    errors.legend(fontsize=8, loc="upper right")
+    for axes in panels:
+        axes.set(xlabel=shown.along, xscale="log" if shown.logarithmic else "linear")
+        for mark in shown.marks:
+            axes.axvline(mark, color="#555555", lw=0.8, ls=(0, (1, 3)))
+
+
 SECTIONS = sections(
-    grazing, surplus, double_root, creep, exact_eta, cusp, small_amplitude, short_stick, stiffness
+    grazing,
+    surplus,
+    double_root,
+    creep,
+    exact_eta,
+    cusp,
+    small_amplitude,
+    short_stick,
+    stiffness,
+    gallery,
 )
 
 if __name__ == "__main__":

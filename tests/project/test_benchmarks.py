@@ -79,7 +79,8 @@ def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
     assert loaded("benchmarks.tables_readme").tables(build=False, workers=2).strip() in section
 
 
-SLOW = {"model", "angles", "stiffness", "cusp", "creep"}
+PICTURES = [path.stem for path in (ROOT / "docs" / "img").glob("hard-*.png")]
+SLOW = {"gallery", "model", "angles", "stiffness", "cusp", "creep"}
 SECTIONS = [
     pytest.param(section, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
     for script in ("validation", "validity", "model_facts", "hard_cases")
@@ -133,13 +134,26 @@ SHOWN: dict[str, Callable[[list[Row]], bool]] = {
         max(column(rows, "rel change of the slip's share of mu~, far turn")) > 1e-12
     ),
     "hard_cases-stiffness": lambda rows: max(column(rows, "steps here")) < 30.0,
+    "hard_cases-gallery": lambda rows: (
+        set(column(rows, "% within the bound")) == {100.0}
+        and max(column(rows, "largest error")) < 1e-9
+        and len(rows) == len(PICTURES)
+    ),
 }
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_section_prints_its_tables(section: Any, request: pytest.FixtureRequest) -> None:
-    first, *_ = tables(section())
+def test_a_section_prints_its_tables(
+    section: Any,
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     name = request.node.callspec.id
+    # its pictures are not put into docs
+    module = loaded(f"benchmarks.{name.partition('-')[0]}")
+    monkeypatch.setattr(module, "IMAGES", tmp_path, raising=False)
+    first, *_ = tables(section())
     assert name not in SHOWN or SHOWN[name](first), first
 
 
@@ -165,23 +179,82 @@ def test_the_errors_that_are_printed_are_within_their_bounds() -> None:
     assert min(column(rows, "bound/error, least")) >= 1.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("script", "least"), [("speed_against_error", 1e-12), ("ball", 1e-10)])
-def test_tables_keep_their_tolerance_where_plain_grids_do_not(script: str, least: float) -> None:
-    """The ball of the finest table is one of 1e-10."""
-    (comparison,) = run(script, "--quick", "--rounds", "1")
+def kept(rows: list[Row], name_in: str, least: float) -> list[str]:
+    """The tables among the rows, whose errors are within their tolerance, or ``least``; no grid of
+    24 or 48 nodes a side follows the border."""
     names = []
-    for row in comparison:
+    for row in rows:
         if row["max abs error"] == "-":
             continue
-        name, error = row["method"].strip("*"), float(row["max abs error"])
+        name, error = row[name_in].strip("*"), float(row["max abs error"])
         if name.startswith("mumacro-"):
-            assert 0.0 < error <= max(float(name.removeprefix("mumacro-")), least)
+            assert 0.0 < error <= max(float(name.removeprefix("mumacro-")), least), row
             names.append(name)
-        assert " x " not in row["data"] or error > 1e-3, (
-            "24 and 48 nodes a side cannot follow the border"
+        assert " x " not in row["data"] or error > 1e-3, row
+    return sorted(names)
+
+
+TABLES = sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
+
+
+@pytest.mark.slow
+def test_tables_keep_their_tolerance_where_plain_grids_do_not() -> None:
+    """In C and in NumPy, and those of a ball."""
+    words = "--quick", "--rounds", "1"
+    (rows,) = run("speed_against_error", *words, "--only", "speed")
+    assert kept(rows, "data", 1e-12) == sorted(2 * TABLES)
+    # the ball of the finest table is one of 1e-10
+    (balls,) = run("speed_against_error", *words, "--only", "ball_speed_against_error")
+    assert kept(balls, "method", 1e-10) == TABLES
+
+
+@pytest.mark.slow
+def test_blocks_converge_and_tails_join_within_their_bounds() -> None:
+    words = "--quick", "--rounds", "1"
+    (rows,) = run("speed_against_error", *words, "--only", "convergence")
+    built = {
+        float(row["built for"].removeprefix("blocks, ")): float(row["max abs error"])
+        for row in rows
+        if row["built for"].startswith("blocks")
+    }
+    assert all(0.0 < error <= tolerance for tolerance, error in built.items())
+    _, joins = run("speed_against_error", *words, "--only", "tails")
+    assert max(column(joins, "largest jump over both bounds")) <= 1.0
+    (blocks,) = run("speed_against_error", *words, "--only", "error_map")
+    for row in blocks:
+        assert float(row["largest"]) <= float(row["largest bound"])
+
+
+def test_the_first_page_has_the_numbers_of_the_page_on_speed() -> None:
+    """All are of one run."""
+    (first,) = tables(marked("README.md", "speed_against_error-headline"))
+    rows = tables(marked("docs/speed-and-error.md", "speed"))[0]
+    ours, peer, direct = first
+    by_method = {(row["method"], row["data"]): row for row in rows}
+    for row, key in (
+        (ours, ("blocks in C, with bound", "mumacro-1e-12")),
+        (peer, ("scipy RectBivariateSpline.ev k=3", "1024 x 1024")),
+        (direct, ("one solve of the full model", "compiled")),
+    ):
+        there = by_method[key]
+        assert (row["ns a point"], row["largest error"]) == (
+            there["ns/point"],
+            there["max abs error"],
         )
-    assert sorted(names) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
+
+
+def marked(page: str, name: str) -> str:
+    """What stands between the markers of a section."""
+    text = (ROOT / page).read_text("utf-8")
+    return re.split(rf"<!-- begin {name}(?:, table)? -->", text)[1].split(f"<!-- end {name} -->")[0]
+
+
+def test_the_figures_of_one_page_are_of_one_machine() -> None:
+    page = (ROOT / "docs" / "speed-and-error.md").read_text("utf-8")
+    machines = re.findall(r"^Took .* min\. Machine: (.*?), load average", page, re.MULTILINE)
+    # sections state the packages that were loaded so far
+    assert len(machines) == page.count("<!-- begin ")
+    assert len({re.split(r", numpy ", machine)[0] for machine in machines}) == 1
 
 
 @pytest.mark.slow

@@ -80,6 +80,10 @@ ELSEWHERE = {
         '["figures", "--out"',
     ),
     "python -m mumacro.builder": ("tests/project/test_wheel.py", "python -m mumacro.builder solve"),
+    "python benchmarks/speed_against_error.py": (
+        "tests/project/test_benchmarks.py",
+        'run("speed_against_error", ',
+    ),
     "python benchmarks/hard_cases.py": ("tests/project/test_benchmarks.py", '"hard_cases")'),
     "python benchmarks/validation.py": ("tests/project/test_benchmarks.py", '("validation", '),
     "python benchmarks/validity.py": ("tests/project/test_benchmarks.py", '"validity", '),

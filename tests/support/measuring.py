@@ -32,7 +32,10 @@ FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 PAGES = tuple(
     ROOT / path
     for path in (
+        "README.md",
         "docs/accuracy.md",
+        "docs/speed-and-error.md",
+        "docs/hard-cases.md",
         "docs/python.md",
         "docs/service.md",
         "docs/fits-and-motions.md",
