@@ -720,7 +720,7 @@ def _over_size(found: Sequence[Measured], panels: Any) -> None:
             label, color, mark = LOOKS[name]
             sizes, errors = zip(*((m.contender.memory, getattr(m, of)) for m in some), strict=True)
             axes.plot(sizes, errors, mark + "-", color=color, label=label)
-        axes.set_xlim(3e3, 2e7)
+        axes.set_xlim(1e3, 2e7)
         axes.set(xlabel="bytes in memory", ylabel=rf"error of $\tilde\mu$, {title}")
         _logarithmic(axes)
     _legend(panels[0], 3)
