@@ -29,7 +29,9 @@ def power(cases: Evaluated) -> Values:
         saved = (mu0 - cases.mu_macro) * load * v0
         saved_bound = cases.error_bound * load * v0 + ROUNDING * abs(saved)
         size: Any = abs(saved)
-        plain = (v < math.inf) & ((cases.mu_macro == mu0) | (size > _LEAST)) & (size < _MOST)
+        # of the drive; and of the shaker
+        driven = (mu0 > _LEAST) & ((cases.mu_macro == mu0) | (size > _LEAST)) & (size < _MOST)
+        plain = driven & (v < math.inf)
         products: tuple[Any, ...] = mu0, force, cases.length_scale, rate, unit, shaker
         for product in products:
             plain = plain & (product > _LEAST) & (product < _MOST)
@@ -38,7 +40,8 @@ def power(cases: Evaluated) -> Values:
         here = np.flatnonzero(~np.broadcast_to(plain, np.size(cases.mu_ratio)))
         for i, whole in enumerate(_at_the_ends(cases, here, v, y, number, bound)):
             column = np.array(np.broadcast_to(values[i], np.size(cases.mu_ratio)))
-            column[here] = np.where(np.isnan(whole), column[here], whole)
+            kept = np.isnan(whole) | (i in (1, 3)) & np.broadcast_to(driven, column.size)[here]
+            column[here] = np.where(kept, column[here], whole)
             values[i] = column if cases.cases.shape else float(column[0])
     return dict(zip(POWER.members, values, strict=True))
 

@@ -99,7 +99,7 @@ def test_outputs_have_the_prefix_that_suits_and_json_is_in_si(capsys: Any) -> No
     arguments = (words(), "--include", "limits,power,settling,groups")
     rows = {line.split()[0]: line.split() for line in output(capsys, *arguments).splitlines()}
     answer = json.loads(output(capsys, *arguments, "--json"))
-    sizes = {"[um]": 1e-6, "[mW]": 1e-3, "[ms]": 1e-3, "[mm/s]": 1e-3}
+    sizes = {"[um]": 1e-6, "[us]": 1e-6, "[mW]": 1e-3, "[ms]": 1e-3, "[mm/s]": 1e-3}
     for path in ("groups.l0", "limits.v0_crit", "power.oscillation", "settling.time"):
         name, _, member = path.partition(".")
         _, number, unit, *_ = rows[path]
