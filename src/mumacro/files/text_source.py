@@ -22,6 +22,7 @@ from mumacro.inputs.decoding import Text, TextError
 from mumacro.inputs.layout import BLANKS, GAPS, ColumnNames, Dialect
 from mumacro.inputs.signs import Cell, Signs
 from mumacro.inputs.text_tables import (
+    BEGIN_OF_STATISTICS,
     Account,
     Record,
     again,
@@ -203,7 +204,17 @@ class TextTable:
         starts = np.concatenate([[0], ends[:-1] + 1])
         seps = np.flatnonzero(signs == ord(self.sep))
         counts = np.searchsorted(seps, ends) - np.searchsorted(seps, starts)
-        is_doubtful = _BEGINS_OTHERWISE[signs[starts]] | (counts != len(self.layout.heads) - 1)
+        is_doubtful = counts != len(self.layout.heads) - 1
+        place = min(self.layout.inputs)
+        if place == 0 or is_doubtful.all():
+            is_doubtful |= ~_BEGINS_NUMBER[signs[starts]]
+        else:  # a name stands first: what matters is the first cell of an input, and the name
+            before = np.minimum(np.searchsorted(seps, starts) + place - 1, len(seps) - 1)
+            cells = np.minimum(seps[before] + 1, len(signs) - 1)
+            two = (
+                signs[starts].astype(np.uint16) << 8 | signs[np.minimum(starts + 1, len(signs) - 1)]
+            )
+            is_doubtful |= ~_BEGINS_NUMBER[signs[cells]] | _MAY_BE_OTHERWISE[two]
         # the row of units below the head again may begin like a number
         is_doubtful[0] |= bool(self._account.repeated)
         if self._account.may_be_head(data.decode()):
@@ -309,8 +320,18 @@ class TextTable:
         return line.getvalue()
 
 
-# by the first byte of a line
-_BEGINS_OTHERWISE = np.array([byte not in _OF_NUMBERS for byte in range(256)])
+# by the first byte of a cell: whether it begins as numbers do
+_BEGINS_NUMBER = np.array([byte in _OF_NUMBERS for byte in range(256)])
+# by the first two bytes of a name: whether the line may be a comment, or begin with a word such as
+# mean; signs that are neither ASCII letters nor those of numbers are looked at
+_MAY_BE_OTHERWISE = np.array(
+    [
+        not (first.isascii() and (first.isalpha() or ord(first) in _OF_NUMBERS))
+        or (first + second).lower() in BEGIN_OF_STATISTICS
+        for first in map(chr, range(256))
+        for second in map(chr, range(256))
+    ]
+)
 
 
 def _has_sign(data: bytes, sep: str) -> bool:

@@ -52,9 +52,18 @@ _BETWEEN = re.compile(r"[,;|\s]+")  # whatever separates cells
 _STATISTICS = re.compile(
     r"(?:mean|average|avg|median|mittel(?:wert)?|mw|moyenne|min(?:imum)?|max(?:imum)?|sum|total"
     r"|summe|range|spannweite|variance|varianz|cov|cv|s\.?d\.?|rsd|count"
-    r"|st(?:andar)?d\.?[ _-]?(?:dev(?:iation)?\.?|err(?:or)?\.?)?|standardabweichung|stabw"
-    r"|[ée]cart[ -]type)(?: ?(?:value|wert|of .{1,20}))?\W*"
+    r"|st(?:andar)?d\.?[ _-]?(?:dev(?:iation)?\.?|err(?:or)?\.?)?|st\.?[ _-]?dev(?:iation)?\.?"
+    r"|standardabweichung|stabw"
+    r"|[ée]cart[ -]type)(?:\.? ?(?:value|wert|of .{1,20}))?\W*"
 )
+#: the first two letters of each of these
+BEGIN_OF_STATISTICS = frozenset(
+    (
+        *("me", "av", "mi", "mw", "mo", "ma", "su", "to", "ra"),
+        *("sp", "va", "co", "cv", "sd", "rs", "st", "ec", "s."),
+    )
+)
+_WITH_POINTS = str.maketrans(",.", ".?")
 _OF_NUMBERS = re.compile(r"[0-9eE+\-.\n]*")  # the signs of plain numbers, line by line
 
 
@@ -175,7 +184,9 @@ class Account:
         if len(first) < 40 and _STATISTICS.fullmatch(first.lower()):
             remedy = self._layout.without(line)
             raise TextError(f"line {line}: {first!r} begins a row of statistics: {remedy}")
-        if self._has_units(line, text):
+        inputs = [cells[i] for i in self._layout.inputs if i < len(cells)]
+        may_be_units = not any(is_number(cell) and cell.strip(" []()") != "1" for cell in inputs)
+        if may_be_units and self._has_units(line, text):
             return False
         width = len(self._layout.heads)
         is_whole = len(cells) in (width, width - self._layout.without_comments)
@@ -270,7 +281,10 @@ def _quoted(
     """The cells of a row with quotes, which may go on in the next lines, and all of its text."""
     if sep == BLANKS:
         return [match[0].strip('"') for match in _QUOTED.finditer(text)], text
-    texts = [text]
+    try:  # most rows end in their line
+        return next(csv.reader((text,), delimiter=sep, strict=True, skipinitialspace=True)), text
+    except csv.Error:
+        texts = [text]
 
     def with_ends() -> Iterator[str]:
         yield f"{text}\n"
@@ -516,7 +530,11 @@ def _column(
 ) -> Array:
     """A column in SI; what is ``wrong`` with its cells is added, with their lines."""
     cells = [row.cells[i].strip() for row in rows]
-    if signs.decimal != "," and _OF_NUMBERS.fullmatch("\n".join(cells)):
+    column = "\n".join(cells)
+    if signs.decimal == ",":  # with a point in place of each comma; a point itself is none
+        column = column.translate(_WITH_POINTS)
+        cells = column.split("\n")
+    if _OF_NUMBERS.fullmatch(column):
         try:  # numbers as programs write them, all at once
             values = np.array([*map(float, cells)])
         except ValueError:

@@ -343,6 +343,53 @@ def test_what_is_no_row_ends_the_run_in_either_reader(
     assert friction(tmp_path / "out.csv") == close(MU, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    "label",
+    [
+        "Mean",
+        "AVERAGE",
+        "Avg.",
+        "median",
+        "Mittelwert",
+        "MW",
+        "moyenne",
+        "Min",
+        "Maximum",
+        "Sum",
+        "Total",
+        "Range",
+        "Spannweite",
+        "Variance",
+        "CoV",
+        "cv",
+        "s.d.",
+        "SD",
+        "RSD",
+        "Count",
+        "Std",
+        "stdev",
+        "Stabw",
+        "Ecart-type",
+        "minimum",
+        "max. value",
+        "Std. Dev.",
+        "Standard deviation",
+        "Écart type",
+        "standard error",
+        "mean of 3",
+    ],
+)
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_a_row_of_statistics_is_found_behind_any_name(
+    tmp_path: Path, label: str, quote: str
+) -> None:
+    row = ROWS.splitlines()[0]
+    text = f"name,{HEAD}\nab,{row}\nmotor,{row}\n{quote}{label}{quote},{row}\n"
+    (tmp_path / "cases.csv").write_text(text, "utf-8")
+    with pytest.raises(FilesError, match=r"line 4: .* begins a row of statistics: --rows 2\.\.3"):
+        evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+
+
 def test_both_readers_give_the_same_rows_and_rejects(tmp_path: Path) -> None:
     cells = ["0.3", "-1", "", "1e400", "x", "rigid", "nan", "1.0D-1", "1,5", "2 um", "+0.3"]
     lines = [f"a,{cell if ',' not in cell else '0.3'},10,{k},2e-6,2e4,0.01,µ" for cell in cells

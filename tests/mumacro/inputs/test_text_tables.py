@@ -525,6 +525,15 @@ SLOW: dict[str, Callable[[int], bytes]] = {
     "groups": lambda n: b"v0;mu_macro\n1" + b".111" * (n // 4) + b"x;2\n",
     "comments": lambda n: b"v0,mu_macro\n1,2\n" + b"#\n" * (n // 2),
     "units": lambda n: b"v0,mu_macro\n" + b"m" * n + b",%\n1,2\n",
+    "names in comments": lambda n: b"v0,mu_macro\n1,2\n" + b"# v0 x mu_macro\n" * (n // 16),
+    "names in a long comment": lambda n: b"# " + b"v0 [" * (n // 4) + b"\nv0,mu_macro\n1,2\n",
+    "lines of units": lambda n: b"v0,mu_macro\nm/s,-\n" + b"m/s,-\n" * (n // 6) + b"1,2\n",
+    "heads again": lambda n: b"v0,mu_macro\n1,2\n" + b"v0,mu_macro\n" * (n // 12),
+    "columns of ECSV": lambda n: (
+        b"# %ECSV 1.0\n# " + b"{name: v0, unit: m/s}" * (n // 21) + b"\nv0 mu_macro\n1 2\n"
+    ),
+    "open braces of ECSV": lambda n: b"# %ECSV 1.0\n# " + b"{" * n + b"\nv0 mu_macro\n1 2\n",
+    "blanks": lambda n: b"v0 mu_macro\n1 2\n" + b" " * n + b"x\n",
     "empty cells": lambda n: b"v0,mu_macro\n" + b"," * n + b"\n1,2\n",
 }
 
