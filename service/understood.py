@@ -20,7 +20,9 @@ UNDERSTOOD = "inputs"  # the name in include
 def is_wanted(members: Mapping[str, Any]) -> bool:
     """Whether a request asks for it; its members may be of any type."""
     include = members.get("include")
-    return isinstance(include, (list, tuple, set)) and UNDERSTOOD in include
+    return include == UNDERSTOOD or (
+        isinstance(include, (list, tuple, set)) and UNDERSTOOD in include
+    )
 
 
 async def understood_in(request: Request, is_requested: bool) -> dict[str, Any]:

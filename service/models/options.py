@@ -23,7 +23,7 @@ from .inputs import (
     either,
     optional,
 )
-from .values import Deviation, Positive
+from .values import OR_ONE, Deviation, Positive
 
 MODEL = "model"  # for one case only
 _BESIDE = (MODEL, UNDERSTOOD)  # what the library does not compute
@@ -105,7 +105,7 @@ class DeviationColumns(Strict):
 class Outputs(Strict):
     """What is computed beside the default answer."""
 
-    include: Annotated[list[Include], Field(max_length=16)] = either(
+    include: Annotated[list[Include], Field(max_length=16), OR_ONE] = either(
         f"{_INCLUDE}; in a query joined by commas"
     )
 

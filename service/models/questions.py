@@ -39,7 +39,7 @@ from .inputs import (
 )
 from .motion import FORMS, Oscillation
 from .options import Choice, Deviations, Options
-from .values import End, Length, Load, Modulus, Ratio, Start, Stop, fault, text_schema
+from .values import OR_ONE, End, Length, Load, Modulus, Ratio, Start, Stop, fault, text_schema
 
 MAX_VALUES = 10_001  # values of a law, at most
 _OF_A_MOTION = ("mu0", "Fz", "k", "omega", "f", "v0", "contact")
@@ -233,7 +233,7 @@ class StiffnessRequest(Strict):
     nu: _Poisson = Field(description="Poisson's ratio of the first body [-]")
     E2: Modulus | None = optional("Of the second body [Pa]; left out, both are of one material")
     nu2: _Poisson | None = optional("Of the second body [-]")
-    include: Annotated[list[Literal["inputs"]], Field(max_length=16)] = either(
+    include: Annotated[list[Literal["inputs"]], Field(max_length=16), OR_ONE] = either(
         "More to answer: inputs (what was understood of them)"
     )
 

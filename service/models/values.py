@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationInfo, WithJsonSchema, WrapValidator
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from mumacro.errors import InputError
@@ -23,6 +23,10 @@ RIGID = {"const": "rigid", "type": "string"}
 #: a number as text; the library reads more than this pattern
 PLAIN_TEXT = {"type": "string", "pattern": r"^[0-9]{1,9}(\.[0-9]{1,9})?$"}
 POSITIVE_TEXT = {"type": "string", "pattern": r"^[1-9][0-9]{0,8}(\.[0-9]{1,9})?$"}
+
+
+#: one name in place of a list of one
+OR_ONE = BeforeValidator(lambda value: [value] if isinstance(value, str) else value)
 
 
 def fault(reason: str) -> PydanticCustomError:

@@ -93,7 +93,7 @@ REFUSED = [
     ("POST mu-macro/batch?tolerance=1e-30", {}, "?tolerance"),
     # include and std
     *(("POST mu-macro", {"include": [name]}, "#/include/0") for name in ("curvature", "Groups", 1)),
-    *(("POST mu-macro", {"include": value}, "#/include") for value in ("groups", 3, {"groups": 1})),
+    *(("POST mu-macro", {"include": value}, "#/include") for value in (3, {"groups": 1})),
     *(("GET mu-macro", {"include": name}, "?include") for name in ("curvature", "")),
     *(
         (f"POST {path}", {"include": ["std"]}, "#/include")

@@ -161,6 +161,29 @@ def test_the_standard_deviation_is_the_root_of_squares(client: Any, case: Case, 
     assert only["std"] == close(0.01 * abs(slopes["mu0"]), rel=1e-12)
 
 
+def test_one_name_stands_in_place_of_a_list_of_one(client: Any, case: Case) -> None:
+    for name in ("power", "inputs"):
+        assert ask(client, case, include=name) == ask(client, case, include=[name])
+
+
+def test_cases_within_an_object_are_pointed_to_rows_and_columns(client: Any, case: Case) -> None:
+    answer = client.post(f"{PATH}/batch", json={"cases": [case]})
+    assert answer.status_code == 422
+    told = {fault["field"]: fault["reason"] for fault in answer.json()["errors"]}
+    assert "rows are" in told["cases"]
+
+
+@pytest.mark.parametrize(("mu0", "f"), [("0,3", "20.000"), ("0,3", "20.000 Hz"), ("0,25", "1.300")])
+def test_texts_of_a_case_agree_on_their_signs(client: Any, case: Case, mu0: str, f: str) -> None:
+    del case["omega"]
+    response = client.post(PATH, json={**case, "mu0": mu0, "f": f})
+    (fault,) = response.json()["errors"]
+    assert (response.status_code, fault["field"]) == (422, "f")
+    assert mu0 in fault["reason"]
+    assert client.post(PATH, json={**case, "mu0": mu0, "f": "20000,0"}).status_code == 200
+    assert client.post(PATH, json={**case, "mu0": mu0.replace(",", "."), "f": f}).status_code == 200
+
+
 def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate) -> None:
     for change in (
         {},

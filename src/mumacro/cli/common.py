@@ -25,6 +25,7 @@ from mumacro.inputs.fields import ENDS, INPUTS, RAD_PER_CYCLE, in_help, unit_of
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.names import suggestion
+from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.reading import NO_DEVIATION, read, read_one
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.units import Scale, belongs_to_value, scale_of, suited
@@ -285,6 +286,10 @@ def read_case(
     if no_pairs:
         verb = "is" if len(no_pairs) == 1 else "are"
         faults.insert(0, f"{', '.join(no_pairs)} {verb} no name=value such as Fz=10")
+    try:
+        check_signs({name: text for name, text in _pairs(words) if text is not None})
+    except InputError as error:
+        faults.append(str(error))
     absent = {*optional} - case.keys()
     faults += _faults_of_names(case, kind, [*without, *absent], whole)
     if faults:

@@ -35,6 +35,7 @@ from mumacro.inputs.kind import (
     kind_of,
 )
 from mumacro.inputs.names import in_place_of, suggestion
+from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, in_unit, read
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Places, common_shape, flat
@@ -479,6 +480,9 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
     units: dict[str, str] = {}
     std: _Numbers = {}
     f: float | Array | None = None
+    texts = {name: x for name, x in values.items() if type(x) is str}
+    if len(texts) > 1:
+        check_signs(texts)
     ends = ends_in(values)
     for name in fields:
         source = name if name != "omega" else _frequency_in(values, fields)

@@ -61,11 +61,12 @@ _SYNONYMS = {
     "slidingvelocity": "v0",
 }
 _SYNONYMS |= {name.lower(): name for name in NAMES}
-#: names that said the same before -> what says it now
+# names that people expect, or that said the same before -> what says it now
 _FORMER = {
     "k_range": 'written as k_low and k_high, or in k as an interval such as "0.8..1.2 N/um"',
     "std": "written as std_k, std_mu0 and so on: one name for each deviation",
     "groups": 'written as include="groups"',
+    "cases": 'left out: rows are [{"mu0": ...}, ...], columns {"mu0": [...], ...}',
 }
 
 

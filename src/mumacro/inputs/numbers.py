@@ -4,6 +4,9 @@ signs, Fortran's exponent, powers of ten; and as they stand in a sentence."""
 import functools
 import re
 import unicodedata
+from collections.abc import Mapping
+
+from mumacro.errors import InputError
 
 #: other signs for the same: minus and dashes of typography, a slash, apostrophes
 _SIGNS = str.maketrans("−–‐‑∕⁄’", "----//'")
@@ -181,3 +184,25 @@ def split_number(text: str) -> tuple[float, str]:
     if more is not None:
         end = more.end()
     return read_number(text[:end]), text[end:].strip()
+
+
+# a comma that can be a decimal one only, points that can be thousands signs only; a point that may
+# be either
+_GERMAN = re.compile(r"\d,(?:\d{1,2}|\d{4,})(?!\d)|\d\.\d{3}\.\d{3}(?!\d)|\d\.\d{3},\d")
+_EITHER = re.compile(r"(?<![\d.,])([1-9]\d{0,2})\.(\d{3})(?![\d.,])")
+
+
+def check_signs(texts: Mapping[str, str]) -> None:
+    """Raise InputError for a text of a case that another one makes ambiguous: beside a decimal
+    comma 20.000 may be twenty thousand.
+
+    >>> check_signs({"mu0": "0,3", "f": "20 kHz", "v0": "0.01"})
+    """
+    german = next((name for name, text in texts.items() if _GERMAN.search(text)), None)
+    if german is None:
+        return
+    for name, text in texts.items():
+        if match := _EITHER.search(text):
+            whole, part = f"{match[1]}{match[2]}", f"{float(match[0]):g}"
+            bound = f'clear beside {german} = "{texts[german]}": it may be {whole} or {part}'
+            raise InputError(name, text, f"{bound}; write that")
