@@ -17,6 +17,7 @@ from mumacro.inputs.fields import INPUTS, LIKE
 from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRINGS_OF, kind_of
 from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.outputs import OUTPUTS
+from mumacro.stiffness import MATERIALS, SOURCE_OF_MATERIALS
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIMES
 
@@ -58,24 +59,11 @@ _EXAMPLE = {
     "points": "v0 [mm/s]\tmu0\tmu_macro\n0.05\t0.3031\t0.04662\n0.1\t0.2994\t0.04374\n"
     "0.2\t0.2836\t0.03957\n0.5\t0.2716\t0.03068\n1\t0.2651\t0.02753\n",
 }
-# E and nu of usual materials: the middle of the ranges that Gere prints
 _MATERIALS = {
-    "source": "typical values after Gere, Mechanics of Materials, 5th edition",
+    "source": SOURCE_OF_MATERIALS,
     "rows": [
-        {"name": name, "E": modulus, "nu": ratio}
-        for name, modulus, ratio in (
-            ("steel", "200 GPa", "0.29"),
-            ("aluminium alloy", "70 GPa", "0.33"),
-            ("titanium alloy", "110 GPa", "0.33"),
-            ("brass", "103 GPa", "0.34"),
-            ("bronze", "108 GPa", "0.34"),
-            ("copper", "115 GPa", "0.35"),
-            ("nickel alloy", "210 GPa", "0.31"),
-            ("tungsten", "360 GPa", "0.2"),
-            ("glass", "70 GPa", "0.2"),
-            ("nylon", "2.8 GPa", "0.4"),
-            ("polyethylene", "1 GPa", "0.4"),
-        )
+        {"name": name, "E": f"{1e-9 * modulus:g} GPa", "nu": f"{ratio:g}"}
+        for name, (modulus, ratio) in MATERIALS.items()
     ],
 }
 _WIDTH, _HEIGHT = 141, 101  # points of the map's grid, twenty a decade

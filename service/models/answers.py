@@ -200,7 +200,7 @@ class Remark(BaseModel):
     text: str = Field(description="A sentence on the first of them")
 
 
-_REMARKS = "What is doubtful; left out where nothing is"
+REMARKS = "What is doubtful; left out where nothing is"
 _UNDERSTOOD = "Only if requested: what was understood of each input"
 
 
@@ -226,7 +226,7 @@ class CaseAnswer(Result, Answered):
         None, description="Only if requested: what the model leaves out here"
     )
     digits: int | None = Field(None, description="With model: digits of mu_macro that k supports")
-    remarks: list[Remark] | None = Field(None, description=_REMARKS)
+    remarks: list[Remark] | None = Field(None, description=REMARKS)
     inputs: dict[str, Understood] | None = understood_inputs()
 
 
@@ -248,7 +248,7 @@ class BatchAnswered(Answered):
         description="One entry per bad case, in order; the first 1000 of them"
     )
     n_errors: int = Field(description="Number of bad cases, listed or not")
-    remarks: list[Remark] | None = Field(None, description=_REMARKS)
+    remarks: list[Remark] | None = Field(None, description=REMARKS)
 
 
 class ColumnsAnswer(Columns, BatchAnswered):
@@ -399,7 +399,7 @@ class StiffnessAnswer(BaseModel):
     )
     contact: ContactName
     warnings: list[str] = Field(description="Where the theory behind k is off")
-    remarks: list[Remark] | None = Field(None, description=_REMARKS)
+    remarks: list[Remark] | None = Field(None, description=REMARKS)
     inputs: dict[str, Understood] | None = understood_inputs()
     api_version: str
 

@@ -23,7 +23,7 @@ from mumacro.inputs.kind import ContactName
 from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
 from mumacro.inputs.reading import read_one, reason_of
 
-from .answers import Number, Numbers, Understood, quantity, understood_inputs
+from .answers import REMARKS, Number, Numbers, Remark, Understood, quantity, understood_inputs
 from .inputs import EXAMPLE, ONE_FREQUENCY, Strict, either, optional
 from .values import (
     AngularFrequency,
@@ -252,6 +252,7 @@ class MotionAnswer(BaseModel):
     )
     contact: ContactName
     warnings: list[str] | None = Field(None, description="Only where the search gave up: why")
+    remarks: list[Remark] | None = Field(None, description=REMARKS)
     cycle: CycleColumns | None = Field(None, description="Only if requested")
     inputs: dict[str, Understood] | None = understood_inputs()
     api_version: str

@@ -6,11 +6,11 @@ from typing import Annotated, Any
 from fastapi import Query, Request, Response
 from starlette.responses import PlainTextResponse
 
-from mumacro import Surrogate
+from mumacro import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
 from mumacro.outputs.evaluation import chosen, cost
-from mumacro.validity import digits, k_effect, model_rows
+from mumacro.validity import digits, effect_of, rows_of
 
 from ..admission import compute
 from ..models.answers import CaseAnswer
@@ -52,7 +52,7 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
             large = cost(outputs, cases) > _LARGE
             answer = await compute(request, work) if large else work()
         if case.model:
-            work = partial(_of_model, table.surrogate, inputs, case.kind.names)
+            work = partial(_of_model, answer)
             more |= await compute(request, work)
     except InputError as error:  # as with_members has it, which is a function more
         raise of_input(error, **more) from None
@@ -60,10 +60,10 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
     return {**answer.to_dict(), **more, **table.signature}
 
 
-def _of_model(surrogate: Surrogate, inputs: Any, words: Any) -> dict[str, Any]:
+def _of_model(answer: Answer[float]) -> dict[str, Any]:
     """Rows of docs/validity.md on this case, and the digits that k supports."""
-    rows = model_rows(surrogate, inputs, **words)
-    return {MODEL: rows, "digits": digits(k_effect(surrogate, inputs, **words))}
+    effect = effect_of(answer)
+    return {MODEL: rows_of(answer, effect), "digits": digits(effect)}
 
 
 @router.get(

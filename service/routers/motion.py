@@ -41,9 +41,11 @@ def _answered(scene: MotionRequest) -> dict[str, Any]:
             raise
         # of a group of inputs, such as the speed: none of them is bad by itself
         refuse([FieldFault((), f"{error.field} {reason_of(error)}", error.value)])
-    answer = {name: getattr(motion, name) for name in _NUMBERS} | {"contact": scene.contact}
-    if motion.warnings:
-        answer["warnings"] = motion.warnings
+    answer: dict[str, Any] = {name: getattr(motion, name) for name in _NUMBERS} | {
+        "contact": scene.contact
+    }
+    said = {"warnings": motion.warnings, "remarks": motion.remarks}
+    answer |= {name: lines for name, lines in said.items() if lines}
     if scene.cycle:
         columns = motion.cycle()._asdict()
         answer["cycle"] = {name: column.tolist() for name, column in columns.items()}

@@ -8,7 +8,7 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.doubts import Remark
+from mumacro.inputs.doubts import Remark, lines_of
 from mumacro.inputs.doubts import remarks as doubts
 from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import AMPLITUDE, Kind
@@ -142,6 +142,18 @@ class Answer(Generic[Number]):
         self.remarks_on_outputs: list[Remark] = []
 
     # --- by name ----------------------------------------------------------------------------------
+
+    def __getattr__(self, name: str) -> Any:
+        """Raise AttributeError; for the name of an output with the way to ask for it."""
+        from mumacro.outputs import OUTPUTS  # which imports this module
+
+        if hasattr(type(self), name):  # a property that has no value says why itself
+            return object.__getattribute__(self, name)
+        if name in OUTPUTS:
+            asked = any(path.partition(".")[0] == name for path in self.outputs)
+            ask = "" if asked else f'evaluate(..., include=("{name}",)), then '
+            raise AttributeError(f'{name} is no attribute: {ask}answer["{name}"]')
+        raise AttributeError(f"{type(self).__name__} has no {name}")
 
     def _group(self, place: int) -> Number:
         if self._groups is None:
@@ -337,12 +349,7 @@ class Answer(Generic[Number]):
         return f"<{type(self).__name__} to {cases}{self._kind_words()}>"
 
     def _notes(self) -> list[str]:
-        """The remarks in a line each."""
-        return [
-            f"remark: {one['field']}: {one['text']}"
-            + (f" ({one['cases']} cases)" if one["cases"] > 1 else "")
-            for one in self.remarks
-        ]
+        return lines_of(self.remarks)
 
     def _columns(self) -> dict[str, Any]:
         """What is shown, by path."""

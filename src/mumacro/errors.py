@@ -20,9 +20,8 @@ class InputError(MumacroError, ValueError):
         self.bound = bound  #: what the value must satisfy, e.g. ``"finite and > 0"``
         self.index = index  #: position in the flattened, broadcast input; None for a scalar call
         where = "" if index is None else f" at index {index}"
-        value_shown = (
-            "" if value is None and bound.startswith("given") else f", got {_shown(value)}"
-        )
+        missing = value is None and bound.startswith(("given", "that of"))
+        value_shown = "" if missing else f", got {_shown(value)}"
         super().__init__(f"{field}{where} must be {bound}{value_shown}")
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -68,25 +68,62 @@ def _positive(**values: Any) -> list[float]:
     return [*numbers.values()]
 
 
+#: E [Pa] and nu of usual materials: the middle of the ranges that Gere prints; of steel the values
+#: of EN 1993-1-1, which are within them
+MATERIALS = {
+    "steel": (210e9, 0.3),
+    "aluminium alloy": (70e9, 0.33),
+    "titanium alloy": (110e9, 0.33),
+    "brass": (103e9, 0.34),
+    "bronze": (108e9, 0.34),
+    "copper": (115e9, 0.35),
+    "nickel alloy": (210e9, 0.31),
+    "tungsten": (360e9, 0.2),
+    "glass": (70e9, 0.2),
+    "nylon": (2.8e9, 0.4),
+    "polyethylene": (1e9, 0.4),
+}
+SOURCE_OF_MATERIALS = "typical values after Gere, Mechanics of Materials, 5th edition"
+
+
+def _named(name: str) -> tuple[float, float] | None:
+    """Return E and nu of a usual material, whatever the case of its name and the spaces in it, and
+    without the word alloy, too; None for another text."""
+    words = name.lower().replace("-", " ").replace("_", " ").split()
+    for known, numbers in MATERIALS.items():
+        if words in (known.split(), known.removesuffix(" alloy").split()):
+            return numbers
+    return None
+
+
 @dataclass(frozen=True)
 class Material:
     """An isotropic elastic body: Young's modulus E [Pa] > 0, ``math.inf`` if rigid; Poisson's ratio
     -1 < nu <= 0.5.
 
+    Or a usual one by its name alone, of :data:`MATERIALS`.
+
     >>> steel = Material(E=210e9, nu=0.3)
-    >>> round(steel.G / 1e9, 2)
-    80.77
+    >>> round(steel.G / 1e9, 2), Material("steel") == steel
+    (80.77, True)
     """
 
     E: float
     nu: float
 
-    def __post_init__(self) -> None:
-        E, nu = _number("E", self.E), _number("nu", self.nu)
+    def __init__(self, E: Any, nu: Any = None) -> None:
+        named = _named(E) if isinstance(E, str) else None
+        if named is not None and nu is not None:
+            raise InputError("nu", nu, f"left out beside {E}, which has one")
+        if named is None and nu is None:
+            if isinstance(E, str):
+                bound = f"one of {', '.join(MATERIALS)}; or E is a modulus [Pa], and beside it nu"
+                raise InputError("material", E, bound)
+            raise InputError("nu", None, "given: Poisson's ratio, beside E")
+        E, nu = named or (_number("E", E), _number("nu", nu))
         _positive(E=LARGEST if math.inf == E else E)
         if not -1.0 < nu <= 0.5:
-            raise InputError("nu", self.nu, "> -1 and <= 0.5")
-        # as numbers in SI, where they came as texts
+            raise InputError("nu", nu, "> -1 and <= 0.5")
         self.__dict__.update(E=E, nu=nu)
 
     @property
@@ -127,7 +164,9 @@ def _moduli(first: Material, second: Material) -> tuple[float, float]:
     """E* and G* [Pa]."""
     for name, body in (("first", first), ("second", second)):
         if not isinstance(body, Material):
-            raise InputError(name, body, "a Material, such as Material(E=210e9, nu=0.3)")
+            raise InputError(
+                name, body, 'a Material, such as Material("steel") or Material(E=210e9, nu=0.3)'
+            )
     compliance = (1.0 - first.nu**2) / first.E + (1.0 - second.nu**2) / second.E
     shear = (2.0 - first.nu) / first.G + (2.0 - second.nu) / second.G
     if not compliance > 0.0:

@@ -12,16 +12,14 @@ from typing import Any, Protocol, TypedDict
 
 import numpy as np
 
+from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
-from mumacro.inputs.cases import Cases, without_interval
 from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
-from mumacro.inputs.kind import SPRING, SPRINGS_OF, Kind, kind_of
+from mumacro.inputs.kind import AMPLITUDE, SPRINGS_OF, Kind, kind_of
 from mumacro.inputs.numbers import plain
-from mumacro.outputs.evaluated import Evaluated
-from mumacro.outputs.settling import decay
-from mumacro.outputs.tabulated import Tabulated
+from mumacro.outputs.settling import REMAINING, decay_of_springs
 
 #: names of the rows, as in the table of docs/validity.md
 ROWS = (
@@ -44,10 +42,8 @@ _ADAPTS = 1e-7, 1e-4
 _PERIODS, _WATTS = 100.0, 0.1  # above them there is a row on settling, and one on heat
 
 
-class Answers(Protocol):
+class Evaluates(Protocol):
     """What answers cases: a :class:`mumacro.Surrogate`."""
-
-    tabulated: Tabulated
 
     @property
     def evaluate(self) -> Callable[..., Any]:
@@ -64,16 +60,14 @@ class Row(TypedDict):
 
 
 def model_rows(
-    surrogate: Answers,
+    surrogate: Evaluates,
     case: Mapping[str, Any],
     contact: str = "spring",
     direction: str = "across",
 ) -> list[Row]:
-    """The rows of docs/validity.md that a case falls in.
+    """Evaluate a case, and return its :func:`rows_of`.
 
-    ``case`` has inputs of :meth:`mumacro.Surrogate.evaluate`, numbers in SI; for an interval of k
-    the rows are those of its geometric middle, without the row of k.  A contact without oscillation
-    has no rows.
+    ``case`` has inputs of :meth:`mumacro.Surrogate.evaluate`.
 
     Examples
     --------
@@ -83,24 +77,33 @@ def model_rows(
     >>> k_row["text"]
     '10 % more or less of k changes mu_macro by 6 %: give k as an interval, or fit k'
     """
-    case, ends = without_interval(case)
-    kind = kind_of(contact, direction)
-    answer = surrogate.evaluate(**case, **kind.names)
-    mu = answer.mu_macro
-    inputs = _inputs_of(case, kind)
-    six = {"y0": 0.0, **inputs}  # 0 for normal
-    swing = six.get("Fz_amplitude", six["y0"])
-    if math.isinf(six["k"]) or six["omega"] == 0.0 or swing == 0.0:
+    return rows_of(_answer_to(surrogate, case, contact, direction))
+
+
+def rows_of(answer: Answer[float], effect: float | None = None) -> list[Row]:
+    """Return the rows of docs/validity.md that an evaluated case falls in.
+
+    Of an interval of k the rows are those of its geometric middle.  Where k is an interval or has a
+    deviation, there is no row of k: the answer shows what follows.  A contact without oscillation
+    has no rows.  ``effect`` is :func:`effect_of` the answer, where it is there already.
+    """
+    cases, y = answer.cases, answer.y_tilde
+    kind, inputs = cases.kind, cases.columns
+    swing = inputs[AMPLITUDE if kind.normal else "y0"]
+    if math.isinf(inputs["k"]) or inputs["omega"] == 0.0 or swing == 0.0:
         return []
-    y = 0.0 if kind.normal else answer.y_tilde
+    y = 0.0 if kind.normal else y
     if y > FURTHEST:  # no contact has such a y~: the remark on it stands alone
         doubts = [one for one in answer.remarks if one["row"] == UNITS]
         return [{"row": UNITS, "text": one["text"], "effect": None} for one in doubts]
+    uncertain = cases.ends is not None or np.any(cases.std.get("k", 0.0))
     rows = [
-        _row_of_other_contact(surrogate, case, mu, contact, direction),
-        None if ends else _row_of_stiffness(surrogate, case, y, contact, direction),
-        _row_of_tilt(six["mu0"], y),
-        *(_rows_of_cycle(surrogate, six) if direction == "across" else ()),
+        _row_of_other_contact(answer, kind),
+        None
+        if uncertain
+        else _row_of_stiffness(effect_of(answer) if effect is None else effect, y),
+        _row_of_tilt(float(inputs["mu0"]), y),
+        *(() if kind.direction else _rows_of_cycle(answer, inputs)),
     ]
     return sorted((row for row in rows if row is not None), key=lambda row: ROWS.index(row["row"]))
 
@@ -139,34 +142,39 @@ def load_rows(
 
 
 def k_effect(
-    surrogate: Answers,
+    surrogate: Evaluates,
     case: Mapping[str, Any],
     contact: str = "spring",
     direction: str = "across",
     uncertainty: float = K_UNCERTAINTY,
 ) -> float:
-    """By how much, relatively, mu_macro may differ [-] where k may by the factor 1 +
+    """Evaluate a case, and return :func:`effect_of` its answer."""
+    return effect_of(_answer_to(surrogate, case, contact, direction), uncertainty)
+
+
+def effect_of(answer: Answer[float], uncertainty: float = K_UNCERTAINTY) -> float:
+    """Return by how much, relatively, mu_macro may differ [-] where k may by the factor 1 +
     ``uncertainty`` up or down; 0 if rigid.
 
-    The largest of seven values of k, since mu_macro is no straight line in k.  Over an interval of
-    k half the width.
+    The largest of seven values of k counts, since mu_macro is no straight line in k.  Over an
+    interval of k it is half the width.
     """
     if not 0.0 < uncertainty < math.inf:
         raise InputError("uncertainty", uncertainty, "finite and > 0")
-    words = kind_of(contact, direction).names
-    middle_case, ends = without_interval(case)
-    k = _inputs_of(middle_case, kind_of(contact, direction))["k"]
-    if math.isinf(k):
+    cases, kind, middle_mu = answer.cases, answer.cases.kind, answer.mu_macro
+    v, y = answer.v_tilde, answer.y_tilde
+    if cases.ends is not None:
+        low, high = (getattr(answer, name) for name in BAND)
+        half_width = 0.5 * (high - low)
+    elif math.isinf(v) or math.isinf(y):  # rigid, or not shaken: k is no part of the answer
         return 0.0
-    if ends:
-        band = surrogate.evaluate(**case, **words)
-        middle_mu, half_width = band.mu_macro, 0.5 * (band.mu_macro_high - band.mu_macro_low)
     else:
-        stiffnesses = k * np.geomspace(
-            1.0 / (1.0 + uncertainty), 1.0 + uncertainty, 7
-        )  # the middle one is k
-        samples = surrogate.evaluate(**{**case, "k": stiffnesses}, **words).mu_macro
-        middle_mu, half_width = float(samples[3]), float(np.abs(samples - samples[3]).max())
+        factors = np.geomspace(1.0 / (1.0 + uncertainty), 1.0 + uncertainty, 7)
+        amplitudes = np.full(factors.size, y) if kind.normal else y * factors
+        tabulated = answer._surrogate.tabulated
+        ratios = tabulated.values("mu_ratio", v * factors, amplitudes, kind)[0]
+        middle_mu = float(ratios[3])  # the middle one is k
+        half_width = float(np.abs(ratios - ratios[3]).max())
     return 0.0 if half_width == 0.0 else half_width / middle_mu if middle_mu > 0.0 else math.inf
 
 
@@ -184,25 +192,26 @@ def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
     return min(max(math.ceil(-math.log10(uncertainty)) + 1, least), most)
 
 
-def _inputs_of(case: Mapping[str, Any], kind: Kind) -> dict[str, float]:
-    """The six inputs as numbers: omega from f, k infinite for a rigid contact."""
-    cases = Cases.of(case, kind)
-    if cases.shape:
+def _answer_to(
+    surrogate: Evaluates, case: Mapping[str, Any], contact: str, direction: str
+) -> Answer[float]:
+    """Return the answer to one case; raise InputError for several."""
+    answer: Answer[float] = surrogate.evaluate(case, contact=contact, direction=direction)
+    if np.shape(answer.mu_macro):
         shapes = {name: np.shape(value) for name, value in case.items()}
         raise InputError("case", shapes, "one case: numbers")
-    return {name: float(column) for name, column in cases.columns.items()}
+    return answer
 
 
-def _row_of_other_contact(
-    surrogate: Answers, case: Mapping[str, Any], mu: float, contact: str, direction: str
-) -> Row | None:
-    alternative = "ball" if contact == "spring" else "spring"
+def _row_of_other_contact(answer: Answer[float], kind: Kind) -> Row | None:
+    alternative = "spring" if kind.contact else "ball"
     try:
-        alternative_mu = surrogate.evaluate(
-            **case, **kind_of(alternative, direction).names
-        ).mu_macro
+        alternative_kind = kind_of(alternative, kind.names["direction"])
     except InputError:  # a ball that oscillates along its normal is another model
         return None
+    mu, groups = answer.mu_macro, (answer.v_tilde, answer.y_tilde)
+    ratio = answer._surrogate.tabulated.value("mu_ratio", *groups, alternative_kind)[0]
+    alternative_mu = answer.cases.columns["mu0"] * ratio
     change = (
         (alternative_mu - mu) / mu
         if mu
@@ -220,10 +229,7 @@ def _row_of_other_contact(
     return {"row": "one spring", "text": text, "effect": change}
 
 
-def _row_of_stiffness(
-    surrogate: Answers, case: Mapping[str, Any], y: float, contact: str, direction: str
-) -> Row | None:
-    effect = k_effect(surrogate, case, contact, direction)
+def _row_of_stiffness(effect: float, y: float) -> Row | None:
     margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{plain(100.0 * effect, 2)} %"
     if effect >= 1e-3:
         advice = "give k as an interval, or fit k"
@@ -249,10 +255,12 @@ def _row_of_tilt(mu0: float, y: float) -> Row | None:
     return {"row": "constant normal force", "text": text, "effect": effect}
 
 
-def _rows_of_cycle(surrogate: Answers, six: dict[str, Any]) -> list[Row]:
+def _rows_of_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Row]:
     """Rows that follow from the slip path of a period, taken from one spring."""
-    cases = Evaluated(surrogate.tabulated, Cases.of(six, SPRING), "groups")
-    _, periods, _, slip, _ = decay(cases)
+    groups = (np.array([x]) for x in (answer.v_tilde, answer.y_tilde))
+    rate = float(decay_of_springs(answer._surrogate.tabulated, *groups).rate[0])
+    slip = 2.0 * math.pi * rate  # over l0
+    periods = 2.0 * math.log(1.0 / REMAINING) / slip if slip else math.inf
     force = six["mu0"] * six["Fz"]
     # [m], [Hz]
     slip_path, frequency = slip * force / six["k"], six["omega"] / RAD_PER_CYCLE

@@ -5,12 +5,12 @@ from typing import Any
 
 from mumacro.answer import Answer
 from mumacro.inputs.doubts import UNITS
-from mumacro.inputs.fields import ENDS, LIKE, PER_UNIT
+from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import Kind
 from mumacro.inputs.units import Scale, scale_of, suited
 from mumacro.outputs import MEMBERS
 from mumacro.shown import Rows, known, tidy_zeros
-from mumacro.validity import digits, k_effect, model_rows
+from mumacro.validity import digits, effect_of, rows_of
 
 REGIMES = {
     "continuous": "slips all the time",
@@ -23,7 +23,6 @@ REGIMES = {
 #: rows of validity.ROWS with another word for a contact
 _CALLED = {("one spring", "ball"): "a ball"}
 _SHOWN = ("std", "std_share", "gradient")  # in rows of their own
-_ROW_OF_K = ("k is known", True)  # the answer for an interval says that already
 
 
 def of_one_case(
@@ -35,17 +34,14 @@ def of_one_case(
     Numbers have the digits that are known, and the unit that ``units`` has for their input, or else
     the one that suits them; with ``shown`` that many digits, in SI.
     """
-    surrogate, cases = answer._surrogate, answer.cases
-    kind, case = cases.kind, cases.columns
-    ends = cases.ends and tuple(float(end[0]) for end in cases.ends)
-    asked = {**case} if ends is None else {**_without_k(case), **dict(zip(ENDS, ends, strict=True))}
-    effect = k_effect(surrogate, asked, *kind.names.values()) if shown is None else 0.0
-    rows = _rows_of(answer, kind, shown, digits(effect), units or {})
+    kind, case = answer.cases.kind, answer.cases.columns
+    effect = effect_of(answer)
+    count = digits(effect if shown is None else 0.0)
+    rows = _rows_of(answer, kind, shown, count, units or {})
     notes: Rows = [
         ("assumes", f"{called(row['row'], kind)}: {in_words(row['text'], case)}")
-        for row in model_rows(surrogate, asked, **kind.names)
-        # a doubtful unit is a remark
-        if (row["row"], ends is not None) != _ROW_OF_K and row["row"] != UNITS
+        for row in rows_of(answer, effect)
+        if row["row"] != UNITS  # a doubtful unit is a remark
     ]
     remarks = answer.remarks_in(units or {})
     notes += [("remark", f"{one['field']}: {one['text']}") for one in remarks]
@@ -60,10 +56,6 @@ def called(row: str, kind: Kind) -> str:
     ('one spring', 'a ball')
     """
     return _CALLED.get((row, kind.names["contact"]), row)
-
-
-def _without_k(case: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: x for name, x in case.items() if name != "k"}
 
 
 def in_words(text: str, case: Mapping[str, Any]) -> str:

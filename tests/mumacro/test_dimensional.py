@@ -411,3 +411,37 @@ def test_single_cases_equal_the_array(table: Surrogate, n: int) -> None:
                 (row.mu_macro, row.mu_ratio, row.error_bound, row.source),
                 (macro[i], mu[i], bound[i], source[i]),
             )
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "words"),
+    [
+        ("y0", "y0", {}),
+        ("f", "f", {}),
+        ("Fz_amplitude", "Fz_amplitude", {"direction": "normal"}),
+    ],
+)
+def test_a_contact_that_is_not_shaken_is_told(
+    table: Surrogate, name: str, field: str, words: Any
+) -> None:
+    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01, **words}
+    case["Fz_amplitude" if words else "y0"] = 1e-6
+    [remark] = table.evaluate(**{**case, name: 0.0}).remarks
+    assert (remark["row"], remark["field"], remark["cases"]) == ("model", field, 1)
+    assert remark["text"] == f"{name} = 0: the contact is not shaken, mu_macro is mu0"
+    swing = np.array([0.0, case[name], 0.0, -1.0])
+    [remark] = table.evaluate(**{**case, name: swing}).remarks
+    assert (remark["row"], remark["cases"]) == ("model", 2)
+
+
+def test_an_output_that_was_not_asked_for_says_how_to_ask(table: Surrogate) -> None:
+    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01, "y0": 1e-6}
+    for v0 in (0.01, np.array([0.01, 0.02])):
+        answer = table.evaluate(**{**case, "v0": v0})
+        for name in ("power", "stick_fraction", "settling", "limits", "std"):
+            with pytest.raises(AttributeError, match=rf'include=\("{name}",\)'):
+                getattr(answer, name)
+        assert not hasattr(answer, "friction")
+        asked = table.evaluate(**{**case, "v0": v0}, include="power")
+        with pytest.raises(AttributeError, match=r'no attribute: answer\["power"\]'):
+            _ = asked.power

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, stiffness
+from mumacro.cli.main import main
 from mumacro.contacts.geometries import (
     ARGUMENTS,
     BODIES,
@@ -22,6 +23,7 @@ from mumacro.contacts.geometries import (
 )
 from mumacro.stiffness import (
     AXES,
+    MATERIALS,
     Contact,
     Material,
     ball_on_flat,
@@ -29,7 +31,7 @@ from mumacro.stiffness import (
     flat_punch,
     in_series,
 )
-from tests.support.cases import Case
+from tests.support.cases import Capture, Case
 from tests.support.comparing import close
 from tests.support.refusals import refused
 
@@ -320,3 +322,29 @@ def test_a_diameter_is_twice_a_radius(geometry: str) -> None:
 def test_lengths_that_bodies_do_not_have_are_doubted(name: str) -> None:
     for value, doubted in ((1e-9, True), (1e-6, False), (5e-3, False), (0.5, False), (5.0, True)):
         assert [one["field"] for one in doubts_of({name: value})] == [name] * doubted
+
+
+def test_materials_have_a_name(capsys: Capture) -> None:
+    for name, (modulus, ratio) in MATERIALS.items():
+        assert Material(name) == Material(modulus, ratio)
+    assert Material("Steel") == STEEL
+    assert Material("Aluminium-Alloy") == Material("aluminium") == Material(70e9, 0.33)
+    with refused("material"):
+        Material("cheese")
+    with refused("nu"):
+        Material("steel", 0.3)
+    with refused("nu"):
+        Material(210e9)
+    words = ["stiffness", "ball", "--radius", "5mm", "--Fz", "10N"]
+    outputs = []
+    for numbers in (
+        ["--E", "210GPa", "--nu", "0.3", "--E2", "70GPa", "--nu2", "0.2"],
+        ["--material", "steel", "--material2", "glass"],
+    ):
+        assert main([*words, *numbers]) == 0
+        outputs.append(capsys.readouterr().out)
+    assert outputs[0] == outputs[1]
+    assert main([*words, "--material", "cheese"]) == 2
+    assert "steel" in capsys.readouterr().err
+    assert main([*words, "--material", "steel", "--nu", "0.3"]) == 2
+    assert "leave it out beside --material" in capsys.readouterr().err

@@ -10,7 +10,8 @@ import pytest
 
 from mumacro import InputError, Surrogate
 from mumacro.cli.one_case import run
-from mumacro.validity import ROWS, digits, k_effect, model_rows
+from mumacro.inputs.cases import Cases
+from mumacro.validity import ROWS, digits, effect_of, k_effect, model_rows, rows_of
 from tests.support.cases import Case
 from tests.support.comparing import close
 from tests.support.refusals import refused
@@ -177,3 +178,26 @@ def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, message: Any) -
         model_rows(surrogate, {**CASE, **changed})
     with refused("uncertainty"):
         k_effect(surrogate, CASE, uncertainty=0.0)
+
+
+@pytest.mark.parametrize("k", ["1 N/um ± 10 %", "0.9..1.1 N/um"])
+def test_a_stiffness_with_its_uncertainty_is_not_asked_for(surrogate: Surrogate, k: str) -> None:
+    answer = surrogate.evaluate(**{**CASE, "k": k})
+    assert "k is known" not in {row["row"] for row in rows_of(answer)}
+    assert "k is known" in {row["row"] for row in model_rows(surrogate, CASE)}
+    for text in (main_words("k", k), answer._repr_html_()):
+        assert "k is known" not in text
+        assert "one spring" in text
+
+
+@pytest.mark.parametrize("words", [{}, {"contact": "ball"}, {"direction": "along"}])
+def test_what_is_said_of_an_evaluated_case_takes_no_second_evaluation(
+    surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch, words: Any
+) -> None:
+    evaluated = surrogate.evaluate(CASE, **words)
+    expected = model_rows(surrogate, CASE, **words), k_effect(surrogate, CASE, **words)
+    for name in ("evaluate", "answer"):
+        monkeypatch.delattr(Surrogate, name)
+    monkeypatch.delattr(Cases, "of")
+    assert (rows_of(evaluated), effect_of(evaluated)) == expected
+    assert evaluated._repr_html_()

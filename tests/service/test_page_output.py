@@ -450,12 +450,12 @@ def test_k_from_materials(open_page: Any) -> None:
             "geometry": "ball",
             "radius": "5 mm",
             "Fz": "10 N",
-            "E": "200 GPa",
-            "nu": "0.29",
+            "E": "210 GPa",
+            "nu": "0.3",
             "E2": "rigid",
             "include": ["inputs"],
         }
-        contact = contact_of("ball", radius=5e-3, Fz=10.0, E=200e9, nu=0.29, E2=np.inf)
+        contact = contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3, E2=np.inf)
         assert page.text("#stiffness-result").strip().startswith(f"k = {contact.k / 1e6:.4g} N/µm")
         page.click("#stiffness-result button")
         assert page.find("[name=contact][value=ball]").is_selected()

@@ -17,6 +17,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ABSENT, columns_of, real
+from mumacro.inputs.doubts import Remark, lines_of, remarks_on_motion
 from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.oscillation import read_oscillation
@@ -110,6 +111,16 @@ class Scenes:
     terms: tuple[tuple[Term, ...], ...]
     contact: str
     tolerance: float
+    frequency: str  #: the word for it that the caller used: omega or f
+
+    @property
+    def amplitudes(self) -> tuple[Array, ...]:
+        """The largest amplitude of each part (n,): 0 where it does not oscillate."""
+        still = np.zeros(self.columns["mu0"].size)
+        return tuple(
+            np.asarray(np.maximum.reduce([still, *(term.amplitude for term in part)]))
+            for part in self.terms
+        )
 
     @property
     def orders(self) -> tuple[tuple[int, ...], ...]:
@@ -234,11 +245,24 @@ class Motion:
             f"tolerance {tolerance:g} mu0; try a larger tolerance, fewer harmonics or a faster drag"
         ]
 
+    @property
+    def remarks(self) -> list[Remark]:
+        """What is doubtful, as of an answer: every amplitude as y0, that of the normal force as
+        Fz_amplitude; and where nothing oscillates."""
+        return remarks_on_motion(
+            self.scenes.columns,
+            dict(zip(PARTS, self.scenes.amplitudes, strict=True)),
+            self.scenes.frequency == "f",
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON of a motion over HTTP, without cycle and api_version; arrays as
         lists, None where a number is not finite."""
-        warnings = {"warnings": self.warnings} if self.warnings else {}
-        return members_of({**self.columns, "contact": self.scenes.contact, **warnings})
+        said = {name: said for name in ("warnings", "remarks") if (said := getattr(self, name))}
+        return members_of({**self.columns, "contact": self.scenes.contact, **said})
+
+    def _notes(self) -> list[str]:
+        return [*self.warnings, *lines_of(self.remarks)]
 
     def to_frame(self) -> Any:
         """The numbers as a DataFrame of pandas, one row a case; ``cycle().to_frame()`` is the cycle
@@ -252,22 +276,22 @@ class Motion:
 
     def __repr__(self) -> str:
         if np.shape(self.mu_macro):
-            return text_of(self._heading(), self.columns, self.warnings)
+            return text_of(self._heading(), self.columns, self._notes())
         one = (
             f"<Motion of a {self.scenes.contact}: mu_macro {self.mu_macro:.6g}, mu_lateral "
             f"{self.mu_lateral:.6g}, error_estimate {self.error_estimate:.1e}>"
         )
-        return "\n".join([one, *self.warnings])
+        return "\n".join([one, *self._notes()])
 
     def _repr_html_(self) -> str:
         """A table for notebooks: of one case a number a row with unit and meaning."""
         if np.shape(self.mu_macro):
-            return html_of(self._heading(), self.columns, self.warnings)
+            return html_of(self._heading(), self.columns, self._notes())
         rows = [
             (name, cell(getattr(self, name)), f"[{unit}]", meaning)
             for name, (unit, meaning) in NUMBERS.items()
         ]
-        return html_of_rows(self._heading(), rows, self.warnings)
+        return html_of_rows(self._heading(), rows, self._notes())
 
 
 @np.errstate(all="ignore")
@@ -365,8 +389,9 @@ def motion(
         ),
         contact,
         float(size),
+        "omega" if f is None else "f",
     )
-    legal = _legal(scenes, one=not shape, frequency="omega" if f is None else "f")
+    legal = _legal(scenes, one=not shape)
     out = np.full((legal.size, 7), math.nan)
     out[legal] = _steady(scenes, legal, default_threads() if threads is None else threads)
     return _answer(scenes, out, shape)
@@ -385,9 +410,9 @@ def _terms(name: str, part: Any) -> Iterable[Term]:
             yield Term(order, size, np.asarray(angle))
 
 
-def _legal(scenes: Scenes, one: bool, frequency: str) -> Bools:
+def _legal(scenes: Scenes, one: bool) -> Bools:
     """Which cases have an answer, (n,); InputError for ``one`` that has none."""
-    c = scenes.columns
+    c, frequency = scenes.columns, scenes.frequency
     legal = np.ones(c["mu0"].size, dtype=np.bool_)
 
     def require(name: str, holds: Any, value: Any, bound: str) -> None:

@@ -34,7 +34,7 @@ def one_value(roots: Sequence[Sequence[Any]], reason: Callable[[int], str]) -> f
         bound = f"that of one root, and there are {len(every)}, {values}: see .roots"
     else:
         bound = f"that of a root, and there is none: {reason(0)}"
-    raise InputError("value", len(every), bound)
+    raise InputError("value", None, bound)
 
 
 def results_of(

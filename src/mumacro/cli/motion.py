@@ -9,6 +9,7 @@ from mumacro.analysis.motion import NUMBERS, PARTS, Motion
 from mumacro.analysis.motion import motion as steady_cycle
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
+from mumacro.inputs.doubts import lines_of
 from mumacro.inputs.fields import in_help
 from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.oscillation import read_oscillation
@@ -69,7 +70,7 @@ def run(words: Sequence[str]) -> str:
         tolerance=options.tolerance,
     )
     if options.json:
-        lines = as_json(motion.columns | ({"warnings": motion.warnings} if motion.warnings else {}))
+        lines = as_json(motion.to_dict())
     else:
         rows = [
             (name, *_shown(name, getattr(motion, name), unit, motion, options.digits), meaning)
@@ -77,7 +78,8 @@ def run(words: Sequence[str]) -> str:
             if name != "error_estimate"
         ]
         error = f"numerical error of both about {motion.error_estimate:.1e}"
-        lines = "\n".join([in_columns(rows), error, *(f"warning: {x}" for x in motion.warnings)])
+        notes = [*(f"warning: {x}" for x in motion.warnings), *lines_of(motion.remarks)]
+        lines = "\n".join([in_columns(rows), error, *notes])
     if options.out is None:
         return lines
     columns = {}

@@ -8,7 +8,7 @@ from mumacro.answer import BAND, DEFAULT
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
 from mumacro.inputs.kind import SPRING
-from mumacro.validity import model_rows
+from mumacro.validity import rows_of
 from mumacro.version import __version__
 from mumacro.words import of_one_case as words_of_one_case
 
@@ -38,7 +38,7 @@ def run(words: Sequence[str], description: str) -> str:
         result |= {"v_tilde": answer.v_tilde, "y_tilde": answer.y_tilde, **members}
         result["inputs"] = case
         if arguments.model:
-            result["model"] = model_rows(surrogate, common.middle_of(case), **kind.names)
+            result["model"] = rows_of(answer)
         result |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**result, "table": common.table_members(surrogate)})
     rows, notes, error = words_of_one_case(

@@ -1,10 +1,12 @@
 """``mumacro stiffness``: k of a contact from materials and geometry."""
 
-from collections.abc import Sequence
+import argparse
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from typing import Any
 
 from mumacro.cli import common
-from mumacro.cli.common import OneLineParser, as_json, in_columns
+from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns
 from mumacro.contacts.geometries import (
     ARGUMENTS,
     BODIES,
@@ -14,6 +16,7 @@ from mumacro.contacts.geometries import (
     doubts_of,
     read_argument,
 )
+from mumacro.stiffness import MATERIALS, Material
 
 
 def _example(geometry: str) -> str:
@@ -25,6 +28,25 @@ def _example(geometry: str) -> str:
 
 EXAMPLE = _example("ball")
 _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
+
+
+_NAMES = ", ".join(MATERIALS)
+
+
+def _of_materials(options: argparse.Namespace, arguments: Mapping[str, Any]) -> dict[str, float]:
+    """Return E and nu of the bodies whose material is named; raise UsageError where a number of
+    them is written, too."""
+    numbers: dict[str, float] = {}
+    for suffix in ("", "2"):
+        name = getattr(options, f"material{suffix}")
+        if name is None:
+            continue
+        for argument in (f"E{suffix}", f"nu{suffix}"):
+            if argument in arguments:
+                raise UsageError(f"--{argument}: leave it out beside --material{suffix}")
+        body = Material(name)
+        numbers |= {f"E{suffix}": body.E, f"nu{suffix}": body.nu}
+    return numbers
 
 
 def run(words: Sequence[str]) -> str:
@@ -43,7 +65,7 @@ def run(words: Sequence[str]) -> str:
             description=f"k of {geometry.meaning}.",
             epilog=f"example:\n  {_example(name)}",
         )
-        required = {*geometry.arguments, *BODIES[:2]} - INSTEAD.keys()
+        required = {*geometry.arguments} - INSTEAD.keys()
         for argument_name in geometry.names:
             argument = ARGUMENTS[argument_name]
             unit = f" [{argument.unit}]" if argument.unit else ""
@@ -53,11 +75,15 @@ def run(words: Sequence[str]) -> str:
                 choices=argument.choices or None,
                 help=f"{argument.meaning}{unit}",
             )
+        for number, which in (("", "first"), ("2", "second")):
+            text = f"of the {which} body, in place of E{number} and nu{number}: {_NAMES}"
+            part.add_argument(f"--material{number}", metavar="NAME", help=text)
         common.add_form(part)
     options = parser.parse_args(words)
     names = GEOMETRIES[options.geometry].names
     texts = {name: text for name in names if (text := getattr(options, name)) is not None}
     arguments = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
+    arguments |= _of_materials(options, arguments)
     contact = contact_of(options.geometry, **arguments)
     stiffnesses = asdict(contact)
     if options.json:

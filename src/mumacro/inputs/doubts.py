@@ -18,6 +18,7 @@ from mumacro.inputs.units import Scale, scale_of
 from mumacro.kernel.arrays import Array, Bools
 
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
+MODEL = "model"  # the row of a case for which no model is needed
 LONGEST = 1e-2  # l0 [m]; no contact has more
 FURTHEST = 1e4  # v~ and y~; no contact has more
 # y0 omega [m/s]: a resonant bar of titanium yields at about 40, stress over density and speed of
@@ -41,9 +42,13 @@ class Remark(TypedDict):
 
 
 def remarks(
-    columns: Mapping[str, Any], frequency: bool = False, units: Mapping[str, str] | None = None
+    columns: Mapping[str, Any],
+    frequency: bool = False,
+    units: Mapping[str, str] | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> list[Remark]:
-    """The remarks on cases, at most one for each input, and one on rigid contacts.
+    """Return the remarks on cases, at most one for each input, and those on contacts that are not
+    shaken, or rigid.
 
     Parameters
     ----------
@@ -54,6 +59,8 @@ def remarks(
         Whether the inputs had ``f`` in place of ``omega``: then that is named.
     units : mapping
         The units that were typed, by input: a value is doubted in its own.
+    names : mapping
+        Other names of inputs, as those of the parts of a motion.
 
     Examples
     --------
@@ -89,17 +96,95 @@ def remarks(
             has_reason |= new
             first = int(np.flatnonzero(new)[0])
             at = {name: float(column.flat[first]) for name, column in six.items()}
-            name, text = _sentence(field, at, frequency, typed)
+            name, text = _sentence(field, at, frequency, typed, names or {})
             if name in by_row:
                 by_row[name]["cases"] += int(np.count_nonzero(new))
             else:
                 cases = int(np.count_nonzero(new))
                 by_row[name] = {"row": UNITS, "field": name, "cases": cases, "text": text}
+        still = _of_still(six, frequency)
         rigid = np.asarray(np.isposinf(six["k"]) & _oscillates(six))
         if not rigid.any():
-            return [*by_row.values()]
+            return [*by_row.values(), *still]
         stiffest = float(np.fmax.reduce((six["mu0"] * six["Fz"] / six["y0"])[rigid]))
-        return [*by_row.values(), _of_rigid(stiffest, int(np.count_nonzero(rigid)))]
+        return [*by_row.values(), *still, _of_rigid(stiffest, int(np.count_nonzero(rigid)))]
+
+
+def lines_of(found: list[Remark]) -> list[str]:
+    """Return remarks in a line each, as a result shows them.
+
+    >>> lines_of([{"row": "units", "field": "k", "cases": 2, "text": "is k = 1 in N/m?"}])
+    ['remark: k: is k = 1 in N/m? (2 cases)']
+    """
+    return [
+        f"remark: {one['field']}: {one['text']}"
+        + (f" ({one['cases']} cases)" if one["cases"] > 1 else "")
+        for one in found
+    ]
+
+
+def remarks_on_motion(
+    columns: Mapping[str, Any], amplitudes: Mapping[str, Any], frequency: bool = False
+) -> list[Remark]:
+    """Return the remarks on motions, each amplitude as y0, and on those in which nothing moves.
+
+    Parameters
+    ----------
+    columns : mapping
+        mu0, Fz, k, omega and v0 in SI, (n,) each.
+    amplitudes : mapping
+        The largest amplitude of x and y [m] and of normal [N], (n,) each.
+    frequency : bool
+        As in :func:`remarks`.
+
+    Examples
+    --------
+    >>> columns = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
+    >>> one = {name: np.array([value]) for name, value in columns.items()}
+    >>> for size in (1.0, 0.0):
+    ...     [remark] = remarks_on_motion(one, {"x": np.array([size])})
+    ...     remark["row"], remark["field"], remark["text"]
+    ('units', 'x', 'x = 1 m, usual is 1e-12 to 0.02 m: is it in metres?')
+    ('model', 'x', 'x = 0: the contact is not shaken, mu_macro is mu0')
+    """
+    found: list[Remark] = []
+    for name, size in amplitudes.items():
+        input_ = "Fz_amplitude" if name == "normal" else "y0"
+        amplitude = np.where(size > 0.0, size, math.nan)  # a part that is still is another matter
+        for one in remarks({**columns, input_: amplitude}, frequency, names={input_: name}):
+            if one["field"] not in {other["field"] for other in found}:
+                found.append(one)
+    legal = np.ones_like(columns["mu0"], np.bool_)
+    for name in ("mu0", "Fz", "k", "omega", "v0"):
+        legal &= np.isfinite(columns[name]) & (columns[name] > 0.0)
+    still = legal & np.all([size == 0.0 for size in amplitudes.values()], axis=0)
+    if still.any():
+        parts = " = ".join(amplitudes)
+        text = f"{parts} = 0: the contact is not shaken, mu_macro is mu0"
+        count = int(np.count_nonzero(still))
+        found.append({"row": MODEL, "field": next(iter(amplitudes)), "cases": count, "text": text})
+    return found
+
+
+def _of_still(six: Mapping[str, Array], frequency: bool) -> list[Remark]:
+    """What is said of legal contacts that are not shaken, by the input that is 0."""
+    legal = (six["mu0"] > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0) & (six["v0"] >= 0.0)
+    legal &= np.isfinite(six["mu0"]) & np.isfinite(six["Fz"]) & np.isfinite(six["v0"])
+    found: list[Remark] = []
+    for name in ("y0", "Fz_amplitude", "omega"):
+        still = np.asarray(legal & (six[name] == 0.0))
+        if still.any():
+            legal &= ~still  # one remark for each case
+            word = "f" if name == "omega" and frequency else name
+            found.append(
+                {
+                    "row": MODEL,
+                    "field": word,
+                    "cases": int(np.count_nonzero(still)),
+                    "text": f"{word} = 0: the contact is not shaken, mu_macro is mu0",
+                }
+            )
+    return found
 
 
 def _usual(columns: Mapping[str, Any]) -> bool:
@@ -155,27 +240,38 @@ def _oscillates(six: Mapping[str, Array]) -> Bools:
 
 
 def _sentence(
-    what: str, case: Mapping[str, float], frequency: bool, units: Mapping[str, "_Unit"]
+    what: str,
+    case: Mapping[str, float],
+    frequency: bool,
+    units: Mapping[str, "_Unit"],
+    names: Mapping[str, str],
 ) -> tuple[str, str]:
     """The input that is doubted, and why, of one case."""
     length = case["mu0"] * case["Fz"] / case["k"] if case["k"] else math.inf
+    swing = names.get("y0", "y0")
+
+    def doubted(name: str, formula: str, value: float) -> tuple[str, str]:
+        word = names.get(name, name)
+        return word, f"{formula}: {_is(name, word, value, units)}"
+
     if what == "l0":
-        return "k", f"l0 = mu0 Fz / k = {plain(length, 3)} m, above 1 cm: {_is('k', case, units)}"
+        formula = f"l0 = mu0 Fz / k = {plain(length, 3)} m, above 1 cm"
+        return doubted("k", formula, case["k"])
     if what == "y~":
         name = _stiff_or(case, "y0")
-        group = plain(case["y0"] / length, 3)
-        return name, f"y~ = y0 k / (mu0 Fz) = {group}, {_CONTACTS}: {_is(name, case, units)}"
+        formula = f"y~ = {swing} k / (mu0 Fz) = {plain(case['y0'] / length, 3)}, {_CONTACTS}"
+        return doubted(name, formula, case[name])
     if what == "v~":
         name = _stiff_or(case, "v0")
         group = plain(case["v0"] / case["omega"] / length, 3)
-        formula = f"v~ = v0 k / (mu0 Fz omega) = {group}"
-        return name, f"{formula}, {_CONTACTS}: {_is(name, case, units)}"
+        return doubted(name, f"v~ = v0 k / (mu0 Fz omega) = {group}, {_CONTACTS}", case[name])
     if what == "y0 omega":
         name, speed = _largest(case, "y0", "omega"), case["y0"] * case["omega"]
+        value = case[name]
         if name == "omega" and frequency:
-            name, case = "f", {"f": case["omega"] / RAD_PER_CYCLE}
-        formula = f"the peak speed y0 omega = {plain(speed, 3)} m/s, above {FASTEST:g} m/s"
-        return name, f"{formula}: {_is(name, case, units)}"
+            name, value = "f", value / RAD_PER_CYCLE
+        formula = f"the peak speed {swing} omega = {plain(speed, 3)} m/s, above {FASTEST:g} m/s"
+        return doubted(name, formula, value)
     value, name = case[what], what
     if what == "omega" and frequency:
         value, name = value / RAD_PER_CYCLE, "f"
@@ -187,17 +283,19 @@ def _sentence(
         question = f"is it in {field.words}" if typed.name else "is it a number, not per cent"
     least, most = field.usual
     usual = f"{typed.number(least)} to {typed.text(most)}" if least else f"up to {typed.text(most)}"
-    return name, f"{name} = {typed.text(value)}, usual is {usual}: {question}?"
+    word = names.get(name, name)
+    return word, f"{word} = {typed.text(value)}, usual is {usual}: {question}?"
 
 
 _CONTACTS = "contacts have 0.01 to 100"
 
 
-def _is(name: str, case: Mapping[str, float], units: Mapping[str, "_Unit"]) -> str:
-    """The question whether a value is right; of a number without a unit, whether it is in SI."""
+def _is(name: str, word: str, value: float, units: Mapping[str, "_Unit"]) -> str:
+    """The question whether the value of an input, which is called a ``word``, is right; of a number
+    without a unit, whether it is in SI."""
     if name in units:
-        return f"is {name} = {units[name].text(case[name])} right?"
-    return f"is {name} = {plain(case[name], 6)} in {INPUTS[name].unit}?"
+        return f"is {word} = {units[name].text(value)} right?"
+    return f"is {word} = {plain(value, 6)} in {INPUTS[name].unit}?"
 
 
 class _Unit(NamedTuple):

@@ -51,7 +51,10 @@ def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
         return _of_text(name, value)
     if isinstance(value, Mapping):
         return [_of_mapping(name, value)]
-    if isinstance(value, tuple) and len(value) == 2:
+    triples = isinstance(value, tuple) and all(map(_is_term, value))
+    if isinstance(value, tuple) and not triples:
+        if len(value) != 2:
+            raise InputError(name, value, f"{_FORM}; amplitudes of several cases are an array")
         return [(1, *value)]
     if isinstance(value, (list, tuple)) and all(
         isinstance(one, (list, tuple, Mapping)) for one in value
@@ -61,6 +64,11 @@ def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
             raise InputError(name, value, _FORM)
         return [(one[0], one[1], one[2]) for one in parts]
     return [(1, value, 0.0)]
+
+
+def _is_term(part: Any) -> bool:
+    """Whether a part of a tuple is a harmonic, and no amplitude or phase."""
+    return isinstance(part, Mapping) or (isinstance(part, tuple) and len(part) == 3)
 
 
 def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:

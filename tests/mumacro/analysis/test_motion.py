@@ -803,3 +803,49 @@ def test_a_turn_within_one_step_ends_no_period(tolerance: float) -> None:
         assert abs(result.mu_macro - 0.0362 * np.mean(wx / speed)) <= off
         assert abs(result.mu_lateral - 0.0362 * np.mean(wy / speed)) <= off
         assert result.error_estimate <= 0.0362 * tolerance
+
+
+@pytest.mark.parametrize("part", ["x", "y"])
+def test_every_amplitude_of_a_motion_is_doubted_as_y0(capsys: Capture, part: str) -> None:
+    [remark] = motion(**RIG, **{part: 1.0}).remarks
+    assert (remark["row"], remark["field"], remark["cases"]) == ("units", part, 1)
+    assert remark["text"] == f"{part} = 1 m, usual is 1e-12 to 0.02 m: is it in metres?"
+    many = motion(**RIG, **{part: np.array([1e-6, 1.0, 2.0])})
+    assert many.remarks[0]["cases"] == 2
+    assert many.to_dict()["remarks"] == many.remarks
+    assert remark["text"] in repr(motion(**RIG, **{part: [(1, 2e-6, 0.0), (3, 1.0, 0.0)]}))
+    assert main(["motion", COMMAND, f"--{part}", "1m", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["remarks"] == [remark]
+    assert main(["motion", COMMAND, f"--{part}", "1m"]) == 0
+    assert f"remark: {part}: {remark['text']}" in capsys.readouterr().out
+
+
+def test_inputs_of_a_motion_are_doubted_as_those_of_a_case() -> None:
+    assert motion(**RIG, x=2e-6, y=(1e-6, 90.0)).remarks == []
+    assert [one["field"] for one in motion(**{**RIG, "k": 1.0}, x=2e-6, y=1e-6).remarks] == ["k"]
+    [remark] = motion(**RIG, x=2e-6, normal=1e-7).remarks
+    assert remark["field"] == "normal"
+    assert remark["text"].startswith("normal = 1e-07 N, usual is")
+
+
+def test_no_motion_at_all_is_told() -> None:
+    [remark] = motion(**RIG).remarks
+    assert (remark["row"], remark["field"]) == ("model", "x")
+    assert remark["text"] == "x = y = normal = 0: the contact is not shaken, mu_macro is mu0"
+    assert motion(**RIG, normal=1.0).remarks == []
+    assert motion(**RIG, x=np.array([0.0, 1e-6, 0.0])).remarks[0]["cases"] == 2
+
+
+@pytest.mark.parametrize("name", ["x", "y", "normal"])
+@pytest.mark.parametrize("part", [(1e-6, 90.0, 2.0), (1e-6,), (1e-6, 1e-6, 1e-6, 1e-6)])
+def test_a_tuple_that_is_no_pair_is_refused_by_name(name: str, part: Any) -> None:
+    with refused(name):
+        motion(**RIG, **{name: part})
+    without_v0 = {one: x for one, x in RIG.items() if one != "v0"}
+    with refused(name):
+        solve_motion("v0", target=0.1, **without_v0, **{"x": 1e-6, name: part})
+
+
+def test_a_tuple_of_triples_is_a_list_of_them() -> None:
+    triples = ((1, 2e-6, 0.0), (3, 1e-6, 90.0))
+    assert motion(**RIG, x=triples).mu_macro == motion(**RIG, x=[*triples]).mu_macro

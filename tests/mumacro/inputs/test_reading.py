@@ -271,8 +271,10 @@ def test_what_is_unusual_is_remarked_on_for_one_case_and_in_columns(
 def test_usual_cases_zero_and_gaps_are_not_doubted() -> None:
     assert remarks(CASE) == []
     for name in ("y0", "omega", "v0"):
-        assert remarks({**CASE, name: 0.0}) == []
-        assert remarks({**CASE, name: np.array([0.0, CASE[name], math.nan])}) == []
+        expected = [] if name == "v0" else [("model", name, 1)]
+        for value in (0.0, np.array([0.0, CASE[name], math.nan])):
+            found = remarks({**CASE, name: value})
+            assert [(one["row"], one["field"], one["cases"]) for one in found] == expected
     assert remarks({name: np.zeros(0) for name in CASE}) == []
 
 
@@ -296,4 +298,6 @@ def test_one_case_has_the_remarks_of_a_column_of_one(
 @pytest.mark.parametrize("name", ["mu0", "Fz", "k", "y0", "omega", "v0"])
 @pytest.mark.parametrize("value", [-1.0, -0.0, 0.0, -math.inf, math.nan])
 def test_what_is_not_legal_is_refused_and_not_doubted(name: str, value: float) -> None:
-    assert remarks({**CASE, name: np.array([CASE[name], value])}) == []
+    found = remarks({**CASE, name: np.array([CASE[name], value])})
+    still = value == 0.0 and name in ("y0", "omega")  # legal, and it needs no model
+    assert [one["row"] for one in found] == ["model"] * still
