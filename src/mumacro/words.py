@@ -129,20 +129,15 @@ def _rows_of(
     if cases.ends is not None:
         low, high = (_stiffness(float(end[0]), shown, units) for end in cases.ends)
         middle = _stiffness(cases.columns["k"], shown, units)
-        rows[:1] = [
-            (*rows[0][:3], f"at k = {middle}, the geometric middle"),
-            (
-                "from",
-                number(answer.mu_macro_low, error),
-                "[-]",
-                f"the least for k from {low} to {high}",
-            ),
-            ("to", number(answer.mu_macro_high, error), "[-]", "the most"),
-        ]
+        least, most = (number(x, error) for x in (answer.mu_macro_low, answer.mu_macro_high))
+        meaning = f"for k from {low} to {high}; {rows[0][1]} at {middle}, the geometric middle"
+        rows[0] = ("mu_macro", f"{least} to {most}", "[-]", meaning)
     if "std" in answer.paths:
         shares = {name: answer[f"std_share.{name}"] for name in kind.fields}
         parts = ", ".join(f"{name} {100.0 * x:.3g} %" for name, x in shares.items() if x > 0.0)
-        rows.insert(1, ("+-", f"{std:.2g}", "[-]", f"standard deviation; {parts}"))
+        deviation = known(std, 2) if shown is None else f"{std:.{shown}g}"
+        meaning = f"standard deviation; {parts}" if parts else "standard deviation"
+        rows[0] = ("mu_macro", f"{rows[0][1]} ± {deviation}", "[-]", meaning)
     for name, slope in (answer.gradient or {}).items():
         unit = PER_UNIT[LIKE.get(name, name)]
         error = answer.gradient_bound[name]

@@ -462,7 +462,9 @@ def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *mo
             parts.append("k rigid")
             continue
         unit = Unit.of(field, float(ends[-1]), units, None)
-        numbers = " to ".join(tidy_zeros(unit.shown(float(end), 6, None)) for end in ends)
+        deviation = [case[f"std_{name}"]] if f"std_{name}" in case else []
+        shown = [tidy_zeros(unit.shown(float(x), 6, None)) for x in (*ends, *deviation)]
+        numbers = (" ± " if deviation else " to ").join(shown)
         parts.append(f"{field} = {numbers} {unit.name}".removesuffix(" -"))
     return "; ".join([", ".join([*parts, *more]), ", ".join(kind.names.values())])
 

@@ -41,7 +41,7 @@ def run(words: Sequence[str], description: str) -> str:
             result["model"] = rows_of(answer)
         result |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**result, "table": common.table_members(surrogate)})
-    rows, notes, error = words_of_one_case(
-        answer, arguments.digits, common.units_in(arguments.words)
-    )
-    return "\n".join([in_columns(rows), *([in_columns(notes)] if notes else []), error])
+    units = common.units_in(arguments.words)
+    rows, notes, error = words_of_one_case(answer, arguments.digits, units)
+    line = common.case_line(case, units, kind)
+    return "\n".join([line, in_columns(rows), *([in_columns(notes)] if notes else []), error])

@@ -144,9 +144,31 @@ def test_a_mean_within_its_error_of_0_is_0(capsys: Any) -> None:
 def test_no_digit_is_below_the_deviation(capsys: Any) -> None:
     for deviation in ("0.0001", "0.002", "0.03"):
         text = output(capsys, words(mu0=f"0.3±{deviation}"))
-        shown = {line.split()[0]: line.split()[1] for line in text.splitlines()}
-        last = 10.0 ** -len(shown["mu_macro"].partition(".")[2])
-        assert last >= 0.99 * 10.0 ** math.floor(math.log10(float(shown["+-"])) - 1.0)
+        (row,) = [line.split() for line in text.splitlines() if line.startswith("mu_macro")]
+        assert row[2] == "±"
+        last = 10.0 ** -len(row[1].partition(".")[2])
+        assert last >= 0.99 * 10.0 ** math.floor(math.log10(float(row[3])) - 1.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "line", "headline"),
+    [
+        ({}, "k = 1 N/um", "0.2405"),
+        ({"k": "1±0.1N/um"}, "k = 1 ± 0.1 N/um", "0.240 ± 0.014"),
+        ({"k": "1N/um±10%"}, "k = 1 ± 0.1 N/um", "0.240 ± 0.014"),
+        ({"k": "0.8..1.2N/um"}, "k = 0.8 to 1.2 N/um", "0.2095 to 0.2640"),
+        ({"k": "rigid"}, "k rigid", "0.0350245"),
+    ],
+)
+def test_one_case_says_how_it_was_understood_and_how_uncertain_it_is(
+    capsys: Any, case: Any, line: str, headline: str
+) -> None:
+    first, second, *_, last = output(capsys, words(**case)).splitlines()
+    assert first.endswith("; spring, across")
+    assert line in first.replace(";", ",").split(", ")
+    name, value = second.partition("[-]")[0].split(maxsplit=1)
+    assert (name, value.strip()) == ("mu_macro", headline)
+    assert last.startswith("numerical error  ")
 
 
 def test_no_digit_is_below_the_numerical_error(capsys: Any) -> None:
