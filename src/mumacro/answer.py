@@ -144,16 +144,14 @@ class Answer(Generic[Number]):
     # --- by name ----------------------------------------------------------------------------------
 
     def __getattr__(self, name: str) -> Any:
-        """Raise AttributeError; for the name of an output with the way to ask for it."""
-        from mumacro.outputs import OUTPUTS  # which imports this module
-
+        """Raise AttributeError, with the way to ask for an output of this name."""
         if hasattr(type(self), name):  # a property that has no value says why itself
             return object.__getattribute__(self, name)
-        if name in OUTPUTS:
-            asked = any(path.partition(".")[0] == name for path in self.outputs)
-            ask = "" if asked else f'evaluate(..., include=("{name}",)), then '
-            raise AttributeError(f'{name} is no attribute: {ask}answer["{name}"]')
-        raise AttributeError(f"{type(self).__name__} has no {name}")
+        if name.startswith("_"):
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        asked = any(path.partition(".")[0] == name for path in self.outputs)
+        ask = "" if asked else f'evaluate(..., include=("{name}",)), then '
+        raise AttributeError(f'{name} is no attribute; an output is {ask}answer["{name}"]')
 
     def _group(self, place: int) -> Number:
         if self._groups is None:

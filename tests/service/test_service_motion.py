@@ -54,7 +54,17 @@ def test_the_answer_is_the_librarys(client: Any, name: str) -> None:
     own = mumacro.motion(**RIG, **same)
     expected = {name: getattr(own, name) for name in NUMBERS}
     expected |= {"contact": same.get("contact", "spring"), "api_version": "1"}
+    if own.remarks:  # of the drag alone
+        expected["remarks"] = own.remarks
     assert answer.json() == expected
+
+
+def test_every_amplitude_of_a_motion_is_doubted(client: Any) -> None:
+    answer = client.post(PATH, json={**RIG, "x": "1m"}).json()
+    assert [(one["row"], one["field"]) for one in answer["remarks"]] == [("units", "x")]
+    refused = client.post(PATH, json={**RIG, "x": [1e-6, 90, 2]})
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["pointer"].startswith("#/x")
 
 
 @pytest.mark.parametrize(
