@@ -14,12 +14,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mumacro import InputError, Surrogate, fit, law, settling, solve_for
+from mumacro import InputError, Surrogate, fit, law, solve_for
 from mumacro.inputs.cases import DEVIATIONS
 from mumacro.inputs.fields import BOUNDS, FIELDS, POSITIVE, STIFFNESS
 from tests.support.cases import CASE, Case, log_uniform, tables, without
 from tests.support.comparing import close
 from tests.support.refusals import refused
+from tests.support.settling import settling
 
 positive = st.floats(
     min_value=5e-324, max_value=1.7976931348623157e308, allow_nan=False, allow_infinity=False
