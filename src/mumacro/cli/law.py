@@ -67,15 +67,8 @@ def run(words: Sequence[str]) -> str:
     model = load_rows(along, law.case, options.contact, law.stiffening)
     columns = law.columns
     if options.json:
-        members = {
-            "along": along,
-            "unit": unit_of(along),
-            **columns,
-            "border": [{along: c.value, "mu_macro": c.mu_macro} for c in law.border],
-            **({"model": model} if model else {}),
-            "table": common.table_members(surrogate),
-        }
-        return as_json(members)
+        said = {"model": model} if model else {}
+        return as_json({**law.to_dict(), **said, "table": common.table_members(surrogate)})
     middle = float(law.values[law.values.size // 2])
     count = common.count_for(options, surrogate, {**case, along: middle}, kind)
     units = common.units_in(options.words, **{along: ends})

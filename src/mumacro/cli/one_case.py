@@ -4,10 +4,8 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from mumacro.answer import BAND, DEFAULT
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
-from mumacro.inputs.kind import SPRING
 from mumacro.validity import rows_of
 from mumacro.version import __version__
 from mumacro.words import of_one_case as words_of_one_case
@@ -33,14 +31,8 @@ def run(words: Sequence[str], description: str) -> str:
     options: dict[str, Any] = {**kind.names, "include": include}
     answer: Any = surrogate.evaluate(case, **options)
     if arguments.json:
-        members = answer.to_dict()
-        result = {name: members.pop(name) for name in (*DEFAULT, *BAND) if name in members}
-        result |= {"v_tilde": answer.v_tilde, "y_tilde": answer.y_tilde, **members}
-        result["inputs"] = case
-        if arguments.model:
-            result["model"] = rows_of(answer)
-        result |= dict(kind.names.items() - SPRING.names.items())
-        return as_json({**result, "table": common.table_members(surrogate)})
+        said = {"model": rows_of(answer)} if arguments.model else {}
+        return as_json({**answer.to_dict(), **said, "table": common.table_members(surrogate)})
     units = common.units_in(arguments.words)
     rows, notes, error = words_of_one_case(answer, arguments.digits, units)
     line = common.case_line(case, units, kind)

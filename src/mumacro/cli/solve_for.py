@@ -110,15 +110,8 @@ def run(words: Sequence[str]) -> str:
         raise ImpossibleError(solution.reason() + _hint(options, case, solution))
     model = load_rows(unknown, common.middle_of(case), options.contact, solution.stiffening)
     if options.json:
-        members = {
-            "unknown": unknown,
-            "unit": solution.unit,
-            "target": target,
-            "roots": [_root_members(solution, k, root) for k, root in rows],
-            **({"model": model} if model else {}),
-            "table": common.table_members(surrogate),
-        }
-        return as_json(members)
+        said = {"model": model} if model else {}
+        return as_json({**solution.to_dict(), **said, "table": common.table_members(surrogate)})
     if options.out is not None:
         heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
         in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
@@ -152,14 +145,6 @@ def _solutions_by_k(solution: Solution, case: Mapping[str, Any]) -> dict[Any, So
         return {middle: solution}
     low, high = (case[name] for name in ENDS)
     return {low: solution.ends[0], middle: solution, high: solution.ends[1]}
-
-
-def _root_members(solution: Solution, k: float, root: Root) -> dict[str, Any]:
-    """A root in JSON, its value under the name of the unknown; with its k where that is an
-    interval."""
-    members = root._asdict()
-    at = {"k": k} if solution.ends else {}
-    return {**at, solution.unknown: members.pop("value"), **members}
 
 
 def _heads(unknown: str, k: str | None) -> list[str]:

@@ -54,17 +54,8 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
     (roots,) = solution.roots
     if not roots:
         raise ImpossibleError(solution.reason() + _hint(options, case, solution))
-    names = ("value", "low", "high", "mean", "error_estimate")
     if options.json:
-        rows = [dict(zip(names, root, strict=True)) for root in roots]
-        return as_json(
-            {
-                "unknown": solution.unknown,
-                "unit": solution.unit,
-                "target": target,
-                "roots": rows,
-            }
-        )
+        return as_json(solution.to_dict())
     if options.out is not None:
         heads = [f"{solution.unknown} [{solution.unit}]", "between", "and", "mu_macro [-]"]
         columns = dict(zip(heads, zip(*(root[:4] for root in roots), strict=True), strict=True))

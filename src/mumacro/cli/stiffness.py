@@ -87,7 +87,8 @@ def run(words: Sequence[str]) -> str:
     contact = contact_of(options.geometry, **arguments)
     stiffnesses = asdict(contact)
     if options.json:
-        return as_json({**stiffnesses, "geometry": options.geometry, **arguments})
+        said = {"remarks": remarks} if (remarks := doubts_of(arguments)) else {}
+        return as_json({"geometry": options.geometry, **stiffnesses, **said})
     form = f".{options.digits or 4}g"  # what materials and geometry give at best
     rows = [(name, f"{stiffnesses[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"

@@ -127,7 +127,9 @@ def test_the_command_gives_the_librarys_roots(capsys: Any, tmp_path: Any) -> Non
     assert main([*words, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     expected = mumacro.solve_motion("normal.phase", **CONVEYOR, v0=0.005, normal=8.0).roots[0]
-    assert [root["value"] for root in answer["roots"]] == [root.value for root in expected]
+    assert [root["value"] for root in answer["results"][0]["roots"]] == [
+        root.value for root in expected
+    ]
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 + len(expected)

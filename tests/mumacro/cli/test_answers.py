@@ -77,7 +77,7 @@ def test_roots_are_in_the_unit_that_was_typed(capsys: Any, name: str, unit: str)
     (row,) = table(output(capsys, *arguments), f"{name} [{unit}]")
     answer = json.loads(output(capsys, *arguments, "--json"))
     assert answer["unit"] == unit_of(name)
-    in_si = answer["roots"][0][name]
+    in_si = answer["results"][0]["roots"][0]["value"]
     assert scale.si(float(row[f"{name} [{unit}]"])) == close(in_si, rel=6e-4)
     text = output(capsys, *arguments, "--digits", "15")
     (row,) = table(text, f"{name} [{unit_of(name)}]")

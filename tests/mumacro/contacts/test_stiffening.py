@@ -303,9 +303,9 @@ def run(capsys: Any, code: int, *words: str) -> str:
 def test_the_command_takes_the_load_at_which_k_holds(surrogate: Surrogate, capsys: Any) -> None:
     grows = ("--stiffness-exponent", "0.5")
     output = json.loads(run(capsys, 0, "law", WORDS, *LAW, *grows, "--json"))
-    assert output["k"] == [close(1e6 * math.sqrt(x / 10.0), rel=1e-14) for x in output["Fz"]]
+    assert output["k"] == [close(1e6 * math.sqrt(x / 10.0), rel=1e-14) for x in output["values"]]
     law = friction_law(
-        surrogate, "Fz", values=np.array(output["Fz"]), stiffness_exponent=0.5, **CASE
+        surrogate, "Fz", values=np.array(output["values"]), stiffness_exponent=0.5, **CASE
     )
     assert output["mu_macro"] == [close(x, rel=1e-13) for x in law.answer.mu_macro]
     assert "k grows as Fz^0.5" in output["model"][0]["text"]
@@ -316,9 +316,9 @@ def test_the_command_takes_the_load_at_which_k_holds(surrogate: Surrogate, capsy
     assert "constant over Fz" in constant
     assert "k [N" not in constant
     ask = ("solve-for", "Fz", WORDS, "--target", "0.25", *grows)
-    (root,) = json.loads(run(capsys, 0, *ask, "--json"))["roots"]
+    (root,) = json.loads(run(capsys, 0, *ask, "--json"))["results"][0]["roots"]
     solution = solve_for(surrogate, "Fz", 0.25, stiffness_exponent=0.5, **CASE)
-    assert root["Fz"] == close(solution.roots[0][0].value, rel=1e-12)
+    assert root["value"] == close(solution.roots[0][0].value, rel=1e-12)
     assert "k grows as Fz^0.5" in run(capsys, 0, *ask)
 
 
