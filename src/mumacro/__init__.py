@@ -20,6 +20,8 @@ if _TYPE_CHECKING:
     from mumacro.analysis.fitted import Fit
     from mumacro.analysis.harmonics import Harmonics, harmonics
     from mumacro.analysis.law import law
+    from mumacro.analysis.loop import fit_loop
+    from mumacro.analysis.loop_fitted import LoopFit
     from mumacro.analysis.motion import Motion, motion
     from mumacro.analysis.solve_for import solve_for
     from mumacro.analysis.solve_motion import MotionSolution, solve_motion
@@ -41,6 +43,8 @@ _PLACES = {
     "Harmonics": "analysis.harmonics",
     "harmonics": "analysis.harmonics",
     "law": "analysis.law",
+    "LoopFit": "analysis.loop_fitted",
+    "fit_loop": "analysis.loop",
     "Motion": "analysis.motion",
     "motion": "analysis.motion",
     "solve_for": "analysis.solve_for",
@@ -62,6 +66,7 @@ __all__ = [
     "Fit",
     "Harmonics",
     "InputError",
+    "LoopFit",
     "Motion",
     "MotionSolution",
     "MumacroError",
@@ -70,6 +75,7 @@ __all__ = [
     "__version__",
     "closed_forms",
     "fit",
+    "fit_loop",
     "harmonics",
     "law",
     "motion",

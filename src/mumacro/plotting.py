@@ -400,6 +400,26 @@ def plot_fit(along: str, curves: Sequence[Curve], title: str, ax: Any = None) ->
     return pair if lower is None else np.array([upper, lower], object)
 
 
+def plot_loop(x: Array, force: Array, fitted: Array, title: str, ax: Any = None) -> Any:
+    """A measured loop, force [N] over displacement [m], and that of the model, and below them the
+    residuals; ``ax`` as for :func:`plot_fit`."""
+    pair = axes_for(ax, OF_FIT)
+    upper, lower = pair if np.ndim(pair) else (pair, None)
+    scale, unit = 1e6, "µm"
+    if np.ptp(x) > 2e-3:
+        scale, unit = 1e3, "mm"
+    upper.plot(scale * x, force, ".", color="C0", ms=4.0, label="measured")
+    upper.plot(scale * x, fitted, color="C1", lw=1.5, label="model")
+    upper.set(ylabel=r"$F_t$ [N]")
+    (upper if lower is None else lower).set_xlabel(f"displacement [{unit}]")
+    if lower is not None:
+        lower.plot(scale * x, force - fitted, ".", color="C0", ms=4.0)
+        lower.axhline(0.0, lw=0.8, color=_ink())
+        lower.set_ylabel("residual [N]")
+    head(upper, title)
+    return pair if lower is None else np.array([upper, lower], object)
+
+
 def _ink() -> str:
     """The colour of text in the user's style."""
     return str(_loaded("").rcParams["text.color"])

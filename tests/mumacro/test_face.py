@@ -18,7 +18,7 @@ def test_the_face_is_what_users_need() -> None:
     assert {name for name in dir(mumacro) if not name.startswith("__")} == {
         *("open", "Surrogate", "Answer", "Fit", "Element", "Motion", "MotionSolution"),
         *("law", "solve_for", "fit", "motion", "solve_motion"),
-        *("harmonics", "Harmonics"),
+        *("harmonics", "Harmonics", "fit_loop", "LoopFit"),
         *("stiffness", "closed_forms", "validity", "plotting"),
         *("InputError", "MumacroError", "TableError", "REGIMES", "SOURCES"),
     }

@@ -99,6 +99,10 @@ ELSEWHERE = {
         "tests/mumacro/analysis/test_fitting.py",
         "fit_coverage.SET_UPS",
     ),
+    "python benchmarks/loops.py": (
+        "tests/mumacro/analysis/test_loop.py",
+        "benchmark.random_loops(",
+    ),
     "mumacro fit --json": ("tests/mumacro/cli/test_command.py", '*words, "--json")'),
     "python benchmarks/error_distribution.py": (
         "tests/project/test_benchmarks.py",

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from mumacro.cli import common, fit, law, motion, one_case, solve_for, stiffness, table
+from mumacro.cli import common, fit, fit_loop, law, motion, one_case, solve_for, stiffness, table
 from mumacro.cli import map as map_
 from mumacro.cli.common import ImpossibleError, UsageError
 from mumacro.errors import missing
@@ -33,6 +33,7 @@ _TASKS = {
     "mumacro map -o map.png": "the map of all cases",
     'mumacro motion "mu0=0.3 ..." --x 1um@90deg --y 2um': "any periodic motion",
     'mumacro fit measured.csv "Fz=10N ..." -o fit.png': "k from measured points",
+    "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft": "k from a measured loop",
     "mumacro stiffness ball --radius 5mm --Fz 10N ...": "k from materials",
     "mumacro table": "the table in use, its errors",
     "mumacro export --format csv": "the table for other tools",
@@ -89,6 +90,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
     "map": map_.run,
     "motion": motion.run,
     "fit": fit.run,
+    "fit-loop": fit_loop.run,
     "stiffness": stiffness.run,
     "table": table.run,
     "export": _export,

@@ -14,6 +14,6 @@ the library is loaded.
   contact and direction
 - ``dimensional.c``, ``interval.c``: cases in SI units, an interval of k
 - ``element.c``: steps in time; ``motion.c``, ``motion_slip.c``, ``motion_cycle.c``,
-  ``motion_ball.c``: steady cycles of any motion
+  ``motion_ball.c``: steady cycles of any motion; ``loop.c``: the force over a way, for loops
 - ``binding.py``, ``arrays.py``, ``threads.py``: the shared object from Python, and long arrays
 """

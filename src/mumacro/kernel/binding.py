@@ -444,6 +444,18 @@ class Kernel:
         )
         return forces
 
+    def loop_forces(
+        self, contact: int, p: Array, x: Array, Fz: Array, before: int = 0, start: float = 0.0
+    ) -> tuple[Array, Array]:
+        """Forces over mu0 at samples of the place ``x`` (n,) under the load ``Fz`` (n,), for each
+        p = k / mu0 (m,), and their slopes along ln p, (m, n) both: see ``kernel/loop.c``."""
+        force, slope = np.empty((p.size, x.size)), np.empty((p.size, x.size))
+        room = np.empty(3 * (x.size + before))
+        ends = map(_numbers, (room, force, slope))
+        numbers = x.size, before, _numbers(x), _numbers(Fz), start
+        self._functions.loop_forces(contact, p.size, _numbers(p), *numbers, *ends)
+        return force, slope
+
     # --- for the builder --------------------------------------------------------------------------
 
     def tabulated(self, data: Data, quantity: int, block: int, a: Array, b: Array) -> Array:

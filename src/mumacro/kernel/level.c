@@ -5,6 +5,7 @@
 #include "motion_cycle.c"
 #include "motion_ball.c"
 #include "settling.c"
+#include "loop.c"
 #include "library.h"
 #include "interval.c"
 
@@ -180,4 +181,5 @@ const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     mu_motions,
     mu_motion_cycle,
     mu_turns_in_stick,
+    mu_loop_forces,
 };

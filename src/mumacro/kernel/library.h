@@ -105,6 +105,11 @@ typedef struct {
      * and its bound, and what that leaves open; 0 for what is no point */
     void (*turns_in_stick)(int64_t n, const double *v, const double *y, const double *stick,
                            const double *bound, double *turn, double *error);
+    /* forces over mu0 (places, n) of a contact that is moved along a line, for each p = k / mu0,
+     * and their slopes along ln p; see loop.c */
+    void (*loop_forces)(int contact, int64_t places, const double *p, int64_t n, int64_t before,
+                        const double *x, const double *Fz, double start, double *room,
+                        double *force, double *slope);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this

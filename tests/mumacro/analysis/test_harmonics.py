@@ -142,7 +142,7 @@ def test_samples_that_are_given_as_amplitudes_are_refused_with_the_way_to_harmon
     samples = sampled([(1, 2e-6, 0.0)], 8)
     for value in (samples, samples.tolist(), [(2, samples, 0.0)], samples.reshape(2, 4)):
         with pytest.raises(InputError, match=r"mumacro\.harmonics") as caught:
-            motion(**SCENE, **{name: value})
+            motion(**{**SCENE, name: value})
         assert caught.value.field == f"{name}, amplitude"
     # a negative amplitude among others spoils its own case
     assert np.isnan(motion(**SCENE, y=[2e-6] * 7 + [-1e-6]).mu_macro).tolist() == [False] * 7 + [

@@ -1,0 +1,554 @@
+"""k and mu0 from a measured loop of force over displacement.
+
+The force of the model is mu0 f(k/mu0) plus an offset and a drift, where f follows from the
+displacement by ``kernel/loop.c``.  Offset and drift are taken out of forces and model by a
+projection, mu0 is a factor: one profile of chi2 over k/mu0 (:mod:`mumacro.analysis.profile`) is
+left.  Needs scipy, a plot matplotlib.
+"""
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from mumacro.analysis.cycles import cycles_of
+from mumacro.analysis.fitted import quantile
+from mumacro.analysis.loop_fitted import LoopFit
+from mumacro.analysis.profile import Profile
+from mumacro.errors import InputError
+from mumacro.inputs.cases import real
+from mumacro.inputs.kind import kind_of
+from mumacro.inputs.reading import read
+from mumacro.inputs.signature import Numbers
+from mumacro.kernel.arrays import Array, Bools
+from mumacro.kernel.binding import kernels
+
+LEAST, MOST = 6, 50_000  # samples of a loop
+_PER_DECADE = 12
+_SOFT = {"spring": 0.5, "ball": 1e-3}  # of k range / (mu0 Fz), below which a loop is a line
+_NARROW = 1e-6  # relative width of an interval in which chi2 is a parabola
+_ALLOWED = 200  # places of the profile at which offset and drift are looked at
+_STEPS = 30  # of Gauss and Newton, and of the force at the start
+_STICKING = 0.02  # share of the samples that must stick, and slip
+# what is noted: standard deviations, share of mu0 Fz, share of the squares of the residuals
+_SURE, _LARGE, _EXPLAINED = 4.0, 0.02, 0.2
+_GAP = 0.1  # share of the range of the force between the ends of a cycle that is periodic
+_PIECES = 8  # of a cycle, at least, whose residuals count as independent
+_KERNEL = kernels[-1]
+_OTHER_SIGN = "the force is against the displacement: its sign is turned"
+_FIRST = (
+    "the force does not come back: a first cycle from rest is not periodic; record two cycles or "
+    "more"
+)
+_OPEN = (
+    "less than one cycle: the first measured force is the state at the start, and there is no "
+    "offset"
+)
+
+
+def fit_loop(
+    displacement: Numbers,
+    force: Numbers,
+    Fz: Numbers,
+    contact: str = "spring",
+    cycles: tuple[int, int] | None = None,
+) -> LoopFit:
+    """k and mu0 of a contact from a loop of tangential force over displacement.
+
+    Parameters
+    ----------
+    displacement, force : array_like
+        In the order of time, (n,): relative displacement [m], and the tangential force that moves
+        it [N], positive along the displacement; the opposite sign is turned, with a note.
+    Fz : array_like
+        Normal force [N], one number, or for a spring one for each sample.
+    contact : str
+        "spring" or "ball", as for :func:`mumacro.motion`: k of a ball is its initial stiffness.
+    cycles : (int, int), optional
+        The first and the last whole cycle that is looked at, counted from 1; all samples if left
+        out.
+
+    Returns
+    -------
+    LoopFit
+        Of several cycles the first sets the state and does not count.  One cycle is taken as
+        periodic.  Less than one, of a spring only, begins with the first measured force.
+
+    Raises
+    ------
+    InputError
+        A value that is no finite number; columns of several lengths; a motion that never turns and
+        is no spring's; a load that is not > 0.
+
+    Examples
+    --------
+    >>> from mumacro import Element
+    >>> way = 5e-6 * np.sin(np.linspace(0.0, 4.0 * np.pi, 401))
+    >>> contact = Element(mu0=0.3, Fz=10.0, k=1e6)
+    >>> measured = [contact.step(step, 0.0)[0] for step in np.diff(way, prepend=0.0)]
+    >>> found = fit_loop(way, measured, Fz=10.0)
+    >>> f"{found.values['k']:.4g} N/m, {found.values['mu0']:.4g}, {found.energy * 1e6:.1f} uJ"
+    '1e+06 N/m, 0.3, 24.0 uJ'
+    """
+    problem = _Loop(displacement, force, Fz, contact, cycles)
+    with np.errstate(all="ignore"):
+        return problem.solve()
+
+
+class _Loop:
+    """A loop as read, and the search for its k and mu0."""
+
+    x: Array  #: of the samples that are looked at [m]
+    force: Array  #: [N]
+    Fz: Array  #: [N]
+
+    def __init__(
+        self,
+        displacement: Any,
+        force: Any,
+        Fz: Any,
+        contact: str,
+        cycles: tuple[int, int] | None,
+    ) -> None:
+        self.contact, self.code = contact, kind_of(contact).contact
+        x = _column("displacement", displacement, "length")
+        measured = _column("force", force, "force")
+        load = real("Fz", Fz)
+        if self.code and load.ndim:
+            raise InputError(
+                "Fz", load.shape, "one number for a ball, whose contact radius would change with it"
+            )
+        if measured.size != x.size or load.shape not in ((), x.shape):
+            shapes = {"displacement": x.shape, "force": measured.shape, "Fz": load.shape}
+            raise InputError("force", shapes, "columns of one length; Fz may be one number")
+        bad = ~((load > 0.0) & np.isfinite(load))
+        if bad.any():
+            index = int(np.argmax(bad)) if load.ndim else None
+            raise InputError("Fz", float(load.flat[index or 0]), "finite and > 0", index)
+        if np.ptp(x) == 0.0:
+            raise InputError("displacement", float(x[0]), "one that moves")
+        if np.ptp(measured) == 0.0:
+            raise InputError("force", float(measured[0]), "one that changes")
+        load = np.ascontiguousarray(np.broadcast_to(load, x.size))
+        self.notes: list[str] = []
+        self._take(x, measured, load, cycles)
+        # units of about 1: the range of the displacement, the mean load
+        self.length, self.load = float(np.ptp(self.x)), float(self.Fz.mean())
+        if _against(self.x, self.force):
+            self.force = -self.force
+            self.notes.append(_OTHER_SIGN)
+        self._set_out()
+
+    def _take(self, x: Array, force: Array, load: Array, chosen: tuple[int, int] | None) -> None:
+        """The samples that are looked at, the cycles among them, and what counts."""
+        found = cycles_of(x)
+        part = slice(0, x.size)
+        if chosen is not None:
+            first, last = _whole(chosen)
+            if not 1 <= first <= last <= found.number:
+                raise InputError(
+                    "cycles", chosen, f"from 1 to {found.number}, the whole cycles there are"
+                )
+            part = slice(found.begins[first - 1], found.begins[last])
+        self.x = np.ascontiguousarray(x[part])
+        self.force = np.ascontiguousarray(force[part])
+        self.Fz = np.ascontiguousarray(load[part])
+        if chosen is not None:
+            begins = [begin - part.start for begin in found.begins[first - 1 : last + 1]]
+        else:
+            begins = [*found.begins]
+        self.begins, self.number = begins, len(begins) - 1
+        self.open = self.number == 0
+        self.before = begins[1] if self.number == 1 else 0
+        self.counted = slice(begins[1] if self.number > 1 else 0, None)
+        if self.open:
+            if self.code:
+                bound = "at least one whole cycle of a ball: its springs have a state of their own"
+                raise InputError("displacement", "less than one cycle", bound)
+            self.notes.append(_OPEN)
+        elif self.number == 1 and not found.goes_on and self._is_first():
+            self.notes.append(_FIRST)
+
+    def _is_first(self) -> bool:
+        """Whether the force of one closed cycle ends far from where it began."""
+        step = float(np.abs(np.diff(self.force)).max()) if self.x[-1] != self.x[0] else 0.0
+        gap = abs(float(self.force[-1] - self.force[0]))
+        return gap > _GAP * float(np.ptp(self.force)) + step
+
+    def _set_out(self) -> None:
+        """Offset and drift as columns, an orthonormal basis of them, and the force beside it."""
+        n = self.x.size
+        times = np.arange(n, dtype=np.float64)[self.counted]
+        middle, half = 0.5 * (times[0] + times[-1]), max(0.5 * float(np.ptp(times)), 1.0)
+        self.names = [] if self.open else ["offset", *(["drift"] if self.number > 1 else [])]
+        both = np.stack([np.ones(times.size), (times - middle) / half], axis=1)
+        self.linear = both[:, : len(self.names)]
+        # the drift is that of the samples from the first on, the offset that at the first
+        self.first, self.step = (times[0] - middle) / half, 1.0 / half
+        self.basis = np.linalg.qr(self.linear)[0] if self.names else self.linear
+        self.measured = self.force[self.counted]
+        self.beside = self._aside(self.measured[None, :])[0]
+        self.dof = self.measured.size - 2 - len(self.names)
+        if self.dof < 1:
+            bound = f"more than {2 + len(self.names)} samples that count, one for each unknown"
+            raise InputError("displacement", f"{self.measured.size}", bound)
+
+    def _aside(self, rows: Array) -> Array:
+        """Rows without what offset and drift can be."""
+        return np.ascontiguousarray(rows - (rows @ self.basis) @ self.basis.T)
+
+    def _rows(self, p: Array, start: float) -> tuple[Array, Array]:
+        """Force over mu0 of all samples, and its slope along ln p, for p = k/mu0 (m,)."""
+        return _KERNEL.loop_forces(self.code, p, self.x, self.Fz, self.before, start)
+
+    def _profile(self, start: float, spare: float) -> Profile:
+        """Least chi2 over s = ln(k/mu0); ``spare`` is the rise that is allowed, as a share of the
+        variance about the fit."""
+
+        def model(s: Array, _slopes: bool) -> tuple[Array, Array]:
+            rows, slopes = self._rows(np.exp(s), start)
+            return self._aside(rows[:, self.counted]), self._aside(slopes[:, self.counted])
+
+        size = float(self.beside @ self.beside)
+        steps = np.abs(np.diff(self.x))
+        low = _SOFT[self.contact] * self.Fz.min() / self.length
+        high = 8.0 * self.Fz.max() / steps[steps > 0.0].min()
+        high = min(max(high, 100.0 * low), 1e12 * low)
+        count = max(int(math.log10(high / low) * _PER_DECADE), 24)
+        s = np.append(np.linspace(math.log(low), math.log(high), count), math.inf)
+        return Profile(
+            model, self.beside, True, s, lambda chi2: chi2 + spare * max(chi2, 1e-20 * size)
+        )
+
+    # --- solution ---------------------------------------------------------------------------------
+
+    def solve(self) -> LoopFit:
+        """The best k and mu0 with their intervals and notes."""
+        width = quantile(self.dof)
+        start, tau = 0.0, 1.0
+        for _ in range(_STEPS):
+            profile = self._profile(start, width**2 * tau / self.dof)
+            best = int(np.argmin(profile.at.chi2))
+            mu0 = float(profile.at.factor[best])
+            if not self.open or mu0 <= 0.0:
+                break
+            before, start = start, float(self.force[0]) / mu0
+            if abs(start - before) <= 1e-12 * self.load:
+                break
+        if not mu0 > 0.0:
+            raise InputError("force", "forces", "larger where the displacement has grown")
+        s, mu0 = self._polished(float(profile.at.s[best]), mu0)
+        start = float(self.force[0]) / mu0 if self.open else 0.0
+        rows, slopes = (part[0] for part in self._rows(np.exp([s]), start))
+        linear = self._linear(rows, mu0)
+        fitted = mu0 * rows + self._line(linear)
+        residuals = (self.force - fitted)[self.counted]
+        chi2 = float(residuals @ residuals)
+        cycle = residuals.size / max(self.number - 1, 1)
+        tau, dof = _correlation(residuals, self.dof, max(cycle / _PIECES, 1.0))
+        if tau > 1.0:
+            spare = quantile(max(int(dof), 1)) ** 2 * tau / dof
+            profile = self._profile(start, spare)
+        size = float(self.beside @ self.beside)
+        variance = max(chi2 / dof * tau, 1e-30 * size)
+        sticks = self._sticks(slopes)
+        values = {"k": mu0 * math.exp(s), "mu0": mu0, **linear}
+        interval = self._intervals(profile, values, rows, slopes, variance, max(int(dof), 1))
+        self._say_open_ends(values, interval, sticks)
+        self._doubt(rows, slopes, mu0, residuals, sticks, variance / tau)
+        return LoopFit(
+            values=values,
+            interval=interval,
+            residuals=residuals,
+            scatter=math.sqrt(chi2 / dof),
+            energy=self._energy(linear),
+            cycles=self.number,
+            notes=tuple(self.notes),
+            contact=self.contact,
+            loop={
+                "displacement": self.x[self.counted],
+                "force": self.measured,
+                "Fz": self.Fz[self.counted],
+                "fitted": fitted[self.counted],
+            },
+        )
+
+    def _polished(self, s: float, mu0: float) -> tuple[float, float]:
+        """The minimum by Gauss and Newton, from a place nearby: the force is straight in k and mu0
+        between the samples that begin to slip."""
+
+        def off(s: float, mu0: float) -> tuple[float, Array, Array, Array]:
+            begin = float(self.force[0]) / mu0 if self.open else 0.0
+            rows, slopes = (x[0, self.counted] for x in self._rows(np.exp([s]), begin))
+            if self.open:  # the force at the start is no multiple of mu0
+                kept = np.logical_and.accumulate(np.abs(rows) < self.Fz[self.counted])
+                by_mu0 = rows - np.where(kept, begin, 0.0)
+            else:
+                by_mu0 = rows
+            r = self._aside((self.measured - mu0 * rows)[None, :])[0]
+            return float(r @ r), r, self._aside(slopes[None, :])[0], self._aside(by_mu0[None, :])[0]
+
+        if not math.isfinite(s):
+            return s, mu0
+        chi2, r, along, factor = off(s, mu0)
+        for _ in range(_STEPS):
+            columns = np.stack([mu0 * along, factor], axis=1)
+            step = np.linalg.lstsq(columns, r, rcond=1e-14)[0]
+            trial = s + float(step[0]), mu0 + float(step[1])
+            if not (abs(step[0]) < 1.0 and trial[1] > 0.0):
+                break
+            better = off(*trial)
+            if not better[0] < chi2:
+                break
+            (s, mu0), (chi2, r, along, factor) = trial, better
+        return s, mu0
+
+    def _linear(self, rows: Array, mu0: float) -> dict[str, float]:
+        """Offset at the first sample and drift a sample."""
+        if not self.names:
+            return {}
+        shares = np.linalg.lstsq(self.linear, self.measured - mu0 * rows[self.counted])[0]
+        return dict(zip(self.names, self._in_samples(shares).tolist(), strict=True))
+
+    def _in_samples(self, shares: Array) -> Array:
+        """Offset and drift a sample from the factors of their columns."""
+        if len(self.names) < 2:
+            return shares
+        return np.array([shares[0] + self.first * shares[1], self.step * shares[1]])
+
+    def _line(self, linear: dict[str, float]) -> Array:
+        """Offset and drift at all samples."""
+        times = np.arange(self.x.size) - (self.counted.start or 0)
+        return np.asarray(linear.get("offset", 0.0) + linear.get("drift", 0.0) * times)
+
+    def _sticks(self, slopes: Array) -> Bools:
+        """Which of the samples that count have not slipped in their step."""
+        return np.asarray(slopes[self.counted] != 0.0)
+
+    def _energy(self, linear: dict[str, float]) -> float:
+        """The work of the force over a whole cycle [J], the mean of those that count."""
+        if self.open:
+            return math.nan
+        force = self.force - self._line(linear)
+        ends = self.begins[1:] if self.number > 1 else self.begins
+        works = []
+        for begin, end in pairwise(ends):
+            x, f = (np.append(part[begin:end], part[begin]) for part in (self.x, force))
+            works.append(float(np.sum(0.5 * (f[1:] + f[:-1]) * np.diff(x))))
+        return float(np.mean(works))
+
+    # --- intervals --------------------------------------------------------------------------------
+
+    def _intervals(
+        self,
+        profile: Profile,
+        values: dict[str, float],
+        rows: Array,
+        slopes: Array,
+        variance: float,
+        dof: int,
+    ) -> dict[str, tuple[float, float]]:
+        width, mu0 = quantile(dof), values["mu0"]
+        # k, mu0, offset, drift: d ln k = d s + d ln mu0
+        columns = np.stack(
+            [mu0 * slopes[self.counted], rows[self.counted] - slopes[self.counted]], axis=1
+        )
+        columns = np.column_stack([columns, self.linear])
+        inverse = np.linalg.pinv(columns.T @ columns)
+        off = width * np.sqrt(variance * np.maximum(np.diag(inverse), 0.0))
+        halves = {"k": off[0] * values["k"], "mu0": off[1]}
+        if self.names:
+            turned = np.eye(len(self.names))
+            if len(self.names) > 1:
+                turned = np.array([[1.0, self.first], [0.0, self.step]])
+            covariance = turned @ inverse[2:, 2:] @ turned.T
+            halves |= zip(
+                self.names, (width * np.sqrt(variance * np.diag(covariance))).tolist(), strict=True
+            )
+        around = {
+            name: (values[name] - float(half), values[name] + float(half))
+            for name, half in halves.items()
+        }
+        straight = np.abs(self._aside(slopes[None, self.counted])).max() > 1e-6 * self.load
+        narrow = straight and max(off[0], off[1] / mu0) < _NARROW
+        if narrow and math.isfinite(values["k"]) and profile.at.chi2[0] > profile.limit:
+            return around
+        return self._by_profile(profile) | self._linear_by_profile(profile, around)
+
+    def _by_profile(self, profile: Profile) -> dict[str, tuple[float, float]]:
+        """Smallest and largest k and mu0 among the contacts that are allowed."""
+        at, limit = profile.at, profile.limit
+        inside = at.chi2 <= limit
+        low, high = {"k": math.inf, "mu0": math.inf}, {"k": 0.0, "mu0": 0.0}
+        if inside[np.isfinite(at.s)].any():
+            ends = profile.ends(
+                [
+                    lambda s, mu0, off: np.exp(s) * np.minimum(off - mu0, 0.0),
+                    lambda s, mu0, off: np.exp(s) * (mu0 + off),
+                    lambda _, mu0, off: off - mu0,
+                    lambda _, mu0, off: mu0 + off,
+                ]
+            )
+            low = {"k": max(-ends[0], 0.0), "mu0": max(-ends[2], 0.0)}
+            high = {"k": ends[1], "mu0": ends[3]}
+        if inside[0]:
+            high["mu0"] = math.inf
+        if inside[-1]:
+            half = math.sqrt((limit - at.chi2[-1]) / at.rise[-1])
+            last = float(np.exp(at.s[-2]) * at.factor[-1])
+            low = {
+                "k": min(low["k"], last),
+                "mu0": min(low["mu0"], max(float(at.factor[-1]) - half, 0.0)),
+            }
+            high = {"k": math.inf, "mu0": max(high["mu0"], float(at.factor[-1]) + half)}
+        return {name: (low[name], high[name]) for name in low}
+
+    def _linear_by_profile(
+        self, profile: Profile, around: dict[str, tuple[float, float]]
+    ) -> dict[str, tuple[float, float]]:
+        """Smallest and largest offset and drift among them."""
+        if not self.names:
+            return {}
+        allowed = np.flatnonzero(profile.at.chi2 <= profile.limit)
+        allowed = allowed[:: 1 + allowed.size // _ALLOWED]
+        rows, _ = self._rows(np.exp(profile.at.s[allowed]), 0.0)
+        ends = {name: list(around[name]) for name in self.names}
+        for i, row in zip(allowed.tolist(), rows[:, self.counted], strict=True):
+            columns = np.column_stack([row, self.linear])
+            inverse = np.linalg.pinv(columns.T @ columns)
+            shares = inverse @ (columns.T @ self.measured)
+            turned = np.eye(len(self.names))
+            if len(self.names) > 1:
+                turned = np.array([[1.0, self.first], [0.0, self.step]])
+            middle = turned @ shares[1:]
+            spread = np.diag(turned @ inverse[1:, 1:] @ turned.T)
+            half = np.sqrt(np.maximum(profile.limit - profile.at.chi2[i], 0.0) * spread)
+            for name, value, off in zip(self.names, middle.tolist(), half.tolist(), strict=True):
+                ends[name] = [min(ends[name][0], value - off), max(ends[name][1], value + off)]
+        return {name: (low, high) for name, (low, high) in ends.items()}
+
+    # --- notes ------------------------------------------------------------------------------------
+
+    def _say_open_ends(
+        self, values: dict[str, float], interval: dict[str, tuple[float, float]], sticks: Bools
+    ) -> None:
+        """What the loop leaves open, as notes; an end that is open makes the value infinite where
+        nothing else can be said."""
+        if interval["mu0"][1] == math.inf:
+            least = interval["mu0"][0]
+            self.notes.append(
+                f"the loop need not slip: mu0 has only a lower bound, {least:.4g} (95 %)"
+            )
+            if sticks.all():
+                values["mu0"] = math.inf
+        if interval["k"][1] == math.inf:
+            least = interval["k"][0]
+            self.notes.append(
+                f"the loop need not stick: k has only a lower bound, {least:.4g} N/m (95 %)"
+            )
+            if not sticks.any():
+                values["k"] = math.inf
+
+    def _doubt(
+        self,
+        rows: Array,
+        slopes: Array,
+        mu0: float,
+        residuals: Array,
+        sticks: Bools,
+        variance: float,
+    ) -> None:
+        """Notes of what the residuals say against the model."""
+        x, step = self.x[self.counted], np.diff(self.x, prepend=self.x[0])[self.counted]
+        sign, speed = np.sign(step), np.abs(step)
+        slips = ~sticks & (speed > 0.0)
+        columns = np.column_stack([rows[self.counted], slopes[self.counted], self.linear])
+        basis = np.linalg.qr(columns)[0]
+        load = mu0 * self.load
+
+        def effect(regressor: Array, size: float) -> float:
+            """How large a share of mu0 Fz a regressor of the residuals has, 0 where that is not
+            sure."""
+            left = regressor - basis @ (basis.T @ regressor)
+            square = float(left @ left)
+            if not square > 1e-9 * float(regressor @ regressor) or not load > 0.0:
+                return 0.0
+            factor = float(left @ residuals) / square
+            sure = abs(factor) > _SURE * math.sqrt(variance / square)
+            sure &= factor**2 * square > _EXPLAINED * float(residuals @ residuals)
+            share = abs(factor) * size / load
+            return share if sure and share > _LARGE else 0.0
+
+        forward = np.where(sticks, sign, 0.0) * slopes[self.counted]
+        if sticks.any() and (share := effect(forward, 2.0 * float(np.abs(forward).max()))):
+            self.notes.append(
+                f"the branches have different slopes: their forces differ by {share:.0%} of mu0 Fz"
+            )
+        if np.count_nonzero(slips) > LEAST:
+            for values, cause in ((speed, "speed"), (x, "place")):
+                spread = float(np.ptp(values[slips]))
+                centred = np.where(slips, sign * (values - values[slips].mean()), 0.0)
+                if spread > 0.0 and (share := effect(centred, spread)):
+                    self.notes.append(
+                        f"the sliding force depends on the {cause}: by {share:.0%} of mu0 Fz"
+                    )
+
+
+def _column(name: str, value: Any, quantity: str) -> Array:
+    """Finite numbers in the order of time, (n,), in SI."""
+    one = read(name, value, quantity)
+    if one.std is not None or one.low is not None:
+        raise InputError(name, value, "without a deviation")
+    column = np.ascontiguousarray(one.si, np.float64)
+    if column.ndim != 1 or not LEAST <= column.size <= MOST:
+        bound = f"a column of {LEAST} to {MOST} samples: give some cycles, or each second sample"
+        raise InputError(name, column.shape, bound)
+    if not np.isfinite(column).all():
+        index = int(np.argmin(np.isfinite(column)))
+        raise InputError(name, float(column[index]), "finite: leave the row out", index)
+    return column
+
+
+def _whole(chosen: Any) -> tuple[int, int]:
+    """The first and the last cycle."""
+    if (
+        not isinstance(chosen, tuple | list)
+        or len(chosen) != 2
+        or not all(isinstance(x, int) and not isinstance(x, bool) for x in chosen)
+    ):
+        raise InputError("cycles", chosen, "the first and the last cycle, such as (3, 8)")
+    return int(chosen[0]), int(chosen[1])
+
+
+def _against(x: Array, force: Array) -> bool:
+    """Whether the force is against the displacement: both the work of a cycle and the correlation
+    are positive where it is along it."""
+    x, force = x - x.mean(), force - force.mean()
+    work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
+    travelled = float(np.abs(np.diff(x)).sum())
+    correlation = float(x @ force) / math.sqrt(float(x @ x) * float(force @ force))
+    return 2.0 * work / (travelled * float(np.ptp(force))) + correlation < 0.0
+
+
+def _correlation(residuals: Array, dof: int, most: float) -> tuple[float, float]:
+    """By how much more the variance of a mean of residuals is than if they were independent, from 1
+    to ``most``, and the degrees of freedom that are left."""
+    n = residuals.size
+    spectrum = np.abs(np.fft.rfft(residuals, 2 * n)) ** 2
+    covariance = np.fft.irfft(spectrum)[:n]
+    if not covariance[0] > 0.0:
+        return 1.0, float(dof)
+    rho = covariance / covariance[0]
+    if rho[1] < 2.0 / math.sqrt(n):
+        return 1.0, float(dof)
+    sums = 1.0 + 2.0 * np.cumsum(rho[1 : max(n // 2, 2)])
+    window = np.flatnonzero(np.arange(1, sums.size + 1) >= 5.0 * sums)
+    # Sums of a few correlations are too small, since a fit takes slow noise up; that of a noise
+    # which forgets evenly follows from its first correlation, nearly without that loss (Kendall).
+    first = min(float(rho[1]) + (1.0 + 4.0 * float(rho[1])) / n, 1.0 - 1.0 / n)
+    of_first = (1.0 + first) / (1.0 - first)
+    tau = max(float(sums[window[0]] if window.size else sums.max()), of_first, 1.0)
+    tau = min(tau, most)
+    lost = n - dof
+    return tau, max(n - lost * tau, dof / tau, 1.0)

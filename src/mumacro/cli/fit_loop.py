@@ -1,0 +1,123 @@
+"""``mumacro fit-loop``: k and mu0 from a measured loop of force over displacement in a file."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from mumacro import plotting
+from mumacro.analysis.loop import fit_loop
+from mumacro.analysis.loop_fitted import LoopFit
+from mumacro.cli import common
+from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, in_columns
+from mumacro.errors import InputError
+from mumacro.inputs.decoding import TextError
+from mumacro.inputs.kind import CONTACTS
+from mumacro.inputs.layout import ColumnNames
+from mumacro.inputs.reading import read_one
+from mumacro.inputs.text_tables import read_table
+
+EXAMPLE = "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft -o loop.png"
+_ABOUT = f"""\
+columns in the order of time, in SI or with a unit as in x [um]; others are ignored:
+  the displacement, the force that moves it, and for a spring, if it varies, the normal force
+of several cycles the first sets the state, and the others count
+
+examples:
+  {EXAMPLE}
+  mumacro fit-loop loop.csv --displacement x --force Ft --load Fn --cycles 3..8
+"""
+
+
+def _cycles(text: str) -> tuple[int, int]:
+    """The first and the last cycle; argparse says the fault of another text."""
+    first, _, last = text.partition("..")
+    if not (first.isdecimal() and (last or first).isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be numbers of cycles, as 3..8")
+    return int(first), int(last or first)
+
+
+def _parser() -> OneLineParser:
+    """The arguments of the command."""
+    description = "k and mu0 of a contact from a measured loop of force over displacement."
+    parser = OneLineParser(prog="mumacro fit-loop", description=description, epilog=_ABOUT)
+    parser.add_argument("loop", help="a table as text, or .xlsx; - is standard input")
+    parser.add_argument("words", nargs="*", metavar="Fz=value", help="the normal force [N]")
+    for name, what in (
+        ("displacement", "of the displacement"),
+        ("force", "of the tangential force"),
+    ):
+        parser.add_argument(f"--{name}", required=True, metavar="COLUMN", help=what)
+    parser.add_argument("--load", metavar="COLUMN", help="of the normal force, in place of Fz=")
+    text = "the first and the last cycle; default: all samples"
+    parser.add_argument("--cycles", type=_cycles, metavar="A..B", help=text)
+    parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
+    text = "write the result there: a picture, .png, .svg or .pdf, or .csv"
+    parser.add_argument("-o", "--out", type=Path, help=text)
+    parser.add_argument("--plot", dest="out", type=Path, metavar="FILE", help="the same as --out")
+    parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
+    common.add_format(parser)
+    return parser
+
+
+def run(words: Sequence[str]) -> str:
+    """``mumacro fit-loop``."""
+    options = _parser().parse_intermixed_args(words)
+    names = {"displacement": options.displacement, "force": options.force}
+    if options.load is not None:
+        names["Fz"] = options.load
+    if len({*names.values()}) < len(names):
+        raise UsageError(f"{', '.join(names.values())}: each column has one meaning")
+    load = _load(options.words, options.load)
+    like = {name: "y0" if what == "displacement" else "Fz" for what, name in names.items()}
+    column_names = ColumnNames(like, [(name,) for name in names.values()])
+    source = sys.stdin.buffer.read() if options.loop == "-" else Path(options.loop)
+    try:
+        table = read_table(source, column_names, common.dialect_in(options))
+    except TextError as error:
+        raise ImpossibleError(f"{options.loop}: {error}") from None
+    columns = {what: table.columns[name] for what, name in names.items()}
+    if load is not None:
+        columns["Fz"] = load
+    try:
+        found = fit_loop(**columns, contact=options.contact, cycles=options.cycles)
+    except InputError as error:
+        at_line = f"line {table.lines[error.index]}: " if error.index is not None else ""
+        name = names.get(error.field, error.field)
+        fault = InputError(name, error.value, error.bound)
+        raise ImpossibleError(f"{options.loop}: {at_line}{fault}") from None
+    except ModuleNotFoundError as error:  # says what to install
+        raise ImpossibleError(str(error)) from None
+    if table.read_as:
+        print(f"mumacro fit-loop: read as: {table.read_as}", file=sys.stderr)
+    report = ""
+    if options.out is not None:
+        heads = ("displacement [m]", "force [N]", "Fz [N]", "force fitted [N]")
+        columns = dict(zip(heads, found.loop.values(), strict=True))
+        report = common.write_result(options.out, columns, found.plot, plotting.OF_FIT)
+    if options.json:
+        return as_json(found.to_dict())
+    return "\n".join(filter(None, [report, _text(found)]))
+
+
+def _load(words: Sequence[str], column: str | None) -> Any:
+    """The normal force that is typed [N]; None where it is a column."""
+    text = " ".join(words)
+    name, equals, value = text.partition("=")
+    if column is not None:
+        if text:
+            raise UsageError(f"{text}: --load {column} is the normal force")
+        return None
+    if name.strip() != "Fz" or not equals:
+        raise UsageError(f"{text or 'Fz'}: give the normal force alone, as Fz=10N or --load COLUMN")
+    try:
+        return read_one("Fz", value.strip())
+    except InputError as error:
+        raise UsageError(str(error)) from None
+
+
+def _text(found: LoopFit) -> str:
+    """Values with intervals, energy, scatter, and notes."""
+    samples = ("samples", str(found.residuals.size), "", f"{found.contact}, {found.cycles} cycles")
+    return "\n".join([in_columns([*found.rows, samples]), *(f"note: {x}" for x in found.notes)])
