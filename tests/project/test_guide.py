@@ -355,6 +355,10 @@ def reader(tmp_path: Path) -> Path:
     v0 = np.geomspace(1e-3, 1.0, 8)
     mu = [0.162, 0.197, 0.242, 0.268, 0.283, 0.294, 0.302, 0.299]
     pd.DataFrame({"v0": v0, "mu_macro": mu}).to_csv(tmp_path / "measured.csv", index=False)
+    x = 5e-6 * np.sin(np.linspace(0.0, 4.0 * np.pi, 200))
+    pd.DataFrame({"x": x, "Ft": np.clip(2e6 * x, -3.0, 3.0)}).to_csv(
+        tmp_path / "loop.csv", index=False
+    )
     return tmp_path
 
 
