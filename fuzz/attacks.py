@@ -346,7 +346,9 @@ def attacks(share: float) -> str:
     for name, attack in ATTACKS.items():
         cost = cost_of(attack, share)
         waits = (f"{1e3 * wait:.0f}" for wait in (cost.livez, cost.metrics, cost.other))
-        rows.append((name, f"{cost.memory:.0f}", *waits, cost.refused, f"{1e3 * cost.after:.0f}"))
+        rows.append(
+            (name, f"{cost.memory:.0f}", *waits, f"{cost.refused}", f"{1e3 * cost.after:.0f}")
+        )
     head = (
         "attack",
         "most memory [MB]",

@@ -3,6 +3,7 @@ wrong has the bound 0."""
 
 import math
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,8 +72,8 @@ def test_power_is_within_its_bound_at_the_ends_of_the_range(
 
 def test_a_slope_is_right_where_mu0_is_subnormal(surrogate: Surrogate) -> None:
     """The same groups in other units by powers of two: slopes change by these, digits do not."""
-    case = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": 0.5, "omega": 1.0, "v0": 0.25}
-    small = {**case, "mu0": 2.0**-1060, "Fz": 2.0**1000, "k": 2.0**-60}
+    case: dict[str, Any] = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": 0.5, "omega": 1.0, "v0": 0.25}
+    small: dict[str, Any] = {**case, "mu0": 2.0**-1060, "Fz": 2.0**1000, "k": 2.0**-60}
     small |= {"omega": 2.0**-1000, "v0": 0.25 * 2.0**-1000}
     for contact in ("spring", "ball"):
         usual, other = (
@@ -91,7 +92,14 @@ def test_a_slope_is_right_where_mu0_is_subnormal(surrogate: Surrogate) -> None:
 
 def test_the_slope_at_rest_needs_no_product_within_range(surrogate: Surrogate) -> None:
     """d mu_macro / d v0 = k / (Fz omega) d mu~ / d v~ at v0 = 0."""
-    case = {"mu0": 1.0, "Fz": 1e-200, "k": 1e-100, "y0": 5e-101, "omega": 1e-250, "v0": 0.0}
+    case: dict[str, Any] = {
+        "mu0": 1.0,
+        "Fz": 1e-200,
+        "k": 1e-100,
+        "y0": 5e-101,
+        "omega": 1e-250,
+        "v0": 0.0,
+    }
     usual = surrogate.evaluate(mu0=1.0, Fz=1.0, k=1.0, y0=0.5, omega=1.0, v0=0.0, gradient=True)
     other = surrogate.evaluate(**{**case, "omega": 1e200, "k": 1e100, "y0": 5e-301}, gradient=True)
     assert other.gradient["v0"] == close(1e100 * usual.gradient["v0"], rel=1e-12)

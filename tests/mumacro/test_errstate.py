@@ -15,7 +15,7 @@ from tests.support.cases import CASE, PAIRS, as_kind, opened, without
 
 EDGES = np.array([0.0, 5e-324, 1e-300, 1e-150, 1e-3, 1.0, 1e3, 1e150, 1e300, np.inf, np.nan])
 STEEL = {"E": 210e9, "nu": 0.3}
-RIG = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
+RIG: dict[str, Any] = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
 
 
 def evaluated(s: Surrogate) -> Any:

@@ -97,7 +97,8 @@ def test_a_call_has_one_contact_and_one_direction(table: Surrogate, form: str) -
         assert np.array_equal(
             one["mu_macro"], table.evaluate({**CASE, "v0": v0, name: words[1]})["mu_macro"]
         )
-        for more in ({}, {"illegal": "raise"}):
+        policies: list[dict[str, Any]] = [{}, {"illegal": "raise"}]
+        for more in policies:
             with pytest.raises(InputError, match="groupby") as caught:
                 table.evaluate({**CASE, "v0": v0, name: column(words)}, **more)
             assert caught.value.field == name

@@ -210,8 +210,8 @@ def of_one(client: Any, row: Case, **query: Any) -> Any:
     return {name: answer[name] for name in (*VALUES, "mu_macro_low", "std") if name in answer}
 
 
-SPRING = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 2e4, "v0": 0.01}
-LIFTED = {**SPRING, "direction": "normal", "y0": None, "Fz_amplitude": 3.0}
+SPRING: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 2e4, "v0": 0.01}
+LIFTED: dict[str, Any] = {**SPRING, "direction": "normal", "y0": None, "Fz_amplitude": 3.0}
 STIFFNESSES = st.sampled_from(
     [
         {"k": "rigid"},
@@ -237,9 +237,11 @@ OTHERS = st.sampled_from(
         )
     ]
 )
-CASES = st.sampled_from([SPRING, LIFTED, {**SPRING, "contact": "ball"}]).flatmap(
+CASES: st.SearchStrategy[list[Any]] = st.sampled_from(
+    [SPRING, LIFTED, {**SPRING, "contact": "ball"}]
+).flatmap(
     lambda case: st.lists(
-        (STIFFNESSES | OTHERS).map(lambda more: {**case, **more}), min_size=1, max_size=5
+        (STIFFNESSES | OTHERS).map(lambda more: case | more), min_size=1, max_size=5
     )
 )
 

@@ -129,17 +129,18 @@ def _answers_of(tolerance: float, pair: tuple[str, str], seed: int) -> Results:
     from mumacro.outputs import OUTPUTS
 
     table, normal = mumacro.open(tolerance), pair[1] == "normal"
-    words = dict(zip(("contact", "direction"), pair, strict=True))
+    words: dict[str, Any] = dict(zip(("contact", "direction"), pair, strict=True))
     cases = _draws(500, normal, seed)
     lacking = {"std"} | ({"settling"} if pair[1] != "across" else set())
     lacking |= {"power"} if normal else set()
     names = [name for name in OUTPUTS if name not in lacking]
-    spreads = {"k": 0.1 * np.where(np.isinf(cases["k"]), 1.0, cases["k"])}
+    spreads: dict[str, Any] = {"k": 0.1 * np.where(np.isinf(cases["k"]), 1.0, cases["k"])}
     spreads |= {"Fz_amplitude" if normal else "y0": 1e-9}
     flat = {f"std_{name}": x for name, x in spreads.items()}
+    old: dict[str, Any] = {"include": names, "std": spreads}
     answer = first_accepted(
         lambda: table.evaluate({**cases, **flat}, include=names, **words),
-        lambda: table.evaluate(cases, include=names, std=spreads, **words),
+        lambda: table.evaluate(cases, **old, **words),
     )
     results = {path: bits(answer[path]) for path in answer.paths}
     results["remarks"] = json.dumps(answer.remarks)
@@ -149,18 +150,16 @@ def _answers_of(tolerance: float, pair: tuple[str, str], seed: int) -> Results:
     results |= {f"interval {path}": bits(band[path]) for path in band.paths}
     for i in range(0, 500, 25):
         one = {name: float(x[i]) for name, x in cases.items()}
-        results[f"one case {i}"] = _said(
-            lambda one=one: json.dumps(table.evaluate(one, include=names, **words).to_dict())
-        )
+        results[f"one case {i}"] = _said(table.evaluate, one, include=names, **words)
     return results
 
 
-def _said(call: Callable[[], Any]) -> Any:
-    """Return what a call gives, or how it refuses."""
+def _said(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> str:
+    """Return the members of what a function returns, or how it refuses."""
     import mumacro
 
     try:
-        return call()
+        return repr(function(*arguments, **keywords).to_dict())
     except mumacro.InputError as error:
         return f"refused: {error}"
 
@@ -181,17 +180,11 @@ def roots(_folder: Path) -> Results:
         target = float(rng.uniform(0.01, 0.5))
         words = dict(zip(("contact", "direction"), pair, strict=True))
         name = f"{i} {unknown} {' '.join(pair)}"
-        results[name] = _said(
-            lambda u=unknown, t=target, w=words, c=case: repr(
-                mumacro.solve_for(table, u, t, **w, **c).to_dict()
-            )
-        )
+        results[name] = _said(mumacro.solve_for, table, unknown, target, **words, **case)
     for i in range(10):
         case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "x": (1e-6 * (1 + i), 90.0)}
         case |= {"y": 2e-6, "normal": (float(i % 3), 45.0)}
-        results[f"{i} motion"] = _said(
-            lambda c=case, t=0.02 * (i + 1): repr(mumacro.solve_motion("v0", t, **c).to_dict())
-        )
+        results[f"{i} motion"] = _said(mumacro.solve_motion, "v0", 0.02 * (i + 1), **case)
     return results
 
 
@@ -206,13 +199,11 @@ def motions(_folder: Path) -> Results:
     for i in range(200):
         x, y = (tuple(row) for row in rng.uniform((0.0, 0.0), (4e-6, 360.0), (2, 2)).tolist())
         normal = (float(rng.uniform(0.0, 8.0)), 45.0) if i % 3 == 0 else 0.0
-        case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": float(rng.uniform(0.0, 0.3))}
+        case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3}
+        case["v0"] = float(rng.uniform(0.0, 0.3))
         contact = "ball" if i % 4 == 1 and not normal else "spring"
-        results[f"{i}"] = _said(
-            lambda x=x, y=y, n=normal, c=case, k=contact: repr(
-                mumacro.motion(x=x, y=y, normal=n, contact=k, tolerance=1e-4, **c).to_dict()
-            )
-        )
+        case |= {"x": x, "y": y, "normal": normal, "contact": contact, "tolerance": 1e-4}
+        results[f"{i}"] = _said(mumacro.motion, **case)
     return results
 
 
@@ -228,15 +219,11 @@ def laws(_folder: Path) -> Results:
         case = {name: x for name, x in CASE.items() if name != along}
         words = dict(zip(("contact", "direction"), pair, strict=True))
         ask = {"along": along, "start": start, "stop": stop, "points": 41, **words}
-        results[f"{along} {' '.join(pair)}"] = _said(
-            lambda a=ask, c=case: repr(mumacro.law(table, **a, **c).to_dict())
-        )
+        results[f"{along} {' '.join(pair)}"] = _said(mumacro.law, table, **ask, **case)
     no_k = {name: x for name, x in CASE.items() if name not in ("k", "v0")}
     ask = {"along": "v0", "start": 1e-4, "stop": 1.0, "points": 41}
     for k in ("0.8..1.2 N/um", "1 ± 0.1 N/um", "rigid"):
-        results[f"k={k}"] = _said(
-            lambda k=k: repr(mumacro.law(table, **ask, **no_k, k=k).to_dict())
-        )
+        results[f"k={k}"] = _said(mumacro.law, table, **ask, **no_k, k=k)
     return results
 
 
@@ -251,12 +238,10 @@ def fits(_folder: Path) -> Results:
     results: Results = {}
     for pair, noise in itertools.product(PAIRS[:4], (0.0, 1e-3)):
         words = dict(zip(("contact", "direction"), pair, strict=True))
-        fixed = {"Fz": 10.0, "y0": 4e-7, "f": 20e3}
+        fixed: dict[str, Any] = {"Fz": 10.0, "y0": 4e-7, "f": 20e3}
         mu = table.evaluate(mu0=0.31, k=1.3e7, v0=v0, **fixed, **words).mu_macro
         points = {"v0": v0, "mu_macro": mu * (1.0 + noise * rng.standard_normal(v0.size))}
-        results[f"{' '.join(pair)} {noise:g}"] = _said(
-            lambda p=points, w=words, f=fixed: repr(mumacro.fit(p, **w, **f).to_dict())
-        )
+        results[f"{' '.join(pair)} {noise:g}"] = _said(mumacro.fit, points, **words, **fixed)
     return results
 
 
@@ -368,8 +353,8 @@ def files(folder: Path) -> Results:
         )
         for path in own.glob("out.csv*"):
             path.unlink()
-        words = ("mumacro", "fit", table.name, "Fz=10N y0=0.4um f=20kHz", "--json")
-        results[f"fit {table.parent.name}/{table.name}"] = _run(own, *words)
+        fit = ("mumacro", "fit", table.name, "Fz=10N y0=0.4um f=20kHz", "--json")
+        results[f"fit {table.parent.name}/{table.name}"] = _run(own, *fit)
     return results
 
 

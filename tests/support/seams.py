@@ -266,7 +266,8 @@ def doubles_at_every_seam(
     """
     rng, ends = np.random.default_rng([seed, kind.contact]), (V_RANGE, Y_RANGE)
     for along in (0, 1):
-        still = np.exp(rng.uniform(*np.log(ends[1 - along]), lines))
+        lowest, highest = np.log(ends[1 - along])
+        still = np.exp(rng.uniform(lowest, highest, lines))
         common = rng.random(lines) < 0.7  # where most blocks are
         still[common] = 10.0 ** rng.uniform(-3.0, 1.5, np.count_nonzero(common))
         grids = np.geomspace(*ends[along], samples), np.geomspace(1e-3, 30.0, samples)
@@ -281,7 +282,8 @@ def doubles_at_every_seam(
                 _cells(table, kind, *(x.view(np.float64), still)[:: 1 - 2 * along])
                 for x in (one, other)
             )
-            return np.any([a != b for a, b in zip(first, second, strict=True)], axis=0)
+            unequal = [a != b for a, b in zip(first, second, strict=True)]
+            return np.asarray(np.any(unequal, axis=0))
 
         crossed = differ(low, high, still)
         low, high, still = low[crossed], high[crossed], still[crossed]
@@ -320,7 +322,7 @@ def beyond_both_sides(
         if kind == BALL and name != "mu_ratio":
             continue  # a table has no slopes of these
         keep = with_slopes(table, QUANTITIES[QUANTITY_NAMES.index(name)], v, y)
-        slopes = [table.tabulated.slopes(name, *(x[keep] for x in at), kind) for at in places]
+        slopes = [table.tabulated.slopes(name, v[keep], y[keep], kind) for v, y in places]
         for row in (1, 2):
             share = beyond([x[row] for x in slopes], [x[row + 2] for x in slopes])
             yield f"slopes of {name}", share

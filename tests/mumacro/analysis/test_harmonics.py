@@ -140,7 +140,13 @@ def test_samples_that_are_given_as_amplitudes_are_refused_with_the_way_to_harmon
     name: str,
 ) -> None:
     samples = sampled([(1, 2e-6, 0.0)], 8)
-    for value in (samples, samples.tolist(), [(2, samples, 0.0)], samples.reshape(2, 4)):
+    values: tuple[Any, ...] = (
+        samples,
+        samples.tolist(),
+        [(2, samples, 0.0)],
+        samples.reshape(2, 4),
+    )
+    for value in values:
         with pytest.raises(InputError, match=r"mumacro\.harmonics") as caught:
             motion(**{**SCENE, name: value})
         assert caught.value.field == f"{name}, amplitude"

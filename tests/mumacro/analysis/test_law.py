@@ -234,7 +234,8 @@ def test_a_deviation_is_that_of_each_case(surrogate: Surrogate, uncertain: Any) 
     assert law.band[1] - law.band[0] == close(2.0 * each["std"], rel=1e-9)
     exact = friction_law(surrogate, values=SPEEDS, **{**LINE, "k": 1e6, "mu0": 0.3})
     assert law.answer.mu_macro.tolist() == exact.answer.mu_macro.tolist()
-    assert exact.std is exact.band is None
+    assert exact.std is None
+    assert exact.band is None
     assert law.to_dict()["std"] == law.columns["std"].tolist()
 
 

@@ -4,6 +4,7 @@ estimate; refusals."""
 import json
 import math
 import threading
+from functools import partialmethod
 from typing import Any
 
 import numpy as np
@@ -740,7 +741,7 @@ def test_the_picture_has_forces_and_path() -> None:
 
 # --- a computation that ends ----------------------------------------------------------------------
 
-RIG = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
+RIG: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
 
 
 @pytest.mark.parametrize("contact", ["spring", "ball"])
@@ -754,7 +755,7 @@ def test_a_motion_beyond_its_steps_gives_up_with_what_it_has_reached(
     of_kernel = Kernel.motions
     estimates = []
     for most in (0, 100, 10_000, 100_000, 1_000_000):
-        monkeypatch.setattr(Kernel, "motions", lambda *a, most=most: of_kernel(*a, most=most))
+        monkeypatch.setattr(Kernel, "motions", partialmethod(of_kernel, most=most))
         answer = motion(**case)
         estimates.append(answer.error_estimate)
         assert abs(answer.mu_macro - right.mu_macro) <= estimates[-1] + right.error_estimate
@@ -807,13 +808,13 @@ def test_a_turn_within_one_step_ends_no_period(tolerance: float) -> None:
 
 @pytest.mark.parametrize("part", ["x", "y"])
 def test_every_amplitude_of_a_motion_is_doubted_as_y0(capsys: Capture, part: str) -> None:
-    [remark] = motion(**RIG, **{part: 1.0}).remarks
+    [remark] = motion(**RIG | {part: 1.0}).remarks
     assert (remark["row"], remark["field"], remark["cases"]) == ("units", part, 1)
     assert remark["text"] == f"{part} = 1 m, usual is 1e-12 to 0.02 m: is it in metres?"
-    many = motion(**RIG, **{part: np.array([1e-6, 1.0, 2.0])})
+    many = motion(**RIG | {part: np.array([1e-6, 1.0, 2.0])})
     assert many.remarks[0]["cases"] == 2
     assert many.to_dict()["remarks"] == many.remarks
-    assert remark["text"] in repr(motion(**RIG, **{part: [(1, 2e-6, 0.0), (3, 1.0, 0.0)]}))
+    assert remark["text"] in repr(motion(**RIG | {part: [(1, 2e-6, 0.0), (3, 1.0, 0.0)]}))
     assert main(["motion", COMMAND, f"--{part}", "1m", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["remarks"] == [remark]
     assert main(["motion", COMMAND, f"--{part}", "1m"]) == 0

@@ -1,6 +1,8 @@
 """At the doubles beside a seam, where cells, blocks or the halves of a coordinate meet, answers are
 those of its two sides."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,14 @@ def test_the_gradient_of_a_ball_is_right_where_a_coordinate_is_folded(
     table: Surrogate, v0: float, y0: float
 ) -> None:
     steps = 2.0**-8 * np.array([-2.0, -1.0, 1.0, 2.0])
-    case = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "y0": y0, "contact": "ball"}
+    case: dict[str, Any] = {
+        "mu0": 1.0,
+        "Fz": 1.0,
+        "k": 1.0,
+        "omega": 1.0,
+        "y0": y0,
+        "contact": "ball",
+    }
     finest = opened(1e-12).evaluate(**case, v0=v0 * np.exp(steps))
     # v0 d mu_macro / d v0, of the fifth order in the step
     slope = finest.mu_macro @ np.array([1.0, -8.0, 8.0, -1.0]) / (12.0 * 2.0**-8)
