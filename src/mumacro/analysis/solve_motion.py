@@ -664,10 +664,10 @@ class _Scan:
         mean, error = (part.reshape(3, -1) for part in self.curve.at(np.r_[left, x, right]))
         slope = np.abs(mean[2] - mean[0]) / (right - left)
         with np.errstate(divide="ignore"):
-            # where the mean force hardly changes, a root is known to a wide range only
-            width = np.minimum(error[1] / slope, self.high - self.low)
-        width = np.where(slope > 0.0, width, step)
-        columns = (x, x - width, x + width, mean[1], error[1])
+            # where the mean force hardly changes, or not at all, every place near is a root
+            width = np.where(slope > 0.0, error[1] / slope, math.inf)
+        low, high = np.maximum(x - width, self.low), np.minimum(x + width, self.high)
+        columns = (x, low, high, mean[1], error[1])
         return [MotionRoot(*root) for root in zip(*(c.tolist() for c in columns), strict=True)]
 
 

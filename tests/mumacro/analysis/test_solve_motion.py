@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mumacro
-from mumacro import InputError
+from mumacro import InputError, solve_motion
 from mumacro.analysis.solve_motion import UNKNOWNS, Curve
 from mumacro.cli.main import main
 from tests.support.comparing import close
@@ -192,3 +192,23 @@ def test_the_width_of_a_flat_root_holds_all_places_where_the_mean_crosses_the_ta
     roots = mumacro.solve_motion("k", target, **case).roots[0]
     for place in crossings:
         assert any(root.low <= place <= root.high for root in roots)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "target", "within", "case"),
+    [
+        ("v0", 0.3, (0.15, 1.0), {"x": 1e-6}),  # it never slides back: mu0 at every speed
+        ("x.phase", 0.3, None, {"x": 1e-9, "v0": 1.0}),
+        ("x.amplitude", 0.3, (0.0, 1e-6), {"v0": 1.0}),
+        ("y.amplitude", 0.2, None, {"v0": 0.02}),
+    ],
+)
+def test_widths_stay_in_the_range_that_is_searched(
+    unknown: str, target: float, within: Any, case: dict[str, Any]
+) -> None:
+    rig: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3}
+    solution = solve_motion(unknown, target, within=within, **rig, **case)
+    roots = solution.roots[0]
+    assert roots
+    for root in roots:
+        assert solution.reach.low <= root.low <= root.value <= root.high <= solution.reach.high
