@@ -125,8 +125,10 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
     """The options for the contact and the direction of its oscillation; :func:`kind_in` reads
     them."""
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
-    text = "of the oscillation; normal: of the normal force; default: across"
-    parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
+    text = f"{', '.join(DIRECTIONS)} (of the normal force); default: across"
+    parser.add_argument(
+        "--direction", choices=DIRECTIONS, default="across", metavar="NAME", help=text
+    )
 
 
 def add_include(parser: argparse.ArgumentParser) -> None:

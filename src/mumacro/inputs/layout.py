@@ -39,6 +39,7 @@ GAPS = frozenset(
 # cells between blanks: quoted, or with blanks within brackets; brackets belong to what is before
 _CELL = re.compile(r'"([^"]*)"|((?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+)')
 _UNIT_CELL = re.compile(r"\[[^\[\]]*\]|\([^()]*\)|\S+")
+_BEGINNING, _OF_WORD = re.compile(r"(?<![\w.])\S"), re.compile(r"\w")  # of a name in a sentence
 _SEP_LINE = re.compile(r'\ufeff?"?sep=(.)"?', re.IGNORECASE | re.DOTALL)
 #: what LabVIEW writes behind each of its headers
 END_OF_HEADER = "***End_of_Header***"
@@ -596,14 +597,30 @@ def legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """
     if len(line) > 2_000 or not any(name in line for name in names):
         return
-    pattern = rf"(?<![\w.])({'|'.join(map(re.escape, sorted(names, key=len, reverse=True)))})(?!\w)"
-    places = [*re.finditer(pattern, line)]
-    ends = [place.start() for place in places[1:]] + [len(line)]
-    for place, end in zip(places, ends, strict=True):
-        behind = line[place.end() : end].rstrip(" ,;|\t\"'.")
+    places = [*_places_of_names(line, [name for name in names if name and name in line])]
+    ends = [start for start, _ in places[1:]] + [len(line)]
+    for (start, name), end in zip(places, ends, strict=True):
+        behind = line[start + len(name) : end].rstrip(" ,;|\t\"'.")
         unit = _unit_in_legend(behind)
         if unit is not None:
-            yield place[1], unit
+            yield name, unit
+
+
+def _places_of_names(line: str, names: Sequence[str]) -> Iterator[tuple[int, str]]:
+    """Yield where a name stands as a word of its own in a line, the longest where several do.
+
+    >>> [*_places_of_names("v0 and v0_set, mu.v0", ["v0", "v0_set"])]
+    [(0, 'v0'), (7, 'v0_set')]
+    """
+    longest_first, end = sorted(names, key=len, reverse=True), 0
+    for place in _BEGINNING.finditer(line):
+        start = place.start()
+        for name in longest_first if start >= end else ():
+            behind = start + len(name)
+            if line.startswith(name, start) and not _OF_WORD.match(line, behind):
+                yield start, name
+                end = behind
+                break
 
 
 def _unit_in_legend(behind: str) -> str | None:
