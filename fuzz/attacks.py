@@ -86,7 +86,7 @@ def motions(server: Server, share: float) -> None:
         ]
         statuses = [server.ask("POST", "/v1/law", json.dumps(law))[0] for _ in range(20)]
     assert statuses == [200] * 20, statuses
-    assert {answer.result()[0] for answer in answers} == {200, 503}
+    assert {200} <= {answer.result()[0] for answer in answers} <= {200, 503}
 
 
 def descriptions(server: Server, share: float) -> None:

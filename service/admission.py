@@ -19,12 +19,14 @@ import math
 import os
 import sys
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from ipaddress import ip_network
 from typing import Any, Generic, NamedTuple, TypeVar
+from weakref import WeakSet
 
 from fastapi import Request
 from starlette.requests import ClientDisconnect
@@ -50,6 +52,9 @@ _TICKET = "mumacro.ticket"  # in the scope of a request that holds something
 _log = logging.getLogger("mumacro.admission")
 
 
+_threads = WeakSet[threading.Thread]()  # of work
+
+
 class Thread(Generic[T]):
     """Work in a thread of its own, which does not keep the process alive; RuntimeError where none
     can start."""
@@ -59,7 +64,9 @@ class Thread(Generic[T]):
         #: what the work returns or raises
         self.done: asyncio.Future[T] = self._loop.create_future()
         arguments = work, niceness
-        threading.Thread(target=self._run, args=arguments, name="work", daemon=True).start()
+        thread = threading.Thread(target=self._run, args=arguments, name="work", daemon=True)
+        thread.start()
+        _threads.add(thread)
 
     def _run(self, work: Callable[[], T], niceness: int) -> None:
         if niceness and sys.platform == "linux":  # where that is of the thread
@@ -76,6 +83,14 @@ class Thread(Generic[T]):
     def _end(self, tell: Callable[[], None]) -> None:
         tell()
         self.done.exception()  # nobody may wait for it any more
+
+
+def join_threads(seconds: float) -> None:
+    """Wait for so long until all work has ended: where Python ends beside a thread that is in
+    compiled code, such as pydantic's, the process aborts."""
+    end = time.monotonic() + seconds
+    for thread in [*_threads]:
+        thread.join(max(0.0, end - time.monotonic()))
 
 
 class _Waiting(NamedTuple):

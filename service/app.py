@@ -25,7 +25,7 @@ from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
-from .admission import Admission, Admitted, Thread
+from .admission import Admission, Admitted, Thread, join_threads
 from .guide_pages import GuidePages
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
@@ -67,6 +67,7 @@ _TAGS = [
 _LOOK_EVERY_S = 1.0  # seconds between two looks at what the process holds
 # held while a description is made: FastAPI cannot make two at the same time
 _DESCRIBING = threading.Lock()
+_END_S = 1.5  # at most, until what is computed has ended at a stop
 _log = logging.getLogger("mumacro.app")
 
 
@@ -108,6 +109,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     yield {"settings": state.settings, "observer": state.observer, "admission": state.admission}
     looking.cancel()
     app.state.admission.end()
+    await asyncio.to_thread(join_threads, _END_S)
 
 
 class Service(FastAPI):

@@ -178,6 +178,7 @@ PEERS = {"bridge", "fmpy", "open_page"}
 #: files of minutes, in the order of their time: they come first, so that none of them is left to
 #: one processor at the end (dev.py keeps this order)
 LONGEST = (
+    "test_service_fuzz.py",
     "test_guide.py",
     "test_kernel_safety.py",
     "test_c_header.py",

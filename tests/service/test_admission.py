@@ -318,3 +318,10 @@ def test_a_file_system_that_hangs_stops_nobody_else(
         until = time.monotonic() + PATIENCE_S
         while client.get("/readyz").status_code != 200:
             assert time.monotonic() < until
+
+
+def test_no_work_goes_on_when_the_service_has_ended(started: Any) -> None:
+    """Python that ends beside a thread in compiled code aborts: the description is made in one."""
+    with started():
+        pass
+    assert [thread for thread in threading.enumerate() if thread.name == "work"] == []

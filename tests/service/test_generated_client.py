@@ -59,7 +59,8 @@ assert isinstance(solved, SolveForAnswer)
 fitted = post_fit.sync(client=client, body=FitRequest(  # docs/http.md
     v0=[0.001, 0.005, 0.02, 0.1], mu_macro=[0.069, 0.174, 0.247, 0.289], fz=10.0, y0=0.4e-6,
     f=20e3))
-assert isinstance(fitted, FitAnswer) and fitted.values.k > 1e6
+assert isinstance(fitted, FitAnswer)
+assert isinstance(fitted.values.k, float) and fitted.values.k > 1e6
 print(json.dumps([
     mu, one.power.saved, one.regime.value, rigid.mu_macro, refused.errors[0].field,
     columns.mu_macro, rows.results[0].mu_macro, solved.results[0].roots[0].value,

@@ -288,6 +288,14 @@ def test_an_answer_over_http_1_0_is_one_piece(live_server: Any, raw: Any) -> Non
     assert response.read() == whole
 
 
+def niceness_of_threads(process: int) -> set[int]:
+    values = set[int]()
+    for task in Path(f"/proc/{process}/task").iterdir():
+        with suppress(OSError):  # it has ended
+            values.add(int((task / "stat").read_text().rpartition(")")[2].split()[16]))
+    return values
+
+
 @pytest.mark.slow
 def test_short_requests_are_answered_while_a_large_batch_is(
     serving: Any, surrogate: Surrogate
@@ -298,25 +306,24 @@ def test_short_requests_are_answered_while_a_large_batch_is(
     )
     with (
         serving(
-            surrogate.path, MUMACRO_MAX_BATCH=str(n), MUMACRO_MAX_BODY_BYTES="200000000"
+            surrogate.path,
+            MUMACRO_MAX_BATCH=str(n),
+            MUMACRO_MAX_BODY_BYTES="200000000",
+            MUMACRO_MAX_HELD_BYTES="400000000",
         ) as server,
         ThreadPoolExecutor(1) as pool,
     ):
         large = pool.submit(server.ask, "POST", BATCH, body)
-        between = 0
+        between, niceness = 0, {0}
         while not large.done():
             assert server.ask("GET", "/livez")[0] == 200
             assert server.ask("POST", SINGLE, json.dumps(CASE))[0] == 200
+            niceness |= niceness_of_threads(server.process.pid)
             between += 1
         assert between >= 10
         status, _, received = large.result()
         assert (status, len(json.loads(received)["mu_macro"])) == (200, n)
-        # threads for batches have a lower priority
-        times_of = {
-            int(task.name): int((task / "stat").read_text().rpartition(")")[2].split()[16])
-            for task in Path(f"/proc/{server.process.pid}/task").iterdir()
-        }
-        assert times_of.pop(server.process.pid) < max(times_of.values())
+        assert {0} < niceness  # threads of batches have a lower priority
 
 
 @pytest.mark.slow
@@ -337,8 +344,9 @@ def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(
         assert [status for status, _, _ in answers] == [200] * places
         assert len({body for _, _, body in answers}) == 1
         # A case takes 90 bytes of text, 56 while it is evaluated, 33 until its answer is sent; the
-        # slice at hand, as objects and as text, up to 4 MB.
-        each = len(rows) + 90 * n + 4_000_000
+        # slice at hand, as objects and as text, up to 4 MB when it is read and again when its
+        # answer is written, and all are computed at the same time.
+        each = len(rows) + 90 * n + 8_000_000
         assert 1e6 * (server.memory("VmHWM") - base) < places * each + 20_000_000
 
 

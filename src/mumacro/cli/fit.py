@@ -3,6 +3,7 @@
 import math
 import sys
 import warnings
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import AMPLITUDE
+from mumacro.surrogate import Surrogate
 from mumacro.validity import digits
 
 EXAMPLE = 'mumacro fit measured.csv "Fz=10N y0=2um f=20kHz" -o fit.png'
@@ -89,8 +91,14 @@ def run(words: Sequence[str]) -> str:
         raise ImpossibleError(f"{options.points}: {at_line}{fault}") from None
     except ModuleNotFoundError as error:  # says what to install
         raise ImpossibleError(str(error)) from None
+    output = _output(result, options, surrogate)
     if table.read_as:
         print(f"mumacro fit: read as: {table.read_as}", file=sys.stderr)
+    return output
+
+
+def _output(result: Fit, options: Namespace, surrogate: Surrogate) -> str:
+    """Write the file that is asked for; return what is printed."""
     if options.out is not None:
         heads = [
             name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]"

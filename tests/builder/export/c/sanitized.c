@@ -134,7 +134,9 @@ static void ask_motions(const mumacro_kernel *kernel, int turn) {
     const int32_t counts[3] = {(int32_t)(drawn() * 3.0), (int32_t)(drawn() * 3.0),
                                ball ? 0 : (int32_t)(drawn() * 2.0)};
     const int terms = counts[0] + counts[1] + counts[2], n = 1 + (int)(drawn() * 50.0);
-    const int64_t room = (int64_t)1 << (3 + (int)(drawn() * 14.0));
+    const int64_t room = (int64_t)1 << (3 + (int)(drawn() * 14.0)),
+                  most = (int64_t)1 << (int)(drawn() * 28.0);
+    const int32_t stop = drawn() < 0.02;
     const double tolerance = scaled(ball ? -5.0 : -8.0, -2.0);
     double *orders = numbers((size_t)terms + 1), *one = numbers(1 + 2 * (size_t)terms);
     double *work = numbers(2 * (size_t)room), *out = numbers(7),
@@ -147,8 +149,9 @@ static void ask_motions(const mumacro_kernel *kernel, int turn) {
         one[2 + 2 * i] = 7.0 * drawn();
     }
     shares[0] = weights[0] = 0.5, shares[1] = weights[1] = 1.0;
-    kernel->motions(ball, 1, counts, orders, one, tolerance, room, work, out);
-    kernel->motion_cycle(counts, orders, one, 2, shares, weights, tolerance, room, work, n, forces);
+    kernel->motions(ball, 1, counts, orders, one, tolerance, room, work, most, &stop, out);
+    kernel->motion_cycle(counts, orders, one, 2, shares, weights, tolerance, room, work, most,
+                         &stop, n, forces);
     free(orders), free(one), free(work), free(out), free(forces), free(shares), free(weights);
 }
 
