@@ -67,7 +67,7 @@ _TAGS = [
 _LOOK_EVERY_S = 1.0  # seconds between two looks at what the process holds
 # held while a description is made: FastAPI cannot make two at the same time
 _DESCRIBING = threading.Lock()
-_END_S = 1.5  # at most, until what is computed has ended at a stop
+_END_S = 5.0  # at most, until what is computed has ended at a stop; a file system may hang
 _log = logging.getLogger("mumacro.app")
 
 
