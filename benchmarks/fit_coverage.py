@@ -31,7 +31,7 @@ _MINIMA = 5000  # random sets of points
 _EXACT = 400  # fits of exact points, of each contact and direction
 REGULAR = 0.95  # share of draws with one solution and closed intervals, in a set-up that has these
 _CODE = b"".join(
-    (ROOT / "src" / "mumacro" / "analysis" / name).read_bytes() for name in ("fit.py", "profile.py")
+    (ROOT / "src" / "mumacro" / "fits" / name).read_bytes() for name in ("fit.py", "profile.py")
 )
 
 

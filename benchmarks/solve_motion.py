@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import mumacro
-from mumacro.analysis.solve_motion import UNKNOWNS, Curve
+from mumacro.motions.solve_motion import UNKNOWNS, Curve
 from mumacro.plotting import INK, Panels, head, save
 
 PROBLEMS, FINE = 1000, 2000

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from mumacro import closed_forms
-from mumacro.analysis.law import Law
 from mumacro.errors import InputError
 from mumacro.inputs.kind import SPRING
 from mumacro.kernel.arrays import Array
+from mumacro.questions.law import Law
 from mumacro.surrogate import Surrogate
 
 #: column -> its formula and range; NaN elsewhere.  A formula without an equation number is this

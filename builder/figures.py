@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from builder.approximations import approximations, border_speeds
 from mumacro import MumacroError, Surrogate, closed_forms, motion, plotting
-from mumacro.analysis.law import law as friction_law
 from mumacro.kernel.arrays import Array
+from mumacro.questions.law import law as friction_law
 
 from .solver.steady import border
 

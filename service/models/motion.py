@@ -16,12 +16,12 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from mumacro.analysis.motion import TOLERANCES
 from mumacro.errors import InputError
 from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, described
 from mumacro.inputs.kind import ContactName
 from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
 from mumacro.inputs.reading import read_one, reason_of
+from mumacro.motions.motion import TOLERANCES
 
 from .answers import REMARKS, Number, Numbers, Remark, Understood, quantity, understood_inputs
 from .inputs import EXAMPLE, ONE_FREQUENCY, Strict, either, optional

@@ -17,8 +17,6 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails
 
-from mumacro.analysis.motion import PARTS
-from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS, described
@@ -26,6 +24,8 @@ from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.reading import no_number, read_one, reason_of
 from mumacro.inputs.signs import THOUSANDS
+from mumacro.motions.motion import PARTS
+from mumacro.motions.solve_motion import UNKNOWNS
 
 from .inputs import (
     EXAMPLE,

@@ -9,9 +9,9 @@ from typing import Any
 from fastapi import Request, Response
 
 import mumacro
-from mumacro.analysis.measured_points import read_points, unknowns_beside
 from mumacro.contacts.geometries import contact_of, doubts_of
 from mumacro.errors import InputError
+from mumacro.fits.measured_points import read_points, unknowns_beside
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.text_tables import Most, Table
 from mumacro.inputs.workbooks import BEGIN as WORKBOOK

@@ -9,8 +9,6 @@ import numpy as np
 from fastapi import Query, Request, Response
 
 import mumacro
-from mumacro.analysis.law import Law
-from mumacro.analysis.solve_for import Solution
 from mumacro.answer import Answer, nested
 from mumacro.contacts.stiffening import Stiffening
 from mumacro.errors import InputError
@@ -20,6 +18,8 @@ from mumacro.inputs.reading import read_one
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
+from mumacro.questions.law import Law
+from mumacro.questions.solve_for import Solution
 from mumacro.validity import load_rows
 
 from .. import API_VERSION

@@ -16,17 +16,17 @@ from mumacro.version import __version__
 
 if _TYPE_CHECKING:
     from mumacro import closed_forms, plotting, stiffness, validity
-    from mumacro.analysis.fit import fit
-    from mumacro.analysis.fitted import Fit
-    from mumacro.analysis.harmonics import Harmonics, harmonics
-    from mumacro.analysis.law import law
-    from mumacro.analysis.loop import fit_loop
-    from mumacro.analysis.loop_fitted import LoopFit
-    from mumacro.analysis.motion import Motion, motion
-    from mumacro.analysis.solve_for import solve_for
-    from mumacro.analysis.solve_motion import MotionSolution, solve_motion
     from mumacro.answer import Answer
     from mumacro.contacts.element import Element
+    from mumacro.fits.fit import fit
+    from mumacro.fits.fitted import Fit
+    from mumacro.fits.loop import fit_loop
+    from mumacro.fits.loop_fitted import LoopFit
+    from mumacro.motions.harmonics import Harmonics, harmonics
+    from mumacro.motions.motion import Motion, motion
+    from mumacro.motions.solve_motion import MotionSolution, solve_motion
+    from mumacro.questions.law import law
+    from mumacro.questions.solve_for import solve_for
     from mumacro.surrogate import Surrogate
     from mumacro.table.atlas import REGIMES, SOURCES
 
@@ -38,18 +38,18 @@ _PLACES = {
     "plotting": "plotting",
     "stiffness": "stiffness",
     "validity": "validity",
-    "Fit": "analysis.fitted",
-    "fit": "analysis.fit",
-    "Harmonics": "analysis.harmonics",
-    "harmonics": "analysis.harmonics",
-    "law": "analysis.law",
-    "LoopFit": "analysis.loop_fitted",
-    "fit_loop": "analysis.loop",
-    "Motion": "analysis.motion",
-    "motion": "analysis.motion",
-    "solve_for": "analysis.solve_for",
-    "MotionSolution": "analysis.solve_motion",
-    "solve_motion": "analysis.solve_motion",
+    "Fit": "fits.fitted",
+    "fit": "fits.fit",
+    "Harmonics": "motions.harmonics",
+    "harmonics": "motions.harmonics",
+    "law": "questions.law",
+    "LoopFit": "fits.loop_fitted",
+    "fit_loop": "fits.loop",
+    "Motion": "motions.motion",
+    "motion": "motions.motion",
+    "solve_for": "questions.solve_for",
+    "MotionSolution": "motions.solve_motion",
+    "solve_motion": "motions.solve_motion",
     "Answer": "answer",
     "Element": "contacts.element",
     "Surrogate": "surrogate",

@@ -10,11 +10,11 @@ import pandas as pd
 import pytest
 
 from mumacro import InputError, Surrogate, solve_for
-from mumacro.analysis.motion import motion
 from mumacro.answer import TEXTS
 from mumacro.contacts.element import Element
 from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.kind import KINDS, Kind
+from mumacro.motions.motion import motion
 from mumacro.outputs import MEMBERS, OUTPUTS
 from tests.support.cases import CASE, Case, as_kind, flat, tables, without
 from tests.support.comparing import close

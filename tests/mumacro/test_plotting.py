@@ -9,9 +9,9 @@ import pytest
 
 import mumacro
 from mumacro import Surrogate, plotting
-from mumacro.analysis.fitted import Fit
-from mumacro.analysis.law import Law
+from mumacro.fits.fitted import Fit
 from mumacro.inputs.kind import KINDS, Kind
+from mumacro.questions.law import Law
 from tests.support.cases import Case
 from tests.support.comparing import close
 

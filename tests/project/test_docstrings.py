@@ -33,7 +33,7 @@ def test_there_are_examples() -> None:
     used = {
         "answer.Answer",
         "table.bundled.bundled_tables",
-        "analysis.fit.fit",
+        "fits.fit.fit",
         "contacts.element.Element",
     }
     used |= {f"surrogate.Surrogate.{name}" for name in ("evaluate", "mu_ratio", "open", "slopes")}

@@ -57,7 +57,7 @@ ELSEWHERE = {
     "python3 dev.py wheels": (".ci/run", "python3 dev.py wheels"),
     "python3 dev.py check": ("dev.py", "failed = check()"),  # by dev.py test
     "python3 dev.py docs": ("dev.py", "return docs() or"),  # by dev.py wheels
-    'python3 dev.py exec pytest -m "" tests/mumacro/analysis/test_law.py': (
+    'python3 dev.py exec pytest -m "" tests/mumacro/questions/test_law.py': (
         ".ci/run",
         "dev.py exec pytest",
     ),
@@ -88,19 +88,19 @@ ELSEWHERE = {
     "python benchmarks/validation.py": ("tests/project/test_benchmarks.py", '("validation", '),
     "python benchmarks/validity.py": ("tests/project/test_benchmarks.py", '"validity", '),
     "python benchmarks/measured.py": (
-        "tests/mumacro/analysis/test_measured.py",
+        "tests/mumacro/fits/test_measured.py",
         "measured.SECTIONS",
     ),
     "python benchmarks/friction_models.py": (
-        "tests/mumacro/analysis/test_measured.py",
+        "tests/mumacro/fits/test_measured.py",
         "friction_models.elements()",
     ),
     "nice python benchmarks/fit_coverage.py": (
-        "tests/mumacro/analysis/test_fitting.py",
+        "tests/mumacro/fits/test_fitting.py",
         "fit_coverage.SET_UPS",
     ),
     "python benchmarks/loops.py": (
-        "tests/mumacro/analysis/test_loop.py",
+        "tests/mumacro/fits/test_loop.py",
         "benchmark.random_loops(",
     ),
     "mumacro fit --json": ("tests/mumacro/cli/test_command.py", '*words, "--json")'),

@@ -9,9 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from mumacro import plotting
-from mumacro.analysis.fit import fit
-from mumacro.analysis.fitted import Fit
-from mumacro.analysis.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
 from mumacro.cli import common
 from mumacro.cli.common import (
     ImpossibleError,
@@ -22,6 +19,9 @@ from mumacro.cli.common import (
     open_table,
 )
 from mumacro.errors import InputError
+from mumacro.fits.fit import fit
+from mumacro.fits.fitted import Fit
+from mumacro.fits.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import AMPLITUDE

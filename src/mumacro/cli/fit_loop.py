@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from mumacro import plotting
-from mumacro.analysis.loop import fit_loop
-from mumacro.analysis.loop_fitted import LoopFit
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, in_columns
 from mumacro.errors import InputError
+from mumacro.fits.loop import fit_loop
+from mumacro.fits.loop_fitted import LoopFit
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.layout import ColumnNames

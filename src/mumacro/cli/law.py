@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mumacro.analysis.law import law as friction_law
 from mumacro.cli import common
 from mumacro.cli.common import (
     CURVE,
@@ -18,6 +17,7 @@ from mumacro.cli.common import (
 )
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.reading import read_one
+from mumacro.questions.law import law as friction_law
 from mumacro.shown import known, tidy_zeros
 from mumacro.validity import load_rows
 

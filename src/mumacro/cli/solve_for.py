@@ -5,10 +5,6 @@ import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mumacro.analysis.law import Law
-from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.solve_for import Root, Solution, solve_for
-from mumacro.analysis.solve_motion import UNKNOWNS
 from mumacro.cli import common, motion, solve_motion
 from mumacro.cli.common import (
     CURVE,
@@ -26,6 +22,10 @@ from mumacro.inputs.fields import ENDS, NAMES
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import read_one
+from mumacro.motions.solve_motion import UNKNOWNS
+from mumacro.questions.law import Law
+from mumacro.questions.law import law as friction_law
+from mumacro.questions.solve_for import Root, Solution, solve_for
 from mumacro.shown import tidy_zeros
 from mumacro.surrogate import Surrogate
 from mumacro.validity import load_rows

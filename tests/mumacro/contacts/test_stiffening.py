@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from builder.approximations import approximations, border_speeds
 from mumacro import Surrogate
-from mumacro.analysis.borders import border_crossings
-from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.solve_for import solve_for
 from mumacro.cli.main import main
 from mumacro.contacts.stiffening import Stiffening
+from mumacro.questions.borders import border_crossings
+from mumacro.questions.law import law as friction_law
+from mumacro.questions.solve_for import solve_for
 from mumacro.validity import load_rows
 from tests.support.cases import CASE, PAIRS, Case, as_kind, without
 from tests.support.comparing import close

@@ -17,9 +17,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mumacro.analysis.fit import fit
-from mumacro.analysis.measured_points import read_points
 from mumacro.errors import InputError
+from mumacro.fits.fit import fit
+from mumacro.fits.measured_points import read_points
 from mumacro.inputs.decoding import Text, TextError, encoding_of
 from mumacro.inputs.headings import absent
 from mumacro.inputs.layout import BLANKS, GAPS, ColumnNames, Dialect

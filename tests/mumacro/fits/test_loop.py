@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mumacro import Element, InputError, LoopFit, fit_loop
-from mumacro.analysis.cycles import cycles_of
 from mumacro.cli.main import main
+from mumacro.fits.cycles import cycles_of
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close
 from tests.support.refusals import refused

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from mumacro import Element, InputError, Motion, Surrogate, motion, solve_motion
-from mumacro.analysis.motion import SLOWEST
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from mumacro.kernel.binding import Kernel
+from mumacro.motions.motion import SLOWEST
 from mumacro.stopping import Stop, StopError
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close

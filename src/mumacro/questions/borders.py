@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
-from mumacro.analysis.rootfinding import TINY, last_double
 from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools
+from mumacro.questions.input_curve import EVERYWHERE, InputCurve
+from mumacro.questions.rootfinding import TINY, last_double
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import STEEPEST_Y
 

@@ -14,10 +14,10 @@ from builder.approximations import (
     border_speeds,
 )
 from mumacro import InputError, Surrogate, closed_forms, plotting
-from mumacro.analysis.law import law as friction_law
-from mumacro.analysis.law import sweep_values
 from mumacro.inputs.fields import FIELDS
 from mumacro.inputs.kind import kind_of
+from mumacro.questions.law import law as friction_law
+from mumacro.questions.law import sweep_values
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
 from tests.support.refusals import refused

@@ -27,7 +27,7 @@ runs through the same values in the same order, its turning points and its borde
 stand in ln Fz 1/(1 - m) times as far apart.  For m = 1 it is constant.  For normal it rises with Fz
 at constant k and rises with k, so it rises with Fz for every m, up to mu0 where that is reached.
 
-How a level is found on a monotone branch: :mod:`mumacro.analysis.rootfinding`.
+How a level is found on a monotone branch: :mod:`mumacro.questions.rootfinding`.
 """
 
 import math
@@ -36,9 +36,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.analysis import solutions as tables
-from mumacro.analysis.input_curve import EVERYWHERE, InputCurve
-from mumacro.analysis.rootfinding import TINY, Branch, branches_between, last_double, samples
 from mumacro.answer import Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
@@ -48,6 +45,9 @@ from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.reading import read_one
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools, Places
+from mumacro.questions import solutions as tables
+from mumacro.questions.input_curve import EVERYWHERE, InputCurve
+from mumacro.questions.rootfinding import TINY, Branch, branches_between, last_double, samples
 from mumacro.shown import frame_of, html_of, members_of, text_of
 from mumacro.surrogate import Surrogate
 

@@ -11,10 +11,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mumacro import Surrogate
-from mumacro.analysis.borders import border_crossings
-from mumacro.analysis.input_curve import InputCurve
-from mumacro.analysis.rootfinding import TINY, Branch, last_double
-from mumacro.analysis.solve_for import solve_for
+from mumacro.questions.borders import border_crossings
+from mumacro.questions.input_curve import InputCurve
+from mumacro.questions.rootfinding import TINY, Branch, last_double
+from mumacro.questions.solve_for import solve_for
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
 from tests.support.refusals import refused

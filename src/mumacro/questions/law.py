@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.borders import Crossing, border_crossings
-from mumacro.analysis.input_curve import InputCurve
 from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
@@ -19,6 +17,8 @@ from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
 from mumacro.outputs.evaluation import chosen
+from mumacro.questions.borders import Crossing, border_crossings
+from mumacro.questions.input_curve import InputCurve
 from mumacro.shown import frame_of, html_of, members_of, text_of
 from mumacro.surrogate import Surrogate
 
@@ -235,7 +235,7 @@ def law(
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_low`` and ``k_high`` for ``k``: the law has a band, see
-        :attr:`mumacro.analysis.law.Law.band`.  So it has where inputs have a standard deviation:
+        :attr:`mumacro.questions.law.Law.band`.  So it has where inputs have a standard deviation:
         "1 ± 0.1 N/um", or ``std_k`` and so on; where k grows with Fz, its deviation grows alike.
 
     Raises

@@ -1,5 +1,5 @@
 """Measured points of friction: their columns, checked, and the model at them; for
-:mod:`mumacro.analysis.fit`."""
+:mod:`mumacro.fits.fit`."""
 
 from collections.abc import Container, Mapping
 from pathlib import Path

@@ -2,7 +2,7 @@
 of what the points do not determine.
 
 mu_macro = mu0 mu~(p) with p = k/mu0: at each p the best mu0 follows from a linear equation, so that
-one profile of chi2 over p (:mod:`mumacro.analysis.profile`) has every minimum, the limits of a soft
+one profile of chi2 over p (:mod:`mumacro.fits.profile`) has every minimum, the limits of a soft
 and of a rigid contact, and the ranges that the points allow.  Needs scipy, a plot matplotlib.
 """
 
@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.analysis.fitted import Fit, quantile
-from mumacro.analysis.measured_points import STD, Measured
-from mumacro.analysis.profile import Goal, Profile
 from mumacro.errors import InputError
+from mumacro.fits.fitted import Fit, quantile
+from mumacro.fits.measured_points import STD, Measured
+from mumacro.fits.profile import Goal, Profile
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 from mumacro.validity import HARDLY

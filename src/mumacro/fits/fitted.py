@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis.measured_points import STD, UNKNOWNS, Measured
 from mumacro.errors import missing
+from mumacro.fits.measured_points import STD, UNKNOWNS, Measured
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array, Bools

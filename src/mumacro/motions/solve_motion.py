@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro import plotting
-from mumacro.analysis import solutions as tables
-from mumacro.analysis.motion import PARTS, motion
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
 from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, unit_of
@@ -25,6 +23,8 @@ from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.reading import read, read_one
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools
+from mumacro.motions.motion import PARTS, motion
+from mumacro.questions import solutions as tables
 from mumacro.shown import frame_of, html_of, members_of, text_of
 
 #: inputs of a motion that may be unknown

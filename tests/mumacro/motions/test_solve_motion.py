@@ -9,8 +9,8 @@ import pytest
 
 import mumacro
 from mumacro import InputError, solve_motion
-from mumacro.analysis.solve_motion import UNKNOWNS, Curve
 from mumacro.cli.main import main
+from mumacro.motions.solve_motion import UNKNOWNS, Curve
 from tests.support.comparing import close
 
 CONVEYOR: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e5, "f": 50.0, "x": 1e-4}

@@ -2,7 +2,7 @@
 
 The force of the model is mu0 f(k/mu0) plus an offset and a drift, where f follows from the
 displacement by ``kernel/loop.c``.  Offset and drift are taken out of forces and model by a
-projection, mu0 is a factor: one profile of chi2 over k/mu0 (:mod:`mumacro.analysis.profile`) is
+projection, mu0 is a factor: one profile of chi2 over k/mu0 (:mod:`mumacro.fits.profile`) is
 left.  Needs scipy, a plot matplotlib.
 """
 
@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.analysis.cycles import cycles_of
-from mumacro.analysis.fitted import quantile
-from mumacro.analysis.loop_fitted import LoopFit
-from mumacro.analysis.profile import Profile
 from mumacro.errors import InputError
+from mumacro.fits.cycles import cycles_of
+from mumacro.fits.fitted import quantile
+from mumacro.fits.loop_fitted import LoopFit
+from mumacro.fits.profile import Profile
 from mumacro.inputs.cases import real
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.reading import read

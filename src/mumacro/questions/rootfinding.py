@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro.analysis.input_curve import InputCurve
 from mumacro.kernel.arrays import Array, Bools, Places
+from mumacro.questions.input_curve import InputCurve
 
 TINY = 5e-324
 _ROUNDING = 2.0**-52

@@ -1,1 +1,0 @@
-"""Questions to a surrogate: friction law, inverse problem, settling, validity, fit to points."""
