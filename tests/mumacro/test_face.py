@@ -82,7 +82,8 @@ mumacro.solve_motion("v0", 0.2, y=2e-6, **case)
 mumacro.harmonics([0.0, 1.0, 0.0, -1.0] * 4, most=3)
 points = {"mu_macro": [0.1, 0.2], "v0": [0.005, 0.02]}
 mumacro.fit({**points, "mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3}, unknowns=["k"])
-mumacro.fit_loop([0.0, 1e-6, 5e-6, -5e-6, 5e-6], [0.0, 1.0, 3.0, -3.0, 3.0], Fz=10.0)
+x = [0.0, 1e-6, 3e-6, 5e-6, 0.0, -5e-6, 0.0, 5e-6]
+mumacro.fit_loop(x, [0.0, 1.0, 3.0, 3.0, -2.0, -3.0, 2.0, 3.0], Fz=10.0)
 print(sorted(called))
 """
     done = subprocess.run(
@@ -90,5 +91,5 @@ print(sorted(called))
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == str(
-        ["fit", "fit_loop", "harmonics", "law", "motion", "open", "solve_for", "solve_motion"]
+        ["fit", "fit_loop", "harmonics", "law", "motion", "solve_for", "solve_motion"]
     )
