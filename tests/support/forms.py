@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,7 +15,3 @@ def as_csv(rows: Sequence[Row]) -> str:
         [list(rows[0]), *(["" if x is None else x for x in row.values()] for row in rows)]
     )
     return text.getvalue()
-
-
-def as_ndjson(rows: Sequence[Row]) -> str:
-    return "".join(json.dumps(row) + "\n" for row in rows)

@@ -18,7 +18,6 @@ from mumacro.cli.common import (
     included,
     open_table,
 )
-from mumacro.files.reading import find_files
 from mumacro.files.run import evaluate_files
 from mumacro.inputs.doubts import Remark
 
@@ -45,7 +44,7 @@ def _standard_input(folder: Path) -> Path:
         stream.seek(0)
         begin = stream.read(4)
     endings = {b"PAR1": ".parquet", b"PK\x03\x04": ".xlsx"}
-    kind = endings.get(begin, ".ndjson" if begin.lstrip()[:1] == b"{" else ".csv")
+    kind = endings.get(begin, ".json" if begin.lstrip()[:1] == b"{" else ".csv")
     packing = ".gz" if begin[:2] == b"\x1f\x8b" else ""
     return path.rename(f"{path}{kind}{packing}")
 
@@ -74,7 +73,7 @@ def _parser() -> OneLineParser:
     """The arguments of the command."""
     parser = OneLineParser(
         prog="mumacro eval",
-        description="Evaluate every case of files: Parquet, NDJSON, text, .xlsx. "
+        description="Evaluate every case of files: Parquet, text, .xlsx. "
         "The output appears whole or not.",
         epilog=_COLUMNS,
     )
@@ -115,8 +114,7 @@ def main(words: Sequence[str]) -> int:
             ]
             out = options.out
             if out == "-":
-                ending = "ndjson" if find_files(files)[1] == "ndjson" else "csv"
-                out = f"{folder}/standard-output.{ending}"
+                out = f"{folder}/standard-output.csv"
             with _Bar(console) as bar:
                 outcome = evaluate_files(
                     files,

@@ -27,7 +27,7 @@ which amplitude halves it: {solve_for.EXAMPLE}
 everything else:           mumacro --help"""
 _TASKS = {
     f'mumacro "{one_case.EXAMPLE}"': "one case",
-    "mumacro eval cases.parquet -o out.parquet": "files: csv, ndjson, parquet",
+    "mumacro eval cases.parquet -o out.parquet": "files: text, xlsx, parquet",
     'mumacro law "mu0=0.3 ..." --along v0 1mm/s 1m/s -o law.png': "mu_macro along one input",
     'mumacro solve-for y0 "mu0=0.3 ..." --target 0.15': "the input for a mu_macro",
     "mumacro map -o map.png": "the map of all cases",

@@ -1,5 +1,5 @@
-"""Files of cases, evaluated without a server: Parquet, CSV and NDJSON, in constant
-memory.  Needs pyarrow.
+"""Files of cases, evaluated without a server: Parquet and tables as text, in constant memory.
+Needs pyarrow.
 
 ``answer`` takes one Arrow record batch and is all that other tools need; ``evaluate_files`` takes
 files.

@@ -1,24 +1,17 @@
 """The formats of files: which files there are, their columns, and their rows in blocks.
 
-Cells of tables as text and values of NDJSON are text.  Inputs become numbers; other columns stay
-text.
+Cells of tables as text are text.  Inputs become numbers; other columns stay text.
 """
 
 import glob
-import json
-import math
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import chain, islice
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.dataset
 
 from mumacro.files.errors import FilesError
-from mumacro.files.text_source import Block, TextTable, excerpt
-from mumacro.inputs.decoding import TextError, file_pieces
+from mumacro.files.text_source import Block, TextTable
 from mumacro.inputs.layout import ColumnNames, Dialect
 
 #: endings of files that are written, and their format
@@ -27,18 +20,17 @@ WRITTEN = {
     ".tsv": "text",
     ".txt": "text",
     ".parquet": "parquet",
-    ".ndjson": "ndjson",
-    ".jsonl": "ndjson",
 }
 #: endings of files that are read, and their format
 FORMATS = WRITTEN | dict.fromkeys((".lvm", ".dat", ".asc", ".prn", ".xlsx"), "text")
 ENDINGS = f"{', '.join(WRITTEN)} (text also .gz)"
 # endings that only tables have; a text with another ending may be a note beside them
-_TABLES = {".csv", ".tsv", ".parquet", ".ndjson", ".jsonl"}
+_TABLES = {".csv", ".tsv", ".parquet"}
+#: endings of files with a JSON object a line, which are refused
+_JSON = {".ndjson", ".jsonl", ".json"}
 # what begins the names of files that others leave in a folder: metadata, hidden files, Excel's lock
 _STRAY = ("_", ".", "~$")
 ROWS = 65_536  # rows of a block, at most: a third of a second of work
-LONGEST = 64 * 2**20  # bytes of a line, at most
 
 
 def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:
@@ -71,6 +63,9 @@ def find_files(
     for entry in cases:
         path = Path(entry)
         if path.is_file():
+            if ending_of(path) in _JSON:
+                remedy = "write CSV or Parquet, as pandas.read_json(..., lines=True).to_csv does"
+                raise FilesError(f"{path}: JSON is no table: {remedy}")
             files.append(path)
             formats[format_of(path, FORMATS)[0] or "text"] = None
             continue
@@ -191,105 +186,3 @@ class TextSource:
         """The blocks of a file, of the columns ``names``."""
         numbers = self.as_lines or not self.to_text
         return self.tables[file].blocks(names, lines=self.as_lines, numbers=numbers)
-
-
-class NdjsonSource:
-    """NDJSON in UTF-8, one object a line.
-
-    The columns are those of the first block of every file, and others are refused unless
-    ``verbatim``: then lines come out as they came in.
-    """
-
-    head: Sequence[str] = ()
-    has_mark, sep, decimal = False, "", "."
-
-    def __init__(self, files: Sequence[Path], verbatim: bool) -> None:
-        self.files, self.verbatim = files, verbatim
-        starts = (line for path in files for _, line in islice(_lines(path), ROWS))
-        names = dict.fromkeys(name for line in starts for name in _object(line)[0])
-        if not names:
-            raise FilesError(f"{files[0]}: holds no JSON object, one a line")
-        self.schema = pa.schema([(name, pa.string()) for name in names])
-
-    def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
-        """The blocks of a file, of the columns ``names``."""
-        path, at = self.files[file], 0
-
-        def report_place(place: int) -> None:
-            nonlocal at
-            at = place
-
-        size, lines = max(path.stat().st_size, 1), _lines(path, report_place)
-        while numbered_lines := [*islice(lines, ROWS)]:
-            numbers, texts = zip(*numbered_lines, strict=True)
-            objects, faults = zip(*map(_object, texts), strict=True)
-            new = {name for record in objects for name in record} - {*self.schema.names}
-            if new and not self.verbatim:
-                first = next(i for i, x in zip(numbers, objects, strict=True) if new & x.keys())
-                where = f"{path}: line {first}"
-                remedy = "name it in the first, or write NDJSON"
-                raise FilesError(f"{where}: {min(new)!r} is in no earlier line; {remedy}")
-            columns = [
-                pa.array([_text(x.get(name)) for x in objects], pa.string()) for name in names
-            ]
-            unreadable = [
-                (i, excerpt(texts[i].decode("utf-8", "replace")), fault)
-                for i, fault in enumerate(faults)
-                if fault
-            ]
-            batch = pa.RecordBatch.from_arrays(columns, [*names])
-            yield Block(batch, at / size, numbers, texts, unreadable)
-
-
-def _lines(
-    path: Path, report_place: Callable[[int], None] = lambda _at: None
-) -> Iterator[tuple[int, bytes]]:
-    """The lines of a file that are not empty, and their numbers."""
-    rest, number = b"", 0
-    try:
-        for piece in chain(file_pieces(path, report_place), [b"\n"]):
-            *lines, rest = (rest + piece).split(b"\n")
-            for line in lines:
-                number += 1
-                if text := line.strip():
-                    yield number, text
-            if len(rest) > LONGEST:
-                raise TextError(f"line {number + 1} has more than {LONGEST >> 20} MiB")
-    except TextError as error:
-        raise FilesError(f"{path}: {error}") from None
-
-
-def _object(text: bytes) -> tuple[dict[str, Any], str | None]:
-    """The object of a line, and its fault, if any."""
-    try:
-        value = _DECODER.decode(text.decode("utf-8-sig"))
-        if b"\\u" in text:
-            json.dumps(value, ensure_ascii=False).encode()  # half of a surrogate pair is no text
-        return (value, None) if isinstance(value, dict) else ({}, "is no JSON object")
-    except (ValueError, RecursionError) as error:
-        return {}, f"is no JSON object: {error}"
-
-
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    if len(unique := dict(pairs)) < len(pairs):
-        raise ValueError(
-            f"repeats the key {Counter(name for name, _ in pairs).most_common(1)[0][0]!r}"
-        )
-    return unique
-
-
-def _refuse_constant(word: str) -> None:
-    raise ValueError(f"{word} is not in it; write null")
-
-
-_DECODER = json.JSONDecoder(object_pairs_hook=_without_repeats, parse_constant=_refuse_constant)
-
-
-def _text(value: Any) -> str | None:
-    """A value as text: strings as they are, others as JSON."""
-    if value is None or isinstance(value, str):
-        return value
-    # JSON has no infinity: too many digits must not pass for a rigid contact
-    if isinstance(value, float):
-        return repr(value) if math.isfinite(value) else "1e999"
-    return json.dumps(value)

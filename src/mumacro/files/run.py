@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import compress
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -116,7 +115,7 @@ class _State(NamedTuple):
     rejects: str = ""
 
 
-_Source = reading.ParquetSource | reading.TextSource | reading.NdjsonSource
+_Source = reading.ParquetSource | reading.TextSource
 
 
 def _source_of(
@@ -131,8 +130,6 @@ def _source_of(
     named."""
     if file_format == "parquet":
         return reading.ParquetSource(files, folder)
-    if file_format == "ndjson":
-        return reading.NdjsonSource(files, verbatim)
     return reading.TextSource(files, dialect, names_of_columns(rigid), verbatim)
 
 
@@ -282,8 +279,7 @@ class _Run:
             keep = np.ones(len(batch), np.bool_)
             keep[[*faults]] = False
             batch = batch.filter(pa.array(keep))
-            is_array = isinstance(texts, pa.Array)
-            texts = texts.filter(pa.array(keep)) if is_array else [*compress(texts, keep)]
+            texts = texts.filter(pa.array(keep)) if isinstance(texts, pa.Array) else texts
         file = [self.files[state.file]] * (len(self.files) > 1)
         reject_lines = csv_lines([*file, block.lines[i], *reason] for i, reason in faults.items())
         n, rejected = len(block.batch), state.rejected + len(faults)

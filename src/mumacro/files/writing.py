@@ -1,4 +1,4 @@
-"""Evaluated batches as pieces of a file: CSV, NDJSON or Parquet."""
+"""Evaluated batches as pieces of a file: tables as text, or Parquet."""
 
 import csv
 import gzip
@@ -34,8 +34,7 @@ def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[s
 
 
 class Output(NamedTuple):
-    """How rows are written: ``text``, ``ndjson`` or ``parquet``; text piece by piece,
-    ``is_compressed`` as .gz.
+    """How rows are written: ``text`` or ``parquet``; text piece by piece, ``is_compressed`` as .gz.
 
     ``sep`` and ``decimal`` are those of a table as text; in the column ``stiffness`` infinity is
     written as ``rigid``.
@@ -64,22 +63,7 @@ class Output(NamedTuple):
             self._cells(name, column)
             for name, column in zip(batch.schema.names, batch.columns, strict=True)
         ]
-        rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
-        if self.format == "text":
-            return self.pack(csv_lines(rows, self.sep))
-        line = (
-            ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names)
-            + "}\n"
-        )
-        # a record without the brace that closes it
-        first = (
-            ["{"] * batch.num_rows
-            if texts is None
-            else [f"{text[:-1].decode().rstrip()}, " for text in texts]
-        )
-        return self.pack(
-            "".join(start + line % row for start, row in zip(first, rows, strict=True))
-        )
+        return self.pack(csv_lines(zip(*cells, strict=True), self.sep))
 
     def _joined(self, lines: pa.Array, batch: pa.RecordBatch) -> str:
         """Lines as they came in, with the columns behind them."""
@@ -113,26 +97,22 @@ class Output(NamedTuple):
 
     def _cells(self, name: str, column: pa.Array) -> list[str | None]:
         """A column as cells of text."""
-        arrow_type, is_json = column.type, self.format == "ndjson"
+        arrow_type = column.type
         if pa.types.is_dictionary(arrow_type):
-            words = [*self._cells(name, column.dictionary), "null" if is_json else None]
+            words = [*self._cells(name, column.dictionary), None]
             return [words[i] for i in pc.fill_null(column.indices, len(words) - 1).to_pylist()]
         if pa.types.is_nested(arrow_type):
             return [json.dumps(value, default=str) for value in column.to_pylist()]
         text = pc.cast(column, pa.string())
         if pa.types.is_floating(arrow_type):
-            rigid = ('"rigid"' if is_json else "rigid") if name == self.stiffness else None
+            rigid = "rigid" if name == self.stiffness else None
             text = pc.if_else(
                 pc.is_finite(column), text, pc.if_else(pc.is_inf(column), rigid, None)
             )
-        if not is_json:
-            is_real = pa.types.is_floating(arrow_type) or pa.types.is_decimal(arrow_type)
-            return list(
-                (pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist()
-            )
-        if pa.types.is_primitive(arrow_type) and not pa.types.is_temporal(arrow_type):
-            return list(pc.fill_null(text, "null").to_pylist())
-        return [json.dumps(cell) for cell in text.to_pylist()]
+        is_real = pa.types.is_floating(arrow_type) or pa.types.is_decimal(arrow_type)
+        return list(
+            (pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist()
+        )
 
     @contextmanager
     def writing(self, stream: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[Any], object]]:

@@ -22,13 +22,13 @@ import pyarrow.parquet as pq  # noqa: E402
 from mumacro.cli.main import main  # noqa: E402
 from mumacro.files import ANSWERS, evaluate_files, reading  # noqa: E402
 from mumacro.inputs import decoding  # noqa: E402
-from tests.support.forms import as_csv, as_ndjson  # noqa: E402
+from tests.support.forms import as_csv  # noqa: E402
 
 NAMES, TABLE = ("mu0", "Fz", "k", "y0", "omega", "v0"), opened(1e-12)
 HEADER = ",".join(NAMES)
 GOOD = "0.3,10,1e6,2e-6,1.3e5,0.01"
 CASE: Case = dict(zip(NAMES, map(float, GOOD.split(",")), strict=True))
-KINDS = ("csv", "csv.gz", "ndjson", "jsonl.gz", "parquet")
+KINDS = ("csv", "csv.gz", "tsv", "parquet")
 MISSING_K = "is missing; write rigid or a number"
 
 
@@ -50,7 +50,8 @@ def write(cases: Any, path: Any) -> Any:
         {name: "rigid" if x == math.inf else x for name, x in row.items()}
         for row in cases.to_pylist()
     ]
-    data = (as_csv if ".csv" in path.name else as_ndjson)(rows).encode()
+    text = as_csv(rows)
+    data = (text.replace(",", "\t") if ".tsv" in path.name else text).encode()
     path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else data)
     return path
 
@@ -61,9 +62,8 @@ def read(path: Any, sep: str = ",") -> Any:
         return pq.read_table(path).to_pylist()
     data = path.read_bytes()
     text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
-    if ".csv" in path.name:
-        return list(csv.DictReader(io.StringIO(text, newline=""), delimiter=sep))
-    return [json.loads(line, parse_constant=pytest.fail) for line in text.splitlines()]
+    delimiter = "\t" if ".tsv" in path.name else sep
+    return list(csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter))
 
 
 def rejects_of(path: Any) -> Any:
@@ -126,36 +126,20 @@ def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path: Pat
         written.select(before.schema.names).drop_columns("f32").equals(before.drop_columns("f32"))
     )
     assert pa.types.is_dictionary(written.schema.field("regime").type)
-    for kind, nothing in (("ndjson", None), ("csv", "")):
-        evaluate_files([source], tmp_path / f"out.{kind}", TABLE)
-        rows = read(tmp_path / f"out.{kind}")
-        assert [row["text"] for row in rows] == ["µ,\n\\"] * 300
-        assert [row["words"] for row in rows[:3]] == ["a", 'b"', nothing]
-        assert [row["f32"] for row in rows[1:3]] == [nothing, nothing]
+    evaluate_files([source], tmp_path / "out.csv", TABLE)
+    rows = read(tmp_path / "out.csv")
+    assert [row["text"] for row in rows] == ["µ,\n\\"] * 300
+    assert [row["words"] for row in rows[:3]] == ["a", 'b"', ""]
+    assert [row["f32"] for row in rows[1:3]] == ["", ""]
     assert json.loads(rows[0]["list"]) == [1, 2]
 
 
 def test_text_comes_out_as_it_came_in(tmp_path: Path) -> None:
-    lines = [
-        '{"mu0":0.30,"Fz":10,"k":1000000,"y0":2e-6,"omega":130000,'
-        '"v0":1E-2,"id":12345678901234567890, "b":[1] }',
-        '{"v0":0.01,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}',
-    ]
-    (tmp_path / "cases.ndjson").write_text("\n".join(lines))
-    evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", TABLE)
-    for line, inputs in zip((tmp_path / "out.ndjson").read_text().splitlines(), lines, strict=True):
-        assert line.startswith(inputs.rstrip("} "))
-        json.loads(line)
-    evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.csv", TABLE)
-    assert [(row["id"], row["b"]) for row in read(tmp_path / "out.csv")] == [
-        ("12345678901234567890", "[1]"),
-        ("", ""),
-    ]
     text = (
         f'name,{HEADER}\r\n"say ""so"",\nand more",{GOOD}\r\n007,{GOOD}\r\n5" pipe,{GOOD}\n,{GOOD}'
     )
     (tmp_path / "cases.csv").write_bytes(text.encode())
-    for kind in ("csv", "parquet", "ndjson"):
+    for kind in ("csv", "parquet"):
         evaluate_files([tmp_path / "cases.csv"], tmp_path / f"o.{kind}", TABLE)
         written = read(tmp_path / f"o.{kind}")
         assert [row["name"] for row in written] == ['say "so",\nand more', "007", '5" pipe', ""]
@@ -193,15 +177,12 @@ def test_a_german_file_is_recognised_and_read_with_its_options(
     assert "line 1" in ran(capsys, 1, *words, "--sep", ";", "--force")
 
 
-@pytest.mark.parametrize("kind", ["csv", "ndjson", "csv.gz", "parquet"])
+@pytest.mark.parametrize("kind", ["csv", "csv.gz", "parquet"])
 def test_standard_input_output(
     tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
 ) -> None:
     bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
-    source, expected = (
-        write(bad, tmp_path / f"cases.{kind}"),
-        tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv"),
-    )
+    source, expected = write(bad, tmp_path / f"cases.{kind}"), tmp_path / "o.csv"
     rejects = evaluate_files([source], expected, TABLE).rejects
     assert rejects
     with source.open("rb") as stream:
@@ -218,7 +199,7 @@ def with_k(cell: Any) -> Any:
     return GOOD.replace("1e6", cell)
 
 
-@pytest.mark.parametrize("end", ["csv", "parquet", "ndjson"])
+@pytest.mark.parametrize("end", ["csv", "parquet"])
 def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
     tmp_path: Path, capsys: Capture, end: Any
 ) -> None:
@@ -262,65 +243,17 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
     ]
 
 
-@pytest.mark.parametrize("end", ["ndjson", "parquet"])
-def test_bad_lines_of_ndjson_land_in_the_side_file(
-    tmp_path: Path, capsys: Capture, end: Any
+@pytest.mark.parametrize("name", ["cases.ndjson", "cases.jsonl.gz", "-"])
+def test_json_is_no_table_and_the_refusal_says_what_to_write(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    without_k = {name: value for name, value in CASE.items() if name != "k"}
-    lines = [
-        json.dumps(line) if isinstance(line, dict) else line
-        for line in (
-            {**CASE, "tag": "a"},
-            "",
-            {**CASE, "k": None},
-            "[1]",
-            "{",
-            "null",
-            {**CASE, "v0": True},
-            {**CASE, "Fz": 10**400},
-            json.dumps(CASE).replace("1000000.0", "1e400"),
-            '{"mu0": 0.3}',
-            {**CASE, "k": "rigid"},
-            without_k,
-            {**CASE, "v0": None},
-            '{"mu0": 0.3, "mu0": 0.4}',
-            {**CASE, "k": math.nan},
-            CASE,
-            json.dumps(CASE) * 2,
-            '{"tag": "\\ud800"}',
-            {**CASE, "tag": None, "v0": 1},
-        )
-    ]
-    (tmp_path / "cases.ndjson").write_text("\n".join(lines))
-    out = tmp_path / f"out.{end}"
-    ran(capsys, 3, tmp_path / "cases.ndjson", "-o", out)
-    written = read(out)
-    assert [row.get("tag") for row in written] == ["a", None, None, None]
-    assert [row["source"] for row in written] == [
-        "stick_slip_low",
-        "rigid",
-        "stick_slip_low",
-        "continuous_low",
-    ]
-    assert written[0]["mu_macro"] == TABLE.evaluate(**CASE).mu_macro
-    reasons = {row: (field, reason) for row, field, reason in rejects_of(out)}
-    unreadable = [line for line, (field, _) in reasons.items() if not field]
-    assert unreadable == [4, 5, 6, 14, 15, 17, 18]  # the second line is empty
-    assert reasons[3] == reasons[12] == ("k", MISSING_K)
-    assert reasons[15] == ("", "is no JSON object: NaN is not in it; write null")
-    assert reasons[7][0] == "v0"
-    assert [reasons[i] for i in (8, 9)] == [
-        (name, "is too large, above 1.8e308") for name in ("Fz", "k")
-    ]
-    assert reasons[13] == ("v0", "is missing")
-    assert reasons[14] == ("", "is no JSON object: repeats the key 'mu0'")
-
-
-@pytest.mark.parametrize("first", ["null", "1", '"a"', "[null]", "{} null"])
-def test_no_first_line_of_ndjson_ends_the_process(tmp_path: Path, first: Any) -> None:
-    (tmp_path / "cases.ndjson").write_text(f"{first}\n{json.dumps(CASE)}\n")
-    summary = evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", TABLE)
-    assert (summary.answered, summary.rejected) == (1, 1)
+    (tmp_path / "cases.ndjson").write_text(json.dumps(CASE))
+    (tmp_path / "cases.jsonl.gz").write_bytes(gzip.compress(json.dumps(CASE).encode()))
+    source = name if name == "-" else tmp_path / name
+    with (tmp_path / "cases.ndjson").open() as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
+        assert "write CSV or Parquet" in ran(capsys, 1, source, "-o", tmp_path / "out.csv")
+    assert not (tmp_path / "out.csv").exists()
 
 
 @pytest.mark.parametrize("piece", [7, 50, 10_000])
@@ -401,7 +334,7 @@ def test_damaged_and_missing_files_are_reported_in_one_line(
     )
 
 
-@pytest.mark.parametrize("end", ["csv", "parquet", "ndjson"])
+@pytest.mark.parametrize("end", ["csv", "parquet"])
 @pytest.mark.parametrize("bad", [1, 2, 5])
 def test_a_file_that_is_windows_1252_from_some_line_on_is_read(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, bad: int, end: str
@@ -417,19 +350,6 @@ def test_a_file_that_is_windows_1252_from_some_line_on_is_read(
     message = ran(capsys, 1, tmp_path / "german.csv", "-o", out, "--force")
     assert f"line {bad + 3}" in message
     assert "give its encoding" in message
-
-
-def test_a_field_that_begins_late_is_not_lost(
-    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(reading, "ROWS", 10)
-    lines = [json.dumps(line) for line in [CASE] * 30 + [{**CASE, "x": 1}]]
-    (tmp_path / "cases.ndjson").write_text("\n".join(lines))
-    assert "line 31: 'x' is in no earlier line" in ran(
-        capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.csv"
-    )
-    ran(capsys, 0, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
-    assert read(tmp_path / "out.ndjson")[-1]["x"] == 1
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
@@ -477,7 +397,7 @@ ANSWERED: dict[str, tuple[Case, Case]] = {
 
 
 @pytest.mark.parametrize("end", ["csv", "parquet"])
-@pytest.mark.parametrize("start", ["csv", "ndjson", "parquet"])
+@pytest.mark.parametrize("start", ["csv", "parquet"])
 @pytest.mark.parametrize("name", ANSWERED)
 def test_files_know_contact_and_ends_of_k(
     tmp_path: Path, capsys: Capture, start: Any, end: Any, name: str

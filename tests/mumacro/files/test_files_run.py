@@ -25,7 +25,7 @@ from mumacro.inputs import decoding  # noqa: E402
 from mumacro.table import atomic  # noqa: E402
 
 TABLE = opened(1e-12)
-KINDS = ("csv", "csv.gz", "ndjson", "parquet")
+KINDS = ("csv", "csv.gz", "parquet")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -214,7 +214,6 @@ def test_a_fault_that_a_change_brings_in_is_told_as_a_change(
     half = {
         "csv": rows + b'"half',
         "csv.gz": gzip.compress(rows + b'"half'),
-        "ndjson": b"\xff" * 20,
         "parquet": (cases / "cases.parquet").read_bytes()[:5000],
     }[kind]
     copied(cases, kind, tmp_path)
