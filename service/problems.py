@@ -256,11 +256,12 @@ _ALTERNATIVES = {
 
 
 class ProblemKind(Enum):
-    """A type of problem: status, title, and headers.  The connection closes where the rest of a
-    request is not read."""
+    """The kinds of problems, the one table of them: status, title, headers, the exception that
+    means it and what is told then.  The connection closes where the rest of a request is not read.
+    """
 
-    MALFORMED_HTTP = 400, "The request is no HTTP that this service reads", CLOSE
     MALFORMED_BODY = 400, "The request cannot be read"
+    MALFORMED_HTTP = 400, "The request is no HTTP that this service reads", CLOSE
     UNAUTHORIZED = 401, "An API key is needed", CLOSE
     NOT_FOUND = 404, "Not Found"
     METHOD_NOT_ALLOWED = 405, "Method Not Allowed"
@@ -269,16 +270,43 @@ class ProblemKind(Enum):
     BATCH_TOO_LARGE = 413, "The batch is too large"
     UNSUPPORTED_BODY = 415, "The body's media type is not supported", CLOSE
     RANGE_NOT_SATISFIABLE = 416, "The file has no such part"
-    INVALID_VALUE = 422, "The request holds invalid values"
+    INVALID_VALUE = 422, "The request holds invalid values", None, InputError
     HEAD_TOO_LARGE = 431, "The head is too large", CLOSE
-    UNEXPECTED = 500, "An unexpected error"
-    NOT_READY = 503, "The service is not ready", {"Retry-After": "5"}
+    NOT_READY = (
+        503,
+        "The service is not ready",
+        {"Retry-After": "5"},
+        TableError,
+        "table {0.path.name}: {0.reason}",
+    )
     OVERLOADED = 503, "The service is overloaded", {**CLOSE, "Retry-After": "1"}
-    OUT_OF_MEMORY = 503, "The service has too little memory", {"Retry-After": "1"}
+    OUT_OF_MEMORY = (
+        503,
+        "The service has too little memory",
+        {"Retry-After": "1"},
+        MemoryError,
+        "send a smaller request, or send it later",
+    )
     TOOK_TOO_LONG = 503, "The request took too long", {**CLOSE, "Retry-After": "1"}
+    # the last one, because it is every other exception, of which nothing is told
+    UNEXPECTED = (
+        500,
+        "An unexpected error",
+        None,
+        Exception,
+        "The request could not be answered; the log has the reason under its request id.",
+    )
 
-    def __init__(self, status: int, title: str, headers: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        status: int,
+        title: str,
+        headers: Mapping[str, str] | None = None,
+        exception: type[Exception] | tuple[()] = (),
+        detail: str = "",
+    ) -> None:
         self.status, self.title, self.headers = status, title, headers or {}
+        self.exception, self.detail = exception, detail
 
 
 class RequestError(MumacroError):
@@ -311,16 +339,32 @@ def path_in(scope: Scope) -> str:
 # --- exceptions of the application ----------------------------------------------------------------
 
 
+def meaning(error: Exception, scope: Scope) -> RequestError:
+    """What an exception means for its request."""
+    if isinstance(error, RequestError):
+        return error
+    if isinstance(error, InputError):
+        return of_input(error)
+    if isinstance(error, HTTPException):
+        return _of_http(error, scope)
+    kind = next(kind for kind in ProblemKind if isinstance(error, kind.exception))
+    return RequestError(kind, kind.detail.format(error))
+
+
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:
     """What Starlette refuses: no such path, method or part of a file."""
-    if error.status_code == 405:  # Starlette names the methods of one route of the path
+    kinds = (kind for kind in ProblemKind if kind.status == error.status_code)
+    kind = next(kinds, ProblemKind.UNEXPECTED)
+    detail, headers = error.detail, error.headers
+    if kind is ProblemKind.UNEXPECTED:
+        detail = kind.detail
+    elif kind is ProblemKind.NOT_FOUND:
+        detail = _no_such_path(scope)
+    elif kind is ProblemKind.METHOD_NOT_ALLOWED:  # Starlette names those of one route of the path
         methods = scope["app"].state.methods.get(path_in(scope), "GET, HEAD")
         detail = f"{scope['method'][:20]} is not allowed here; allowed: {methods}"
-        return RequestError(ProblemKind.METHOD_NOT_ALLOWED, detail, headers={"Allow": methods})
-    kinds = (ProblemKind.MALFORMED_BODY, ProblemKind.NOT_FOUND, ProblemKind.RANGE_NOT_SATISFIABLE)
-    kind = next((one for one in kinds if one.status == error.status_code), ProblemKind.UNEXPECTED)
-    detail = _no_such_path(scope) if kind is ProblemKind.NOT_FOUND else error.detail
-    return RequestError(kind, detail, headers=error.headers)
+        headers = {"Allow": methods}
+    return RequestError(kind, detail, headers=headers)
 
 
 _NO_GUIDE = (
@@ -356,34 +400,6 @@ def with_members(**members: Any) -> Iterator[None]:
     except RequestError as error:
         error.members |= members
         raise
-
-
-def _of_table(error: TableError, _: Scope) -> RequestError:
-    return RequestError(ProblemKind.NOT_READY, f"table {error.path.name}: {error.reason}")
-
-
-def _of_memory(_error: MemoryError, _: Scope) -> RequestError:
-    return RequestError(ProblemKind.OUT_OF_MEMORY, "send a smaller request, or send it later")
-
-
-#: exception -> what it means for its request
-_MEANINGS: dict[type[Exception], Any] = {
-    RequestError: lambda error, _: error,
-    HTTPException: _of_http,
-    InputError: lambda error, _: of_input(error),
-    TableError: _of_table,
-    MemoryError: _of_memory,
-}
-
-
-def meaning(error: Exception, scope: Scope) -> RequestError:
-    """What an exception means for its request; nothing of an unknown one is told."""
-    for kind, means in _MEANINGS.items():
-        if isinstance(error, kind):
-            request_error: RequestError = means(error, scope)
-            return request_error
-    detail = "The request could not be answered; the log has the reason under its request id."
-    return RequestError(ProblemKind.UNEXPECTED, detail)
 
 
 def document_of(error: RequestError, scope: Scope) -> dict[str, Any]:
@@ -493,6 +509,6 @@ class Failures:
 
 
 def _log_unexpected(error: Exception, scope: Scope) -> None:
-    if not isinstance(error, tuple(_MEANINGS)):
+    if meaning(error, scope).kind is ProblemKind.UNEXPECTED:
         fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
         _log.error("unexpected error", exc_info=error, extra={"fields": fields})

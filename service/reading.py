@@ -25,6 +25,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from .admission import Ticket, compute, ticket_of
 from .problems import ABORT, FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
+from .understood import UNDERSTOOD, understood
 
 T = TypeVar("T")
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -306,6 +307,11 @@ def _number(text: str) -> Any:
 # --- routes ---------------------------------------------------------------------------------------
 
 
+async def understood_in(request: Request, is_requested: bool) -> dict[str, Any]:
+    """The member of an answer with what was understood of a request in JSON, where it is wanted."""
+    return {UNDERSTOOD: understood(decode(await request.body()))} if is_requested else {}
+
+
 class DirectRoute(APIRoute):
     """A route for ``async def answer(request, model)``: the model is read straight from the bytes
     of the body, or from the query.
@@ -321,7 +327,7 @@ class DirectRoute(APIRoute):
         answer: Any = self.endpoint
 
         async def of_body(request: Request) -> Response:
-            request._body = body = await small_body(request)  # for those who read it as JSON
+            request._body = body = await small_body(request)  # for understood_in
             if len(body) <= AT_ONCE:
                 asked = validated(model, body)
             else:

@@ -4,8 +4,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from fastapi import Request
-
 from mumacro.contacts.geometries import ARGUMENTS
 from mumacro.errors import InputError
 from mumacro.inputs.fields import INPUTS, QUANTITY_OF, RIGID
@@ -23,11 +21,6 @@ def is_wanted(members: Mapping[str, Any]) -> bool:
     return include == UNDERSTOOD or (
         isinstance(include, (list, tuple, set)) and UNDERSTOOD in include
     )
-
-
-async def understood_in(request: Request, is_requested: bool) -> dict[str, Any]:
-    """The member of an answer to a request in JSON, where it is wanted."""
-    return {UNDERSTOOD: understood(await request.json())} if is_requested else {}
 
 
 def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

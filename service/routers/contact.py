@@ -21,9 +21,8 @@ from ..admission import compute
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
 from ..problems import FieldFault, refuse, with_members
-from ..reading import Json
+from ..reading import Json, understood_in
 from ..tables import LoadedTable
-from ..understood import understood_in
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")

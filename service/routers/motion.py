@@ -12,8 +12,7 @@ from .. import API_VERSION
 from ..admission import compute
 from ..models.motion import MotionAnswer, MotionRequest
 from ..problems import FieldFault, reason_of, refuse, with_members
-from ..reading import Json
-from ..understood import understood_in
+from ..reading import Json, understood_in
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")

@@ -30,9 +30,9 @@ from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
 from ..models.questions import LawRequest, SolveForRequest
 from ..problems import with_members
-from ..reading import Json
+from ..reading import Json, understood_in
 from ..tables import LoadedTable, Tables
-from ..understood import UNDERSTOOD, understood_in
+from ..understood import UNDERSTOOD
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers")

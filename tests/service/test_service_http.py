@@ -6,6 +6,7 @@ import itertools
 import json
 import re
 import time
+from pathlib import Path
 from typing import Any, cast
 from unittest.mock import AsyncMock, Mock
 from urllib.parse import urljoin
@@ -15,10 +16,12 @@ from fastapi import APIRouter, Depends, Request
 from starlette.exceptions import HTTPException
 from starlette.websockets import WebSocketDisconnect
 
+from mumacro.errors import InputError, TableError
 from mumacro.inputs.cases import DEVIATIONS
 from mumacro.inputs.fields import FIELDS, SI
 from service.models.inputs import EXAMPLE
 from service.models.options import CaseRequest
+from service.problems import ProblemKind, meaning
 from service.reading import DirectRoute
 from tests.support.cases import Case
 from tests.support.places import ROOT
@@ -134,11 +137,27 @@ def test_an_unexpected_error_is_logged_and_not_shown(
     assert "MemoryError: secret" not in caplog.text  # too little memory is no fault
 
 
+def test_every_exception_is_the_kind_of_problem_that_the_table_names() -> None:
+    scope = {"type": "http", "path": "/", "method": "GET", "headers": []}
+    errors = {
+        InputError: InputError("k", None, "a number"),
+        TableError: TableError(Path("a.nc"), "missing"),
+        MemoryError: MemoryError("secret"),
+        Exception: LookupError("secret"),
+    }
+    kinds = {kind: errors[kind.exception] for kind in ProblemKind if kind.exception}
+    assert len(kinds) == len(errors)
+    for kind, error in kinds.items():
+        told = meaning(error, scope)
+        assert (told.kind, "secret" in told.detail, "{" in told.detail) == (kind, False, False)
+
+
 @pytest.mark.parametrize(
     ("error", "logged"),
     [
         (HTTPException(400, cast("str", {"a set"})), "not JSON serializable"),
         (HTTPException(400, headers={"X-Why": "\u03bc"}), "latin-1"),
+        (HTTPException(418, "a secret"), "a secret"),
     ],
 )
 @pytest.mark.parametrize("method", ["GET", "HEAD"])
@@ -160,7 +179,7 @@ def test_an_error_that_cannot_be_told_is_an_unexpected_one(
         response = client.request(method, "/new")
     assert response.status_code == 500
     if method == "GET":
-        problem(response, 500)
+        assert "secret" not in problem(response, 500)["detail"]
     assert caplog.text.count("unexpected error") == 1
     assert logged in caplog.text
 
