@@ -7,7 +7,6 @@ an argument the settings are read from the environment.
 import asyncio
 import gc
 import logging
-import re
 import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -246,7 +245,7 @@ def _without_default(member: dict[str, Any]) -> None:
         member["description"] += f"; left out: {default_text}"
 
 
-def _described(app: FastAPI) -> Any:
+def _described(app: FastAPI) -> dict[str, Any]:
     """FastAPI's description, with what it cannot know."""
     document: dict[str, Any] = get_openapi(
         title=app.title,
@@ -269,6 +268,4 @@ def _described(app: FastAPI) -> Any:
     if app.state.settings.keys():
         document |= {"security": [{name: []} for name in SCHEMES]}
         document["components"]["securitySchemes"] = SCHEMES
-    # pydantic names a generic model by its parameter
-    text = re.sub(r"_list_Union_float__NoneType___", "Columns", orjson.dumps(document).decode())
-    return orjson.loads(text.replace("_Union_float__NoneType__", ""))
+    return document

@@ -1,21 +1,21 @@
-"""What is answered.  ``N`` is one number, or a list of them: an answer in columns has the same
-members.
+"""What is answered.  The models of a case and of cases in columns are made from the library's list
+of outputs, with its units and meanings; the others are written out.
 
 A member whose value can be missing is null there; what ``include`` did not ask for is left out.
 """
 
-from typing import Annotated, Any, Generic, Literal, TypeAlias, TypeVar
+from collections import defaultdict
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, Field, WithJsonSchema
+from pydantic import BaseModel, Field, WithJsonSchema, create_model
 
-from mumacro.inputs.kind import ContactName, DirectionName
-from mumacro.outputs import MEMBERS
+from mumacro.answer import BAND
+from mumacro.inputs.kind import AMPLITUDE, ContactName, DirectionName
+from mumacro.outputs import MEMBERS, OUTPUTS
+from mumacro.outputs.entry import Member
 
 from .inputs import Name
 
-N = TypeVar("N")
-R = TypeVar("R")
-S = TypeVar("S")
 Regime = Literal["continuous", "stick_slip", "static", "partial_slip", "reverse_slip"]
 Number: TypeAlias = float | None
 Numbers: TypeAlias = list[float | None]
@@ -26,125 +26,63 @@ def quantity(text: str, unit: str, default: Any = ...) -> Any:
     return Field(default, description=f"{text} [{unit}]", json_schema_extra={"x-unit": unit})
 
 
+def _described(member: Member, default: Any = ...) -> Any:
+    return quantity(member.meaning, member.unit, default)
+
+
 def member(path: str, default: Any = ...) -> Any:
     """A value of an output, with the unit and the meaning that the library's list gives it."""
-    return quantity(MEMBERS[path].meaning, MEMBERS[path].unit, default)
+    return _described(MEMBERS[path], default)
 
 
-class Part(BaseModel, Generic[N]):
-    """A part of an answer."""
+def _included(number: Any, ending: str) -> Any:
+    """Make the model of what ``include`` asks for: of numbers, or of columns.
 
-    @classmethod
-    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """The name in the description: that of the class, with Columns for lists."""
-        return f"{cls.__name__}Columns" if params[0] == Numbers else cls.__name__
-
-
-class Groups(Part[N]):
-    """Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double
-    range)."""
-
-    v_tilde: N = member("groups.v_tilde")
-    y_tilde: N = member("groups.y_tilde")
-    l0: N = member("groups.l0")
-
-
-class Limits(Part[N]):
-    """Marks on the friction law of this case; null: beyond double range."""
-
-    mu_static: N = member("limits.mu_static")
-    v0_crit: N = member("limits.v0_crit")
-    mu_crit: N = member("limits.mu_crit")
+    Values whose paths have two steps stand in a model of their own, such as ``PowerBound``.
+    """
+    members: dict[str, Any] = {}
+    for output in OUTPUTS.values():
+        of_part = defaultdict[str, dict[str, Any]](dict)
+        for path, one in output.members.items():
+            part, _, name = path.partition(".")
+            if not name:
+                members[part] = number | None, _described(one, None)
+            elif name in ("y0", AMPLITUDE):  # whichever the direction has
+                of_part[part][name] = number | None, _described(one, None)
+            else:
+                of_part[part][name] = number, _described(one)
+        for part, values in of_part.items():
+            title = part.title().replace("_", "") + ending
+            about = output.parts[part].replace("NaN", "null")
+            model: Any = create_model(title, __doc__=f"{about}.", **values)
+            members[part] = model | None, None
+    return create_model(f"Included{ending}", __doc__="What ``include`` asks for.", **members)
 
 
-class Gradient(Part[N]):
-    """d mu_macro / d input; null: not finite, or no such input (k of rigid contact)."""
-
-    mu0: N = member("gradient.mu0")
-    Fz: N = member("gradient.Fz")
-    k: N = member("gradient.k")
-    y0: N | None = member("gradient.y0", None)
-    Fz_amplitude: N | None = member("gradient.Fz_amplitude", None)
-    omega: N = member("gradient.omega")
-    v0: N = member("gradient.v0")
-
-
-class GradientBound(Gradient[N], Generic[N]):
-    """Bounds of the absolute errors of the gradient; null: not known."""
+def _answer(name: str, included: Any, about: str, number: Any, regime: Any, source: Any) -> Any:
+    """Make the model of the default answer and what ``include`` adds."""
+    more = {path for output in OUTPUTS.values() for path in output.members}
+    members: dict[str, Any] = {
+        path: (number | None, _described(one, None)) if path in BAND else (number, _described(one))
+        for path, one in MEMBERS.items()
+        if path not in more
+    }
+    members["regime"] = regime, Field(description="How the contact moves")
+    text = "Block of the table, or closed-form tail, that the value came from"
+    members["source"] = source, Field(description=text)
+    return create_model(name, __base__=included, __doc__=about, **members)
 
 
-class StdShare(Part[N]):
-    """Share of each input in the variance, 0 to 1."""
-
-    mu0: N = member("std_share.mu0")
-    Fz: N = member("std_share.Fz")
-    k: N = member("std_share.k")
-    y0: N | None = member("std_share.y0", None)
-    Fz_amplitude: N | None = member("std_share.Fz_amplitude", None)
-    omega: N = member("std_share.omega")
-    v0: N = member("std_share.v0")
-
-
-class Power(Part[N]):
-    """Mean powers; null: not finite in double precision."""
-
-    oscillation: N = member("power.oscillation")
-    saved: N = member("power.saved")
-
-
-class PowerBound(Part[N]):
-    """Bounds of the absolute errors of the powers; null also: not known."""
-
-    oscillation: N = member("power_bound.oscillation")
-    saved: N = member("power_bound.saved")
-
-
-class Settling(Part[N]):
-    """Until a disturbed contact is within 1 % of its steady cycle; null: infinite, it never
-    slips."""
-
-    periods: N = member("settling.periods")
-    periods_any: N = member("settling.periods_any")
-    time: N = member("settling.time")
-    slip_path: N = member("settling.slip_path")
-
-
-class SettlingBound(Part[N]):
-    """Bound of the absolute error of periods; null also: not known."""
-
-    periods: N = member("settling_bound.periods")
-
-
-class Included(Part[N]):
-    """What ``include`` asks for."""
-
-    groups: Groups[N] | None = None
-    limits: Limits[N] | None = None
-    gradient: Gradient[N] | None = None
-    gradient_bound: GradientBound[N] | None = None
-    std: N | None = member("std", None)
-    std_bound: N | None = member("std_bound", None)
-    std_share: StdShare[N] | None = None
-    stick_fraction: N | None = member("stick_fraction", None)
-    stick_fraction_bound: N | None = member("stick_fraction_bound", None)
-    power: Power[N] | None = None
-    power_bound: PowerBound[N] | None = None
-    settling: Settling[N] | None = None
-    settling_bound: SettlingBound[N] | None = None
-
-
-class OneOrMany(Included[N], Generic[N, R, S]):
-    """The default answer and what ``include`` adds."""
-
-    mu_macro: N = member("mu_macro")
-    mu_ratio: N = member("mu_ratio")
-    regime: R = Field(description="How the contact moves")
-    error_bound: N = member("error_bound")
-    source: S = Field(
-        description="Block of the table, or closed-form tail, that the value came from"
-    )
-    mu_macro_low: N | None = member("mu_macro_low", None)
-    mu_macro_high: N | None = member("mu_macro_high", None)
+Included, IncludedColumns = _included(Number, ""), _included(Numbers, "Columns")
+Result = _answer("Result", Included, "Answer to one case.", Number, Regime, str)
+Columns = _answer(
+    "Columns",
+    IncludedColumns,
+    "Answers in columns, order kept.",
+    Numbers,
+    list[Regime | None],
+    list[str | None],
+)
 
 
 class TableLabel(BaseModel):
@@ -209,15 +147,7 @@ def understood_inputs() -> Any:
     return Field(None, description=_UNDERSTOOD)
 
 
-class Result(OneOrMany[Number, Regime, str]):
-    """Answer to one case."""
-
-
-class Columns(OneOrMany[Numbers, list[Regime | None], list[str | None]]):
-    """Answers in columns, order kept."""
-
-
-class CaseAnswer(Result, Answered):
+class CaseAnswer(Result, Answered):  # type: ignore[misc, valid-type]
     """Answer to one case."""
 
     mu_macro: float = member("mu_macro")
@@ -251,14 +181,14 @@ class BatchAnswered(Answered):
     remarks: list[Remark] | None = Field(None, description=REMARKS)
 
 
-class ColumnsAnswer(Columns, BatchAnswered):
+class ColumnsAnswer(Columns, BatchAnswered):  # type: ignore[misc, valid-type]
     """Answer to a batch in columns, order kept; null: a bad case."""
 
 
 class RowsAnswer(BatchAnswered):
     """Answer to a batch in rows, order kept; null where a case is bad."""
 
-    results: list[Result | None]
+    results: list[Result | None]  # type: ignore[valid-type]
 
 
 # --- questions ------------------------------------------------------------------------------------
@@ -273,7 +203,7 @@ class BorderMark(BaseModel):
     mu_macro: float = Field(description="[-]")
 
 
-class LawAnswer(Columns, Answered):
+class LawAnswer(Columns, Answered):  # type: ignore[misc, valid-type]
     """A friction law in columns."""
 
     along: Name
@@ -288,7 +218,7 @@ class LawAnswer(Columns, Answered):
     inputs: dict[str, Understood] | None = understood_inputs()
 
 
-class Root(Included[Number]):
+class Root(Included):  # type: ignore[misc, valid-type]
     """One value of the unknown, and the answer there."""
 
     value: float = Field(description="The unknown [SI]")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mumacro.inputs.fields import INPUTS, described
-from mumacro.outputs import OUTPUTS
+from mumacro.outputs import MEMBERS, OUTPUTS
 from tests.support.places import ROOT
 from tests.support.serving import CASE
 
@@ -109,21 +109,39 @@ def test_members_that_may_be_left_out_have_no_default_in_the_description(
     assert "contact" not in schemas["CaseRequest"]["required"]
 
 
-def _members(schemas: dict[str, Any], name: str) -> set[str]:
-    """The paths of the members of an object."""
-    found: set[str] = set()
+def _members(schemas: dict[str, Any], name: str) -> dict[str, str]:
+    """What is said of the members of an object, by their paths."""
+    found: dict[str, str] = {}
     for member, schema in schemas[name]["properties"].items():
-        found.add(member)
+        found[member] = schema.get("description", "")
         for one in (schema, *schema.get("anyOf", ())):
-            part = one.get("$ref", "").rpartition("/")[2]
-            found |= {f"{member}.{path}" for path in (_members(schemas, part) if part else ())}
+            if part := one.get("$ref", "").rpartition("/")[2]:
+                inner = _members(schemas, part)
+                found |= {f"{member}.{path}": text for path, text in inner.items()}
     return found
 
 
 @pytest.mark.parametrize("answer", ["CaseAnswer", "Result", "ColumnsAnswer", "LawAnswer", "Root"])
-def test_every_value_of_every_output_is_described(schemas: dict[str, Any], answer: str) -> None:
-    paths = {path for output in OUTPUTS.values() for path in output.members}
-    assert paths - _members(schemas, answer) == set()
+def test_every_value_of_every_output_is_described_as_in_the_list(
+    schemas: dict[str, Any], answer: str
+) -> None:
+    described = _members(schemas, answer)
+    wanted = {path: f"{one.meaning} [{one.unit}]" for path, one in MEMBERS.items()}
+    if answer == "Root":  # it has no default answer but mu_macro, which stands at the root
+        wanted = {path: wanted[path] for output in OUTPUTS.values() for path in output.members}
+    told = {path: described.get(path) for path in wanted}
+    assert told == wanted
+
+
+@pytest.mark.parametrize("answer", ["CaseAnswer", "ColumnsAnswer"])
+def test_every_group_of_values_is_described(schemas: dict[str, Any], answer: str) -> None:
+    for output in OUTPUTS.values():
+        groups = {path.partition(".")[0] for path in output.members if "." in path}
+        assert groups == output.parts.keys()
+        for group in groups:
+            refs = [one for one in schemas[answer]["properties"][group]["anyOf"] if "$ref" in one]
+            about = schemas[refs[0]["$ref"].rpartition("/")[2]]["description"]
+            assert about == f"{output.parts[group].replace('NaN', 'null')}."
 
 
 def test_every_body_of_the_description_is_asked_here(client: Any) -> None:

@@ -81,4 +81,5 @@ STD = Output(
     cost=8,
     gradient=True,
     lacks={"interval": _ONE_K},
+    parts={"std_share": "Share of each input in the variance, 0 to 1"},
 )

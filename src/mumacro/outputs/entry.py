@@ -31,6 +31,8 @@ class Output(NamedTuple):
     gradient: bool = False  #: whether it needs the slopes of mu_macro
     #: a direction, or "interval" for an interval of k, for which the output does not exist -> why
     lacks: Mapping[str, str] = {}
+    #: by the name of a group of values, such as ``power_bound``: what it is, and where it is NaN
+    parts: Mapping[str, str] = {}
 
     def paths(self, fields: tuple[str, ...]) -> list[str]:
         """Its values for cases with these inputs, in order."""

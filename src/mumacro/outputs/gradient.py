@@ -39,4 +39,8 @@ GRADIENT = Output(
     },
     cost=6,
     gradient=True,
+    parts={
+        "gradient": "d mu_macro / d input; NaN: not finite, or no such input (k of rigid contact)",
+        "gradient_bound": "Bounds of the absolute errors of the gradient; NaN: not known",
+    },
 )

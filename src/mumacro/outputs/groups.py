@@ -22,4 +22,8 @@ GROUPS = Output(
         "groups.l0": Member("m", "Length scale mu0 Fz/k; 0 for rigid contact"),
     },
     cost=2,
+    parts={
+        "groups": "Dimensionless groups; NaN: not finite (rigid contact, no oscillation, or beyond "
+        "double range)"
+    },
 )

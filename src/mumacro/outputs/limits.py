@@ -33,4 +33,5 @@ LIMITS = Output(
         "limits.mu_crit": Member("-", "mu_macro at that border"),
     },
     cost=8,
+    parts={"limits": "Marks on the friction law of this case; NaN: beyond double range"},
 )

@@ -113,4 +113,8 @@ POWER = Output(
     },
     cost=5,
     lacks={"normal": "how far the load moves is not modelled"},
+    parts={
+        "power": "Mean powers; NaN: not finite in double precision",
+        "power_bound": "Bounds of the absolute errors of the powers; NaN also: not known",
+    },
 )

@@ -204,4 +204,9 @@ SETTLING = Output(
     cost=75,
     cost_of_ball=5000,
     lacks={"along": _DERIVED, "normal": _DERIVED},
+    parts={
+        "settling": "Until a disturbed contact is within 1 % of its steady cycle; infinite (null "
+        "in JSON) where it never slips",
+        "settling_bound": "Bound of the absolute error of periods; NaN: not known",
+    },
 )
