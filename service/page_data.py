@@ -30,8 +30,8 @@ POLICY = (
     "'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-_HALF = "half of peak to peak"
-# label, offered units, decimal exponents of the slider [SI], text at the start, a note
+_HALF = "half of p-p"
+# label, offered units, decimal exponents of the usual range [SI], text at the start, a note
 _INPUTS = {
     "mu0": ("friction", ["-"], [-2, 0.5], "0.3", ""),
     "Fz": ("force", ["N", "mN", "kN"], [-3, 5], "10 N", ""),
@@ -88,12 +88,12 @@ def names(guide: bool) -> dict[str, Any]:
             "symbol": INPUTS[name].symbol,
             "meaning": INPUTS[name].meaning,
             "offered": offered,
-            "range": slider,
+            "range": exponents,
             "usual": INPUTS[name].usual,
             "note": note,
             "units": _scales(UNITS_OF[LIKE.get(name, name)]),
         }
-        for name, (label, offered, slider, _, note) in _INPUTS.items()
+        for name, (label, offered, exponents, _, note) in _INPUTS.items()
     }
     geometries = {
         name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]}

@@ -171,7 +171,7 @@ class Page:
         )
 
     def number(self, selector: str = "#mu") -> Any:
-        return float(self.text(selector))
+        return float(self.text(selector).replace("−", "-"))
 
     def shown(self) -> Any:
         return dict(zip(self.texts("#values dt"), self.texts("#values dd"), strict=True))
@@ -265,6 +265,25 @@ class Page:
 
         ActionChains(self.browser, duration=0).release().perform()
         self.settle()
+
+    @contextmanager
+    def by_touch(self) -> Any:
+        """The page, opened anew, under a finger in place of a mouse."""
+        emulation = {"enabled": True, "maxTouchPoints": 1}
+        self.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", emulation)
+        try:
+            self.browser.refresh()
+            self.settle()
+            yield
+        finally:
+            self.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+    def rests(self) -> None:
+        """Wait until the page does not scroll any more."""
+        self.run(
+            "let before; do { before = scrollY; "
+            "await new Promise((next) => setTimeout(next, 200)); } while (scrollY !== before);"
+        )
 
     def swipes(self, selector: str, x: float, y: float, *steps: tuple[int, int]) -> None:
         """Put a finger on a place in an element, in pixels from its corner, move it by the steps,

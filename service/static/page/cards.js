@@ -36,14 +36,14 @@ export function cards(store, moved, aim, again) {
 
   const point = (answer, target) => map(answer, target?.mu_ratio);
 
-  /** While something is dragged, what does not belong to the case alone waits for the end of it. */
+  /** While something is dragged, what asks another question waits for the end of it. */
   function rest(answer, trouble, target, old) {
     const { state } = store;
     law(state, answer, point(answer, target), target, old);
     side(answer);
-    if (store.dragged) return;
     const settled = answer?.state === state;
     copy(textsOf(state), settled ? null : (trouble?.text ?? "there is no number yet."));
+    if (store.dragged) return;
     tab(state.panel);
     stiffness();
     fit(answer);

@@ -1,11 +1,16 @@
-// The card of the inputs: contact, direction, sketch, and a field for each input with what the
-// service understood below it.
+// The card of the inputs: contact, direction, sketch, and a field for each input.  Its label is
+// dragged, and what the service understood stands below it where that says more than the text.
+import { dials } from "./dials.js";
 import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
-import { about, inPrint, inUnit, numberOf, prose, typeset, unitAt } from "./words.js";
+import { about, inUnit, numberOf, prose, typeset, unitAt, withUnit } from "./words.js";
 
-const STEPS = 100; // of a slider, a decade
+/** Of an input, by one press of an arrow key; with Shift. */
+const [STEP, FINE_STEP] = [1.05, 1.005];
+
+/** What can be done with a label. */
+const HOW = "Drag it sideways: 1 pixel is 1 %. Arrow up and down in the field: 5 %, with Shift 0.5 %";
 
 /** A choice of a few words, as a row of buttons of which one is pressed in. */
 export function choice(store, name, words, reasons = {}) {
@@ -41,36 +46,28 @@ function understood(name, typed, { text, value, unit, std, low, high } = {}) {
   return text && asTyped(text) !== asTyped(said) ? `read as ${said}` : "";
 }
 
-/**
- * Texts without a unit get the one that their field has, before they are sent: 2.9 in the field of
- * 2 µm is 2.9 µm.
- */
-export function withUnit(name, text, answer) {
-  const unit = answer?.inputs[name]?.unit;
-  const bare = text.trim() && !/[^\d\s.,e+±%-]/i.test(text) && /\d\s*$/.test(text.trim());
-  return bare && unit && unit !== "-" && /[^-\d]/.test(unit)
-    ? `${text.trim()} ${inPrint(unit)}`
-    : text;
-}
-
-/** `moved({ name: value [SI] })` takes the value of a slider. */
+/** `moved({ name: value [SI] })` takes a value that is dragged or stepped to. */
 export function inputsPanel(store, moved) {
   let answer = null;
   let known = new Map(); // the faults of the fields
   let typing = ""; // the field whose text is not taken yet
+  let stepped = {}; // the last press of an arrow key: { name, value, text }
 
   function field(name, fault, doubt) {
-    const { label, symbol, note, range } = about.inputs[name];
-    const one = answer?.inputs[name];
+    const { label, symbol, note, meaning } = about.inputs[name];
     const rigid = name === "k" && store.state.contact === "rigid";
-    const said = fault ?? doubt ?? (understood(name, store.state[name], one) || note);
-    const below = name === typing ? "Enter takes it, Esc takes it back" : said;
-    const number = numberOf(one);
-    const value = number > 0 ? Math.log10(number) : range[0];
+    const text = rigid ? "rigid" : store.state[name];
+    const below = fault ?? doubt ?? understood(name, text, answer?.inputs[name]);
+    const movable = numberOf(answer?.inputs[name]) > 0 && !rigid;
     return html`
       <div class="field ${name === typing ? "" : fault ? "bad" : doubt ? "doubt" : ""}">
-        <label for=${`field-${name}`} title=${about.inputs[name].meaning}>
-          ${typeset(symbol)} <span class="label">${label}</span>
+        <label
+          for=${`field-${name}`}
+          data-dial=${movable ? name : nothing}
+          title=${`${meaning}${movable ? `. ${HOW}` : ""}`}
+        >
+          ${typeset(symbol)}
+          <span class="label">${label}<small>${name === typing ? "Enter takes it" : note}</small></span>
         </label>
         <input
           id=${`field-${name}`}
@@ -80,37 +77,26 @@ export function inputsPanel(store, moved) {
           aria-invalid=${String(fault !== undefined)}
           aria-describedby=${`note-${name}`}
           ?disabled=${rigid}
-          .value=${rigid ? "rigid" : store.state[name]}
+          .value=${text}
         />
-        <input
-          type="range"
-          id=${`slider-${name}`}
-          aria-label=${`${label}, slider`}
-          aria-valuetext=${rigid ? "rigid" : store.state[name]}
-          min=${range[0] * STEPS}
-          max=${range[1] * STEPS}
-          step="1"
-          ?disabled=${rigid || !one}
-          .value=${String(Math.round(value * STEPS))}
-          @input=${({ target }) => {
-            store.drag(true);
-            moved({ [name]: 10 ** (target.value / STEPS) }, 3);
-          }}
-          @change=${() => store.drag(false)}
-          @keydown=${(event) => step(event, name)}
-        />
-        <p id=${`note-${name}`} class="note" title=${below}>${prose(below)}</p>
+        <p id=${`note-${name}`} class="note">${name === typing ? "" : prose(below)}</p>
       </div>
     `;
   }
 
-  /** An arrow key moves an input by 5 %, with Shift by 0.5 %. */
-  function step(event, name) {
-    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
-    const value = numberOf(answer?.inputs[name]);
-    if (!way || !(value > 0)) return;
+  /** An arrow key moves the input of a field by 5 %, with Shift by 0.5 %. */
+  function step(event) {
+    const { name } = event.target;
+    const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (!way || !name || name === typing) return;
+    // presses that are faster than the answers go on from each other
+    const again = stepped.name === name && stepped.text === store.state[name];
+    const from = again ? stepped.value : numberOf(answer?.inputs[name]);
+    if (!(from > 0)) return;
     event.preventDefault();
-    moved({ [name]: value * (event.shiftKey ? 1.005 : 1.05) ** way }, 6);
+    const value = from * (event.shiftKey ? FINE_STEP : STEP) ** way;
+    moved({ [name]: value }, 6);
+    stepped = { name, value, text: store.state[name] };
   }
 
   function sketch() {
@@ -137,15 +123,23 @@ export function inputsPanel(store, moved) {
   }
 
   $("fields").addEventListener("input", ({ target }) => typed(target));
-  $("fields").addEventListener("change", ({ target: { name, value } }) => {
+  $("fields").addEventListener("change", ({ target }) => {
+    const { name, value } = target;
     if (!name) return;
     typing = "";
-    store.change({ [name]: withUnit(name, value, answer) });
+    store.change({ [name]: withUnit(name, value, answer?.inputs[name]?.unit) });
+    target.value = store.state[name]; // also where that is the text that stood there before
   });
-  $("fields").addEventListener("keydown", ({ key, target }) => {
-    if (key !== "Escape" || !target.name) return;
+  $("fields").addEventListener("keydown", (event) => {
+    const { key, target } = event;
+    if (key !== "Escape" || !target.name) return step(event);
     target.value = store.state[target.name];
-    typed(target);
+    return typed(target);
+  });
+  dials($("fields"), {
+    valueOf: (name) => numberOf(answer?.inputs[name]),
+    grab: (moving) => store.drag(moving),
+    take: (name, value) => moved({ [name]: value }),
   });
   $("fields").addEventListener("submit", (event) => event.preventDefault());
 

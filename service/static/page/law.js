@@ -29,8 +29,7 @@ function usualRange(state, { inputs, limits }) {
   const { along, scale } = state;
   const border = along === "v0" ? limits?.v0_crit : null;
   const marks = [numberOf(inputs[along]), border].filter((one) => one > 0 && Number.isFinite(one));
-  const slider = about.inputs[along].range.map((exponent) => 10 ** exponent);
-  let [low, high] = slider;
+  let [low, high] = about.inputs[along].range.map((exponent) => 10 ** exponent);
   if (marks.length) {
     const exponents = marks.map(Math.log10);
     low = scale === "linear" ? 0 : 10 ** (Math.floor(Math.min(...exponents)) - 2);

@@ -120,6 +120,16 @@ $("reset").addEventListener("click", () =>
 $("notice-close").addEventListener("click", () => {
   $("notice").hidden = true;
 });
+// a ring stands around what keys have reached: not after a press, and not while a text is typed
+const root = document.documentElement;
+addEventListener("pointerdown", () => root.classList.remove("keys"), true);
+addEventListener(
+  "keydown",
+  ({ key, target }) => {
+    if (key === "Tab" || !target.closest?.("input, textarea")) root.classList.add("keys");
+  },
+  true,
+);
 $("print").addEventListener("click", () => window.print());
 new Channel(
   () => getPreloaded("static/page/names.json"),

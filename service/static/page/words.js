@@ -75,6 +75,24 @@ export function inUnit(name, value, unit = unitFor(name, value), digits = 4) {
   return unit === "-" ? String(number) : `${number} ${inPrint(unit)}`;
 }
 
+const NUMBER = String.raw`[-+]?\d[\d.,]*(?:e[-+]?\d+)?`;
+const DEVIATION = String.raw`\s*(?:±|\+\/?-)\s*${NUMBER}`;
+/** A text without a unit: a number, an interval, or a number with a deviation, also in per cent. */
+const BARE = new RegExp(
+  String.raw`^(${NUMBER}(?:\s*\.\.\s*${NUMBER}|${DEVIATION}(?!\s*%|[\d.,e]))?)(${DEVIATION}\s*%)?$`,
+  "i",
+);
+
+/** A text that is typed without a unit, in the unit of its field: the one that it had, or SI. */
+export function withUnit(name, text, typed) {
+  const [, number, deviation = ""] = text.trim().match(BARE) ?? [];
+  const unit = typed ?? siUnit(name);
+  return number && unit && unit !== "-" ? `${number} ${inPrint(unit)}${deviation}` : text;
+}
+/** The offered unit of an input that is SI. */
+const siUnit = (name) =>
+  about.inputs[name].offered.find((unit) => scaleOf(name, unit).every((part) => part === 1));
+
 /** The text of an input at a value [SI], in the unit and with the relative deviation it had. */
 export function textAt(answer, name, value, digits = 4) {
   const { unit, std, value: before } = answer.inputs[name] ?? {};
