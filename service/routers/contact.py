@@ -3,7 +3,6 @@ points."""
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 from fastapi import Request, Response
@@ -41,7 +40,7 @@ async def post_stiffness(request: Request, contact: StiffnessRequest) -> Respons
     more = await understood_in(request, bool(contact.include))
     with with_members(**more):
         arguments = contact.model_dump(exclude_none=True, exclude={"geometry", "include"})
-        answer = asdict(contact_of(contact.geometry, **arguments))
+        answer = contact_of(contact.geometry, **arguments).to_dict()
         if doubts := doubts_of(arguments):
             answer["remarks"] = doubts
         answer |= more

@@ -12,7 +12,7 @@ from mumacro.inputs.doubts import Remark, lines_of
 from mumacro.inputs.doubts import remarks as doubts
 from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import AMPLITUDE, Kind
-from mumacro.shown import cell, frame_of, html_of, html_of_rows, listed, text_of, text_of_rows
+from mumacro.results import Result, Rows, cell
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 #: float for one case; for many an array of float64, or a labelled object in its place
@@ -63,7 +63,7 @@ class PlainCase(NamedTuple):
         return Cases(self.kind, self.columns, (), f=self.f)
 
 
-class Answer(Generic[Number]):
+class Answer(Result, Generic[Number]):
     """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the
     broadcast shape else.
 
@@ -308,25 +308,10 @@ class Answer(Generic[Number]):
             ends,
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
-
-        Arrays are lists, and what is not finite is None.
-
-        >>> from mumacro import Surrogate
-        >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3, v0=0.01)
-        >>> [*Surrogate.open().evaluate(**case, include=("groups",)).to_dict()]
-        ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
-        """
-        members = {path: listed(getattr(self, path)) for path in self._always}
-        members |= nested({path: listed(value) for path, value in self.outputs.items()})
-        if said := self.remarks:
-            members["remarks"] = said
-        return members
-
-    def to_frame(self) -> Any:
-        """The outputs by path as a DataFrame of pandas, one row a case, in the order of ``ravel``;
-        MumacroError without pandas.
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The outputs by path, in the shape of the cases; of a frame one row a case, in the order
+        of ``ravel``.
 
         >>> from mumacro import Surrogate
         >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3)
@@ -334,7 +319,20 @@ class Answer(Generic[Number]):
         >>> answer.to_frame()["regime"].tolist()
         ['static', 'stick_slip']
         """
-        return frame_of({path: self[path] for path in self.paths})
+        return {path: self[path] for path in self.paths}
+
+    def _members(self) -> dict[str, Any]:
+        """What is in the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
+
+        >>> from mumacro import Surrogate
+        >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3, v0=0.01)
+        >>> [*Surrogate.open().evaluate(**case, include=("groups",)).to_dict()]
+        ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
+        """
+        members = {path: getattr(self, path) for path in self._always} | nested(self.outputs)
+        if said := self.remarks:
+            members["remarks"] = said
+        return members
 
     def _kind_words(self) -> str:
         if self._cases is None:
@@ -346,13 +344,6 @@ class Answer(Generic[Number]):
         cases = f"{math.prod(shape)} cases of shape {shape}" if shape else "one case"
         return f"<{type(self).__name__} to {cases}{self._kind_words()}>"
 
-    def _notes(self) -> list[str]:
-        return lines_of(self.remarks)
-
-    def _columns(self) -> dict[str, Any]:
-        """What is shown, by path."""
-        return {path: self[path] for path in self.paths}
-
     @property
     def _shape(self) -> tuple[int, ...]:
         mu: Any = self.mu_macro
@@ -361,18 +352,18 @@ class Answer(Generic[Number]):
     def _is_one(self) -> bool:
         return self._cases is not None and not self._shape
 
-    def __repr__(self) -> str:
-        if self._is_one():
-            pairs = [(path, cell(x)) for path, x in self._columns().items()]
-            return text_of_rows(self._heading(), pairs, self._notes())
-        return text_of(self._heading(), self._columns(), self._notes())
+    def _rows(self) -> Rows | None:
+        return [(path, cell(x)) for path, x in self.columns.items()] if self._is_one() else None
 
-    def _repr_html_(self) -> str:
-        """A table for notebooks: of one case what the command prints."""
+    def _below(self) -> list[str]:
+        return lines_of(self.remarks)
+
+    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
+        """Of one case what the command prints."""
         if not self._is_one():
-            return html_of(self._heading(), self._columns(), self._notes())
+            return super()._in_full()
         rows, notes, error = self._surrogate.in_words(self)
-        return html_of_rows("", rows, [*map(" ".join, notes), error])
+        return "", rows, [*map(" ".join, notes), error]
 
 
 _NOTHING: dict[str, Any] = {}

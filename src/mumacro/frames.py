@@ -71,9 +71,9 @@ class LabelledAnswer(IntervalAnswer[Any]):
             return _categories(table, code, name)
         return self._apply(lambda codes: table[codes], {"source_code": code}, name)
 
-    def _columns(self) -> dict[str, Any]:
+    def _shown(self) -> Mapping[str, Any]:
         """What is shown; of Dask only the names, since it computes when it is asked to."""
-        columns = super()._columns()
+        columns = super()._shown()
         lazy = any(getattr(x, "chunks", None) is not None for x in columns.values())
         return {"computed by Dask": np.array([*columns])} if lazy else columns
 

@@ -44,11 +44,14 @@ from typing import Any
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
+from mumacro.results import Result, Rows
 
 SMALLEST, LARGEST = 1e-60, 1e60  # numbers in SI; every product of them below is a double
 AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
 # the half width of a contact over the radius of ball or cylinder above which Hertz's theory is off
 WIDE = 0.1
+#: what a contact has: the unit of each number
+NUMBERS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
 SOFT = 1e6  # [Pa]; a modulus below it may be meant in GPa
 
 
@@ -132,8 +135,8 @@ class Material:
         return self.E / (2.0 * (1.0 + self.nu))
 
 
-@dataclass(frozen=True)
-class Contact:
+@dataclass(frozen=True, repr=False)
+class Contact(Result):
     """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its
     ``contact``."""
 
@@ -153,6 +156,23 @@ class Contact:
         if name not in self.keys():
             raise KeyError(name)
         return getattr(self, name)
+
+    @property
+    def columns(self) -> dict[str, float]:
+        """The numbers by name."""
+        return {name: getattr(self, name) for name in NUMBERS}
+
+    def _members(self) -> dict[str, Any]:
+        return {**self.columns, "contact": self.contact, "warnings": self.warnings}
+
+    def _heading(self) -> str:
+        return f"<Contact: {self.contact}>"
+
+    def _rows(self) -> Rows:
+        return [(name, f"{x:.4g}", f"[{NUMBERS[name]}]") for name, x in self.columns.items()]
+
+    def _below(self) -> list[str]:
+        return [f"warning: {text}" for text in self.warnings]
 
     def length_scale(self, mu0: float, Fz: float) -> float:
         """l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""

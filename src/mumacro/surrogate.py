@@ -34,7 +34,7 @@ from mumacro.outputs import evaluation
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, names_in
 from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
-from mumacro.shown import Rows
+from mumacro.results import Rows
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
 from mumacro.table.bundled import bundled_table, bundled_tables

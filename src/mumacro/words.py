@@ -9,7 +9,7 @@ from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import Kind
 from mumacro.inputs.units import Scale, scale_of, suited
 from mumacro.outputs import MEMBERS
-from mumacro.shown import Rows, known, tidy_zeros
+from mumacro.results import Rows, known, tidy_zeros
 from mumacro.validity import digits, effect_of, rows_of
 
 REGIMES = {

@@ -31,7 +31,7 @@ from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.units import Scale, belongs_to_value, scale_of, suited
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
-from mumacro.shown import known, tidy_zeros
+from mumacro.results import known, tidy_zeros
 from mumacro.surrogate import Surrogate
 from mumacro.validity import Row, digits, k_effect
 

@@ -18,7 +18,7 @@ from mumacro.cli.common import (
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.reading import read_one
 from mumacro.questions.law import law as friction_law
-from mumacro.shown import known, tidy_zeros
+from mumacro.results import known, tidy_zeros
 from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'

@@ -26,7 +26,7 @@ from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.questions.law import Law
 from mumacro.questions.law import law as friction_law
 from mumacro.questions.solve_for import Root, Solution, solve_for
-from mumacro.shown import tidy_zeros
+from mumacro.results import tidy_zeros
 from mumacro.surrogate import Surrogate
 from mumacro.validity import load_rows
 

@@ -13,7 +13,7 @@ from mumacro.inputs.reading import read
 from mumacro.inputs.units import Scale, scale_in, suited
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import MotionSolution, quantity_of_unknown, solve_motion
-from mumacro.shown import known, tidy_zeros
+from mumacro.results import known, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --normal 8N@-90deg'
 

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 from mumacro.cli import common
@@ -16,7 +15,7 @@ from mumacro.contacts.geometries import (
     doubts_of,
     read_argument,
 )
-from mumacro.stiffness import MATERIALS, Material
+from mumacro.stiffness import MATERIALS, NUMBERS, Material
 
 
 def _example(geometry: str) -> str:
@@ -27,7 +26,6 @@ def _example(geometry: str) -> str:
 
 
 EXAMPLE = _example("ball")
-_UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
 
 
 _NAMES = ", ".join(MATERIALS)
@@ -85,12 +83,13 @@ def run(words: Sequence[str]) -> str:
     arguments = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
     arguments |= _of_materials(options, arguments)
     contact = contact_of(options.geometry, **arguments)
-    stiffnesses = asdict(contact)
     if options.json:
         said = {"remarks": remarks} if (remarks := doubts_of(arguments)) else {}
-        return as_json({"geometry": options.geometry, **stiffnesses, **said})
+        return as_json({"geometry": options.geometry, **contact.to_dict(), **said})
     form = f".{options.digits or 4}g"  # what materials and geometry give at best
-    rows = [(name, f"{stiffnesses[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
+    rows = [
+        (name, f"{contact.columns[name]:{form}}", f"[{unit}]") for name, unit in NUMBERS.items()
+    ]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
     rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
     doubts = [one["text"] for one in doubts_of(arguments)]

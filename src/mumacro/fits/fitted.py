@@ -13,40 +13,43 @@ from mumacro.fits.measured_points import STD, UNKNOWNS, Measured
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array, Bools
-from mumacro.shown import frame_of, html_of, html_of_rows, members_of, text_of
+from mumacro.results import Result, Rows
 
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 _CURVE = 200  # points of the fitted law
 
 
-class Prediction(NamedTuple):
-    """Friction that a fit predicts, in the shape of the inputs."""
-
+class _Prediction(NamedTuple):
     mu_macro: Any  #: [-]
     #: its standard deviation, from the covariance of the fit [-].  Where the points had no ``std``
     #: it is known from their scatter alone: a 95 % interval takes Student's factor of it
     std: Any
 
-    def to_dict(self) -> dict[str, Any]:
-        """Both by name: arrays as lists."""
-        return members_of(self._asdict())
 
-    def to_frame(self) -> Any:
-        """Both as a DataFrame of pandas, one row a case."""
-        return frame_of(self._asdict())
+class Prediction(Result, _Prediction):
+    """Friction that a fit predicts, in the shape of the inputs."""
 
-    def __repr__(self) -> str:
+    __slots__ = ()
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """Both by name; of a frame one row a case."""
+        return self._asdict()
+
+    def _heading(self) -> str:
         if shape := np.shape(self.mu_macro):
-            return text_of(f"<Prediction of cases of shape {shape}>", self._asdict())
+            return f"<Prediction of cases of shape {shape}>"
         return f"Prediction(mu_macro={self.mu_macro!r}, std={self.std!r})"
 
-    def _repr_html_(self) -> str:
-        """A table for notebooks."""
-        return html_of("<Prediction>", self._asdict())
+    def _rows(self) -> Rows | None:
+        return None if np.shape(self.mu_macro) else []
+
+    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
+        return self._heading(), None, []
 
 
 @dataclass(frozen=True, repr=False)
-class Fit:
+class Fit(Result):
     """k and mu0 of a contact, fitted to measured points.
 
     Attributes
@@ -158,29 +161,35 @@ class Fit:
             "high": mu + half_width,
         }
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON of a fit, on the command line and over HTTP, without table and
-        api_version: lists in place of arrays, the word rigid for an infinite k, None for another
-        number that is not finite."""
-        members = {
-            "values": self.values,
-            "std": self.std,
+    def _members(self) -> dict[str, Any]:
+        """The word rigid stands for an infinite k."""
+        worded = {
+            name: _worded(getattr(self, name))
+            for name in ("values", "interval", "solutions", "points")
+        }
+        remarks = {"remarks": self.remarks} if self.remarks else {}
+        return {
+            "values": worded["values"],
+            "std": self.std,  # an infinite deviation of k is no rigid contact
             "covariance": self.covariance,
-            "interval": self.interval,
+            "interval": worded["interval"],
             "residuals": self.residuals,
             "chi2": self.chi2,
             "reduced_chi2": self.reduced_chi2,
-            "solutions": self.solutions,
+            "solutions": worded["solutions"],
             "warnings": self.warnings,
-            **({"remarks": self.remarks} if self.remarks else {}),
+            **remarks,
             "contact": self.contact,
             "direction": self.direction,
-            "points": self.points,
+            "points": worded["points"],
             "curve": self.curve(),
         }
-        # an infinite deviation of k is no rigid contact
-        parts = ("values", "interval", "solutions", "points")
-        return {name: _plain(part, name in parts) for name, part in members.items()}
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """The points, with mu_macro of the fit and the residuals."""
+        friction = self.points["mu_macro"] - self.residuals
+        return {**self.points, "fitted": friction, "residual": self.residuals}
 
     def _width(self) -> float:
         """Half width of a 95 % interval in standard deviations."""
@@ -249,25 +258,20 @@ class Fit:
         summary = f"{self.residuals.size} points, {scatter}, {self.contact}"
         return f"<Fit {', '.join(self._value_texts())}; {summary}>"
 
-    def _notes(self) -> list[str]:
+    def _rows(self) -> Rows:
+        return []
+
+    def _below(self) -> list[str]:
         remarks = (f"{remark['row']}: {remark['text']}" for remark in self.remarks)
         return [*(f"warning: {text}" for text in self.warnings), *remarks]
 
-    def __repr__(self) -> str:
-        return text_of(self._heading(), {}, self._notes())
-
-    def _repr_html_(self) -> str:
-        """A table for notebooks: the values with their deviations and intervals, and warnings."""
-        rows = [
+    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
+        """The values with their deviations and intervals."""
+        rows: Rows = [
             (name, f"{x:.4g}", f"± {self.std[name]:.2g}", "95 %: {:.4g} to {:.4g}".format(*ends))
             for (name, x), ends in zip(self.values.items(), self.interval.values(), strict=True)
         ]
-        return html_of_rows(self._heading(), rows, self._notes())
-
-    def to_frame(self) -> Any:
-        """The points as a DataFrame of pandas, with mu_macro of the fit and the residuals."""
-        friction = self.points["mu_macro"] - self.residuals
-        return frame_of({**self.points, "fitted": friction, "residual": self.residuals})
+        return self._heading(), rows, self._below()
 
 
 def _fine(x: Array) -> Array:
@@ -292,18 +296,15 @@ def _interpolated(x: Array, column: Array, fine: Array) -> Any:
     return np.asarray(curve(np.arcsinh(fine / scale)))
 
 
-def _plain(part: Any, as_word: bool, name: str = "") -> Any:
-    """Numbers, texts, lists and dicts for JSON; where ``worded`` an infinite k is the word
-    rigid."""
+def _worded(part: Any, name: str = "") -> Any:
+    """A part of a fit, with the word rigid for an infinite k."""
     if isinstance(part, Mapping):
-        return {key: _plain(entry, as_word, key) for key, entry in part.items()}
+        return {key: _worded(entry, key) for key, entry in part.items()}
     if isinstance(part, np.ndarray):
         part = part.tolist()
     if isinstance(part, (list, tuple)):
-        return [_plain(entry, as_word, name) for entry in part]
-    if isinstance(part, float) and not math.isfinite(part):
-        return RIGID if as_word and name == "k" and part == math.inf else None
-    return part
+        return [_worded(entry, name) for entry in part]
+    return RIGID if name == "k" and part == math.inf else part
 
 
 def quantile(dof: int | None) -> float:

@@ -7,13 +7,13 @@ from typing import Any
 from mumacro import plotting
 from mumacro.inputs.fields import unit_of
 from mumacro.kernel.arrays import Array
-from mumacro.shown import frame_of, html_of_rows, members_of, text_of_rows
+from mumacro.results import Result, Rows
 
 _UNITS = {"offset": "N", "drift": "N/sample"}
 
 
 @dataclass(frozen=True, repr=False)
-class LoopFit:
+class LoopFit(Result):
     """k and mu0 of a contact, fitted to a measured loop.
 
     Attributes
@@ -62,31 +62,18 @@ class LoopFit:
         x, force, fitted = (self.loop[name] for name in ("displacement", "force", "fitted"))
         return plotting.plot_loop(x, force, fitted, title, ax)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members as JSON has them: lists in place of arrays, None where a number is not
-        finite."""
-        return members_of(
-            {
-                "values": self.values,
-                "interval": self.interval,
-                "scatter": self.scatter,
-                "energy": self.energy,
-                "cycles": self.cycles,
-                "notes": [*self.notes],
-                "contact": self.contact,
-                "loop": self.loop,
-                "residuals": self.residuals,
-            }
-        )
-
-    def to_frame(self) -> Any:
-        """The samples that count as a DataFrame of pandas, with the residuals."""
-        return frame_of({**self.loop, "residual": self.residuals})
+    def _members(self) -> dict[str, Any]:
+        names = ("values", "interval", "scatter", "energy", "cycles", "notes", "contact", "loop")
+        return {name: getattr(self, name) for name in (*names, "residuals")}
 
     @property
-    def rows(self) -> list[tuple[str, str, str, str]]:
+    def columns(self) -> dict[str, Array]:
+        """The samples that count, with the residuals."""
+        return {**self.loop, "residual": self.residuals}
+
+    def _rows(self) -> Rows:
         """Name, value, unit and interval of each value as text, and the energy."""
-        rows = []
+        rows: Rows = []
         for name, value in self.values.items():
             low, high = self.interval[name]
             unit = _UNITS.get(name) or unit_of(name)
@@ -105,9 +92,5 @@ class LoopFit:
         count = f"{self.residuals.size} samples, {self.cycles} cycles"
         return f"<LoopFit of a {self.contact}: {count}>"
 
-    def __repr__(self) -> str:
-        return text_of_rows(self._heading(), self.rows, self.notes)
-
-    def _repr_html_(self) -> str:
-        """A table for notebooks."""
-        return html_of_rows(self._heading(), self.rows, self.notes)
+    def _below(self) -> list[str]:
+        return [*self.notes]

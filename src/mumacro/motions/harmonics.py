@@ -13,7 +13,7 @@ from mumacro.inputs.oscillation import MOST_HARMONIC
 from mumacro.inputs.reading import carries_unit, read
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
-from mumacro.shown import frame_of, html_of, members_of, text_of
+from mumacro.results import Result
 
 # shares of the largest sample: what rounding alone leaves of a term, and between equal samples
 _NOTHING, _SAME = 8.0 * 2.0**-52, 1e-9
@@ -24,7 +24,7 @@ _REPEATED = "the last sample repeats the first, which begins the next period: it
 
 
 @dataclass(frozen=True, repr=False)
-class Harmonics:
+class Harmonics(Result):
     """The harmonics of an oscillation, in the unit of its samples."""
 
     #: (harmonic, amplitude, phase in degrees): amplitude sin(harmonic omega t + phase), with t = 0
@@ -44,27 +44,20 @@ class Harmonics:
             "phase": np.array(phases),
         }
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members as JSON has them; each term is a dict, as HTTP takes it."""
+    def _members(self) -> dict[str, Any]:
+        """Each term is a dict, as HTTP takes it."""
         names = ("harmonic", "amplitude", "phase")
         terms = [dict(zip(names, term, strict=True)) for term in self.terms]
-        return members_of(
-            {"terms": terms, "mean": self.mean, "rms": self.rms, "notes": [*self.notes]}
-        )
-
-    def to_frame(self) -> Any:
-        """The terms as a DataFrame of pandas, one row a harmonic."""
-        return frame_of(self.columns)
+        return {"terms": terms, "mean": self.mean, "rms": self.rms, "notes": self.notes}
 
     def _heading(self) -> str:
         return f"<Harmonics: {len(self.terms)}, mean {self.mean:.6g}, rms left out {self.rms:.3g}>"
 
-    def __repr__(self) -> str:
-        return text_of(self._heading(), self.columns if self.terms else {}, self.notes)
+    def _shown(self) -> dict[str, Any]:
+        return self.columns if self.terms else {}
 
-    def _repr_html_(self) -> str:
-        """A table for notebooks."""
-        return html_of(self._heading(), self.columns, self.notes)
+    def _below(self) -> list[str]:
+        return [*self.notes]
 
 
 def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:

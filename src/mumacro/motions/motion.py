@@ -25,7 +25,7 @@ from mumacro.inputs.signature import Numbers, Oscillation
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
-from mumacro.shown import cell, frame_of, html_of, html_of_rows, members_of, text_of
+from mumacro.results import Result, Rows, cell
 from mumacro.stopping import current, look
 
 TOLERANCES = 1e-9, 1e-2
@@ -64,9 +64,7 @@ class Term(NamedTuple):
         return out
 
 
-class Cycle(NamedTuple):
-    """One steady period of one case, arrays (n + 1,)."""
-
+class _Cycle(NamedTuple):
     t: Array  #: time [s], from 0 to the end of the period
     x: Array  #: way of the upper point along the drag [m], that of the drag included
     y: Array  #: and across [m]
@@ -74,20 +72,19 @@ class Cycle(NamedTuple):
     Fy: Array  #: and across [N]
     Fz: Array  #: normal force [N]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The columns as lists."""
-        return members_of(self._asdict())
 
-    def to_frame(self) -> Any:
-        """The columns as a DataFrame of pandas."""
-        return frame_of(self._asdict())
+class Cycle(Result, _Cycle):
+    """One steady period of one case, arrays (n + 1,)."""
 
-    def __repr__(self) -> str:
-        return text_of(f"<Cycle of {self.t.size} times>", self._asdict())
+    __slots__ = ()
 
-    def _repr_html_(self) -> str:
-        """A table for notebooks."""
-        return html_of(f"<Cycle of {self.t.size} times>", self._asdict())
+    @property
+    def columns(self) -> dict[str, Array]:
+        """The times, and what is there at each."""
+        return self._asdict()
+
+    def _heading(self) -> str:
+        return f"<Cycle of {self.t.size} times>"
 
 
 #: what a motion has: unit and meaning
@@ -147,7 +144,7 @@ class Scenes:
 
 
 @dataclass(frozen=True, repr=False)
-class Motion:
+class Motion(Result):
     """Steady cycles: floats for one case, arrays of the broadcast shape otherwise; NaN at an
     illegal case of an array."""
 
@@ -255,43 +252,34 @@ class Motion:
             self.scenes.frequency == "f",
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON of a motion over HTTP, without cycle and api_version; arrays as
-        lists, None where a number is not finite."""
+    def _members(self) -> dict[str, Any]:
         said = {name: said for name in ("warnings", "remarks") if (said := getattr(self, name))}
-        return members_of({**self.columns, "contact": self.scenes.contact, **said})
-
-    def _notes(self) -> list[str]:
-        return [*self.warnings, *lines_of(self.remarks)]
-
-    def to_frame(self) -> Any:
-        """The numbers as a DataFrame of pandas, one row a case; ``cycle().to_frame()`` is the cycle
-        of one case."""
-        return frame_of(self.columns)
+        return {**self.columns, "contact": self.scenes.contact, **said}
 
     def _heading(self) -> str:
-        shape = np.shape(self.mu_macro)
-        cases = f", {math.prod(shape)} cases of shape {shape}" if shape else ""
-        return f"<Motion of a {self.scenes.contact}{cases}>"
-
-    def __repr__(self) -> str:
-        if np.shape(self.mu_macro):
-            return text_of(self._heading(), self.columns, self._notes())
-        one = (
-            f"<Motion of a {self.scenes.contact}: mu_macro {self.mu_macro:.6g}, mu_lateral "
+        contact, shape = self.scenes.contact, np.shape(self.mu_macro)
+        if shape:
+            return f"<Motion of a {contact}, {math.prod(shape)} cases of shape {shape}>"
+        return (
+            f"<Motion of a {contact}: mu_macro {self.mu_macro:.6g}, mu_lateral "
             f"{self.mu_lateral:.6g}, error_estimate {self.error_estimate:.1e}>"
         )
-        return "\n".join([one, *self._notes()])
 
-    def _repr_html_(self) -> str:
-        """A table for notebooks: of one case a number a row with unit and meaning."""
+    def _rows(self) -> Rows | None:
+        return None if np.shape(self.mu_macro) else []
+
+    def _below(self) -> list[str]:
+        return [*self.warnings, *lines_of(self.remarks)]
+
+    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
+        """Of one case a number a row with unit and meaning."""
         if np.shape(self.mu_macro):
-            return html_of(self._heading(), self.columns, self._notes())
-        rows = [
+            return super()._in_full()
+        rows: Rows = [
             (name, cell(getattr(self, name)), f"[{unit}]", meaning)
             for name, (unit, meaning) in NUMBERS.items()
         ]
-        return html_of_rows(self._heading(), rows, self._notes())
+        return f"<Motion of a {self.scenes.contact}>", rows, self._below()
 
 
 @np.errstate(all="ignore")

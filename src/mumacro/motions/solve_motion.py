@@ -25,7 +25,7 @@ from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.motions.motion import PARTS, motion
 from mumacro.questions import solutions as tables
-from mumacro.shown import frame_of, html_of, members_of, text_of
+from mumacro.results import Result, Rows
 
 #: inputs of a motion that may be unknown
 INPUTS = ("v0", "k", "Fz", "f", "omega", "mu0")
@@ -65,7 +65,7 @@ class MotionReach(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class MotionSolution:
+class MotionSolution(Result):
     """All roots of every target."""
 
     unknown: str
@@ -140,9 +140,7 @@ class MotionSolution:
                 words.append(plotting.oscillation_words(symbol, unit, shown))
         return "; ".join(filter(None, words))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON of an inverse problem of a motion over HTTP, without
-        api_version."""
+    def _members(self) -> dict[str, Any]:
         reach, other = self.reach, self.other_way
         members: dict[str, Any] = {
             "unknown": self.unknown,
@@ -159,34 +157,37 @@ class MotionSolution:
         }
         if other is not None:
             members["other_way"] = tables.results_of(other.targets, other.roots, other.reason)
-        return members_of(members)
+        return members
 
     @property
     def columns(self) -> dict[str, Any]:
         """The roots as a table: target, value, low, high, mean, error_estimate; one row a root."""
         return tables.columns_of(MotionRoot, self.targets, self.roots)
 
-    def to_frame(self) -> Any:
-        """The roots as a DataFrame of pandas, one row a root."""
-        return frame_of(self.columns)
-
     def _heading(self) -> str:
-        unit, counts = self.unit, tables.counts(self.roots)
+        unit, one = self.unit, self._one_root()
+        if one is not None:
+            value = f"{one.value:.6g} {unit}".rstrip(" -")
+            return f"<MotionSolution {self.unknown}: {value}>"
+        counts = tables.counts(self.roots)
         return f"<MotionSolution for {self.unknown} [{unit}], {self.of}: {counts}>"
 
-    def _notes(self) -> list[str]:
+    def _one_root(self) -> MotionRoot | None:
+        """The root of the only target, where it has one."""
+        every = [root for roots in self.roots for root in roots]
+        return every[0] if len(every) == len(self.targets) == 1 else None
+
+    def _shown(self) -> dict[str, Any]:
+        return self.columns if any(self.roots) else {}
+
+    def _rows(self) -> Rows | None:
+        return None if self._one_root() is None else []
+
+    def _below(self) -> list[str]:
         return [*filter(None, map(self.reason, range(len(self.targets))))][:4]
 
-    def __repr__(self) -> str:
-        every = [root for roots in self.roots for root in roots]
-        if len(every) == len(self.targets) == 1:
-            value = f"{every[0].value:.6g} {self.unit}".rstrip(" -")
-            return f"<MotionSolution {self.unknown}: {value}>"
-        return text_of(self._heading(), self.columns if every else {}, self._notes())
-
-    def _repr_html_(self) -> str:
-        """A table for notebooks."""
-        return html_of(self._heading(), self.columns, self._notes())
+    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
+        return self._heading(), None, self._below()
 
 
 def unit_of_unknown(unknown: str) -> str:

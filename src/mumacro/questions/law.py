@@ -19,14 +19,14 @@ from mumacro.kernel.arrays import Array
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.borders import Crossing, border_crossings
 from mumacro.questions.input_curve import InputCurve
-from mumacro.shown import frame_of, html_of, members_of, text_of
+from mumacro.results import Result
 from mumacro.surrogate import Surrogate
 
 SCALES = ("log", "linear")
 
 
 @dataclass(frozen=True, repr=False)
-class Law:
+class Law(Result):
     """A sweep of one input."""
 
     along: str  #: the swept input, as it was named: omega [rad/s] or f [Hz]
@@ -79,33 +79,20 @@ class Law:
         k = {} if self.stiffening is None else {"k": self.inputs["k"]}
         return {self.along: self.values, **k, **answer_columns, "mu_static": self.mu_static}
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON of a law over HTTP, without table and api_version: lists in place
-        of arrays, None where a number is not finite."""
+    def _members(self) -> dict[str, Any]:
         columns = {name: x for name, x in self.columns.items() if name != self.along}
         border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in self.border]
         members = {"along": self.along, "unit": unit_of(self.along), "values": self.values}
-        return members_of({**members, **columns, "border": border})
-
-    def to_frame(self) -> Any:
-        """The law as a DataFrame of pandas, one row a value of the swept input."""
-        return frame_of(self.columns)
+        return {**members, **columns, "border": border}
 
     def _heading(self) -> str:
         unit, kind = unit_of(self.along), ", ".join(self.kind.names.values())
         low, high = self.values[0], self.values[-1]
         return f"<Law over {self.along} from {low:.6g} to {high:.6g} {unit}: {kind}>"
 
-    def _notes(self) -> list[str]:
+    def _below(self) -> list[str]:
         unit = unit_of(self.along)
         return [f"{mark.name} at {self.along} = {mark.value:.6g} {unit}" for mark in self.border]
-
-    def __repr__(self) -> str:
-        return text_of(self._heading(), self.columns, self._notes())
-
-    def _repr_html_(self) -> str:
-        """A table for notebooks, with the borders."""
-        return html_of(self._heading(), self.columns, self._notes())
 
     def plot(
         self, ax: Any = None, *, roots: Iterable[float] = (), target: float | None = None

@@ -48,7 +48,7 @@ from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.questions import solutions as tables
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.rootfinding import TINY, Branch, branches_between, last_double, samples
-from mumacro.shown import frame_of, html_of, members_of, text_of
+from mumacro.results import Result
 from mumacro.surrogate import Surrogate
 
 HUGE = 1.7976931348623157e308
@@ -96,7 +96,7 @@ class Reach:
 
 
 @dataclass(frozen=True, repr=False)
-class Solution:
+class Solution(Result):
     """All roots of every target."""
 
     unknown: str  #: the input that was solved for
@@ -137,13 +137,13 @@ class Solution:
             f"{reach.mu_min:.4g} to {reach.mu_max:.4g}"
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON of an inverse problem over HTTP, without table and api_version;
-        ``ends`` have those of the softest and the stiffest contact of an interval of k."""
-        ends = {"ends": [end._members() for end in self.ends]} if self.ends else {}
-        return members_of({"unknown": self.unknown, "unit": self.unit, **self._members(), **ends})
-
     def _members(self) -> dict[str, Any]:
+        """What was solved for, and the answers; ``ends`` have those of the softest and the stiffest
+        contact of an interval of k."""
+        ends = {"ends": [end._answers() for end in self.ends]} if self.ends else {}
+        return {"unknown": self.unknown, "unit": self.unit, **self._answers(), **ends}
+
+    def _answers(self) -> dict[str, Any]:
         """The roots, what was searched, and what is reachable there."""
         reach = self.reach
         reachable = {"min": reach.mu_min, "max": reach.mu_max}
@@ -159,28 +159,17 @@ class Solution:
         """The roots as a table: target, value, low, high, mu_macro, regime; one row a root."""
         return tables.columns_of(Root, self.targets, self.roots)
 
-    def to_frame(self) -> Any:
-        """The roots as a DataFrame of pandas, one row a root."""
-        return frame_of(self.columns)
-
     def _heading(self) -> str:
         return f"<Solution for {self.unknown} [{self.unit}]: {tables.counts(self.roots)}>"
 
-    def _notes(self) -> list[str]:
+    def _below(self) -> list[str]:
         ends = zip(("softest", "stiffest"), self.ends or (), strict=False)
         at_ends = [
             f"for the {word} contact: {root.value:.6g} {self.unit}"
             for word, end in ends
             for root in end.roots[0]
         ]
-        return [*at_ends, *filter(None, map(self.reason, range(len(self.targets))))]
-
-    def __repr__(self) -> str:
-        return text_of(self._heading(), self.columns, self._notes()[:4])
-
-    def _repr_html_(self) -> str:
-        """A table for notebooks."""
-        return html_of(self._heading(), self.columns, self._notes()[:4])
+        return [*at_ends, *filter(None, map(self.reason, range(len(self.targets))))][:4]
 
 
 @np.errstate(all="ignore")

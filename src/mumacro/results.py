@@ -1,5 +1,9 @@
-"""How results show themselves: as text of at most 16 lines, as a table of a notebook, as a frame of
-pandas, and as what JSON holds."""
+"""What every result is: a heading, columns by path, rows where it is about one thing, and what is
+said below them.
+
+:class:`Result` makes its forms of them: text of at most 16 lines, a table of a notebook, a frame of
+pandas, and what JSON holds.
+"""
 
 import html
 import math
@@ -18,6 +22,77 @@ _ENDS = 5  # rows at the beginning and at the end of a long table
 _DIGITS = 6
 
 
+class Result:
+    """What a question gives back.
+
+    Each kind of result says what its columns are, and may say its members as JSON has them, a
+    heading, rows and what is said below; the forms are made here.
+    """
+
+    __slots__ = ()
+
+    @property
+    def columns(self) -> Mapping[str, Any]:
+        """The result as a table: numbers and texts by path."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the members as JSON has them, the same on the command line and over HTTP, there
+        with ``table`` and ``api_version``: lists in place of arrays, None where a number is not
+        finite."""
+        return {name: listed(value) for name, value in self._members().items()}
+
+    def to_frame(self) -> Any:
+        """Return the columns as a DataFrame of pandas; raise MumacroError without pandas."""
+        return frame_of(self.columns)
+
+    def __repr__(self) -> str:
+        """Show the result in at most 16 lines of 100 characters."""
+        rows = self._rows()
+        if rows is None:
+            return _text_of(self._heading(), _table_lines(self._shown()), self._below())
+        return _text_of(self._heading(), _aligned(rows), self._below(), notes_first=True)
+
+    def _repr_html_(self) -> str:
+        """Show the result as a table of a notebook."""
+        heading, rows, below = self._in_full()
+        if rows is not None:
+            return _html(heading, [], rows, below)
+        columns = self._shown()
+        head, *body = _table_of(columns) if columns else [[]]
+        return _html(heading, head, body, below)
+
+    # --- what a kind of result says of itself -----------------------------------------------------
+
+    def _members(self) -> Mapping[str, Any]:
+        """The members as JSON has them, arrays as arrays."""
+        return self.columns
+
+    def _heading(self) -> str:
+        """The first line."""
+        return f"<{type(self).__name__}>"
+
+    def _shown(self) -> Mapping[str, Any]:
+        """The columns that are shown."""
+        return self.columns
+
+    def _rows(self) -> Rows | None:
+        """Rows of name, value, unit and meaning in place of columns, where the result is about one
+        thing."""
+        return None
+
+    def _below(self) -> list[str]:
+        """What is said below, in a line each."""
+        return []
+
+    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
+        """Heading, rows and what is said below, where there is room for all of it."""
+        return self._heading(), self._rows(), self._below()
+
+
+# --- the forms ------------------------------------------------------------------------------------
+
+
 def listed(value: Any) -> Any:
     """Numbers, texts, lists and dicts for JSON: lists in place of arrays, None where a number is
     not finite, and for no text.
@@ -32,7 +107,7 @@ def listed(value: Any) -> Any:
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return members_of(value)
+        return {name: listed(entry) for name, entry in value.items()}
     if isinstance(value, (list, tuple)):
         return [listed(entry) for entry in value]
     if value is None or isinstance(value, (bool, int)):
@@ -44,11 +119,6 @@ def listed(value: Any) -> Any:
         texts = [x if isinstance(x, str) and x else None for x in array.ravel().tolist()]
         array = np.array(texts, object).reshape(array.shape)
     return array.tolist()
-
-
-def members_of(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by name for JSON, see :func:`listed`."""
-    return {name: listed(value) for name, value in values.items()}
 
 
 def frame_of(columns: Mapping[str, Any]) -> Any:
@@ -107,7 +177,7 @@ def cell(value: Any) -> str:
     return str(value)
 
 
-def _table(columns: Mapping[str, Any]) -> list[list[str]]:
+def _table_of(columns: Mapping[str, Any]) -> list[list[str]]:
     """The heads of columns, and of their rows (n,) the first and the last; places stand before
     them."""
     arrays = [np.asarray(x) for x in columns.values()]
@@ -136,30 +206,6 @@ def _fitting(table: Sequence[Sequence[str]]) -> tuple[list[str], int]:
     return [f"  {line}".rstrip() for line in lines], len(widths) - count
 
 
-def text_of(heading: str, columns: Mapping[str, Any], notes: Iterable[str] = ()) -> str:
-    """A heading, the first and the last rows of columns, and notes, in at most 16 lines of 100
-    characters."""
-    lines, rest = _fitting(_table(columns)) if columns else ([], 0)
-    if rest:
-        lines.append(f"  {rest} more columns: see to_frame()")
-    below = [part for note in notes for part in _broken(f"  {note}")]
-    return _in_lines([*_broken(heading), *lines, *below])
-
-
-def text_of_rows(heading: str, pairs: Iterable[Sequence[str]], notes: Iterable[str] = ()) -> str:
-    """A heading, and rows of cells and notes below it, in at most 16 lines of 100 characters;
-    notes come before rows that do not fit."""
-    table = [*pairs]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = [
-        "  " + "  ".join(x.ljust(width) for x, width in zip(row, widths, strict=True)).rstrip()
-        for row in table
-    ]
-    below = [part for note in notes for part in _broken(f"  {note}")][: LINES - 2]
-    rows = _in_lines([heading, *(line[:WIDTH] for line in lines)], LINES - len(below))
-    return "\n".join([rows, *below])
-
-
 def _in_lines(lines: list[str], most: int = LINES) -> str:
     if len(lines) > most:
         lines = [*lines[: most - 1], f"  ... {len(lines) - most + 1} more lines"]
@@ -170,15 +216,31 @@ def _broken(line: str) -> list[str]:
     return textwrap.wrap(line, WIDTH, subsequent_indent="    ")
 
 
-def html_of(heading: str, columns: Mapping[str, Any], notes: Iterable[str] = ()) -> str:
-    """The same as a table of a notebook, with all columns."""
-    head, *body = _table(columns) if columns else [[]]
-    return _html(heading, head, body, notes)
+def _text_of(
+    heading: str, lines: Sequence[str], notes: Iterable[str], notes_first: bool = False
+) -> str:
+    """A heading, lines and notes below them, in at most 16 lines of 100 characters; what does not
+    fit are the last notes, or with ``notes_first`` the last lines."""
+    below = [part for note in notes for part in _broken(f"  {note}")]
+    if notes_first:
+        below = below[: LINES - 2]
+        return "\n".join([_in_lines([*_broken(heading), *lines], LINES - len(below)), *below])
+    return _in_lines([*_broken(heading), *lines, *below])
 
 
-def html_of_rows(heading: str, pairs: Iterable[Sequence[str]], notes: Iterable[str] = ()) -> str:
-    """Rows of cells, and notes below them, as a table of a notebook."""
-    return _html(heading, [], pairs, notes)
+def _aligned(rows: Rows) -> list[str]:
+    """Rows of cells as lines of 100 characters at most."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(x.ljust(n) for x, n in zip(row, widths, strict=True)) for row in rows)
+    return [f"  {line}".rstrip()[:WIDTH] for line in lines]
+
+
+def _table_lines(columns: Mapping[str, Any]) -> list[str]:
+    """The first and the last rows of columns as lines; columns that do not fit are counted."""
+    if not columns:
+        return []
+    lines, rest = _fitting(_table_of(columns))
+    return [*lines, f"  {rest} more columns: see to_frame()"] if rest else lines
 
 
 def _html(

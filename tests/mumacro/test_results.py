@@ -15,7 +15,7 @@ import mumacro
 from mumacro import InputError, Surrogate
 from mumacro.cli.main import main
 from mumacro.outputs import OUTPUTS
-from mumacro.shown import known
+from mumacro.results import Result, known
 from tests.support.cases import Case
 from tests.support.comparing import close
 
@@ -76,6 +76,16 @@ ONE: dict[str, Callable[[Surrogate], Any]] = {
     "element": lambda _: mumacro.Element(0.3, 10.0, 1e6, contact="ball"),
     "elements": lambda _: mumacro.Element(np.full(1000, 0.3), 10.0, 1e6),
 }
+
+
+def test_the_forms_of_all_results_are_made_in_one_place(surrogate: Surrogate) -> None:
+    steel = mumacro.stiffness.Material("steel")
+    made = {type(of_n(surrogate, 2)) for of_n in RESULTS.values()}
+    made |= {mumacro.LoopFit, mumacro.Harmonics, type(surrogate.evaluate(**CASE))}
+    made.add(type(mumacro.stiffness.ball_on_flat(5e-3, 10.0, steel, steel)))
+    for kind in made:
+        for name in ("to_dict", "to_frame", "__repr__", "_repr_html_"):
+            assert getattr(kind, name) is getattr(Result, name), (kind, name)
 
 
 def is_short(text: str) -> bool:
