@@ -1,4 +1,4 @@
-"""Processor time a case, of many cases: the plan in docs/how-to/scale.md.
+"""Processor time a case, of many cases: the plan in docs/how-to/many-cases.md.
 
     python benchmarks/scale.py [--cases 1e8] [--write]
 

@@ -112,7 +112,7 @@ def times(share: float = 1.0) -> str:
 
 
 def picture(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
-    """Writes the picture of docs/how-to/conveyor.md: transport speed over the phase of the load."""
+    """Writes the picture of docs/how-to/motion.md: transport speed over the phase of the load."""
     speeds = np.full(PHASES.size, np.nan)
     for i, phase in enumerate(PHASES):
         roots = mumacro.solve_motion("v0", 0.0, **CONVEYOR, normal=(8.0, phase)).roots[0]

@@ -263,8 +263,8 @@ def test_picture_of_the_surface_is_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "surface.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_picture_of_the_set_ups_is_the_sketch_of_the_page(tmp_path: Path) -> None:
-    """It is written anew where the sketch has changed: python benchmarks/setups.py."""
-    assert run("setups", str(tmp_path / "setups.svg")) == []
-    drawn = (tmp_path / "setups.svg").read_bytes()
-    assert drawn == (ROOT / "docs" / "img" / "setups.svg").read_bytes()
+def test_the_pictures_of_the_set_ups_are_the_sketch_of_the_page(tmp_path: Path) -> None:
+    """They are written anew where the sketch has changed: python benchmarks/setups.py."""
+    assert run("setups", str(tmp_path)) == []
+    for name in ("setup.svg", "setups.svg"):
+        assert (tmp_path / name).read_bytes() == (ROOT / "docs" / "img" / name).read_bytes()

@@ -128,7 +128,7 @@ ELSEWHERE = {
     ),
 }
 #: pages whose Python programs another file runs
-PROGRAMS_ELSEWHERE = {"docs/how-to/scale.md": "tests/project/test_recipes.py"}
+PROGRAMS_ELSEWHERE = {"docs/how-to/many-cases.md": "tests/project/test_recipes.py"}
 SHELL = ("bash", "console")
 #: what the reader of a page has, and ports and folders of this machine
 HERE = (

@@ -1,4 +1,4 @@
-"""The programs of docs/how-to/scale.md run unchanged and agree with the library."""
+"""The programs of docs/how-to/many-cases.md run unchanged and agree with the library."""
 
 import re
 from pathlib import Path
@@ -13,7 +13,7 @@ from tests.support.places import ROOT
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
-PAGE = (ROOT / "docs" / "how-to" / "scale.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "many-cases.md").read_text("utf-8")
 RUN = {"Lazy designs, streaming reductions", "Files over a cluster"}
 CASES: dict[str, Any] = {
     "mu0": 0.3,
