@@ -3,7 +3,8 @@
 
     python3 dev.py demo            start the service, send it one request, stop it
     python3 dev.py test [ARGS]     every check, then the tests that are not slow; --all adds those
-                                   marked slow, .ci/peers those marked peer; ARGS go to pytest
+                                   marked slow, .ci/peers those marked peer; --nightly runs the
+                                   longer forms of some alone; ARGS go to pytest
     python3 dev.py check           the checks without pytest
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until a signal stops it
@@ -37,6 +38,11 @@ OLDEST, NEWER_NAMES = (3, 11), ("python3.13", "python3.12", "python3.11")
 # Each set holds those before it, at the same versions; zig.txt is added where a compiler is
 # missing.
 SETS = {"service": ("build", "service"), "test": ("test",), "tools": ("test", "tools")}
+#: what pytest's -m is for each option of the tests
+MARKS = {
+    "--all": ("-m", "not nightly and not peer"),
+    "--nightly": ("-m", "nightly and not peer"),
+}
 
 
 class FailedError(Exception):
@@ -195,8 +201,8 @@ def test(*arguments: str) -> int:
     """Another ``-m`` replaces that of pyproject.toml; every processor runs a file at a time, with
     ``-n 0`` one."""
     failed = check()
-    marks = ("-m", "not peer") if "--all" in arguments else ()
-    chosen = [*marks, *(word for word in arguments if word != "--all")]
+    marks = [word for option in arguments for word in MARKS.get(option, ())]
+    chosen = [*marks, *(word for word in arguments if word not in MARKS)]
     spread = ("-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder")  # see tests/conftest.py
     return run(PYTHON, "-m", "pytest", *spread, *chosen) or failed
 

@@ -52,7 +52,7 @@ sys.exit(0 if result.attempted and not result.failed else 1)
 INSTALLS = {"bare": "pip install .", "service": 'pip install ".[service]"'}
 #: the file that runs a command, perhaps with smaller numbers, and the words there that do
 ELSEWHERE = {
-    "python3 dev.py test": ("dev.py", 'if "--all" in arguments'),  # by dev.py test --all
+    "python3 dev.py test": ("dev.py", "for word in MARKS.get(option"),  # by dev.py test --all
     "python3 dev.py test --all": (".ci/run", "python3 dev.py test --all"),
     "python3 dev.py wheels": (".ci/run", "python3 dev.py wheels"),
     "python3 dev.py check": ("dev.py", "failed = check()"),  # by dev.py test

@@ -2,18 +2,19 @@
 
 import pytest
 
+from tests.support.nightly import nightly
 from tests.support.scripts import script
 from tests.support.serving import Server
 
 attacks, framing, strange = map(script, ("fuzz.attacks", "fuzz.framing", "fuzz.strange"))
-SHARE = 0.2
 MOST_MB, MOST_S = 400, 2.0  # the aim for the wait is 0.25 s, on a machine that does nothing else
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("share", [0.05, nightly(0.2)])
 @pytest.mark.parametrize("name", attacks.ATTACKS)
-def test_an_attack_takes_little_memory_and_keeps_nobody_waiting(name: str) -> None:
-    cost = attacks.cost_of(attacks.ATTACKS[name], SHARE)
+def test_an_attack_takes_little_memory_and_keeps_nobody_waiting(name: str, share: float) -> None:
+    cost = attacks.cost_of(attacks.ATTACKS[name], share)
     assert cost.memory < MOST_MB
     assert max(cost.livez, cost.metrics) < MOST_S
     assert cost.after < 0.5

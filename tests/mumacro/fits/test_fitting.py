@@ -13,6 +13,7 @@ from mumacro.inputs.kind import CONTACTS
 from tests.support.cases import Case
 from tests.support.comparing import close
 from tests.support.fits import least_chi2, random_points
+from tests.support.nightly import nightly
 from tests.support.refusals import refused
 from tests.support.scripts import script
 
@@ -44,13 +45,14 @@ def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> An
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("draws", [50, nightly(200)])
 @pytest.mark.parametrize("has_std", [True, False], ids=["std", "scatter"])
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_inputs_lie_within_their_covariance(
-    surrogate: Surrogate, contact: Any, unknowns: Any, has_std: Any
+    surrogate: Surrogate, contact: Any, unknowns: Any, has_std: Any, draws: int
 ) -> None:
-    """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for
+    """In 95 % of the draws, by the binomial distribution (99.9 %); so are the intervals, each for
     itself."""
     from scipy.stats import binom, chi2
     from scipy.stats import f as fisher
@@ -62,7 +64,7 @@ def test_inputs_lie_within_their_covariance(
     inside: Any = 0
     intervals: Any = np.zeros(n, dtype=int)
     clean = friction(surrogate, contact, v0=v0, y0=y0)
-    for seed in range(200):
+    for seed in range(draws):
         mu = clean + np.random.default_rng(seed).normal(scale=spread, size=40)
         data = {"v0": v0, "y0": y0, "mu_macro": mu} | ({"std": spread} if has_std else {})
         estimate = fit(data, unknowns, contact=contact, Fz=10.0, f=20e3, **inputs)
@@ -75,7 +77,7 @@ def test_inputs_lie_within_their_covariance(
         ]
         assert len(estimate.solutions) == 1
         assert estimate.reduced_chi2 * (1.0 if has_std else spread**-2) == close(1.0, abs=1.0)
-    low, high = (float(binom.ppf(level, 200, 0.95)) for level in (0.0005, 0.9995))
+    low, high = (float(binom.ppf(level, draws, 0.95)) for level in (0.0005, 0.9995))
     assert low <= inside <= high
     assert np.all((low <= intervals) & (intervals <= high))
 

@@ -28,6 +28,7 @@ from mumacro.table.blocks import INTERPOLATIONS
 from mumacro.table.netcdf import read_table
 from tests.support.cases import Array, tables
 from tests.support.comparing import close
+from tests.support.nightly import nightly
 from tests.support.places import ROOT
 from tests.support.scripts import script
 
@@ -65,12 +66,15 @@ def compare(table: Surrogate, sweep: Sweep, v: Array, y: Array) -> Array:
 
 
 @pytest.mark.slow
-def test_fresh_solves_lie_within_tolerance_and_bounds(table: Surrogate, sweep: Sweep) -> None:
+@pytest.mark.parametrize("n", [8000, nightly(40_000)])
+def test_fresh_solves_lie_within_tolerance_and_bounds(
+    n: int, table: Surrogate, sweep: Sweep
+) -> None:
     """Values and slopes of every quantity, at points of every kind.
 
     tests/builder/tables/test_verify.py tries the verifier itself.
     """
-    report = verify(table, spring(sweep), 40_000, seed=77)
+    report = verify(table, spring(sweep), n, seed=77)
     assert holds(report, table.tolerance)
     # the stated errors are those at other points: of slopes ten lie beyond 99 %, and the median is
     # where closed forms answer

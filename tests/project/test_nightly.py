@@ -1,0 +1,45 @@
+"""What only the nightly run has, so that nothing slips into it unseen: longer forms of tests that
+every run has."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.places import ROOT
+
+#: the functions with a longer form, by their files
+NIGHTLY = {
+    "builder/tables/test_seams.py": {"test_a_table_of_an_odd_tolerance_keeps_its_bounds"},
+    "mumacro/fits/test_fitting.py": {"test_inputs_lie_within_their_covariance"},
+    "mumacro/fits/test_loop.py": {"test_intervals_of_noisy_loops_hold_the_truth"},
+    "mumacro/kernel/test_kernel_safety.py": {"test_sanitizers_are_silent"},
+    "mumacro/kernel/test_processors.py": {
+        "test_a_table_that_is_built_there_differs_within_what_both_state",
+        "test_what_a_table_states_is_measured_there_too",
+    },
+    "mumacro/table/test_committed_tables.py": {"test_fresh_solves_lie_within_tolerance_and_bounds"},
+    "service/test_service_fuzz.py": {"test_an_attack_takes_little_memory_and_keeps_nobody_waiting"},
+}
+
+
+def collected(marks: str) -> dict[str, set[str]]:
+    """The functions of all tests with these marks, by their files."""
+    command = [sys.executable, "-m", "pytest", "-n", "0", "--collect-only", "-m", marks]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    functions: dict[str, set[str]] = {}
+    for line in done.stdout.splitlines():
+        if line.startswith("tests/") and "::" in line:
+            file, function = line.partition("[")[0].split("::")
+            functions.setdefault(file.removeprefix("tests/"), set()).add(function)
+    return functions
+
+
+@pytest.mark.slow
+def test_the_nightly_tests_are_those_listed_and_each_has_a_form_that_every_run_has() -> None:
+    assert collected("nightly") == NIGHTLY
+    ordinary = collected("not nightly")
+    assert {file: functions - ordinary[file] for file, functions in NIGHTLY.items()} == {
+        file: set() for file in NIGHTLY
+    }

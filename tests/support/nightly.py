@@ -1,0 +1,15 @@
+"""The longer forms of tests: ``python3 dev.py test --nightly`` runs them, and a release does.
+
+A test that would take long has a smaller form, which every run has, beside the whole one: the same
+function with other numbers.  tests/project/test_nightly.py lists them all.
+"""
+
+from typing import Any
+
+import pytest
+
+
+def nightly(*values: Any, marks: Any = ()) -> Any:
+    """A set of parameters that only the nightly run has."""
+    ids = "-".join(["nightly", *(value for value in values if isinstance(value, str))])
+    return pytest.param(*values, id=ids, marks=[pytest.mark.nightly, *marks])
