@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple
+from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
@@ -36,33 +36,6 @@ _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)[_REGIME_CODES]
 
 
-class PlainCase(NamedTuple):
-    """One case in plain numbers, as it came; of :class:`Cases` what its answer needs."""
-
-    kind: Kind
-    six: tuple[float, ...]
-    with_f: bool
-
-    @property
-    def columns(self) -> dict[str, Any]:
-        """The six inputs by name."""
-        return dict(zip(self.kind.fields, map(float, self.six), strict=True))
-
-    @property
-    def f(self) -> float | None:
-        """f [Hz], where it was given."""
-        return self.six[4] / RAD_PER_CYCLE if self.with_f else None
-
-    @property
-    def units(self) -> dict[str, str]:
-        """None: the numbers came without."""
-        return {}
-
-    def as_cases(self) -> Cases:
-        """The same in the one form of all cases."""
-        return Cases(self.kind, self.columns, (), f=self.f)
-
-
 class Answer(Result, Generic[Number]):
     """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the
     broadcast shape else.
@@ -86,6 +59,9 @@ class Answer(Result, Generic[Number]):
         0 for k where the contact is rigid.
     gradient_bound : dict of str to float or ndarray, or None
         Verified bounds of the absolute errors of ``gradient``.
+    mu_macro_low, mu_macro_high : float or ndarray
+        Of an interval of k alone: smallest and largest mu_macro over it [-]; all else is that of
+        its geometric middle, and ``error_bound`` holds for them, too.
     outputs : dict of str to float or ndarray
         What ``include`` has asked for, by path [SI]; NaN at an illegal case of an array, and where
         there is no such number.
@@ -105,11 +81,13 @@ class Answer(Result, Generic[Number]):
     __slots__ = (
         "_cases",
         "_groups",
+        "_plain",
         "_surrogate",
         "error_bound",
         "gradient",
         "gradient_bound",
         "mu_macro",
+        *BAND,
         "mu_ratio",
         "outputs",
         "remarks_on_outputs",
@@ -134,7 +112,9 @@ class Answer(Result, Generic[Number]):
         self.error_bound = error_bound
         self.source_code = source_code
         self._groups = groups
-        self._cases: Cases | PlainCase | None = cases
+        self._cases: Cases | None = cases
+        #: of one case in plain numbers its kind, the six, and whether f was given
+        self._plain: tuple[Kind, tuple[float, ...], bool] | None = None
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
         self.outputs: Mapping[str, Any] = _NOTHING
@@ -145,6 +125,8 @@ class Answer(Result, Generic[Number]):
 
     def __getattr__(self, name: str) -> Any:
         """Raise AttributeError, with the way to ask for an output of this name."""
+        if name in BAND:
+            raise AttributeError(f"{name} is there for an interval of k: evaluate(k_low=, k_high=)")
         if hasattr(type(self), name):  # a property that has no value says why itself
             return object.__getattribute__(self, name)
         if name.startswith("_"):
@@ -217,7 +199,7 @@ class Answer(Result, Generic[Number]):
     @property
     def _always(self) -> tuple[str, ...]:
         """The paths of what is there without being asked for."""
-        return DEFAULT
+        return (*DEFAULT, *(name for name in BAND if hasattr(self, name)))
 
     @property
     def paths(self) -> list[str]:
@@ -245,8 +227,16 @@ class Answer(Result, Generic[Number]):
     def cases(self) -> Cases:
         """The cases that were evaluated."""
         if self._cases is None:
-            raise AttributeError("these labelled cases are not kept")
-        return self._cases if isinstance(self._cases, Cases) else self._cases.as_cases()
+            if self._plain is None:
+                raise AttributeError("these labelled cases are not kept")
+            kind, six, with_f = self._plain
+            columns: dict[str, Any] = dict(zip(kind.fields, map(float, six), strict=True))
+            self._cases = Cases(kind, columns, (), f=six[4] / RAD_PER_CYCLE if with_f else None)
+        return self._cases
+
+    @property
+    def _has_cases(self) -> bool:
+        return self._cases is not None or self._plain is not None
 
     @property
     def remarks(self) -> list[Remark]:
@@ -257,9 +247,9 @@ class Answer(Result, Generic[Number]):
     def remarks_in(self, units: Mapping[str, str]) -> list[Remark]:
         """:attr:`remarks`, with a value in the unit that ``units`` has for its input, as it was
         typed."""
-        cases = self._cases
-        if cases is None:
+        if not self._has_cases:
             return [*self.remarks_on_outputs]
+        cases = self.cases
         on_inputs = doubts(cases.columns, cases.f is not None, {**cases.units, **units})
         return [*on_inputs, *self.remarks_on_outputs]
 
@@ -335,7 +325,7 @@ class Answer(Result, Generic[Number]):
         return members
 
     def _kind_words(self) -> str:
-        if self._cases is None:
+        if not self._has_cases:
             return ""
         return f": {', '.join(self.cases.kind.names.values())}"
 
@@ -350,7 +340,7 @@ class Answer(Result, Generic[Number]):
         return np.shape(mu)
 
     def _is_one(self) -> bool:
-        return self._cases is not None and not self._shape
+        return self._has_cases and not self._shape
 
     def _rows(self) -> Rows | None:
         return [(path, cell(x)) for path, x in self.columns.items()] if self._is_one() else None
@@ -392,32 +382,19 @@ def _edge_words(columns: Mapping[str, Any], amplitude: str, v: Any, y: Any) -> A
     return words
 
 
-class AnswerWithGradient(Answer[Number]):
-    """An answer with the slopes by input, see :class:`Answer`."""
+if TYPE_CHECKING:
 
-    __slots__ = ()
+    class AnswerWithGradient(Answer[Number]):
+        """An answer whose slopes were asked for, as a type checker sees it."""
 
-    gradient: dict[str, Number]
-    gradient_bound: dict[str, Number]
+        gradient: dict[str, Number]
+        gradient_bound: dict[str, Number]
 
+    class IntervalAnswer(AnswerWithGradient[Number]):
+        """An answer over an interval of k, as a type checker sees it."""
 
-class IntervalAnswer(AnswerWithGradient[Number]):
-    """An answer for an interval of stiffnesses: mu_macro and all beside it at the geometric middle.
-
-    Attributes
-    ----------
-    mu_macro_low, mu_macro_high : float or ndarray
-        Smallest and largest mu_macro over the interval [-]; ``error_bound`` holds for them, too.
-    """
-
-    __slots__ = BAND
-
-    mu_macro_low: Number
-    mu_macro_high: Number
-
-    @property
-    def _always(self) -> tuple[str, ...]:
-        return DEFAULT + BAND
+        mu_macro_low: Number
+        mu_macro_high: Number
 
 
 def add(remarks: list[Remark], remark: Remark) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import BAND, DEFAULT, GROUPS, Answer, IntervalAnswer, add
+from mumacro.answer import BAND, GROUPS, Answer, add
 from mumacro.errors import InputError
 from mumacro.inputs.cases import DEVIATIONS, KIND, Cases, library_of
 from mumacro.inputs.doubts import Remark
@@ -49,7 +49,7 @@ _DTYPES = {
 Apply = Callable[[Callable[..., Any], Mapping[str, Any], Sequence[str]], list[Any]]
 
 
-class LabelledAnswer(IntervalAnswer[Any]):
+class LabelledAnswer(Answer[Any]):
     """An answer whose attributes and outputs are Series, DataArrays or Dask arrays."""
 
     __slots__ = ("_kinds", "_library", "_values")
@@ -57,10 +57,6 @@ class LabelledAnswer(IntervalAnswer[Any]):
     _kinds: dict[str, Any]  # contact and direction, where they were given
     _library: str
     _values: dict[str, Any]  # all inputs
-
-    @property
-    def _always(self) -> tuple[str, ...]:
-        return (*DEFAULT, *(name for name in BAND if hasattr(self, name)))
 
     def _apply(self, function: Callable[..., Any], inputs: Mapping[str, Any], name: str) -> Any:
         return _APPLY[self._library](lambda *arrays: [function(*arrays)], inputs, [name])[0]
@@ -79,7 +75,7 @@ class LabelledAnswer(IntervalAnswer[Any]):
 
     def plot(self, ax: Any = None) -> Any:
         """As in :class:`mumacro.Answer`."""
-        if self._cases is not None:
+        if self._has_cases:
             return super().plot(ax)
         values = self._values
         if self._library == "xarray":

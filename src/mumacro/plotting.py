@@ -2,8 +2,10 @@
 arrays, names and marks.
 
 The methods ``plot`` of :class:`mumacro.Surrogate`, :class:`mumacro.Answer`, of a law, of solutions,
-motions and :class:`mumacro.Fit` fill in the numbers.  Each draws on ``ax``, the axes of matplotlib
-that are given, or new ones, and returns them; MumacroError where it is not installed.  Sizes,
+motions and fits fill in the numbers.  Each draws on ``ax``, the axes of matplotlib that are given,
+or new ones; of a picture with two panels an array of two, or one, which gets the first panel alone.
+Each returns the axes of its first panel, whose ``figure`` is the whole picture.  MumacroError where
+matplotlib is not installed.  Sizes,
 lines, grids and the colours of curves are those of the user's style; the map has its own colours,
 which are those of the page, too, and each regime has one colour everywhere.
 """
@@ -13,6 +15,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -299,16 +302,15 @@ def plot_law(
     band: tuple[Array, Array] | None = None,
     band_of: str = "k",
     borders: Iterable[tuple[float, str]] = (),
-    roots: Iterable[float] = (),
-    target: float | None = None,
+    roots_of: Mapping[float, Iterable[float]] = MappingProxyType({}),
     title: str = "",
 ) -> Any:
     """mu_macro (n,) over values ``x`` (n,) of the input ``along``, with its static limit (n,).
 
     ``band`` are the least and the most mu_macro over an interval of k, (n,) each, or with
     ``band_of`` "std" one standard deviation below and above; ``borders`` places on ``x`` with their
-    names, such as "border of continuous sliding"; ``roots`` values of the input to mark, and
-    ``target`` the mu_macro [-] that they give; ``title`` the other inputs.
+    names, such as "border of continuous sliding"; ``roots_of`` values of the input to mark, by the
+    mu_macro [-] that they give; ``title`` the other inputs.
     """
     ax, ink = axes_for(ax), _ink()
     ax.plot(x, mu_macro, color="C0", label=r"$\mu_\mathrm{macro}$")
@@ -321,9 +323,10 @@ def plot_law(
         label = None if name in legend_names else name
         ax.axvline(value, ls=_LINES[name], lw=1.2, color=BORDER, label=label)
         legend_names.add(name)
-    if target is not None:
+    for target, roots in roots_of.items():
+        places = [*roots]
         ax.axhline(target, lw=0.8, color=ink, label=f"target {target:.6g}")
-        ax.plot([*roots], [target] * len([*roots]), "o", color=ink, mec="white")
+        ax.plot(places, [target] * len(places), "o", color=ink, mec="white")
     if x[0] > 0.0 and x[-1] > 20.0 * x[0]:
         ax.set_xscale("log")
     ax.set(xlabel=_axis(along), ylabel=r"$\mu_\mathrm{macro}$ [-]", xlim=(x[0], x[-1]))
@@ -364,8 +367,8 @@ def plot_fit(along: str, curves: Sequence[Curve], title: str, ax: Any = None) ->
     """Measured points, the fit and its band over the input ``along``, and below them the residuals;
     more than 8 curves have no legend.
 
-    ``ax`` are two axes, or new ones, and an array of both is returned; on one alone there are no
-    residuals, and it is returned.
+    ``ax`` are two axes, or new ones; on one alone there are no residuals.  The upper ones are
+    returned.
     """
     pair = axes_for(ax, OF_FIT)
     upper, lower = pair if np.ndim(pair) else (pair, None)
@@ -397,7 +400,7 @@ def plot_fit(along: str, curves: Sequence[Curve], title: str, ax: Any = None) ->
         reach = 1.15 * max(map(abs, lower.get_ylim()))
         lower.set_ylim(-reach, reach)
     head(upper, title, legend=len(curves) <= _MOST_LABELS)
-    return pair if lower is None else np.array([upper, lower], object)
+    return upper
 
 
 def plot_loop(x: Array, force: Array, fitted: Array, title: str, ax: Any = None) -> Any:
@@ -417,7 +420,7 @@ def plot_loop(x: Array, force: Array, fitted: Array, title: str, ax: Any = None)
         lower.axhline(0.0, lw=0.8, color=_ink())
         lower.set_ylabel("residual [N]")
     head(upper, title)
-    return pair if lower is None else np.array([upper, lower], object)
+    return upper
 
 
 def _ink() -> str:
@@ -669,9 +672,10 @@ def plot_cycle(
     ax: Any = None,
 ) -> Any:
     """Forces of one period over time, with the limit mu0 Fz, and the path of the upper point with
-    the force at 16 moments; all (n,), in SI.  ``ax`` are two axes, or new ones; an array of both is
-    returned."""
-    forces, path = axes_for(ax, OF_CYCLE)
+    the force at 16 moments; all (n,), in SI.  ``ax`` are two axes, or new ones; on one alone there
+    is no path.  Those of the forces are returned."""
+    pair = axes_for(ax, OF_CYCLE)
+    forces, path = pair if np.ndim(pair) else (pair, None)
     ink = _ink()
     share = (t - t[0]) / (t[-1] - t[0])
     forces.plot(share, Fx, color="C0", label="$F_x$, along the drag")
@@ -682,12 +686,19 @@ def plot_cycle(
     forces.axhline(mean, lw=0.8, color="C0", ls="--", label="mean of $F_x$")
     forces.set(xlabel="share of the period [-]", ylabel="force [N]", xlim=(0.0, 1.0))
     head(forces, title, last=path)
+    if path is not None:
+        _draw_path(path, x, y, Fx, Fy)
+    return forces
+
+
+def _draw_path(path: Any, x: Array, y: Array, Fx: Array, Fy: Array) -> None:
+    """The path of the upper point on its axes, with the force at 16 moments."""
     extent = max(np.ptp(x), np.ptp(y))
     unit, scale = suited("m", float(extent))
     x, y = x * scale.over / scale.times, y * scale.over / scale.times
-    path.plot(x, y, color=ink, label="upper point")
+    path.plot(x, y, color=_ink(), label="upper point")
     path.plot(x[0], y[0], "o", color="C0", label="start of the period")
-    at = np.linspace(0, t.size - 1, _ARROWS + 1).astype(int)[:-1]
+    at = np.linspace(0, x.size - 1, _ARROWS + 1).astype(int)[:-1]
     # the longest arrow is a fifth of the path's extent
     length = 0.2 * max(np.ptp(x), np.ptp(y)) / max(float(np.hypot(Fx, Fy).max()), 1e-300)
     tips = np.stack([x[at] + length * Fx[at], y[at] + length * Fy[at]], axis=1)
@@ -715,4 +726,3 @@ def plot_cycle(
     )
     path.autoscale_view()
     head(path, "")
-    return np.array([forces, path], object)

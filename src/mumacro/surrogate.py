@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal, Self, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, Self, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import plotting
-from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, PlainCase
+from mumacro.answer import Answer
 from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled
 from mumacro.inputs.cases import (
@@ -39,6 +39,9 @@ from mumacro.table import atlas
 from mumacro.table.blocks import Table
 from mumacro.table.bundled import bundled_table, bundled_tables
 from mumacro.table.netcdf import json_attributes, parse_table, read_image
+
+if TYPE_CHECKING:
+    from mumacro.answer import AnswerWithGradient, IntervalAnswer
 
 _RATIO = SCALAR_KERNEL.ratio
 _FLOAT = np.dtype(np.float64)
@@ -399,7 +402,7 @@ class Surrogate:
     @overload
     def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: Literal[True], **case: Unpack[OneCase]
-    ) -> AnswerWithGradient[float]: ...
+    ) -> "AnswerWithGradient[float]": ...
 
     @overload
     def evaluate(  # type: ignore[overload-overlap]
@@ -409,7 +412,7 @@ class Surrogate:
     @overload
     def evaluate(  # type: ignore[overload-overlap]
         self, cases: None = ..., /, *, gradient: bool = ..., **case: Unpack[OneInterval]
-    ) -> IntervalAnswer[float]: ...
+    ) -> "IntervalAnswer[float]": ...
 
     @overload
     def evaluate(
@@ -419,7 +422,7 @@ class Surrogate:
         *,
         gradient: Literal[True],
         **columns: Unpack[ManyCases],
-    ) -> AnswerWithGradient[Array]: ...
+    ) -> "AnswerWithGradient[Array]": ...
 
     @overload
     def evaluate(
@@ -607,15 +610,16 @@ class Surrogate:
         if with_f:
             six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
         row = self.tabulated.one(six, gradient, kind.contact)
-        answer: Answer[float] = (AnswerWithGradient if gradient else Answer)(
+        answer: Answer[float] = Answer(
             row.mu_macro,
             row.mu_ratio,
             row.error_bound,
             row.source,
             (row.v_tilde, row.y_tilde, row.length_scale),
-            PlainCase(kind, six, with_f),
+            None,
             self,
         )
+        answer._plain = kind, six, with_f
         if gradient:
             slopes, bounds = tuple(row.gradient), tuple(row.gradient_bound)
             answer.gradient = dict(zip(FIELDS, slopes, strict=True))

@@ -7,7 +7,6 @@ from typing import Any
 
 from mumacro.cli import common, motion, solve_motion
 from mumacro.cli.common import (
-    CURVE,
     ImpossibleError,
     OneLineParser,
     Unit,
@@ -23,11 +22,8 @@ from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import read_one
 from mumacro.motions.solve_motion import UNKNOWNS
-from mumacro.questions.law import Law
-from mumacro.questions.law import law as friction_law
 from mumacro.questions.solve_for import Root, Solution, solve_for
 from mumacro.results import tidy_zeros
-from mumacro.surrogate import Surrogate
 from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
@@ -100,9 +96,14 @@ def run(words: Sequence[str]) -> str:
     between = [(unknown, text) for text in options.between or ()]
     ends = common.read_values(between, read_one)
     surrogate = open_table(options.table)
-    others = {"stiffness_exponent": options.stiffness_exponent, **kind.names, **case}
     solution = solve_for(
-        surrogate, unknown, target, within=(ends[0], ends[1]) if ends else None, **others
+        surrogate,
+        unknown,
+        target,
+        within=(ends[0], ends[1]) if ends else None,
+        stiffness_exponent=options.stiffness_exponent,
+        **kind.names,
+        **case,
     )
     solutions = _solutions_by_k(solution, case)
     rows = [(k, root) for k, one in solutions.items() for root in one.roots[0]]
@@ -116,13 +117,7 @@ def run(words: Sequence[str]) -> str:
         heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
         in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
         columns = dict(zip(heads, zip(*in_si, strict=True), strict=True))
-        low, high = ends or _around([root.value for _, root in rows])
-
-        def draw(axes: Any) -> Any:
-            law = _law_over(surrogate, unknown, low, high, others)
-            return law.plot(axes, roots=[root.value for _, root in rows], target=target)
-
-        return common.write_result(options.out, columns, draw)
+        return common.write_result(options.out, columns, solution.plot)
     units = common.units_in(options.words, **{unknown: options.between or ()})
     first_root = rows[0][1].value
     count = common.count_for(options, surrogate, {**case, unknown: first_root}, kind)
@@ -150,28 +145,6 @@ def _solutions_by_k(solution: Solution, case: Mapping[str, Any]) -> dict[Any, So
 def _heads(unknown: str, k: str | None) -> list[str]:
     """The heads of the columns of roots, from those of the unknown and, of an interval, of k."""
     return [*([k] if k else []), unknown, "between", "and", "mu_macro [-]", "regime"]
-
-
-def _law_over(
-    surrogate: Surrogate, unknown: str, low: float, high: float, others: Mapping[str, Any]
-) -> Law:
-    """The law over the unknown for a picture."""
-    return friction_law(
-        surrogate,
-        unknown,
-        start=low,
-        stop=high,
-        points=CURVE,
-        scale="log" if low > 0.0 else "linear",
-        refine=True,
-        **others,
-    )
-
-
-def _around(roots: Sequence[float]) -> tuple[float, float]:
-    """The range of a picture: a decade around the roots; what is at 0 is shown up to 1."""
-    least, most = min(roots), max(roots)
-    return 0.1 * least or 1e-6 * (most or 1.0), 10.0 * most or 1.0
 
 
 def _table(

@@ -202,8 +202,8 @@ class Fit(Result):
 
         Each set of the other inputs has a curve; more than 8 of them have no legend.  Where each
         point has a set of its own, such as its mu0, one curve goes through all of them, with the
-        other inputs interpolated.  ``ax`` are two axes of matplotlib, or new ones, and an array of
-        both is returned; one alone gets no residuals, and is returned.
+        other inputs interpolated.  ``ax`` are two axes of matplotlib, or one, which gets no
+        residuals, or new ones; the upper ones are returned.
         """
         inputs = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(inputs, key=lambda name: (np.unique(inputs[name]).size, name == "v0"))

@@ -55,8 +55,8 @@ class LoopFit(Result):
     def plot(self, ax: Any = None) -> Any:
         """The measured loop and that of the model, and below them the residuals.
 
-        ``ax`` are two axes of matplotlib, or new ones, and an array of both is returned; one alone
-        gets no residuals, and is returned.
+        ``ax`` are two axes of matplotlib, or one, which gets no residuals, or new ones; the upper
+        ones are returned.
         """
         title = f"{', '.join(self._texts()[:2])}; {self.contact}"
         x, force, fitted = (self.loop[name] for name in ("displacement", "force", "fitted"))

@@ -193,7 +193,8 @@ class Motion(Result):
         """Forces over a period, and beside them the path of the upper point with the force at 16
         moments; of many cases the one at ``index``, as in :meth:`cycle`.
 
-        ``ax`` are two axes of matplotlib, or new ones; an array of both is returned.
+        ``ax`` are two axes of matplotlib, or one, which gets no path, or new ones; those of the
+        forces are returned.
         """
         i = self._place(index)
         case = {name: float(column[i]) for name, column in self.scenes.columns.items()}

@@ -7,13 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import (
-    BAND,
-    GROUPS,
-    Answer,
-    AnswerWithGradient,
-    IntervalAnswer,
-)
+from mumacro.answer import BAND, GROUPS, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.kind import BALL, Kind
@@ -113,15 +107,6 @@ def answer(
     return _of_many(tabulated, cases, outputs, detail)
 
 
-def _type_of(cases: Cases, outputs: tuple[Output, ...]) -> Any:
-    """The type of the answer."""
-    if cases.ends is not None:
-        return IntervalAnswer
-    if GRADIENT in outputs:
-        return AnswerWithGradient
-    return Answer
-
-
 def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
     """The answer to one case, in plain numbers."""
     values: Values = {}
@@ -129,7 +114,7 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
         for output in outputs:
             values |= output.compute(case)
     cases = case.cases
-    answer: Answer[float] = _type_of(cases, outputs)(
+    answer: Answer[Any] = Answer(
         case.mu_macro,
         case.mu_ratio,
         case.error_bound,
@@ -138,8 +123,9 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
         cases,
     )
     answer.outputs = {path: float(values[path]) for path in paths_of(outputs, cases.fields)}
-    if isinstance(answer, IntervalAnswer):
-        answer.mu_macro_low, answer.mu_macro_high = case.mu_macro_low, case.mu_macro_high
+    if cases.ends is not None:
+        for name in BAND:
+            setattr(answer, name, getattr(case, name))
     if GRADIENT in outputs:
         answer.gradient, answer.gradient_bound = case.gradient, case.gradient_bound
     if STD in outputs:
@@ -156,15 +142,19 @@ def _of_many(
     def shaped(name: str) -> Any:
         return columns[name].reshape(cases.shape)
 
-    answer: Answer[Any] = _type_of(cases, outputs)(
-        *map(shaped, _ALWAYS[:3]),
+    mu_macro, mu_ratio, error_bound = map(shaped, _ALWAYS[:3])
+    answer: Answer[Any] = Answer(
+        mu_macro,
+        mu_ratio,
+        error_bound,
         np.asarray(columns["source"], np.int8).reshape(cases.shape),
         None if detail == "values" else (*map(shaped, GROUPS),),
         cases,
     )
     answer.outputs = {path: shaped(path) for path in paths_of(outputs, cases.fields)}
-    if isinstance(answer, IntervalAnswer):
-        answer.mu_macro_low, answer.mu_macro_high = map(shaped, BAND)
+    if cases.ends is not None:
+        for name in BAND:
+            setattr(answer, name, shaped(name))
     if GRADIENT in outputs:
         answer.gradient, answer.gradient_bound = (
             {field: shaped(f"{name} {field}") for field in cases.fields} for name in _SLOPES

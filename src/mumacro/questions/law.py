@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -95,10 +96,13 @@ class Law(Result):
         return [f"{mark.name} at {self.along} = {mark.value:.6g} {unit}" for mark in self.border]
 
     def plot(
-        self, ax: Any = None, *, roots: Iterable[float] = (), target: float | None = None
+        self, ax: Any = None, *, roots_of: Mapping[float, Iterable[float]] = MappingProxyType({})
     ) -> Any:
-        """mu_macro over the swept input with its static limit and borders, on axes ``ax`` of
-        matplotlib, or new ones, which are returned; see ``mumacro.plotting.plot_law``."""
+        """Draw mu_macro over the swept input with its static limit and borders; ``roots_of`` has
+        the roots of each target to mark.
+
+        ``ax`` are axes of matplotlib, or new ones; they are returned.
+        """
         return plotting.plot_law(
             self.along,
             self.values,
@@ -108,8 +112,7 @@ class Law(Result):
             band=self.band,
             band_of="k" if self.std is None else "std",
             borders=[(crossing.value, crossing.name) for crossing in self.border],
-            roots=roots,
-            target=target,
+            roots_of=roots_of,
             title=plotting.in_words(
                 self.case if self.k_ends is None else {**self.case, "k": self.k_ends},
                 self.kind.names,

@@ -31,7 +31,8 @@ How a level is found on a monotone branch: :mod:`mumacro.questions.rootfinding`.
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,18 +41,20 @@ from mumacro.answer import Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
-from mumacro.inputs.fields import POSITIVE, QUANTITY_OF, field_of, unit_of
+from mumacro.inputs.fields import ENDS, POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.reading import read_one
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.questions import solutions as tables
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
+from mumacro.questions.law import law
 from mumacro.questions.rootfinding import TINY, Branch, branches_between, last_double, samples
 from mumacro.results import Result
 from mumacro.surrogate import Surrogate
 
 HUGE = 1.7976931348623157e308
+_DRAWN = 400  # points of a curve in a picture
 _NO_LIMIT = 1e300  # of the unknown: what is beyond it is all that a double holds
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.
@@ -111,6 +114,10 @@ class Solution(Result):
     ends: tuple["Solution", "Solution"] | None = None
     #: how k grows with Fz, where that is solved for; None where k is constant
     stiffening: Stiffening | None = None
+    #: what was searched; of an interval of k at its middle
+    curve: InputCurve | None = field(default=None, compare=False)
+    #: the range that was asked for [SI]; None for the default one
+    within: tuple[float, float] | None = field(default=None, compare=False)
 
     @property
     def value(self) -> float:
@@ -159,6 +166,42 @@ class Solution(Result):
         """The roots as a table: target, value, low, high, mu_macro, regime; one row a root."""
         return tables.columns_of(Root, self.targets, self.roots)
 
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the law over the unknown with the targets and their roots, over the range that was
+        asked for, or a decade around the roots; of an interval of k its band, and the roots at its
+        ends, too.
+
+        ``ax`` are axes of matplotlib, or new ones; they are returned.
+        """
+        if self.curve is None:
+            raise TypeError("a solution that solve_for has not made has no picture")
+        roots_of: dict[float, list[float]] = {target: [] for target in self.targets}
+        for one in (self, *(self.ends or ())):
+            for target, roots in zip(self.targets, one.roots, strict=True):
+                roots_of[target] += (root.value for root in roots)
+        every = [root for roots in roots_of.values() for root in roots] or [1.0]
+        low, high = self.within or _around(every)
+        case: dict[str, Any] = dict(self.curve.case)
+        if self.stiffening is not None:
+            load, exponent = self.stiffening.load, self.stiffening.exponent
+            case |= {"Fz": load, "stiffness_exponent": exponent}
+        if self.ends is not None:
+            del case["k"]
+            curves = [end.curve for end in self.ends if end.curve is not None]
+            case |= {name: curve.case["k"] for name, curve in zip(ENDS, curves, strict=True)}
+        over = law(
+            self.curve.surrogate,
+            self.unknown,
+            start=low,
+            stop=high,
+            points=_DRAWN,
+            scale="log" if low > 0.0 else "linear",
+            refine=True,
+            **self.curve.kind.names,
+            **case,
+        )
+        return over.plot(ax, roots_of=roots_of)
+
     def _heading(self) -> str:
         return f"<Solution for {self.unknown} [{self.unit}]: {tables.counts(self.roots)}>"
 
@@ -170,6 +213,12 @@ class Solution(Result):
             for root in end.roots[0]
         ]
         return [*at_ends, *filter(None, map(self.reason, range(len(self.targets))))][:4]
+
+
+def _around(roots: Sequence[float]) -> tuple[float, float]:
+    """A decade around roots; what is at 0 is shown up to 1."""
+    least, most = min(roots), max(roots)
+    return 0.1 * least or 1e-6 * (most or 1.0), 10.0 * most or 1.0
 
 
 @np.errstate(all="ignore")
@@ -239,7 +288,8 @@ def solve_for(
         if ends is None:
             return solution
         low, high = ends
-        return replace(solution, reach=replace(solution.reach, low=low, high=high))
+        reach = replace(solution.reach, low=low, high=high)
+        return replace(solution, reach=reach, within=ends)
     inputs, interval = without_interval(case, unknown)
     if interval:
         softest, middle, stiffest = (
@@ -301,7 +351,16 @@ def _solution_over(
         tuple(of_target) if reach.holds(target) else ()
         for target, of_target in zip(targets, candidates, strict=True)
     )
-    return Solution(unknown, tuple(targets), roots, reach, constant, stiffening=curve.stiffening)
+    return Solution(
+        unknown,
+        tuple(targets),
+        roots,
+        reach,
+        constant,
+        stiffening=curve.stiffening,
+        curve=curve,
+        within=within,
+    )
 
 
 def _in_unit(solution: Solution, unknown: str, per: float) -> Solution:
@@ -317,7 +376,7 @@ def _in_unit(solution: Solution, unknown: str, per: float) -> Solution:
     ends = solution.ends
     if ends is not None:
         ends = _in_unit(ends[0], unknown, per), _in_unit(ends[1], unknown, per)
-    return replace(solution, unknown=unknown, roots=roots, reach=reach, ends=ends)
+    return replace(solution, unknown=unknown, roots=roots, reach=reach, ends=ends, within=None)
 
 
 def _ends(unknown: str, within: Any) -> tuple[float, float]:

@@ -428,7 +428,7 @@ def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -
         {along: x, "mu_macro": friction(surrogate, **case), "std": 1e-3},
         **{name: value for name, value in case.items() if name != along},
     )
-    axes, below = estimate.plot()
+    axes, below = estimate.plot().figure.axes
     assert below.get_xlabel() == {"v0": "$v_0$ [m/s]", "y0": "$y_0$ [m]"}[along]
     assert axes.get_ylabel() == r"$\mu_\mathrm{macro}$ [-]"
     points, curve = axes.lines[0], axes.lines[-1]

@@ -280,7 +280,7 @@ def test_a_result_is_text_a_dict_a_frame_and_a_picture() -> None:
     assert found.to_frame().shape == (found.residuals.size, 5)
     area = 4.0 * MU0 * FZ * (6e-6 - MU0 * FZ / K)
     assert found.energy == close(area, rel=0.01)
-    upper, _ = found.plot()
+    upper = found.plot()
     assert len(upper.lines) == 2
     assert found.plot(pyplot.subplots()[1]).lines
     pyplot.close("all")

@@ -117,7 +117,7 @@ def test_the_normal_force_obeys_the_published_form(surrogate: Surrogate, alpha: 
 
 def test_the_plot_of_points_with_their_own_mu0_is_one_smooth_curve_through_the_fit() -> None:
     result = measured.fitted("ball")
-    axes, _ = result.plot()
+    axes = result.plot()
     assert axes.get_title(loc="left").endswith(" N/m; ball, along")
     x, y = axes.get_lines()[-1].get_data()
     at_points = np.isin(x, measured.points().v0)

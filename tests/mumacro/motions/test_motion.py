@@ -733,7 +733,8 @@ def test_the_command_writes_pictures_and_csv(capsys: Capture, tmp_path: Any) -> 
 
 def test_the_picture_has_forces_and_path() -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
-    forces, path = motion(**SCENE, x=(2e-6, 90.0), y=4e-6).plot(figure.subplots(1, 2))
+    forces = motion(**SCENE, x=(2e-6, 90.0), y=4e-6).plot(figure.subplots(1, 2))
+    path = figure.axes[1]
     assert len(forces.lines) == 5
     assert path.lines[0].get_xdata()[0] == close(2.0, abs=1e-9)
     assert "mumacro motion" in EXAMPLE
