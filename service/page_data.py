@@ -79,9 +79,10 @@ def _impossible(contact: str, direction: str) -> str:
     return ""
 
 
-def names(guide: bool) -> dict[str, Any]:
+def names(built: bool) -> dict[str, Any]:
     """``names.json``: inputs, choices, geometries with arguments, materials, an example of measured
-    points, the version, and whether a ``guide`` is served."""
+    points, the version, and where the pages of the documents are: in the guide that was ``built``,
+    or as they are written."""
     inputs: dict[str, dict[str, Any]] = {
         name: {
             "label": label,
@@ -115,13 +116,14 @@ def names(guide: bool) -> dict[str, Any]:
         "impossible": {" ".join(kind): reason for kind, reason in reasons.items() if reason},
         "outputs": {" ".join(kind): _outputs_of(kind) for kind in kinds if not reasons[kind]},
         "lacks": {" ".join(kind): _lacks(kind) for kind in kinds if not reasons[kind]},
-        "regimes": {name: name.replace("_", " ") for name in REGIMES},
+        "regimes": {name: plotting.regime_words(name) for name in REGIMES},
         "geometries": geometries,
         "arguments": arguments,
         "materials": _MATERIALS,
         "example": _EXAMPLE,
         "version": __version__,
-        "guide": guide,
+        "guide": "guide/" if built else "documents/",
+        "guide_ending": ".html" if built else ".md",
     }
 
 

@@ -50,7 +50,8 @@ async def docs(request: Request) -> Response:
 @router.get("/static/page/names.json")
 async def get_names(request: Request) -> Response:
     """The library's inputs, units and bounds, and the geometries of a contact."""
-    return Json(names(guide=request.app.state.settings.guide is not None), headers=_FRESH)
+    built = request.app.state.settings.guide is not None or not _DOCUMENTS
+    return Json(names(built), headers=_FRESH)
 
 
 @router.get("/static/page/map.json")
@@ -73,8 +74,13 @@ _FILES = {
     for paths in (ASSETS, *_VENDORED)
     for path in paths
 }
+# the documents as they are written, in a checkout whose guide is not built
+_SOURCE = Path(__file__).resolve().parent.parent.parent / "docs"
+_DOCUMENTS = {
+    f"/documents/{path.relative_to(_SOURCE).as_posix()}": path for path in _SOURCE.rglob("*.md")
+}
 #: what needs no API key: the same for everyone, and without a number of a table
-OPEN = ("/", "/docs", "/static/page/names.json", *_FILES)
+OPEN = ("/", "/docs", "/static/page/names.json", *_FILES, *_DOCUMENTS)
 
 
 @router.get("/static/{folder}/{name}")
@@ -85,3 +91,12 @@ async def get_asset(request: Request, folder: str, name: str) -> Response:
         raise HTTPException(404)
     headers = _ONE_DAY if folder in LIBRARIES else _FRESH
     return file_answer(request, path, headers, media_type=_TYPES[path.suffix])
+
+
+@router.get("/documents/{name:path}")
+async def get_document(request: Request, name: str) -> Response:
+    """A page of the documents as it is written."""
+    path = _DOCUMENTS.get(f"/documents/{name}")
+    if path is None:
+        raise HTTPException(404)
+    return file_answer(request, path, _FRESH, media_type="text/plain")

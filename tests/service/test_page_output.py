@@ -36,16 +36,15 @@ def test_it_loads_and_shows_the_known_value(
     page = open_page()
     answer = surrogate.evaluate(**START, gradient=True)
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
-    assert page.text("#regime") == "stick slip"
-    assert "10\xa0% more or less of k changes µ by" in page.text("#spread")
-    assert 1 <= len(page.texts("#rows li")) <= 3
-    page.click("#assumes")
-    assert page.find("#assumptions").is_displayed()
-    assert len(page.texts("#all-rows p")) >= len(page.texts("#rows li"))
-    page.click("#assumptions button")
-    assert not page.find("#assumptions").is_displayed()
+    assert page.text("#regime") == "Stick and slip: sticks 77 % of a period"
+    assert page.text("#advice").startswith("k decides: 10\xa0% more or less of k changes µ by")
+    assert not page.find("#rows").is_displayed()
+    page.click("#assumes summary")
+    assert page.find("#rows").is_displayed()
+    assert len(page.texts("#rows li")) >= 2
     stick = surrogate.stick_fraction(answer.v_tilde, answer.y_tilde)
     settled = surrogate.evaluate(**START, include=("settling",))
+    limits = surrogate.evaluate(**START, include=("limits",))
     power = surrogate.power(answer.v_tilde, answer.y_tilde) * 0.3 * 10 * 3e-6 * START["omega"]
     expected = {
         "µ/µ₀": f"{answer.mu_ratio:.4g}",
@@ -56,6 +55,7 @@ def test_it_loads_and_shows_the_known_value(
         "sticks": f"{100 * stick:.4g} %",
         "shaker power": f"{1e3 * power:.4g} mW",
         "power saved": f"{1e3 * (0.3 - answer.mu_macro) * 0.1:.4g} mW",
+        "critical speed": f"{1e3 * limits['limits.v0_crit']:.4g} mm/s",
         "settles in": f"{settled['settling.periods']:.3g} periods",
         "error ≤": f"{answer.error_bound:.2g}",
     }
@@ -77,39 +77,16 @@ def test_it_loads_and_shows_the_known_value(
     assert {urlsplit(address).netloc for address in loaded} == {urlsplit(live_server.url).netloc}
 
 
-#: the numbers beside the law that are not seen whole
-CUT = (
-    "return [...document.querySelectorAll('#values dd')]"
-    ".filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.textContent);"
-)
-
-
-def test_all_digits_are_seen_whole_in_the_room_of_a_few(open_page: Any) -> None:
-    sizes = []
-    for digits in ("few", "all"):
-        page = open_page(f"#k=2 N/um&f=25 kHz&digits={digits}", width=1280, height=800)
-        assert page.run(CUT) == []
-        sizes.append(page.find("#part-values").size)
-    assert sizes[0] == sizes[1]
-
-
 def test_a_doubtful_unit_is_told_beside_the_number_and_the_field(open_page: Any) -> None:
     page = open_page("#y0=2")
-    assert page.text("#doubt").startswith("Check the units: ")
-    for address in ("#f=20000 kHz", "#mu0=30&digits=all", "#y0=2"):
-        page = open_page(address, width=1280, height=800)
-        inner, outer = page.run(
-            "const one = document.querySelector('#doubt');"
-            "return [one.scrollHeight, one.clientHeight];"
-        )
-        assert 0 < inner <= outer, address
-        assert "omega" not in page.text("#doubt")
+    assert page.text("#advice").startswith("Check the units: ")
+    assert "doubt" in page.find("#advice").get_attribute("class")
     assert "y" in page.text("#note-y0")
     assert "doubt" in page.run(
         "return document.querySelector('#field-y0').closest('.field').className;"
     )
     page.type("#field-y0", "2 um")
-    assert page.text("#doubt") == ""
+    assert "units" not in page.text("#advice")
 
 
 @pytest.mark.parametrize(
@@ -122,7 +99,8 @@ def test_a_doubtful_unit_is_told_beside_the_number_and_the_field(open_page: Any)
 )
 def test_a_value_is_doubted_as_it_was_typed(open_page: Any, address: str, words: str) -> None:
     page = open_page(address)
-    assert page.text("#doubt").replace("\xa0", " ").endswith(words)
+    assert page.text("#advice").replace("\xa0", " ").endswith(words)
+    assert "omega" not in page.text("#advice")
     assert not re.search(r"\de\+?\d", page.text("#rows"))  # 20600 periods
 
 
@@ -144,7 +122,7 @@ def test_the_law_has_a_unit_in_which_its_ends_read(open_page: Any, speed: str) -
 def test_bars_and_sentence_have_the_same_shares_of_the_variance(open_page: Any) -> None:
     page = open_page("#mu0=0.3 ± 0.02&k=1 ± 0.1 N/um&f=20 ± 4 kHz")
     page.click("#tab-bars")
-    told = page.text("#spread").removeprefix("The variance comes from ").rstrip(".")
+    told = page.text("#advice").removeprefix("Deviation: the variance comes from ").rstrip(".")
     sentence = dict(part.removesuffix(" %").split() for part in told.split(", "))
     names = [name.strip() for name in page.texts("#bars tbody th")]
     bars = dict(zip(names, page.texts("#bars .variance"), strict=True))
@@ -152,10 +130,6 @@ def test_bars_and_sentence_have_the_same_shares_of_the_variance(open_page: Any) 
         name.replace("₀", "0"): share for name, share in sentence.items()
     }
     assert page.texts("#bars thead th") == ["change", "variance"]
-    assert page.run(  # and are seen whole
-        "const one = document.querySelector('#side');"
-        "return one.scrollHeight <= one.clientHeight && one.scrollWidth <= one.clientWidth;"
-    )
     page = open_page()
     page.click("#tab-bars")
     assert page.texts("#bars .variance") == []
@@ -180,7 +154,7 @@ def test_a_target_is_reached_and_drawn(open_page: Any, surrogate: Surrogate) -> 
     page.click("#tab-target")
     page.click("#solve-form button")  # which amplitude halves the friction?
     match = page.wait_for(
-        "#solve-result", r"y₀ = (\S+) µm: µ = 0.1500, stick slip, shaker (\S+) mW"
+        "#solve-result", r"y₀ = (\S+) µm: µ = 0.1500, stick and slip, shaker (\S+) mW"
     )
     assert surrogate.evaluate(**{**START, "y0": float(match[1]) * 1e-6}).mu_ratio == close(
         0.5, abs=1e-5
@@ -236,7 +210,7 @@ def test_a_point_outside_of_the_map_is_marked_on_its_frame(
         "return [(point.x + point.width / 2 - plot.x) / plot.width,"
         " (point.y + point.height / 2 - plot.y) / plot.height];"
     )
-    sides = (x > 0.8) - (x < 0.2), (y < 0.1) - (y > 0.8)
+    sides = (x > 0.8) - (x < 0.2), (y < 0.2) - (y > 0.8)
     assert all(one in (0, at) for one, at in zip(side, sides, strict=True))
     assert page.text("#status") == ""
 
@@ -268,8 +242,8 @@ def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surr
     shades = [colour for _, colour in sorted(painted)]
     written = ["#" + "".join(f"{int(x):02x}" for x in re.findall(r"\d+", one)) for one in shades]
     assert written == plotting.band_colours()
-    # the legend and the law have the same colours
-    for place in ("#map .legend rect", "#law .shade"):
+    # the legend and the strip beside the law have the same colours
+    for place in ("#map .legend rect", "#law .strip"):
         fills = page.run(
             f"return [...document.querySelectorAll('{place}')].map((one) => one.style.fill);"
         )
@@ -294,12 +268,14 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(
         "at v₀ = 5 mm/s to.*at v₀ = 2000 mm/s", page.find("#law").get_attribute("aria-label")
     )
     page.type("#from", "0")
-    page.wait_for("#law-status", "start")  # on a logarithmic scale
+    page.wait_for("#law-status", "^from: ")  # on a logarithmic scale
     assert (page.is_old("#law"), page.is_old("#number")) == (True, False)
     page.choose("#scale", "linear")
     assert page.text("#law-status") == ""
     page.type("#from", "x")
-    page.wait_for("#law-status", "start")
+    page.wait_for("#law-status", "^from: ")
+    page.type("#from", "5")
+    assert page.value("#from") == "5 mm/s"
     page.type("#from", "")
     assert not page.is_old("#law")
     page.choose("#scale", "log")
@@ -334,9 +310,9 @@ def test_k_grows_with_the_load_along_fz(
                 surrogate.evaluate(**grown).mu_macro, rel=1e-9
             )
         page.type("#exponent", "1.5")
-        page.wait_for("#law-status", "stiffness_exponent")
+        page.wait_for("#law-status", "^m: ")
         page.type("#exponent", "half")
-        page.wait_for("#law-status", "stiffness_exponent")
+        page.wait_for("#law-status", "^m: ")
         page.type("#exponent", "")
         page.click("[name=contact][value=ball]")
         question = page.question("v1/law")
@@ -370,7 +346,7 @@ ENDS = {
 @pytest.mark.parametrize("address", ENDS)
 def test_every_law_and_the_ends_of_every_range_are_answered(open_page: Any, address: str) -> None:
     page = open_page(address)
-    assert page.number() >= 0
+    assert float(page.text("#mu").split(" to ")[0]) >= 0
     assert page.run(AXIS).startswith(ENDS[address])
     assert "Friction law from" in page.find("#law").get_attribute("aria-label")
     assert (page.text("#status"), page.text("#law-status")) == ("", "")
@@ -405,7 +381,8 @@ def test_all_contacts_and_directions_answer(
     expected = surrogate.evaluate(
         **case, contact=contact, direction=direction, k_low=8e5, k_high=1.2e6
     )
-    match = page.wait_for("#spread", r"^(\S+) to (\S+) for k = 0.8..1.2 N/um$")
+    assert page.text("#advice").startswith("Interval: k from 0.8 N/µm to 1.2 N/µm; ")
+    match = page.wait_for("#mu", r"^(\S+) to (\S+)$")
     ends = [expected.mu_macro_low, expected.mu_macro_high]
     assert [float(match[1]), float(match[2])] == close(ends, abs=0.02 * (ends[1] - ends[0]) + 1e-9)
     assert len(page.texts("#law .band")) == 1
@@ -430,19 +407,16 @@ def test_all_contacts_and_directions_answer(
 
 @pytest.mark.parametrize("width", [1280, 1920])
 def test_a_body_is_one_row(open_page: Any, width: int) -> None:
-    page = open_page(width=width, height=800)
-    for body in (("material-1", "E", "nu"), ("material-2", "E2", "nu2")):
-        material, *numbers = body
-        rows = {page.find(f"#{material}").rect["y"]}
-        rows |= {page.find(f"#argument-{name}").rect["y"] for name in numbers}
-        assert len(rows) == 1, body
+    page = open_page("#panel=stiffness", width=width, height=800)
+    for body in (("E", "nu"), ("E2", "nu2")):
+        assert len({page.find(f"#argument-{name}").rect["y"] for name in body}) == 1, body
 
 
 def test_k_from_materials(open_page: Any) -> None:
-    with open_page.faked(RECORDED) as page:
+    with open_page.faked(RECORDED, "#panel=stiffness") as page:
         page.click("#stiffness-form button")  # what is missing is named beside its field
         assert page.find("#argument-E").get_attribute("aria-invalid") == "true"
-        assert "nu" in page.text("#stiffness-status")
+        assert "ν" in page.text("#stiffness-status")
         page.type("#argument-radius", "5 mm")
         page.choose("#material-1", "steel")
         page.type("#argument-E2", "rigid")
@@ -471,7 +445,7 @@ def test_k_from_materials(open_page: Any) -> None:
 
 
 def test_a_length_without_a_unit_is_told_and_doubted(open_page: Any) -> None:
-    page = open_page()
+    page = open_page("#panel=stiffness")
     page.choose("#argument-radius", "5")
     assert page.text("#about-radius") == "read as 5 m"
     assert page.find("#argument-E").get_attribute("aria-invalid") == "false"  # not typed yet
@@ -518,8 +492,7 @@ def test_the_measured_example_is_read_and_fitted(open_page: Any) -> None:
 
 def test_before_the_points_stands_what_they_are(open_page: Any) -> None:
     page = open_page("#panel=fit", width=1280, height=800)
-    form, hint = page.find("#fit-form").rect, page.find("#fit-hint").rect
-    assert hint["x"] >= form["x"] + form["width"]  # the right half is not empty
+    assert page.find("#fit-hint").is_displayed()
     assert not page.find("#fit-plot").is_displayed()
     page.choose("#points", "v0 mu_macro\n0.001 0.22\n0.1 0.27")
     assert (page.find("#fit-hint").is_displayed(), page.find("#fit-plot").is_displayed()) == (
@@ -624,7 +597,7 @@ def test_a_remedy_is_one_of_the_page(open_page: Any) -> None:
         assert page.text(f"#note-{field}").startswith("must be ")
         assert not re.search(r"--\w|mumacro ", page.text(f"#note-{field}"))
     page.type("#field-k", "5 psi")
-    assert page.find("#tab-stiffness").text in page.text("#note-k")
+    assert page.text("#part-stiffness h2") in page.text("#note-k")
 
 
 def test_a_motion_says_that_it_has_no_deviation(open_page: Any) -> None:
@@ -635,8 +608,41 @@ def test_a_motion_says_that_it_has_no_deviation(open_page: Any) -> None:
     assert page.text("#motion-doubt") == ""
 
 
+def test_the_motion_at_the_start_answers_its_question(open_page: Any) -> None:
+    page = open_page("#panel=motion")
+    page.click("#motion-target-form button")
+    root = page.wait_for("#motion-roots", r"v₀ = (\S+) mm/s")
+    case: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 1e-3 * float(root[1])}
+    conveyor = mumacro.motion(**case, x=(2e-6, 90.0), normal=(5.0, -90.0))
+    assert conveyor.mu_macro == close(0.0, abs=1e-5)
+
+
+def test_a_motion_has_its_remarks(open_page: Any) -> None:
+    page = open_page("#panel=motion&x=&normal=")
+    assert page.texts("#motion-doubt li") != []
+    page.type("#motion-x", "50 mm")
+    assert page.text("#motion-note-x").endswith("is it in metres?")
+    page.type("#motion-x", "2 um")
+    assert page.texts("#motion-doubt li") == []
+    page.click("[name=contact][value=ball]")  # whose load cannot oscillate
+    assert not page.find("#motion-normal").is_enabled()
+    assert page.text("#motion-status") == ""
+    assert "radius" in page.text("#motion-note-normal")
+
+
+@pytest.mark.parametrize(
+    "address", ["#k=1 ± 0.1 N/um", "#mu0=0.3 ± 5 %&Fz=10 ± 1 N", "#k=0.1..10 N/um"]
+)
+@pytest.mark.parametrize("along", ["v0", "Fz", "k", "y0"])
+def test_what_is_uncertain_is_a_band_of_the_law(open_page: Any, address: str, along: str) -> None:
+    page = open_page(f"{address}&along={along}")
+    assert page.text("#law-status") == ""
+    swept = along == "k" and address.startswith("#k")  # which has no deviation itself
+    assert len(page.texts("#law .band")) == (0 if swept else 1)
+
+
 def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
-    page = open_page("#digits=all")
+    page = open_page("#digits=all&x=1 um @ 90 deg&normal=")
     page.click("#tab-motion")
     page.type("#motion-y", "2 um")
     case: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
@@ -692,11 +698,10 @@ def test_no_text_of_the_plots_of_a_motion_covers_another(open_page: Any, y: str)
 @pytest.mark.parametrize("kind", ["spring", "ball", "rigid"])
 def test_what_is_assumed_and_what_slips_is_that_of_the_contact(open_page: Any, kind: str) -> None:
     page = open_page(f"#contact={kind}&panel=motion&k=1 N/um" if kind != "rigid" else "#k=rigid")
-    page.click("#assumes")
-    words = page.find("#assumptions").text + page.find("#rows").text
+    page.click("#assumes summary")
+    words = page.find("#answer").text
     assert ("foot" in words) is (kind == "spring")
     assert ("One spring" in words) is (kind == "spring")
-    page.click("#assumptions button")
     if kind == "rigid":
         return
     page.click("[data-meanings=motion-values]")
@@ -791,7 +796,11 @@ LONG = "mu0=0.3 ± 0.03&Fz=20 ± 0.5 N&k=10.6114 ± 1 N/µm&y0=0.5 ± 0.05 µm&f
         ("#k=1 ± 0.1 N/um", []),
         (f"#{LONG}&contact=ball&direction=along", ["reverse slip", "565"]),
         (f"#{LONG}&contact=ball&panel=motion&x=0.2 um&y=0.5 um@90", ["Any motion", "drag force"]),
+        ("#panel=motion", ["Any motion", "drag force"]),
         ("#panel=fit", []),
+        ("#panel=stiffness&side=target&digits=all", ["shaker power"]),
+        ("#k=0.1..10 N/um", ["0.03460 to 0.2997"]),
+        ("#k=rigid&y0=2", ["Check the units"]),
         ("#panel=fit&example", ["k from measured friction", "9.97 N/µm", "residuals", "Rings"]),
     ],
 )
@@ -811,8 +820,7 @@ def test_it_prints_on_one_page(
         (tmp_path / "page.pdf").write_bytes(pdf)
         text = subprocess.check_output(["pdftotext", tmp_path / "page.pdf", "-"], text=True)
         assert page.text("#mu") in text
-        assert ("k=1" in text.replace("+", " ").replace("%20", " ")) is (address != "#panel=fit")
-        assert "Example" not in text
+        assert all(word not in text for word in ("Example", "Reset", "Find", "Close"))
         assert all(one in text for one in words)
         assert ("Any motion" in text) is ("panel=motion" in address)
         assert ("k from measured friction" in text) is ("example" in address)

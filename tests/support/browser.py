@@ -312,6 +312,13 @@ class Page:
         self.until((folder / name).exists, lambda: [path.name for path in folder.iterdir()])
         return (folder / name).read_text("utf-8")
 
+    def pixel_ratio(self, ratio: int, width: int, height: int) -> None:
+        """Show the page with so many pixels of the screen in one of the style sheet."""
+        metrics = {"width": width, "height": height, "mobile": width < 500}
+        metrics |= {"deviceScaleFactor": ratio}
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        self.settle()
+
     def scheme(self, name: str) -> None:
         """Switch to the light or dark scheme, and wait until the page has taken it and every colour
         has changed."""

@@ -7,10 +7,10 @@ import { lawPanel } from "./law.js";
 import { mapPanel } from "./map.js";
 import { meaningsDialog } from "./meanings.js";
 import { motionPanel } from "./motion.js";
-import { sidePanel, tabs } from "./side.js";
+import { sidePanel } from "./side.js";
 import { fromAddress } from "./state.js";
 import { stiffnessPanel } from "./stiffness.js";
-import { about } from "./words.js";
+import { about, withUnit } from "./words.js";
 
 const LAW_FIELDS = ["along", "scale", "from", "to", "exponent"];
 
@@ -25,7 +25,7 @@ export function cards(store, moved, aim, again) {
   const law = lawPanel(store, moved);
   const side = sidePanel(store, moved, aim);
   const copy = copies("copy");
-  const tab = tabs("panel-tabs", (panel) => store.look({ panel }));
+  const open = panels(store);
   const stiffness = stiffnessPanel(store, moved);
   const fit = fitPanel(store, moved, (address) =>
     store.change(fromAddress(`#${address}&panel=fit`).state),
@@ -44,7 +44,7 @@ export function cards(store, moved, aim, again) {
     const settled = answer?.state === state;
     copy(textsOf(state), settled ? null : (trouble?.text ?? "there is no number yet."));
     if (store.dragged) return;
-    tab(state.panel);
+    open(state.panel);
     stiffness();
     fit(answer);
     motion(answer, settled || trouble !== null);
@@ -57,13 +57,38 @@ export function cards(store, moved, aim, again) {
   return { point, rest };
 }
 
+/** What is open beside the map, and any motion below it; the result opens one by its name. */
+function panels(store) {
+  const parts = { stiffness: "part-stiffness", fit: "part-fit", motion: "part-motion" };
+  $("tab-motion").addEventListener("click", () =>
+    store.look({ panel: store.state.panel === "motion" ? "none" : "motion" }),
+  );
+  for (const button of document.querySelectorAll("[data-close]"))
+    button.addEventListener("click", () => store.look({ panel: "none" }));
+  let shown; // what a link opens stays where it is, below the number
+  return (panel) => {
+    for (const [name, id] of Object.entries(parts)) $(id).hidden = name !== panel;
+    $("tool").hidden = !["stiffness", "fit"].includes(panel);
+    $("tab-motion").setAttribute("aria-expanded", String(panel === "motion"));
+    const opened = shown !== undefined && panel !== shown && panel !== "none";
+    shown = panel;
+    if (opened) $(parts[panel]).scrollIntoView({ block: "nearest" });
+  };
+}
+
 /** What is chosen of the law, and how many digits are shown. */
 function lawFields(store) {
   for (const [name, { symbol }] of Object.entries(about.inputs))
     $("along").append(new Option(symbol, name));
+  const unit = (name) => $(name).placeholder.split(" ")[1]; // in which the ends of the axis read
+  function changeOf(name, value) {
+    if (name === "along") return { along: value, from: "", to: "" };
+    const end = name === "from" || name === "to";
+    return { [name]: end ? withUnit(store.state.along, value, unit(name)) : value };
+  }
   for (const name of LAW_FIELDS)
     $(name).addEventListener("change", ({ target: { value } }) =>
-      store.change(name === "along" ? { along: value, from: "", to: "" } : { [name]: value }),
+      store.change(changeOf(name, value)),
     );
   $("digits").addEventListener("change", ({ target: { checked } }) =>
     store.change({ digits: checked ? "all" : "few" }),

@@ -44,7 +44,7 @@ export function textsOf(state) {
   return {
     link: page() + toAddress(state),
     curl: curl("v1/mu-macro", body),
-    python: `import mumacro\nprint(mumacro.open().evaluate(${keywords(body)}).mu_macro)`,
+    python: `import mumacro\nprint(mumacro.open().evaluate(${keywords(body)}))`,
     command: `mumacro ${words(inputs)}${options(chosen)}`,
   };
 }
@@ -66,7 +66,7 @@ export function motionTexts(state, answer) {
  * function takes them; where there is no number, it takes the reason, and the link alone is left.
  */
 export function copies(id) {
-  const button = ([name, word]) => html`<button data-copy=${name}>${word}</button>`;
+  const button = ([name, word]) => html`<button class="word" data-copy=${name}>${word}</button>`;
   render(Object.entries(BUTTONS).map(button), $(`${id}-row`));
   const [buttons, field] = [[...$(`${id}-row`).children], $(`${id}-text`)];
   let texts = {};
@@ -87,7 +87,7 @@ export function copies(id) {
   });
   return (latest, why = null) => {
     [texts, reason] = [why === null ? latest : { link: latest.link }, why];
-    for (const button of buttons) button.disabled = !(button.dataset.copy in texts);
+    for (const button of buttons) button.disabled = !Object.hasOwn(texts, button.dataset.copy);
     field.value = shown("command");
     field.classList.toggle("hint", why !== null);
     write(`${id}-status`, "");

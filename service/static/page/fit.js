@@ -56,7 +56,7 @@ export function fitPanel(store, moved, openCase) {
   function question(more = {}) {
     const unknowns = $("unknowns")
       .value.split(" ")
-      .filter((name) => !(table && name in table.columns));
+      .filter((name) => !(table && Object.hasOwn(table.columns, name)));
     const columns = table ? Object.keys(table.columns) : [];
     const body = exactCase(store.state, answer, [
       "v0",

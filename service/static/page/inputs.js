@@ -4,7 +4,7 @@ import { dials } from "./dials.js";
 import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
-import { about, inUnit, numberOf, prose, typeset, unitAt, withUnit } from "./words.js";
+import { about, around, inUnit, numberOf, pageOf, prose, typeset, unitAt, withUnit } from "./words.js";
 
 /** Of an input, by one press of an arrow key; with Shift. */
 const [STEP, FINE_STEP] = [1.05, 1.005];
@@ -21,7 +21,7 @@ export function choice(store, name, words, reasons = {}) {
         name=${name}
         value=${value}
         .checked=${store.state[name] === value}
-        ?disabled=${value in reasons}
+        ?disabled=${Object.hasOwn(reasons, value)}
         @change=${() => store.change({ [name]: value })}
       />
       <span>${words[value]}</span>
@@ -80,8 +80,41 @@ export function inputsPanel(store, moved) {
           .value=${text}
         />
         <p id=${`note-${name}`} class="note">${name === typing ? "" : prose(below)}</p>
+        ${name === "k" && !rigid ? ways(numberOf(answer?.inputs.k)) : nothing}
       </div>
     `;
+  }
+
+  /** Where k comes from, which is the input that nobody knows. */
+  function ways(k) {
+    const tool = (panel, words) => html`
+      <button
+        id=${`tab-${panel}`}
+        class="word"
+        type="button"
+        aria-controls="tool"
+        aria-expanded=${String(store.state.panel === panel)}
+        @click=${() => store.look({ panel: store.state.panel === panel ? "none" : panel })}
+      >
+        ${words}
+      </button>
+    `;
+    const interval = html`
+      <button
+        id="as-interval"
+        class="word"
+        type="button"
+        title="Ten per cent less to ten per cent more, to be changed"
+        ?disabled=${!(k > 0)}
+        @click=${() => store.change({ k: around(k) })}
+      >
+        interval
+      </button>
+    `;
+    return html`<p class="ways">
+      from ${tool("stiffness", "materials")} · ${tool("fit", "points")} ·
+      <a href=${pageOf("how-to/loop")}>loop</a> · ${interval}
+    </p>`;
   }
 
   /** An arrow key moves the input of a field by 5 %, with Shift by 0.5 %. */

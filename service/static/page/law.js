@@ -49,7 +49,7 @@ function lawQuestion(state, answer) {
   const { along, scale } = state;
   const [start, stop] = usualRange(state, answer);
   return {
-    ...caseAround(state, answer, along),
+    ...caseAround(state, answer, along, false),
     along,
     start: state.from || start,
     stop: state.to || stop,
@@ -89,7 +89,6 @@ export function lawPanel(store, moved) {
   /** Why there is no other law; what the number lacks, too, is told beside the number. */
   function tell() {
     write("law-status", behind ? "" : (refused ?? ""));
-    attribute("law-status", "title", $("law-status").textContent);
     $("law").classList.toggle("old", behind || refused !== null);
   }
 
@@ -104,34 +103,41 @@ export function lawPanel(store, moved) {
 
   /** µ₀ where the law is drawn: at each value, or one for all of them. */
   const heights = () => (law.along === "mu0" ? law.values : [answer.inputs.mu0.value]);
+  /** Both ends of what an interval or a deviation leaves open. */
+  function band() {
+    const { mu_macro: mu, std, mu_macro_low: low, mu_macro_high: high } = law;
+    if (std) return [-1, 1].map((side) => mu.map((one, i) => Math.max(one + side * std[i], 0)));
+    return low ? [low, high] : null;
+  }
   const shown = () => law.values.map((value) => toUnit(law.along, value, unit()));
 
   function paint() {
     if (!law || !answer) return;
     const high = answer.mu_macro + (answer.std ?? 0); // of the case
-    const top = 1.05 * Math.max(...heights(), high, ...(law.mu_macro_high ?? law.mu_macro)) || 1;
+    const top = 1.05 * Math.max(...heights(), high, ...(band()?.[1] ?? law.mu_macro)) || 1;
     const places = shown();
     plot.axes({
       x: { domain: [places[0], places.at(-1)], log: law.scale === "log", title: heading() },
       y: { domain: [0, top], log: false, title: "friction µ" },
     });
     const { inside, box } = plot;
-    bands(places);
     plot.path(
       places.map((x, i) => [x, law.mu_static[i]]),
       "still",
     );
-    if (law.mu_macro_low) range(places, law.mu_macro_low, law.mu_macro_high, "band");
+    const ends = band();
+    if (ends) range(places, ...ends, "band");
     plot.path(
       places.map((x, i) => [x, law.mu_macro[i]]),
       "curve",
     );
+    strip();
     for (const { value } of law.border) {
       const x = plot.x(toUnit(law.along, value, unit()));
       inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
-      const left = x > box.x + box.width - 60;
+      const left = x > box.x + box.width - 100;
       plot.text(
-        "border",
+        law.along === "v0" ? "critical speed" : "border",
         x + (left ? -5 : 5),
         box.y + box.height - 6,
         "mark",
@@ -139,7 +145,7 @@ export function lawPanel(store, moved) {
       );
     }
     const still = plot.y(law.mu_static[0]);
-    plot.text("static", box.x + 5, Math.min(still + 14, box.y + box.height - 6), "note", "start");
+    plot.text("static µ", box.x + 10, Math.min(still + 14, box.y + box.height - 6), "note", "start");
   }
 
   /** The line of the target and the user's point. */
@@ -166,17 +172,14 @@ export function lawPanel(store, moved) {
     plot.point(x, answer.mu_macro);
   }
 
-  /** The areas between the levels of µ/µ₀, in the colours of the map. */
-  function bands(places) {
-    if (!colours) return;
-    const levels = [0, ...colours.levels, 1];
-    const mu0 = heights();
-    const across = mu0.length === 1 ? plot.x.domain() : places;
+  /** The colours of the map beside the axis of µ, where one µ₀ holds for the whole law. */
+  function strip() {
+    if (!colours || law.along === "mu0") return;
+    const levels = [0, ...colours.levels, 1].map((level) => plot.y(level * heights()[0]));
     colours.colours.forEach((colour, i) => {
-      const [low, high] = [levels[i], levels[i + 1]].map((level) =>
-        across.map((_, at) => level * (mu0[at] ?? mu0[0])),
-      );
-      range(across, low, high, "shade").style("fill", colour);
+      const part = plot.inside.append("rect").attr("class", "strip").style("fill", colour);
+      part.attr("x", plot.box.x).attr("width", 6);
+      part.attr("y", levels[i + 1]).attr("height", levels[i] - levels[i + 1]);
     });
   }
 
@@ -227,7 +230,7 @@ export function lawPanel(store, moved) {
 
   /** All that is drawn, as CSV (RFC 4180), in the units that are shown. */
   function csv() {
-    const { values, k, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high } = law;
+    const { values, k, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high, std } = law;
     const columns = {
       [heading()]: values.map((value) => Number(toUnit(law.along, value, unit()).toPrecision(15))),
       ...(k && { "k [N/m]": k }),
@@ -235,6 +238,7 @@ export function lawPanel(store, moved) {
       "mu_static [-]": mu_static,
       regime,
       ...(low && { "mu_macro_low [-]": low, "mu_macro_high [-]": high }),
+      ...(std && { "std [-]": std }),
     };
     const rows = values.map((_, i) => Object.values(columns).map((column) => column[i]));
     return [Object.keys(columns), ...rows].map((cells) => `${cells.join(",")}\r\n`).join("");

@@ -5,7 +5,7 @@ import { inputsPanel } from "./inputs.js";
 import { numberPanel } from "./number.js";
 import { getPreloaded, post } from "./service.js";
 import { Store, caseOf, kindOf, startState, useStart } from "./state.js";
-import { about, textAt } from "./words.js";
+import { about, pageOf, textAt } from "./words.js";
 
 let answer = null; // the last one, with the state that it belongs to
 let trouble = null; // why there is no newer one: { text, calm, faults by input }
@@ -106,7 +106,7 @@ function start(names) {
   panels = { inputs: inputsPanel(store, moved), number: numberPanel(store) };
   show();
   $("version").textContent = about.version;
-  for (const link of document.querySelectorAll("[data-guide]")) link.hidden = !about.guide;
+  for (const link of document.querySelectorAll("[data-page]")) link.href = pageOf(link.dataset.page);
   const unknown = store.unknown.join(", ");
   $("notice").hidden = !unknown;
   $("notice-text").textContent = unknown

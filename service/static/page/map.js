@@ -5,7 +5,7 @@ import { $, attribute, write } from "./dom.js";
 import { caseOf, inputsOf } from "./state.js";
 import { Plot } from "./plot.js";
 import { get } from "./service.js";
-import { about, inWords, show } from "./words.js";
+import { about, inPrint, inWords, show, toUnit, unitAt } from "./words.js";
 
 const { contours } = d3;
 
@@ -61,7 +61,9 @@ export function mapPanel(store, moved, loaded) {
         log: map.y_tilde.log,
         title: normal ? "amplitude ỹ = ΔFz/Fz" : "amplitude ỹ = y₀/l₀",
       },
-      right: 66,
+      top: 40,
+      right: 62,
+      below: 30,
     });
     const { box, inside, over } = plot;
     const ground = inside.append("rect").attr("class", "shade").style("fill", map.colours[0]);
@@ -91,36 +93,52 @@ export function mapPanel(store, moved, loaded) {
       const shape = contours().size([map.v_tilde.n, map.y_tilde.n]).contour(values, target);
       plot.inside.append("path").attr("class", "target").attr("d", outline(shape));
     }
-    if (answer?.groups && store.state.contact !== "rigid") point(answer.groups, answer.inputs);
+    if (!answer?.groups || store.state.contact === "rigid") return;
+    if (answer.state.direction === map.direction) ownAxes(answer);
+    point(answer.groups, answer.inputs);
   }
 
-  /** The colours and the levels between them, beside the map. */
+  /** The speed and the amplitude of a case where ṽ and ỹ are 1 [SI]. */
+  const sizes = ({ groups: { l0 }, inputs }) => ({
+    v0: l0 * 2 * Math.PI * inputs.f.value,
+    y0: l0,
+    Fz_amplitude: inputs.Fz.value,
+  });
+
+  /** The axes of this case, in the units that were typed. */
+  function ownAxes(one) {
+    const size = sizes(one);
+    const axis = (name, { start, stop, log }) => {
+      const unit = unitAt(name, one.inputs[name].value, one.inputs[name].unit);
+      const domain = [start, stop].map((end) => toUnit(name, end * size[name], unit));
+      return { domain, log, title: `${about.inputs[name].symbol} [${inPrint(unit)}]` };
+    };
+    const up = inputsOf(one.state)[3];
+    if (!(size.v0 > 0 && size[up] > 0)) return;
+    plot.outerAxes({ x: axis("v0", map.v_tilde), y: axis(up, map.y_tilde) });
+  }
+
+  /** The colours and the levels between them, below the map; levels without room have no number. */
   function legend(over) {
     const { box } = plot;
-    const left = box.x + box.width + 14;
-    const tall = box.height / map.colours.length;
+    const wide = box.width / map.colours.length;
+    const top = plot.height - 24;
     const group = over.append("g").attr("class", "legend");
+    const text = (words, x, y, anchor = "middle") =>
+      group.append("text").attr("x", x).attr("y", y).attr("text-anchor", anchor).text(words);
+    text("µ/µ₀", box.x - 8, top + 9, "end");
+    let end = -Infinity;
     map.colours.forEach((colour, i) => {
-      const y = box.y + box.height - (i + 1) * tall;
-      group
-        .append("rect")
-        .attr("x", left)
-        .attr("y", y)
-        .attr("width", 12)
-        .attr("height", tall + 0.5)
-        .style("fill", colour);
-      if (i)
-        group
-          .append("text")
-          .attr("x", left + 16)
-          .attr("y", y + tall + 4)
-          .text(show(map.levels[i - 1]));
+      const left = box.x + i * wide;
+      const cell = group.append("rect").attr("x", left).attr("y", top).style("fill", colour);
+      cell.attr("width", wide + 0.5).attr("height", 9);
+      const words = i ? show(map.levels[i - 1]) : "0";
+      const half = 3 * words.length + 2;
+      if (left - half < end) return;
+      text(words, left, top + 20);
+      end = left + half;
     });
-    group
-      .append("text")
-      .attr("x", left + 16)
-      .attr("y", box.y + 6)
-      .text("µ/µ₀");
+    if (box.x + box.width - 5 > end) text("1", box.x + box.width, top + 20);
   }
 
   /** The user's point, with a bar for its deviation or for the interval of k. */
@@ -180,10 +198,9 @@ export function mapPanel(store, moved, loaded) {
   /** The values of the case at a place of the map. */
   function pull([x, y]) {
     if (!answer?.groups?.l0 || store.state.contact === "rigid") return;
-    const omega = 2 * Math.PI * answer.inputs.f.value;
-    const { l0 } = answer.groups;
-    const scale = map.direction === "normal" ? answer.inputs.Fz.value : l0;
-    moved({ v0: plot.x.invert(x) * l0 * omega, [amplitude()]: plot.y.invert(y) * scale });
+    const size = sizes(answer);
+    const place = { v0: plot.x.invert(x), [amplitude()]: plot.y.invert(y) };
+    moved(Object.fromEntries(Object.entries(place).map(([name, at]) => [name, at * size[name]])));
   }
 
   plot.follow({

@@ -8,7 +8,7 @@ import { html, nothing, render } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
-import { PARTS, motionOf, uncertainOf } from "./state.js";
+import { PARTS, motionOf, partsOf, uncertainOf } from "./state.js";
 import { about, digitsWithin, friction, inUnit, prefixed, prose, show, typeset } from "./words.js";
 
 const { extent } = d3;
@@ -85,19 +85,20 @@ export function motionPanel(store, moved) {
     return one.harmonics.map(term).join(", ");
   }
 
-  /** A doubt about an oscillation that is larger than what contacts have. */
+  /** Whether a remark stands below the field of an oscillation. */
+  const isDoubt = ({ row, field: one }) => row === "units" && Object.hasOwn(PARTS, one);
+
+  /** A doubt about an oscillation as it is typed, in the words of the service. */
   function doubted(name) {
-    const one = motion?.inputs[name];
-    const most = about.inputs[LIKE[name]].usual[1];
-    const { amplitude } = one?.harmonics.find((term) => term.amplitude > most) ?? {};
-    return amplitude && name !== "normal" && one.text === store.state[name].trim()
-      ? `${inUnit(LIKE[name], amplitude, "m")}: is it in metres?`
-      : null;
+    const { text } = motion?.remarks?.find((one) => isDoubt(one) && one.field === name) ?? {};
+    return text && motion.inputs[name]?.text === store.state[name].trim() ? prose(text) : null;
   }
 
   function field(name) {
-    const fault = faults.get(name);
-    const doubt = doubted(name);
+    const none = !partsOf(store.state).includes(name);
+    const fault = none ? undefined : faults.get(name);
+    const doubt = none ? undefined : doubted(name);
+    const note = none ? about.impossible["ball normal"] : (fault ?? doubt ?? understood(name));
     return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
       <label for=${`motion-${name}`}
         >${typeset(name === "normal" ? "ΔFz" : name)}
@@ -110,11 +111,10 @@ export function motionPanel(store, moved) {
         aria-invalid=${String(fault !== undefined)}
         aria-describedby=${`motion-note-${name}`}
         placeholder="none"
-        .value=${store.state[name]}
+        ?disabled=${none}
+        .value=${none ? "" : store.state[name]}
       />
-      <p id=${`motion-note-${name}`} class="note" title=${fault ?? doubt ?? understood(name)}>
-        ${fault ?? doubt ?? understood(name)}
-      </p>
+      <p id=${`motion-note-${name}`} class="note">${note}</p>
     </div>`;
   }
 
@@ -194,9 +194,14 @@ export function motionPanel(store, moved) {
     if (motion) numbers();
     $("motion-meanings").hidden = !motion;
     render(roots(), $("motion-roots"));
-    const atFields = faults.size && [...faults.keys()].every((name) => name.split(",")[0] in PARTS);
+    const atFields = faults.size && [...faults.keys()].every((name) => Object.hasOwn(PARTS, name.split(",")[0]));
     write("motion-status", refused && !atFields ? prose(refused) : "");
-    write("motion-doubt", withoutDeviations());
+    const remarks = (motion?.remarks ?? []).filter((one) => !isDoubt(one));
+    const all = [withoutDeviations(), ...remarks.map(({ text }) => prose(text))].filter(Boolean);
+    render(
+      all.map((words) => html`<li>${words}</li>`),
+      $("motion-doubt"),
+    );
     $("motion-unknown").value = state.motion_unknown;
     $("motion-target").value = state.motion_target;
     const old = motion && JSON.stringify(question()) !== asked;

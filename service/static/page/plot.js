@@ -2,7 +2,7 @@
 // for download.  Scales, axes, shapes and dragging are those of d3.
 import d3 from "./d3.js";
 
-const { axisBottom, axisLeft, drag, scaleLinear, scaleLog, select, line } = d3;
+const { axisBottom, axisLeft, axisRight, axisTop, drag, scaleLinear, scaleLog, select, line } = d3;
 
 const DIGIT = 7; // pixels of a figure beside an axis
 const FINGER = 36; // pixels from the point, within which a finger takes it
@@ -69,6 +69,10 @@ function ticked(axis, scale, room, least = -Infinity) {
   return axis.tickValues(within).tickFormat((value) => String(Number(value.toPrecision(3))));
 }
 
+const scaleOf = ({ domain, log }) => (log ? scaleLog() : scaleLinear()).domain(domain);
+/** Whether two boxes [left, top, right, bottom] lie on each other. */
+const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+
 /**
  * An SVG of two layers: `paint(plot)` fills the lower one when its size or what it shows changes,
  * `mark(plot)` the upper one, which is drawn anew by itself in every step of a drag.
@@ -113,13 +117,14 @@ export class Plot {
     this.mark(this);
   }
 
-  /** Two axes with titles; `right` pixels are left free beside them, `from` is the lowest tick. */
-  axes({ x, y, right = 12 }) {
-    const [top, foot] = [10, 42];
-    const made = ({ domain, log }) =>
-      (log ? scaleLog() : scaleLinear()).domain(domain).clamp(false);
-    this.y = made(y).range([this.height - foot, top]);
-    const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 34, y.from);
+  /**
+   * Two axes with titles; so many pixels are left free above, to the right and below, `from` is
+   * the lowest tick.
+   */
+  axes({ x, y, top = 10, right = 12, below = 0 }) {
+    const foot = 42 + below;
+    this.y = scaleOf(y).range([this.height - foot, top]);
+    const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 44, y.from);
     const numbers = side.tickValues().map((value) => side.tickFormat()(value).length);
     const left = 52 + DIGIT * Math.max(0, ...numbers.map((length) => length - 4));
     this.box = {
@@ -128,7 +133,7 @@ export class Plot {
       width: this.width - left - right,
       height: this.height - top - foot,
     };
-    this.x = made(x).range([left, this.width - right]);
+    this.x = scaleOf(x).range([left, this.width - right]);
     const root = select(this.svg);
     root.selectAll("*").remove();
     const { box } = this;
@@ -155,12 +160,28 @@ export class Plot {
     beside.call(side);
     const title = (text, place) =>
       root.append("text").attr("class", "title").attr("transform", place).text(text);
-    title(x.title, `translate(${box.x + box.width / 2} ${this.height - 8})`);
+    title(x.title, `translate(${box.x + box.width / 2} ${this.height - below - 8})`);
     title(y.title, `translate(13 ${box.y + box.height / 2}) rotate(-90)`);
     const marks = clipped(); // below the texts, which a line would strike out
     this.over = root.append("g");
     this.marks = [marks, root.append("g")];
     return this;
+  }
+
+  /** A second pair of axes above and to the right, in the upper layer. */
+  outerAxes({ x, y }) {
+    const { box, over } = this;
+    const [across, up] = [scaleOf(x), scaleOf(y)];
+    across.range([box.x, box.x + box.width]);
+    up.range([box.y + box.height, box.y]);
+    const axis = (made, place) =>
+      over.append("g").attr("class", "axis").attr("transform", place).call(made);
+    axis(ticked(axisTop(across).tickSizeOuter(0), across, 44), `translate(0 ${box.y})`);
+    axis(ticked(axisRight(up).tickSizeOuter(0), up, 34), `translate(${box.x + box.width} 0)`);
+    const title = (text, place) =>
+      over.append("text").attr("class", "title").attr("transform", place).text(text);
+    title(x.title, `translate(${box.x + box.width / 2} 12)`);
+    title(y.title, `translate(${this.width - 12} ${box.y + box.height / 2}) rotate(90)`);
   }
 
   /** An empty plot. */
@@ -190,14 +211,32 @@ export class Plot {
     return text;
   }
 
-  /** Moves centred texts into the frame: all are measured, then moved, which is one layout. */
+  /**
+   * Moves centred texts into the frame, and leaves out those that would lie on an earlier one; all
+   * are measured, then moved, which is one layout.
+   */
   centre() {
-    const { box, centred } = this;
+    const { box, centred, svg } = this;
     const halves = centred.map(([text]) => text.node().getComputedTextLength() / 2 + 3);
     centred.forEach(([text, x], i) =>
       text.attr("x", Math.min(Math.max(x, box.x + halves[i]), box.x + box.width - halves[i])),
     );
     this.centred = [];
+    this.texts = [];
+    for (const text of svg.querySelectorAll(":is(.tag, .area, .mark, .note)")) {
+      const { x, y, width, height } = text.getBBox();
+      const place = [x - 1, y, x + width + 1, y + height];
+      const left = this.texts.some((one) => !one.left && overlap(one.place, place));
+      this.texts.push({ text, place, left: left || (box && width > box.width) });
+    }
+    this.uncover();
+  }
+
+  /** Shows the texts that have room, but those that the user's point lies on. */
+  uncover([x, y] = [-99, -99]) {
+    const point = [x - 8, y - 8, x + 8, y + 8];
+    for (const { text, place, left } of this.texts ?? [])
+      text.classList.toggle("covered", left || overlap(place, point));
   }
 
   /** The user's point; where it is outside, an arrow on the frame that points to it. */
@@ -216,6 +255,7 @@ export class Plot {
     );
     const outside = right !== 0 || down !== 0;
     this.pointAt = place;
+    this.uncover(place);
     const turn = (Math.atan2(down, right) * 180) / Math.PI;
     return this.over
       .append("path")

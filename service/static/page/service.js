@@ -1,14 +1,14 @@
 // Questions to the service, and what its answers mean for the page.
 import { withKey } from "./ask.js";
+import { called } from "./words.js";
 
 const WAIT_MS = 20_000; // for an answer
 
-/** All faults of a question that has several; names that share a reason stand together. */
+/** The faults of a question by the names that the page has; those of one reason stand together. */
 function together(errors) {
-  if (errors.length < 2) return null;
   const names = Map.groupBy(errors, ({ reason }) => reason);
   return [...names]
-    .map(([reason, all]) => `${all.map(({ field }) => field).join(", ")}: ${reason}`)
+    .map(([reason, all]) => `${all.map(({ field }) => called(field)).join(", ")}: ${reason}`)
     .join("; ");
 }
 
@@ -26,7 +26,7 @@ async function ask(path, options) {
   const { status, headers } = response;
   if (status === 401) return { key: true };
   const { errors = [], inputs = {} } = body;
-  const detail = together(errors) ?? body.detail ?? `status ${status}`;
+  const detail = together(errors) || (body.detail ?? `status ${status}`);
   if (status < 500 && ![408, 429].includes(status))
     return { refused: detail, faults: errors, inputs };
   return {

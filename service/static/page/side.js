@@ -22,7 +22,7 @@ import {
  * Tabs: buttons "tab-name" that show one of several parts; `chosen(name)` hears which, and the
  * returned function chooses one by its name.
  */
-export function tabs(id, chosen = () => {}) {
+function tabs(id, chosen = () => {}) {
   const buttons = [...$(id).querySelectorAll("[role=tab]")];
   function choose(button, focus = false) {
     turn(button);
@@ -72,7 +72,7 @@ function numbers(answer, all) {
     ["µ/µ₀", "share of the friction that remains", show(answer.mu_ratio, digits)],
     ["static µ", "µ where v₀ goes to 0", show(limits.mu_static, digits)],
     [
-      "border v₀",
+      "critical speed",
       "from this speed on the contact slides all the time",
       prefixed(limits.v0_crit, "m/s"),
     ],

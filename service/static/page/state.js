@@ -22,7 +22,7 @@ const CHOICES = {
   unknown: ["y0", "mu0", "Fz", "k", "Fz_amplitude", "f", "v0"],
   quantity: ["mu_ratio", "mu_macro"],
   side: ["values", "bars", "target"],
-  panel: ["stiffness", "fit", "motion"],
+  panel: ["none", "stiffness", "fit", "motion"],
   motion_unknown: [
     "v0",
     "k",
@@ -35,8 +35,9 @@ const CHOICES = {
     "normal.phase",
   ],
 };
-/** The oscillations of any motion, as texts. */
-export const PARTS = { x: "1 µm @ 90 deg", y: "", normal: "" };
+/** The oscillations of any motion, as texts: at the start those of a conveyor, which has a speed at
+ * which it carries itself. */
+export const PARTS = { x: "2 µm @ 90 deg", y: "", normal: "5 N @ -90 deg" };
 /** Texts beside the inputs; an empty one is left to the service. */
 const TEXTS = { from: "", to: "", exponent: "", target: "0.5", ...PARTS, motion_target: "0" };
 
@@ -105,7 +106,7 @@ export const uncertainOf = (state, answer, question) =>
   );
 
 /**
- * The inputs without deviations, for questions that have none (laws, targets, fits, motions):
+ * The inputs without deviations, for questions that have none (targets, fits, motions):
  * the value that the service understood stands in place of a text with a deviation.
  */
 export function exactCase(state, answer, without = []) {
@@ -115,21 +116,28 @@ export function exactCase(state, answer, without = []) {
   return question;
 }
 
+/** The oscillations that a contact can have: the load of a ball stays as it is. */
+export const partsOf = ({ contact }) =>
+  Object.keys(PARTS).filter((name) => name !== "normal" || contact !== "ball");
+
 /** Any motion: the case without y0 and direction, and the oscillations that are given. */
 export function motionOf(state, answer, without = []) {
   const { direction: _, ...body } = exactCase(state, answer, ["y0", "Fz_amplitude", ...without]);
-  const parts = Object.keys(PARTS).filter((name) => state[name].trim());
+  const parts = partsOf(state).filter((name) => state[name].trim());
   return { ...body, ...Object.fromEntries(parts.map((name) => [name, state[name]])) };
 }
 
 /**
  * The case around one input that is swept or solved for.  Where that is Fz and k grows with it, the
- * Fz of the case stays, as the load at which k holds.
+ * Fz of the case stays, as the load at which k holds.  What is not `exact` keeps its deviations,
+ * but that of the input itself.
  */
-export function caseAround(state, answer, name) {
+export function caseAround(state, answer, name, exact = true) {
   const { contact, exponent } = state;
   const grows = name === "Fz" && contact !== "rigid" && (exponent || contact === "ball");
-  const question = exactCase(state, answer, grows ? [] : [name]);
+  const question = exact
+    ? exactCase(state, answer, grows ? [] : [name])
+    : { ...caseOf(state, [name]), ...(grows && { Fz: exactCase(state, answer).Fz }) };
   return grows && exponent ? { ...question, stiffness_exponent: exponent } : question;
 }
 

@@ -10,10 +10,12 @@ const SUCH_AS = {
   radius: "5 mm",
   diameter: "10 mm",
   length: "10 mm",
-  E: "200 GPa",
-  E2: "200 GPa",
+  E: "210 GPa",
+  E2: "210 GPa",
 };
 const SIZES = ["radius", "diameter"];
+/** Of a body, two of which share a row. */
+const BODIES = ["E", "nu", "E2", "nu2"];
 
 export function stiffnessPanel(store, moved) {
   const typed = { geometry: "ball", size: "radius" }; // a ball has a radius or a diameter
@@ -102,9 +104,11 @@ export function stiffnessPanel(store, moved) {
       >${typeset(name)}
       <span class="label">${/\w/.test(unit) && !(name in SUCH_AS) ? unit : ""}</span></label
     >`;
-    return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
+    return html`<div
+      class="field ${fault ? "bad" : doubt ? "doubt" : ""} ${BODIES.includes(name) ? "" : "wide"}"
+    >
       ${SIZES.includes(name) ? size(name) : title} ${input}
-      <p id=${`about-${name}`} class="note" title=${below}>${below}</p>
+      <p id=${`about-${name}`} class="note">${below}</p>
     </div>`;
   }
 
@@ -129,10 +133,10 @@ export function stiffnessPanel(store, moved) {
       ask(false);
     };
     const same = number === 2 && !typed.E2?.trim();
-    return html`<div class="field body">
+    return html`<div class="field wide">
       <label for=${`material-${number}`}>body ${number}</label>
       <select id=${`material-${number}`} @change=${take}>
-        <option value="">choose a material, or type E and ν</option>
+        <option value="">choose a material</option>
         ${about.materials.rows.map(
           ({ name, E: modulus }) => html`<option value=${name}>${name}, ${modulus}</option>`,
         )}
@@ -159,7 +163,7 @@ export function stiffnessPanel(store, moved) {
         .filter((name) => list.includes(name))
         .map(field);
     render(
-      html`<div class="field">
+      html`<div class="field wide">
           <label for="geometry">contact of</label>
           <select id="geometry" @change=${({ target }) => change("geometry", target.value)}>
             ${Object.entries(about.geometries).map(
@@ -169,7 +173,7 @@ export function stiffnessPanel(store, moved) {
                 </option>`,
             )}
           </select>
-          <p class="note">Fz is that of the form above.</p>
+          <p class="note">Fz is that of the form.</p>
         </div>
         ${of([...LENGTHS, "oscillation"])} ${materials(1, "E", "nu")} ${of(["E", "nu"])}
         ${materials(2, "E2", "nu2")} ${of(["E2", "nu2"])}`,

@@ -141,6 +141,18 @@ export const prose = (text) =>
     .replace(/(?<=[\d/] ?)u(?=[mN]\b)/g, "µ")
     .replace(/(\d) (?=%|µm|N\b|mm\b)/g, "$1\u00a0");
 
+/** Names of a request as the page calls them. */
+const CALLED = { start: "from", stop: "to", stiffness_exponent: "m", nu: "ν", nu2: "ν₂", E2: "E₂" };
+
+/** A field of a request as the page calls it. */
+export function called(field) {
+  if (Object.hasOwn(CALLED, field)) return CALLED[field];
+  return Object.hasOwn(about.inputs ?? {}, field) ? about.inputs[field].symbol : field;
+}
+
+/** The address of a page of the guide, or of its source where no guide is built. */
+export const pageOf = (name) => `${about.guide}${name}${about.guide_ending}`;
+
 /** A regime as a person names it. */
 export const inWords = (regime) => about.regimes[regime] ?? regime;
 
