@@ -48,20 +48,9 @@ html_math_renderer = "mathml"  # docs/_ext/mathml.py
 html_static_path = ["_static"]
 html_css_files = ["mathml.css", "site.css"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "interface", "mathml"]
+extensions = ["myst_parser", "mathml"]
 exclude_patterns = ["_ext", "_static"]
-nitpicky = True  # every reference to a function, a method, a module or a name must lead somewhere
-nitpick_ignore_regex = [
-    ("py:(class|exc|obj)", ".*")
-]  # types are words with shapes, such as "float or ndarray"
-
 # Anchors of headings are those that GitHub makes, so that the pages read alike there.
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_fence_as_directive = ["math"]  # GitHub draws the same fence
-
-autodoc_member_order = "bysource"
-autodoc_typehints = "none"  # types stand in the docstrings, with shapes and units
-napoleon_google_docstring = False
-napoleon_use_ivar = True
-napoleon_use_rtype = False

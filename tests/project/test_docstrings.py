@@ -1,8 +1,12 @@
 """Examples of docstrings run."""
 
+import contextlib
 import doctest
 import importlib
 import pkgutil
+import re
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,3 +42,40 @@ def test_there_are_examples() -> None:
     }
     used |= {f"surrogate.Surrogate.{name}" for name in ("evaluate", "mu_ratio", "open", "slopes")}
     assert {f"mumacro.{name}" for name in used} <= shown
+
+
+def places(module: Any) -> list[Any]:
+    """Return what a name in a docstring of a module may be a member of."""
+    classes = [member for member in vars(module).values() if isinstance(member, type)]
+    return [module, mumacro, *classes]
+
+
+def walk(value: Any, parts: list[str]) -> bool:
+    """Whether members lead on from a value; the last may be an annotation of a class."""
+    for i, part in enumerate(parts):
+        if i == len(parts) - 1 and part in getattr(value, "__annotations__", {}):
+            return True
+        if not hasattr(value, part):
+            return False
+        value = getattr(value, part)
+    return True
+
+
+def is_found(name: str, module: Any) -> bool:
+    """Whether a name leads somewhere: from the module, one of its classes, or from the top."""
+    parts = name.split(".")
+    if any(walk(place, parts) for place in places(module)):
+        return True
+    for i in range(len(parts), 0, -1):
+        with contextlib.suppress(ImportError):
+            return walk(importlib.import_module(".".join(parts[:i])), parts[i:])
+    return False
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_names_in_docstrings_lead_somewhere(name: str) -> None:
+    module = importlib.import_module(name)
+    text = Path(str(module.__file__)).read_text("utf-8")
+    named = re.findall(r":(?:func|class|meth|mod|data|attr):`~?([^`]+)`", text)
+    missing = [one for one in named if not is_found(one, module)]
+    assert [one for one in missing if f"self.{one}: " not in text] == []

@@ -129,6 +129,8 @@ ELSEWHERE = {
 }
 #: pages whose Python programs another file runs
 PROGRAMS_ELSEWHERE = {"docs/how-to/many-cases.md": "tests/project/test_recipes.py"}
+#: made from docstrings, whose examples tests/project/test_docstrings.py runs
+REFERENCE = ROOT / "docs" / "python.md"
 SHELL = ("bash", "console")
 #: what the reader of a page has, and ports and folders of this machine
 HERE = (
@@ -144,7 +146,11 @@ def name(page: Path) -> str:
 
 
 def having(*languages: str) -> list[Path]:
-    return [page for page in PAGES if any(not block.marked for block in blocks(page, *languages))]
+    return [
+        page
+        for page in PAGES
+        if page != REFERENCE and any(not block.marked for block in blocks(page, *languages))
+    ]
 
 
 # --- nothing is left out --------------------------------------------------------------------------
