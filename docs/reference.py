@@ -353,7 +353,7 @@ def _signature(value: Any) -> str:
     ]
     text = str(signature.replace(parameters=plain, return_annotation=inspect.Signature.empty))
     # a default that is no literal, such as that of an input that is left out
-    return re.sub(r"=(?!None|True|False|[-'\"(\d])[^,)]*", "=...", text)
+    return re.sub(r"=(?!None|True|False|[-'\"(\d])[^,()]*(?:\([^)]*\))?", "=...", text)
 
 
 def _own(value: Any, module: str) -> bool:
