@@ -6,9 +6,9 @@ the library is loaded.
 
 - ``data.h``, ``records.h``, ``mumacro.h``: a table in memory, a quantity, what C programs call
 - ``lanes.h``, ``arithmetic.c``, ``closed_forms.c``: several points at once, functions, formulas
-- ``atlas.c``, ``border.c``, ``charts.c``, ``cells.c``: the blocks, their coordinates and
-  polynomials; ``ball_atlas.c``, ``ball_charts.c``: those of a ball
-- ``quantities.c``, ``records.c``, ``ball_records.c``: how each quantity follows from them
+- ``atlas.c``, ``border.c``, ``charts.c``, ``ball_charts.c``, ``places.c``, ``cells.c``: the list of
+  blocks, their coordinates (of a ball), polynomials
+- ``quantities.c``, ``records.c``: how each quantity follows from them
 - ``points.c``, ``passes.c``: one point, many points
 - ``directions.c``, ``contact.c``: along and normal, of one spring and of a ball; the dispatch over
   contact and direction

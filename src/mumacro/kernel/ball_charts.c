@@ -141,32 +141,9 @@ static void mu_place_ball_corner(mu_place *at) {
     at->b = mu_first(mu_cube_root(mu_all(root / (MU_SQRT2 * at->a + 2.0 * phi))));
 }
 
-/* The place of any point with V > 0, Y > 0, both finite; MU_B_FAST has no coordinates. */
-static mu_place mu_locate_ball(const mumacro_data *data, double v, double y) {
-    mu_place at = {MU_B_FAST, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {0.0, 0.0}};
-    double ln_y;
-    at.v = v;
-    at.y = y;
-    at.crit = mu_border(data, y, &at.tilt, &ln_y);
-    if (y > MU_Y_TAIL) {
-        const double rho = v / at.crit;
-        if (rho > MU_RHO_MAX) return at;
-        at.a = 1.0 / y;
-        at.block = rho >= 1.0 ? MU_B_TAIL : MU_B_S_TAIL;
-        at.b = rho >= 1.0 ? mu_log1(rho) : mu_sigma_of(rho);
-    } else {
-        const mu_places places = mu_place_ball(mu_steepest_of(data), mu_all(v), mu_all(y),
-                                               mu_all(at.crit), mu_all(ln_y));
-        at.block = (int)mu_first_whole(places.block);
-        at.a = mu_first(places.a);
-        at.b = mu_first(places.b);
-        if (at.block == MU_B_CORNER) mu_place_ball_corner(&at);
-    }
-    return at;
-}
-
-static mu_place mu_locate_as(const mumacro_data *data, int contact, double v, double y) {
-    return contact == MU_BALL ? mu_locate_ball(data, v, y) : mu_locate(data, v, y);
+static void mu_place_in_corner(mu_place *at) {
+    if (at->block == MU_CORNER) mu_place_corner(at);
+    if (at->block == MU_B_CORNER) mu_place_ball_corner(at);
 }
 
 /* d b / d ln x of a folded coordinate. */
@@ -203,53 +180,7 @@ static mu_turn mu_turn_of_ball_corner(const mu_place *at) {
     return out;
 }
 
-MU_INLINE mu_turn mu_turn_of_ball(const mu_place *at) {
-    mu_turn out = {0.0, 1.0, 1.0, -at->tilt.slope, 0.0, 0.0, 1.0, -at->tilt.slope, MU_SQRT2, 1.0};
-    switch (at->block) {
-        case MU_B_RING:
-            return mu_turn_of_ring(at);
-        case MU_B_CORNER:
-            return mu_turn_of_ball_corner(at);
-        case MU_B_LOW:
-            out.a_y = 2.0 * at->a;
-            out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);
-            out.b_y = 0.0;
-            return out;
-        case MU_B_SLOW:
-            out.a_v = at->a / 6.0;
-            out.a_y = 0.0;
-            out.b_v = -2.0 * at->b;
-            out.b_y = 2.0 * at->b;
-            return out;
-        case MU_B_S_LOW:
-            out.a_y = at->a / 6.0;
-            out.end = 2.0 * MU_FOLD_KNOT;
-            out.scale = MU_FOLD_SCALE;
-            out.b_v = mu_fold_slope(at->b);
-            out.b_y = -at->tilt.slope * out.b_v;
-            return out;
-        case MU_B_S_MID:
-            out.a_y = at->a;
-            break;
-        case MU_B_TAIL:
-        case MU_B_S_TAIL:
-            out.a_y = -at->a;
-            break;
-        default:
-            break;
-    }
-    if (!mu_is_sliding_block(at->block)) {
-        out.b_v = mu_sigma_slope(at->b);
-        out.b_y = -at->tilt.slope * out.b_v;
-    }
-    return out;
-}
-
 /* Whether a place of a ball is next to the ridge, where the steepest ray touches the border. */
 MU_INLINE int mu_is_ridge(const mu_place *at) {
     return fabs(at->y - MU_STEEPEST_Y) < 0.01 && fabs(at->v - MU_SLOW) < 0.01;
-}
-
-MU_INLINE mu_turn mu_turn_of(const mu_place *at) {
-    return mu_is_ball(at->block) ? mu_turn_of_ball(at) : mu_turn_of_spring(at);
 }

@@ -269,8 +269,16 @@ class Kernel:
         """A text of the kernel."""
         return str(_FFI.string(pointer).decode())
 
+    def chart(self, contact: int, place: int) -> Any:
+        """Return a block of a contact; null beyond the last."""
+        return self._functions.chart(contact, place)
+
+    def source(self, code: int) -> Any:
+        """Return where an answer comes from; its name is null beyond the last."""
+        return self._functions.source(code)
+
     def quantity(self, code: int) -> Any:
-        """The record of a quantity."""
+        """Return the record of a quantity; null beyond the last."""
         return self._functions.quantity(code)
 
     def values(

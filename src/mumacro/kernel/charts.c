@@ -48,8 +48,7 @@ static double mu_sigma_of(double rho) {
 /* d sigma / d ln rho; in the last 1e-9 below the border that 1e-9 below it. */
 MU_INLINE double mu_sigma_slope(double sigma) {
     const double root = mu_max(MU_SQRT2 - sigma, 1e-9);
-    return mu_is_first_half(sigma, MU_SIGMA_KNOT) ? 0.5 * sigma
-                                                  : 0.5 * (1.0 - root * root) / root;
+    return mu_is_first_half(sigma, MU_SIGMA_KNOT) ? 0.5 * sigma : 0.5 * (1.0 - root * root) / root;
 }
 
 /* --- many points: selections, no branches ----------------------------------------------------- */
@@ -140,31 +139,6 @@ static void mu_place_corner(mu_place *at) {
     at->b = 2.0 * phi / (MU_SQRT2 * at->a + sqrt(squared));
 }
 
-/* The place of any point with v~ > 0, y~ > 0, both finite; MU_FAST has no coordinates. */
-static mu_place mu_locate(const mumacro_data *data, double v, double y) {
-    mu_place at = {MU_FAST, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {0.0, 0.0}};
-    double ln_y;
-    at.v = v;
-    at.y = y;
-    at.crit = mu_border(data, y, &at.tilt, &ln_y);
-    if (y > MU_Y_TAIL) {
-        const double root = sqrt(y), rho = v / at.crit;
-        if (v > MU_FAST_KAPPA * root) return at;
-        at.a = 1.0 / y;
-        at.block = v >= at.crit ? MU_C_TAIL : MU_S_TAIL;
-        at.b = v >= at.crit ? mu_log1(v / root)
-                            : mu_sigma_of(rho);
-    } else {
-        const mu_places places =
-            mu_place_common(mu_all(v), mu_all(y), mu_all(at.crit), mu_all(ln_y));
-        at.block = (int)mu_first_whole(places.block);
-        at.a = mu_first(places.a);
-        at.b = mu_first(places.b);
-        if (at.block == MU_CORNER) mu_place_corner(&at);
-    }
-    return at;
-}
-
 /* Derivatives of a chart's coordinates along ln v~ and ln y~. */
 typedef struct {
     double a_v, a_y, b_v, b_y;
@@ -194,21 +168,4 @@ static mu_turn mu_turn_corner(const mu_place *at) {
 MU_INLINE double mu_speed_share(double v) {
     const double rest = 1.0 / mu_fma1(v, v, 1.0);
     return v < 1.0 ? v * v * rest : 1.0 - rest;
-}
-
-MU_INLINE mu_turn mu_turn_of_spring(const mu_place *at) {
-    /* a is this power of y~; where it is 0, ln y~ */
-    static const signed char power[MU_CHARTS] = {2, 0, 0, 0, -1, 2, 1, 0, 0, 0, 0, -1};
-    mu_turn out = {0.0, 1.0, 1.0, -at->tilt.slope, 0.0, 0.0, 1.0, -at->tilt.slope, MU_SQRT2, 1.0};
-    if (at->block == MU_CORNER) return mu_turn_corner(at);
-    if (power[at->block]) out.a_y = power[at->block] * at->a;
-    if (at->block >= MU_S_LOW) {
-        out.b_v = mu_sigma_slope(at->b);
-        out.b_y = -at->tilt.slope * out.b_v;
-    } else if (at->block == MU_C_LOW) {
-        out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);
-        out.b_y = 0.0;
-    } else if (at->block == MU_C_TAIL)
-        out.b_y = -0.5;
-    return out;
 }

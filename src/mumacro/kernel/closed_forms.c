@@ -76,30 +76,6 @@ MU_INLINE void mu_outer_terms(const double *cells, double t, double *first, doub
     }
 }
 
-/* mu~ and its bound for large v~: two terms.  For 1 + r^2 below MU_OUTER_MAX f and g + r
- * f'/2 are read from cells of ln(1 + r^2), (MU_OUTER_CELLS, 2, 8), to rounding: its
- * singularities are at +-i pi and beyond. */
-static double mu_fast_ratio(const double *cells, double v, double y, double *bound) {
-    const int plain = mu_max(v, y) < 1e150;
-    const double share = 1.0 / (1.0 + v * v);
-    /* (35) at y~ / sqrt(1 + v~^2) is exact to O(y~^2) at every v~; what it takes
-     * from the second term is half r f' */
-    const double t = 1.0 + (plain ? y * y * share : (y / v) * (y / v));
-    double first, rest, correction;
-    if (t < MU_OUTER_MAX) {
-        mu_outer_terms(cells, t, &first, &rest);
-    } else {
-        const mu_outer outer = mu_outer_expansion(y / mu_hypot(v, 1.0));
-        first = outer.first;
-        rest = outer.second + 0.5 * outer.first_slope;
-    }
-    correction = plain ? rest * share : rest / v / v;
-    /* rounding; what two terms leave out is at most 6.2e-16 of mu~, where
-     * large speeds begin, near y~ = 1e4 */
-    *bound = MU_FAST_ROUNDING * first;
-    return mu_min(first + correction, 1.0);
-}
-
 typedef struct {
     /* orders, and their slopes along ln v~ and ln y~ */
     double first, first_v, first_y, both, both_v, both_y;
@@ -107,8 +83,8 @@ typedef struct {
 
 /* Power for large v~, from the slow manifold of eq. (11); the relative error of both terms is
  * O(v~^-4).  With D = 1 + r^2 cos^2, r = y~/v~ and J_p = <D^(-p/2)>: the first order is v~ <r^2
- * cos^2 / sqrt D>, the second -(((1 + r^2) J_5 - J_3)/2 + g)/v~. */
-static mu_power_terms mu_power_expansion(double v, double y) {
+ * cos^2 / sqrt D>, the second -(((1 + r^2) J_5 - J_3)/2 + g)/v~ times the square of mu_contact. */
+static mu_power_terms mu_power_expansion(double v, double y, double square) {
     /* <cos^2 / sqrt(1 + n cos^2)> = sum of (-1)^k c_k c_(k+1) n^k, c_k = (2k
      * choose k) / 4^k; highest power first */
     static const double series[11] = {
@@ -128,8 +104,9 @@ static mu_power_terms mu_power_expansion(double v, double y) {
     const mu_outer outer = mu_outer_expansion(r);
     /* <sqrt(1 + n cos^2)> = (1 + n) J3 = h i3; J1 is f */
     const double h = outer.h, j3 = outer.i3 / h, j5 = outer.i5 / h;
-    const double next = (0.5 * (h * outer.i5 - j3) + outer.second) / v;
-    const double next_y = (h * outer.i5 - j5 - 2.5 * h * (outer.i5 - outer.i7) + 1.5 * (j3 - j5) +
+    const double next = square * (0.5 * (h * outer.i5 - j3) + outer.second) / v;
+    const double next_y = square *
+                          (h * outer.i5 - j5 - 2.5 * h * (outer.i5 - outer.i7) + 1.5 * (j3 - j5) +
                            outer.second_slope) /
                           v;
     double lead = v * (h * outer.i3 - outer.first), lead_y = v * (h * outer.i3 - j3);

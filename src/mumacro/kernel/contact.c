@@ -5,7 +5,7 @@
  *     mu~(v~, y~) = 3/2 int_0^1 s mu~_spring(v~ / (1.5 s), y~ / (1.5 s)) d xi:
  *
  * from the middle outwards the springs are the points of a ray, from (v~, y~)/1.5 to
- * infinity.  Across, a table holds that (ball_atlas.c).  Along, it is an integral
+ * infinity.  Across, a table holds that (atlas.c).  Along, it is an integral
  * over closed forms, taken here. */
 
 #define MU_DRIVEN_COLUMNS 5 /* of a node of the rule of oscillation along */
@@ -322,9 +322,8 @@ static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int directi
         const mu_driven driven = mu_drive(data, contact, direction, v, y);
         return mu_slopes_of_driven(&driven);
     }
-    return contact == MU_BALL
-               ? mu_slopes_at(data, MU_BALL, MU_MU_RATIO, v / MU_MIDDLE, y / MU_MIDDLE)
-               : mu_slopes_at(data, MU_SPRING, MU_MU_RATIO, v, y);
+    return mu_slopes_at(data, contact, MU_MU_RATIO, v / MU_CONTACT[contact].middle,
+                        y / MU_CONTACT[contact].middle);
 }
 
 /* d mu~ / d v~ at v~ = 0; along and normal it is h^2 / pi = pi for springs that

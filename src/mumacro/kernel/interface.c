@@ -31,7 +31,7 @@ static int mu_fill(const double *rows, int source, int returned, mumacro_answer 
     out->v_tilde = rows[MU_ROW_V_TILDE];
     out->y_tilde = rows[MU_ROW_Y_TILDE];
     out->source = source;
-    out->regime = source < 0 ? -1 : MU_REGIME_OF_SOURCE[source];
+    out->regime = source < 0 ? -1 : mu_source_of(source).regime;
     memcpy(out->gradient, rows + MU_ROW_GRADIENT, sizeof out->gradient);
     memcpy(out->gradient_bound, rows + MU_ROW_GRADIENT_BOUND, sizeof out->gradient_bound);
     return returned;
@@ -213,7 +213,7 @@ MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double 
 }
 
 MUMACRO_API const char *mumacro_source_name(int source) {
-    return source < 0 || source >= MU_SOURCES ? "illegal" : MU_SOURCE_NAME[source];
+    return source < 0 || source >= MU_SOURCES ? "illegal" : mu_source_of(source).name;
 }
 
 MUMACRO_API const char *mumacro_regime_name(int regime) {

@@ -73,7 +73,7 @@ static void mu_intervals(const mumacro_data *data, int contact, int direction, i
 static void mu_places_of(const mumacro_data *data, int contact, int64_t n, const double *v,
                          const double *y, int8_t *block, double *a, double *b) {
     for (int64_t i = 0; i < n; ++i) {
-        const mu_place at = mu_locate_as(data, contact, v[i], y[i]);
+        const mu_place at = mu_locate(data, contact, v[i], y[i]);
         block[i] = (int8_t)MU_PLACE_OF(at.block);
         a[i] = at.a;
         b[i] = at.b;
@@ -139,17 +139,25 @@ static void mu_outers(int64_t n, const double *r, double *out) {
 }
 
 static const mumacro_quantity *mu_about(int code) {
-    return code >= 0 && code < MU_QUANTITIES ? &MU_SPRING_QUANTITY[code].about : NULL;
+    return code >= 0 && code < MU_QUANTITIES ? &MU_QUANTITY[code].about : NULL;
+}
+
+static const mumacro_chart *mu_chart_of(int contact, int place) {
+    if (contact < 0 || contact >= MU_CONTACTS) return NULL;
+    return place >= 0 && place < MU_CONTACT[contact].charts ? &MU_BLOCK[contact][place].chart
+                                                            : NULL;
+}
+
+static mumacro_source mu_source_at(int code) {
+    const mumacro_source none = {NULL, -1};
+    return code >= 0 && code < MU_SOURCES ? mu_source_of(code) : none;
 }
 
 static const mumacro_atlas MU_ATLAS = {
-    MU_Y_STICK_LO,  MU_Y_STICK_HI,    MU_Y_CONT,           MU_Y_MID,      MU_Y_HIGH,
-    MU_Y_TAIL,      MU_S_CUT,         MU_SIGMA_CUT,        MU_RHO_MAX,    MU_FAST_KAPPA,
-    MU_ROUNDING,    MU_OUTER_LOG_MAX, MU_CHARTS,           MU_SOURCES,    MU_PIECES,
-    MU_QUANTITIES,  MU_REGIMES,       MU_OUTER_CELLS,      MU_CHART,      MU_PIECE,
-    MU_SOURCE_NAME, MU_REGIME_NAME,   MU_REGIME_OF_SOURCE, MU_MIDDLE,     MU_STEEPEST,
-    MU_STEEPEST_Y,  MU_SLOW,          MU_FOLD_KNOT,        MU_FOLD_SCALE, MU_BALL_CHARTS,
-    MU_BALL_CHART,
+    MU_Y_STICK_LO, MU_Y_STICK_HI, MU_Y_CONT,      MU_Y_MID,      MU_Y_HIGH,      MU_Y_TAIL,
+    MU_S_CUT,      MU_SIGMA_CUT,  MU_RHO_MAX,     MU_FAST_KAPPA, MU_ROUNDING,    MU_OUTER_LOG_MAX,
+    MU_MIDDLE,     MU_STEEPEST,   MU_STEEPEST_Y,  MU_SLOW,       MU_FOLD_KNOT,   MU_FOLD_SCALE,
+    MU_PIECES,     MU_REGIMES,    MU_OUTER_CELLS, MU_PIECE,      MU_REGIME_NAME,
 };
 
 #define MU_TEXT(x) #x
@@ -161,6 +169,8 @@ extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     MU_NAME(MUMACRO_LEVEL),
     &MU_ATLAS,
+    mu_chart_of,
+    mu_source_at,
     mu_about,
     mu_values_as,
     mu_slopes_of_points,

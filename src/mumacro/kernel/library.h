@@ -7,19 +7,14 @@
 #include "data.h"
 #include "records.h"
 
-/* Where blocks meet, and other constants of the atlas (charts.c). */
+/* Where blocks meet, and other constants of the atlas (atlas.c). */
 typedef struct {
     double y_stick_lo, y_stick_hi, y_cont, y_mid, y_high, y_tail, s_cut, sigma_cut, rho_max,
         fast_kappa, rounding, outer_log_max;
-    int charts, sources, pieces, quantities, regimes, outer_cells;
-    const mumacro_chart *chart;
+    double middle, steepest, steepest_y, slow, fold_knot, fold_scale; /* of a ball */
+    int pieces, regimes, outer_cells;
     const mumacro_piece *piece;
-    const char *const *source_name, *const *regime_name;
-    const signed char *regime_of_source;
-    /* of a ball, see ball_atlas.c */
-    double middle, steepest, steepest_y, slow, fold_knot, fold_scale;
-    int ball_charts;
-    const mumacro_chart *ball_chart;
+    const char *const *regime_name;
 } mumacro_atlas;
 
 /* The evaluation for one instruction level.  Arrays are float64 and contiguous; nothing is read or
@@ -28,6 +23,10 @@ typedef struct {
 typedef struct {
     const char *level;
     const mumacro_atlas *atlas;
+    /* lists, which end with NULL: the blocks of a contact, where an answer comes from, quantities
+     */
+    const mumacro_chart *(*chart)(int contact, int place);
+    mumacro_source (*source)(int code);
     const mumacro_quantity *(*quantity)(int code);
     /* a quantity: value, bound of its error and source.  contact 1 is a ball, whose data are its
      * own where it is shaken across and need the rule along; direction 1 is along, 2 normal, with
@@ -93,8 +92,8 @@ typedef struct {
      * once more; then it gives up with the mean force that it has reached and its estimate, and
      * so it does as soon as stop is not 0 */
     void (*motions)(int contact, int64_t n, const int32_t *counts, const double *orders,
-                    const double *cases, double tolerance, int64_t room, double *work,
-                    int64_t most, const int32_t *stop, double *out);
+                    const double *cases, double tolerance, int64_t room, double *work, int64_t most,
+                    const int32_t *stop, double *out);
     /* one cycle of a case, summed over springs by weight, each with its share of the limit: forces
      * (n + 1, 2) at equal times of the period */
     void (*motion_cycle)(const int32_t *counts, const double *orders, const double *one,

@@ -75,11 +75,9 @@ MU_INLINE int mu_pass_places(const mumacro_data *data, int contact, int n, mu_ch
                                                     : mu_place_common(v, y, crit, ln_y);
         memcpy(&chosen, c->block + i, sizeof chosen);
         block = mu_select_whole(MU_WHERE(chosen == 0), places.block, chosen);
-        left |=
-            MU_WHERE(block ==
-                     mu_all_whole(contact == MU_BALL ? (int)MU_B_CORNER : (int)MU_CORNER)) |
-            MU_WHERE(block == mu_all_whole(contact == MU_BALL ? (int)MU_B_FAST : (int)MU_FAST)) |
-            MU_WHERE(block == mu_all_whole(MU_OTHER));
+        left |= MU_WHERE(block == mu_all_whole(MU_CONTACT[contact].corner)) |
+                MU_WHERE(block == mu_all_whole(MU_CONTACT[contact].fast)) |
+                MU_WHERE(block == mu_all_whole(MU_OTHER));
         mu_store(c->a + i, places.a);
         mu_store(c->b + i, places.b);
         mu_store(c->base + i, places.base);
@@ -194,12 +192,10 @@ MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c
 
 /* A point of the chunk in its block. */
 MU_INLINE mu_place mu_place_of(const mumacro_data *data, const mu_chunk *c, int i, int slope) {
-    mu_place at = {(int)c->block[i], c->v[i],    c->y[i],   c->a[i], c->b[i], 0.0,
-                   c->crit[i],       {0.0, 0.0}};
-    if (at.block == MU_CORNER)
-        mu_place_corner(&at);
-    else if (at.block == MU_B_CORNER)
-        mu_place_ball_corner(&at);
+    mu_place at = {(int)c->block[i], c->v[i], c->y[i],    c->a[i],
+                   c->b[i],          0.0,     c->crit[i], {0.0, 0.0}};
+    if (mu_is_corner(at.block))
+        mu_place_in_corner(&at);
     else if (slope)
         at.tilt =
             mu_border_tilt(data->pieces, data->border + 8 * c->border[i], c->local[i], c->y[i]);
@@ -220,25 +216,20 @@ static int mu_ball_source(int source) {
     return source == MU_FAST ? MU_BALL_SLIDES : MU_BALL_PARTLY;
 }
 
-static mu_answer mu_answer_left(const mumacro_data *data, int contact, int quantity,
-                                const mu_chunk *c, int i, double v, double y) {
+MU_INLINE mu_answer mu_answer_left(const mumacro_data *data, int contact, int quantity,
+                                   const mu_chunk *c, int i, double v, double y) {
+    const double middle = MU_CONTACT[contact].middle;
     mu_answer out;
-    if (contact == MU_BALL) {
-        if (c->block[i] == MU_B_CORNER) {
-            const mu_place at = mu_place_of(data, c, i, 0);
-            out = mu_in_block(data, quantity, &at);
-        } else {
-            out = mu_answer_at(data, MU_BALL, quantity, v / MU_MIDDLE, y / MU_MIDDLE);
-        }
-        out.source = mu_ball_source(out.source);
-        return out;
-    }
-    if (c->block[i] == MU_CORNER) {
+    if (c->block[i] == MU_CONTACT[contact].corner) {
         const mu_place at = mu_place_of(data, c, i, 0);
-        return mu_in_block(data, quantity, &at);
+        out = mu_in_block(data, quantity, &at);
+    } else if (c->block[i] == MU_CONTACT[contact].fast) {
+        out = MU_QUANTITY[quantity].fast(data, contact, c->v[i], c->y[i]);
+    } else {
+        out = mu_answer_at(data, contact, quantity, v / middle, y / middle);
     }
-    return c->block[i] == MU_FAST ? MU_SPRING_QUANTITY[quantity].fast(data, v, y)
-                                  : mu_answer_at(data, MU_SPRING, quantity, v, y);
+    if (contact == MU_BALL) out.source = mu_ball_source(out.source);
+    return out;
 }
 
 /* mu~ at up to MU_CHUNK points, and where slope is not NULL, q and its derivatives; returns as
@@ -328,8 +319,8 @@ static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
 MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quantity,
                                  const mu_chunk *c, const mu_slope *slope, int i, double v,
                                  double y) {
-    const int charted = contact == MU_BALL ? c->block[i] >= MU_B_LOW && c->block[i] < MU_B_END
-                                           : c->block[i] < MU_CHARTS;
+    const int charted = c->block[i] != MU_OTHER && c->block[i] != MU_CONTACT[contact].fast;
+    const double middle = MU_CONTACT[contact].middle;
     if (charted && mu_form_in((int)c->block[i], quantity).factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
         if (slope != NULL && !mu_is_corner(at.block)) {
@@ -339,8 +330,7 @@ MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int contact, int quan
         }
         return mu_slopes_at_place(data, quantity, &at);
     }
-    return contact == MU_BALL ? mu_slopes_at(data, MU_BALL, quantity, v / MU_MIDDLE, y / MU_MIDDLE)
-                              : mu_slopes_at(data, MU_SPRING, quantity, v, y);
+    return mu_slopes_at(data, contact, quantity, v / middle, y / middle);
 }
 
 MU_INLINE void mu_slopes_of_contact(const mumacro_data *data, int contact, int quantity, int64_t n,

@@ -11,7 +11,7 @@ MU_INLINE const double *mu_block_of(const mumacro_data *data, int block) {
 /* Value and bound in a block: the table's error of q times the factor, an absolute part, and the
  * quantity's slack. */
 static mu_answer mu_in_block(const mumacro_data *data, int quantity, const mu_place *at) {
-    const mu_quantity *about = mu_quantity_in(at->block, quantity);
+    const mu_quantity *about = &MU_QUANTITY[quantity];
     const mumacro_cells *cells = &data->quantities[quantity];
     const mu_form form = mu_form_in(at->block, quantity);
     const double base = mu_base(form.base, at), factor = mu_factor(form.factor, at);
@@ -36,15 +36,15 @@ static mu_answer mu_in_block(const mumacro_data *data, int quantity, const mu_pl
  * where illegal. */
 static mu_answer mu_answer_at(const mumacro_data *data, int contact, int quantity, double v,
                               double y) {
-    const mu_quantity *about = mu_quantity_of(contact, quantity);
+    const mu_quantity *about = &MU_QUANTITY[quantity];
     mu_answer out = {NAN, NAN, MU_OTHER};
     mu_place at;
     if (!(0.0 < v && v < HUGE_VAL && 0.0 < y && y < HUGE_VAL)) {
-        out = about->limit(v, y);
+        out = about->limit(contact, v, y);
         if (out.source != MU_OTHER) return out;
     }
-    at = mu_locate_as(data, contact, v == 0.0 ? MU_CREEP : v, y);
-    if (at.block == MU_FAST || at.block == MU_B_FAST) return about->fast(data, v, y);
+    at = mu_locate(data, contact, v == 0.0 ? MU_CREEP : v, y);
+    if (at.block == MU_CONTACT[contact].fast) return about->fast(data, contact, v, y);
     out = mu_in_block(data, quantity, &at);
     if (v == 0.0) out.source = MU_STATIC_LIMIT;
     return out;
@@ -59,23 +59,6 @@ MU_INLINE double mu_border_share(double w) { return 1.0 / (1.0 + 10.0 * (1.0 - w
 MU_INLINE double mu_slope_error(const double *errors, double of_factor, double of_a, double of_b) {
     return errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b);
 }
-
-/* Whether b is a function of v~/v~crit. */
-MU_INLINE int mu_follows_border(int block) {
-    switch (block) {
-        case MU_C_LOW:
-        case MU_C_TAIL:
-        case MU_B_LOW:
-        case MU_B_SLOW:
-        case MU_B_RING:
-            return 0;
-        default:
-            return !mu_is_corner(block);
-    }
-}
-
-/* Whether b ends at the border with a square root. */
-MU_INLINE int mu_has_edge(int block) { return !mu_is_sliding_block(block) && !mu_is_corner(block); }
 
 /* Whether x is in the last of the cells that end at end. */
 MU_INLINE int mu_is_last(double x, double end, double offset, double step) {
@@ -132,7 +115,7 @@ static mu_across mu_across_rays(const double *cell, const mu_place *at, mu_spot 
 /* The slopes in a block, from the place, its spot in a cell, q there, and base and factor. */
 MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, const mu_place *at,
                                        mu_spot spot, mu_slope slope, double base, double factor) {
-    const mu_quantity *about = mu_quantity_in(at->block, quantity);
+    const mu_quantity *about = &MU_QUANTITY[quantity];
     const mumacro_cells *cells = &data->quantities[quantity];
     const double *block = mu_block_of(data, at->block);
     const mu_turn turn = mu_turn_of(at);
@@ -179,8 +162,8 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
         along_b = 0.0;
         along_b_y /= turn.edge_y;
         share_a = mu_border_share(spot.u);
-        more = scale * (errors[1] * share_a * rays.reach_a +
-                        errors[2] * share_b * reach * rays.reach_b);
+        more = scale *
+               (errors[1] * share_a * rays.reach_a + errors[2] * share_b * reach * rays.reach_b);
     }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
     out.along_v = form.base_v + factor * (form.factor_v * slope.q + along_a + along_b);
@@ -271,17 +254,17 @@ static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer limit) {
  * 1, where mu~ has the infinite slope of a cube root in v~ (and a finite logarithmic one). */
 static mu_slopes mu_slopes_at(const mumacro_data *data, int contact, int quantity, double v,
                               double y) {
-    const mu_quantity *about = mu_quantity_of(contact, quantity);
+    const mu_quantity *about = &MU_QUANTITY[quantity];
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_place at;
     if (!(0.0 < v && v < HUGE_VAL && 0.0 < y && y < HUGE_VAL)) {
-        const mu_answer limit = about->limit(v, y);
+        const mu_answer limit = about->limit(contact, v, y);
         if (limit.source != MU_OTHER)
             return contact == MU_BALL ? mu_ball_limit_slopes(y, limit)
                                       : mu_limit_slopes(quantity, y, limit);
     }
-    at = mu_locate_as(data, contact, v == 0.0 ? MU_CREEP : v, y);
-    if (at.block == MU_FAST || at.block == MU_B_FAST) return about->fast_slopes(data, v, y);
+    at = mu_locate(data, contact, v == 0.0 ? MU_CREEP : v, y);
+    if (at.block == MU_CONTACT[contact].fast) return about->fast_slopes(data, contact, v, y);
     if (mu_form_in(at.block, quantity).factor == MU_NOTHING) {
         if (!about->about.smooth_at_border && at.v <= at.crit * (1.0 + mu_border_error(data)))
             out.bound_v = out.bound_y = HUGE_VAL;

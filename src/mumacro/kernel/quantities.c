@@ -1,48 +1,13 @@
-/* How a value follows from what a block tabulates; the records of the quantities are in records.c.
+/* How a value follows from what a block tabulates, value = base + factor q: which base and which
+ * factor, the list of blocks says (atlas.c).  The records of the quantities are in records.c.
  *
  * mu_ratio        mu~ = mu_macro/mu0 = <u_x>, eq. (15)
  * power           p = <y~ cos tau u_y>, the mean power of the shaker over mu0 Fz l0 omega
  *                 (that of the drive is v~ mu~)
  * stick_fraction  f, the share of the period during which the contact sticks
  *
- * A record says how a value follows from what a block tabulates, value = base + factor q; what its
- * bound allows beside the table's error; and what is known where there is no table. */
-
-/* base */
-enum {
-    MU_NO_BASE,
-    MU_ONE,
-    MU_OUTER,
-    MU_OUTER_LAYER,
-    MU_FIRST_POWER,
-    MU_ONE_LN_V,   /* 1 + 3/16 y~^2 ln v~ */
-    MU_ONE_LN_Y,   /* 1 + 3/8 y~^2 ln y~ */
-    MU_POWER_LN_V, /* -9/16 v~ y~^2 ln v~ */
-    MU_BALL_POWER  /* MU_FIRST_POWER of a ball */
-};
-/* factor; in brackets what it is */
-enum {
-    MU_NOTHING,      /* 0 */
-    MU_UNITY,        /* 1 */
-    MU_Y,            /* y~ */
-    MU_V_Y2,         /* v~ y~^2 */
-    MU_V_OVER_Y,     /* v~/y~ */
-    MU_V2_OVER_Y,    /* v~^2/y~ */
-    MU_ROOT_Y,       /* 1/sqrt(y~) */
-    MU_DEFICIT,      /* -y~^2 */
-    MU_SLIP_DEFICIT, /* -y~^2 / (4 (1 + v~^2)) */
-    MU_COSINE,       /* 1 / sqrt(1 + y~^2/v~^2) */
-    MU_SLIP_POWER,   /* v~ y~^2 / (1 + v~^2) */
-    MU_SWEPT_POWER,  /* y~^2 / sqrt(v~^2 + y~^2) */
-    MU_PHI,          /* phi, the root of the corner's normal form */
-    MU_V_OVER_PHI,   /* v~/phi */
-    MU_Y3,           /* y~^3 */
-    MU_PHI_R         /* phi R */
-};
-
-typedef struct {
-    signed char base, factor;
-} mu_form;
+ * A record says what the bound of a quantity allows beside the table's error, and what is known
+ * where there is no table. */
 
 typedef struct {
     double value, bound;
@@ -56,29 +21,17 @@ typedef struct {
 
 typedef struct {
     mumacro_quantity about;
-    double most;                   /* end of the range that starts at 0 */
-    mu_form forms[MU_BALL_CHARTS]; /* by block; one spring has two less */
+    double most; /* end of the range that starts at 0 */
     double (*slack)(const mumacro_data *data, const mu_place *at, double value, double factor);
-    mu_answer (*limit)(double v, double y);
-    mu_answer (*fast)(const mumacro_data *data, double v, double y);
-    mu_slopes (*fast_slopes)(const mumacro_data *data, double v, double y);
+    mu_answer (*limit)(int contact, double v, double y);
+    mu_answer (*fast)(const mumacro_data *data, int contact, double v, double y);
+    mu_slopes (*fast_slopes)(const mumacro_data *data, int contact, double v, double y);
 } mu_quantity;
 
 /* --- forms --- */
 
-/* mu~ of a block as mu_place_common has it. */
-static double mu_ratio_factor(const mu_place *at) {
-    const mu_mask yes = mu_all_whole(-1), no = mu_all_whole(0);
-    const int deep = at->block == MU_S_LOW || at->block == MU_B_S_LOW || at->block == MU_B_RING ||
-                     at->block == MU_B_SLOW;
-    const int low = at->block == MU_C_LOW || at->block == MU_B_LOW || deep;
-    const mu_mask sliding = mu_is_sliding_block(at->block) && !deep ? yes : no,
-                  small = low ? yes : no;
-    const mu_mask lowest = deep ? yes : no;
-    const mu_lanes v = mu_all(at->v), y = mu_all(at->y), share = mu_share(v, y, sliding, small);
-    mu_lanes base, factor;
-    mu_ratio_form(v, y, sliding, small, lowest, share, mu_sqrt(v * v * share), &base, &factor);
-    return mu_first(factor);
+MU_INLINE mu_form mu_form_in(int block, int quantity) {
+    return mu_block_as(block)->forms[quantity];
 }
 
 static double mu_factor(int factor, const mu_place *at) {
@@ -97,9 +50,11 @@ static double mu_factor(int factor, const mu_place *at) {
         case MU_ROOT_Y:
             return 1.0 / sqrt(y);
         case MU_DEFICIT:
+            return -(y * y);
         case MU_SLIP_DEFICIT:
+            return y * y * (-0.25 * (1.0 / mu_fma1(v, v, 1.0)));
         case MU_COSINE:
-            return mu_ratio_factor(at);
+            return sqrt(v * v * (1.0 / mu_fma1(v, v, y * y)));
         case MU_SLIP_POWER:
             return v < 1e150 ? v * (y * y) * (1.0 / mu_fma1(v, v, 1.0)) : y * (y / v);
         case MU_SWEPT_POWER:
@@ -134,9 +89,8 @@ static double mu_base(int base, const mu_place *at) {
         case MU_OUTER_LAYER:
             return mu_outer_layer(at->v, at->y);
         case MU_FIRST_POWER:
-            return mu_power_expansion(at->v, at->y).first;
-        case MU_BALL_POWER:
-            return MU_MIDDLE * mu_power_expansion(at->v, at->y).first;
+            return MU_CONTACT[mu_is_ball(at->block)].middle *
+                   mu_power_expansion(at->v, at->y, 1.0).first;
         case MU_ONE_LN_V:
             return mu_fma1(at->y * at->y, 0.1875 * mu_log1(at->v), 1.0);
         case MU_ONE_LN_Y:
@@ -161,9 +115,10 @@ static void mu_base_slopes(int base, const mu_place *at, mu_form_slopes *out) {
     } else if (base == MU_ONE_LN_Y) {
         out->base_y = 0.375 * y * y * (1.0 + 2.0 * mu_log1(y));
     } else if (base == MU_FIRST_POWER) {
-        const mu_power_terms power = mu_power_expansion(v, y);
-        out->base_v = power.first_v;
-        out->base_y = power.first_y;
+        const mu_power_terms power = mu_power_expansion(v, y, 1.0);
+        const double middle = MU_CONTACT[mu_is_ball(at->block)].middle;
+        out->base_v = middle * power.first_v;
+        out->base_y = middle * power.first_y;
     } else if (base == MU_OUTER_LAYER && factor < 1e-100) {
         out->base_v = mu_outer_layer(v, y);
         out->base_y = 0.5 * factor * MU_TWO_OVER_PI - out->base_v;

@@ -3,9 +3,11 @@
 #define MU_RECORDS_H
 #include <stdint.h>
 
-/* One coordinate of a chart or of a piece of the border: its name and its range in a table file. */
+/* One coordinate of a chart or of a piece of the border: its name in a table file, its code
+ * (mu_coordinate in atlas.c), its range. */
 typedef struct {
     const char *name;
+    int code;
     double low, high;
 } mumacro_axis;
 
@@ -25,6 +27,12 @@ typedef struct {
     mumacro_axis axis;
     const char *tabulated;
 } mumacro_piece;
+
+/* Where an answer comes from, and the regime there. */
+typedef struct {
+    const char *name;
+    int regime;
+} mumacro_source;
 
 /* One quantity: its name; its variable in a block of a table file; its meaning; whether it is
  * more than zero in continuous sliding; whether it is smooth in v~ at the border (else it has

@@ -1,15 +1,17 @@
 """The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of each.
 
-The lists of blocks, of pieces of the border and of quantities are in ``kernel/atlas.c``,
-``kernel/ball_atlas.c`` and ``kernel/records.c``; this module reads them.  What a table file calls a
-coordinate is defined here, with both ways between a chart and (v~, y~).
+The lists of blocks and of pieces of the border are in ``kernel/atlas.c``, that of quantities in
+``kernel/records.c``; this module reads them.  What a table file calls a coordinate is defined here,
+with both ways between a chart and (v~, y~).
 
 Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the
 drive is v~ mu~. The stick fraction f is the share of the period during which the contact sticks.
 """
 
+import functools
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -224,20 +226,24 @@ def _quantity(q: Any) -> Quantity:
     return Quantity(*texts, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
-def _charts(records: Any, count: int) -> tuple[Chart, ...]:
+def _listed(entry: Callable[[int], Any]) -> Iterator[Any]:
+    """Yield the entries of a list of the kernel, which ends with one that is null."""
+    return itertools.takewhile(bool, map(entry, itertools.count()))
+
+
+def _charts(contact: int) -> tuple[Chart, ...]:
     return tuple(
         Chart(
             _text(c.name), c.regime, _axis(c.a), _axis(c.b), _text(c.tabulated), c.floor, c.rounding
         )
-        for c in (records[i] for i in range(count))
+        for c in _listed(functools.partial(kernels[-1].chart, contact))
     )
 
 
 #: the blocks of each contact that is shaken across, in the order of the kernel's codes of contacts;
 #: those of a ball are over v~/1.5 and y~/1.5
 CHARTS: dict[str, tuple[Chart, ...]] = {
-    "spring": _charts(_ATLAS.chart, _ATLAS.charts),
-    "ball": _charts(_ATLAS.ball_chart, _ATLAS.ball_charts),
+    name: _charts(contact) for contact, name in enumerate(("spring", "ball"))
 }
 #: a spring's; a block's place in this list is the source code of its values
 BLOCK_NAMES = tuple(chart.name for chart in CHARTS["spring"])
@@ -246,12 +252,11 @@ BORDER_PIECES = tuple(
     (_text(p.name), _axis(p.axis), _text(p.tabulated))
     for p in (_ATLAS.piece[i] for i in range(_ATLAS.pieces))
 )
-QUANTITIES = tuple(_quantity(kernels[-1].quantity(i)) for i in range(_ATLAS.quantities))
+QUANTITIES = tuple(map(_quantity, _listed(kernels[-1].quantity)))
 QUANTITY_NAMES = tuple(quantity.name for quantity in QUANTITIES)
 MU, POWER, STICK = map(QUANTITY_NAMES.index, ("mu_ratio", "power", "stick_fraction"))
+_SOURCES = tuple(itertools.takewhile(lambda s: s.name, map(kernels[-1].source, itertools.count())))
 #: where an answer comes from: a block, or a limit in closed form
-SOURCES = tuple(_text(_ATLAS.source_name[i]) for i in range(_ATLAS.sources))
+SOURCES = tuple(_text(source.name) for source in _SOURCES)
 #: regime code of every source code
-REGIME_OF_SOURCE = np.array(
-    [_ATLAS.regime_of_source[i] for i in range(_ATLAS.sources)], dtype=np.int8
-)
+REGIME_OF_SOURCE = np.array([source.regime for source in _SOURCES], dtype=np.int8)
