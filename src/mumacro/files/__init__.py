@@ -5,8 +5,7 @@ Needs pyarrow.
 files.
 """
 
-from mumacro.files.errors import FilesError
-from mumacro.files.record_batch import ANSWERS, REJECTS, answer
+from mumacro.files.record_batch import ANSWERS, REJECTS, FilesError, answer
 from mumacro.files.run import Summary, evaluate_files
 
 __all__ = ["ANSWERS", "REJECTS", "FilesError", "Summary", "answer", "evaluate_files"]

@@ -1,18 +1,26 @@
-"""The formats of files: which files there are, their columns, and their rows in blocks.
+"""Files of cases: which there are, their columns, and their rows in blocks.
 
-Cells of tables as text are text.  Inputs become numbers; other columns stay text.
+A table as text is cut into rows by :class:`mumacro.inputs.text_tables.TextTable`; Arrow reads their
+cells: inputs as numbers, other columns as text.
 """
 
 import glob
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
 import pyarrow.dataset
 
-from mumacro.files.errors import FilesError
-from mumacro.files.text_source import Block, TextTable
-from mumacro.inputs.layout import ColumnNames, Dialect
+from mumacro.files.record_batch import FilesError
+from mumacro.inputs.decoding import TextError
+from mumacro.inputs.layout import GAPS, ColumnNames, Dialect, Layout
+from mumacro.inputs.signs import Signs
+from mumacro.inputs.text_tables import Rows, TextTable, joined
+from mumacro.kernel.arrays import Places
 
 #: endings of files that are written, and their format
 WRITTEN = {
@@ -30,7 +38,8 @@ _TABLES = {".csv", ".tsv", ".parquet"}
 _JSON = {".ndjson", ".jsonl", ".json"}
 # what begins the names of files that others leave in a folder: metadata, hidden files, Excel's lock
 _STRAY = ("_", ".", "~$")
-ROWS = 65_536  # rows of a block, at most: a third of a second of work
+ROWS = 65_536  # rows of a block of Parquet, at most: a third of a second of work
+_NULLS = sorted({text for gap in GAPS for text in (gap, gap.upper(), gap.title())} | {"NaN"})
 
 
 def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:
@@ -98,10 +107,28 @@ def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     return tables, [path for path in paths if path not in set(tables)]
 
 
+class Block(NamedTuple):
+    """Some rows in order."""
+
+    batch: pa.RecordBatch  #: of a row that could not be read, nulls
+    share: float  #: of the file that is read after them
+    lines: Sequence[int] | Places  #: of the file, or numbers of rows from 1 where it has none
+    faults: Mapping[int, tuple[str, str]] = {}  #: by index, the text of such a row, and why
+    signs: Signs | None = None  #: of numbers as text
+    rows: Rows | None = None  #: of a table as text, and the heads of their cells
+    heads: Sequence[str] = ()
+
+    def value(self, i: int, name: str) -> str | None:
+        """Return a cell as it stands in the file."""
+        if self.rows is not None:
+            return self.rows.of(i)[self.heads.index(name)]
+        cell = self.batch.column(name)[i].as_py()
+        return None if cell is None else str(cell)
+
+
 class ParquetSource:
     """Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in Hive."""
 
-    head: Sequence[str] = ()
     has_mark, sep, decimal = False, "", "."
 
     def __init__(self, files: Sequence[Path], folder: str | None) -> None:
@@ -112,9 +139,10 @@ class ParquetSource:
         schemas = [part.physical_schema.remove_metadata() for part in dataset.get_fragments()]
         self.schema = pa.unify_schemas([dataset.schema, *schemas], promote_options="permissive")
         self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
+        self.where = f"{files[0]}: "
 
     def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
-        """The blocks of a file, of the columns ``names``."""
+        """Yield the rows of a file in blocks, of the columns ``names``."""
         part, row = self.parts[file], 0
         scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
         options = {
@@ -133,56 +161,128 @@ class ParquetSource:
 
 
 class TextSource:
-    """Tables as text, whose heads name the same columns.
-
-    ``to_text``, rows come out as they came in: as lines where the separator of the output is that
-    of every file, else as cells.  FilesError where heads differ.
-    """
+    """Tables as text, whose heads name the same columns; FilesError where one does not."""
 
     def __init__(
         self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, to_text: bool
     ) -> None:
-        self.tables = [TextTable(path, column_names, dialect) for path in files]
-        first = self.tables[0]
-        for table in self.tables:
-            if table.layout.heads != first.layout.heads:
-                raise FilesError(f"{table.path}: its header differs from that of {first.path}")
-            if to_text and table.decimal != first.decimal:
+        self.files, self.tables = files, list[TextTable]()
+        for path in files:
+            try:
+                table = TextTable(path, column_names, dialect)
+                if (rows := next(table.rows(), None)) is not None:
+                    table.see_signs(rows)
+            except TextError as error:
+                raise FilesError(f"{path}: {error}") from None
+            self.tables.append(table)
+            if table.layout.heads != self.layout.heads:
+                raise FilesError(f"{path}: its header differs from that of {files[0]}")
+            if to_text and table.signs.decimal not in ("", self.decimal):
                 raise FilesError(
-                    f"{table.path}: its decimal sign differs from that of {first.path}; give the "
+                    f"{path}: its decimal sign differs from that of {files[0]}; give the "
                     "files one by one, or write Parquet"
                 )
-        self.to_text, self.as_lines = to_text, to_text
-        self.sep, self.decimal = first.sep, first.decimal
-        self.head = first.layout.heads
-        self.schema = pa.schema([(head, pa.string()) for head in self.head])
+        # Excel reads the signs of UTF-8 where it begins with a mark
+        self.has_mark = self.layout.encoding != "utf-8"
+        self.where = f"{files[0]}: line {self.layout.head}: "
+        self.sep = self.layout.cell_sep
+        self.schema = pa.schema([(head, pa.string()) for head in self.layout.heads])
 
     @property
-    def has_mark(self) -> bool:
-        """Whether the first file has a mark of byte order, or needs one as UTF-8, so that Excel
-        reads its signs."""
-        return self.tables[0].layout.encoding != "utf-8"
+    def layout(self) -> Layout:
+        """How the first table is written."""
+        return self.tables[0].layout
 
     @property
-    def where(self) -> str:
-        """The place of the head, for messages."""
-        return f"{self.tables[0].path}: line {self.tables[0].layout.head}: "
+    def decimal(self) -> str:
+        """The decimal sign of the first table."""
+        return self.tables[0].signs.decimal or "."
 
     def describe(self, say: Callable[[str], None]) -> None:
         """Say how the files were read, once where all are alike, and what was left out."""
         by_form: dict[str, list[str]] = {}
-        for table in self.tables:
-            by_form.setdefault(table.read_as, []).append(table.path.name)
+        for path, table in zip(self.files, self.tables, strict=True):
+            by_form.setdefault(table.read_as, []).append(path.name)
         for form, names in by_form.items():
             where = "" if len(names) == len(self.tables) else f"{', '.join(names[:3])} "
             say(f"{where}read as: {form}")
 
-    def write_with(self, sep: str) -> bool:
-        """Prepare for an output with the separator ``sep``; return whether rows come as lines."""
-        self.as_lines = self.to_text and all(table.sep == sep for table in self.tables)
-        return self.as_lines
-
     def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
-        """The blocks of a file, of the columns ``names``."""
-        numbers = self.as_lines or not self.to_text
-        return self.tables[file].blocks(names, lines=self.as_lines, numbers=numbers)
+        """Yield the rows of a file in blocks, of the columns ``names``: inputs are numbers where
+        all of a block are plain ones."""
+        path, table = self.files[file], self.tables[file]
+        size, place = max(path.stat().st_size, 1), 0
+
+        def report_place(at: int) -> None:
+            nonlocal place
+            place = at
+
+        try:
+            for rows in table.rows(report_place):
+                table.see_signs(rows)
+                batch = pa.RecordBatch.from_arrays(_columns(rows, table, names), [*names])
+                share, heads = place / size, table.layout.heads
+                yield Block(batch, share, rows.lines, rows.faults, table.signs, rows, heads)
+        except TextError as error:
+            raise FilesError(f"{path}: {error}") from None
+
+
+def _columns(rows: Rows, table: TextTable, names: Sequence[str]) -> list[pa.Array]:
+    """The columns of rows: inputs as numbers, or as text where a cell is no plain number."""
+    places = {head: str(i) for i, head in enumerate(table.layout.heads)}
+    as_text = dict.fromkeys((places[name] for name in names), pa.string())
+    inputs = {str(i) for i in table.layout.inputs}.intersection(as_text)
+    try:
+        types = as_text | dict.fromkeys(inputs, pa.float64())
+        columns = _read(rows, len(places), types, table.signs.decimal or ".")
+        # too many digits must not pass for a rigid contact
+        if not any(pc.any(pc.is_inf(columns[i])).as_py() for i in inputs):
+            return [columns[places[name]] for name in names]
+    except pa.ArrowInvalid:
+        pass
+    columns = _read(rows, len(places), as_text, ".")
+    return [columns[places[name]] for name in names]
+
+
+def _read(
+    rows: Rows, width: int, types: Mapping[str, pa.DataType], decimal: str
+) -> dict[str, pa.Array]:
+    if not rows.data or not types:
+        return {name: pa.array([], arrow_type) for name, arrow_type in types.items()}
+    table = pa.csv.read_csv(
+        pa.BufferReader(rows.data),
+        pa.csv.ReadOptions(
+            use_threads=False,
+            block_size=len(rows.data) + 1,
+            column_names=[*map(str, range(width))],
+        ),
+        pa.csv.ParseOptions(
+            delimiter=rows.sep,
+            quote_char='"' if rows.has_quotes else False,
+            ignore_empty_lines=False,
+            newlines_in_values=not rows.is_cut_by_lines,
+        ),
+        pa.csv.ConvertOptions(
+            check_utf8=False,
+            column_types=types,
+            null_values=_NULLS,
+            strings_can_be_null=False,
+            include_columns=[*types],
+            decimal_point=decimal,
+        ),
+    )
+    return {name: table.column(name).combine_chunks() for name in types}
+
+
+def lines_of(rows: Rows, sep: str) -> pa.Array:
+    """Return rows as they stand in the file, as an array of texts; with another separator, with
+    their cells in quotes where they need them."""
+    if sep != rows.sep:
+        return pa.array([joined(cells, sep) for cells in rows.cells()], pa.string())
+    count = rows.ends.size
+    offsets = np.concatenate([[0], rows.ends - np.arange(count)]).astype(np.int32)
+    if rows.is_cut_by_lines:
+        text = rows.data.replace(b"\n", b"")
+    else:
+        text = np.delete(np.frombuffer(rows.data, np.uint8), rows.ends).tobytes()
+    return pa.StringArray.from_buffers(count, pa.py_buffer(offsets), pa.py_buffer(text))

@@ -13,9 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mumacro.answer import BAND, DEFAULT, TEXTS
-from mumacro.errors import InputError
-from mumacro.files.errors import FilesError
-from mumacro.files.text_columns import numbers_of
+from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
@@ -24,6 +22,7 @@ from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
+from mumacro.inputs.text_tables import numbers_of
 from mumacro.inputs.units import Scale, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS
@@ -37,6 +36,11 @@ ANSWERS = DEFAULT
 REJECTS = pa.schema(
     [("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())]
 )
+
+
+class FilesError(MumacroError):
+    """A file of cases cannot be read, understood or written; one line that names it, the reason and
+    the remedy."""
 
 
 def answer_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
@@ -103,9 +107,12 @@ def answer(
     result = answer_columns(batch, surrogate or Surrogate.open(), columns)
     schema = pa.schema([*batch.schema, *answer_fields(columns.answer_names)], batch.schema.metadata)
     answers = pa.RecordBatch.from_arrays([*batch.columns, *result.columns], schema=schema)
-    return answers, pa.RecordBatch.from_pylist(
-        [dict(zip(REJECTS.names, row, strict=True)) for row in result.rejects], REJECTS
-    )
+    cells = [batch.column(columns.headings[name][0])[i].as_py() for i, name, _ in result.rejects]
+    rejects = [
+        {"row": i, "field": name, "value": None if cell is None else str(cell), "reason": reason}
+        for cell, (i, name, reason) in zip(cells, result.rejects, strict=True)
+    ]
+    return answers, pa.RecordBatch.from_pylist(rejects, REJECTS)
 
 
 class Columns(NamedTuple):
@@ -123,7 +130,7 @@ class AnswerColumns(NamedTuple):
     """What :func:`answer_columns` gives."""
 
     columns: list[pa.Array]
-    rejects: list[tuple[int, str, str | None, str]]  #: rows of ``REJECTS``
+    rejects: list[tuple[int, str, str]]  #: index, input and reason of each row without a result
     inputs: dict[str, Array]  #: the inputs in the units of the table, by heading
     remarks: list[Remark]
 
@@ -277,9 +284,7 @@ def answer_columns(
     rejects = []
     for i in np.flatnonzero(is_rejected).tolist():
         name, reason = _field_and_reason(cases.reason(i))
-        cell = batch.column(columns.headings[name][0])[i].as_py()
-        reason = faults.get(name, {}).get(i, reason)
-        rejects.append((i, name, None if cell is None else str(cell), reason))
+        rejects.append((i, name, faults.get(name, {}).get(i, reason)))
     in_heads = {name: split_unit(heading)[1] for name, (heading, _) in columns.headings.items()}
     remarks = result.remarks_in({name: unit for name, unit in in_heads.items() if unit})
     return AnswerColumns(
@@ -309,7 +314,9 @@ def numbers(
         or pa.types.is_large_string(arrow_type)
         or pa.types.is_string_view(arrow_type)
     ):
-        return numbers_of(pc.cast(array, pa.string()), name, signs, scale)
+        field = name.removeprefix("std_")
+        cells = pc.cast(array, pa.string()).to_pylist()
+        return numbers_of(cells, LIKE.get(field, field), signs, scale)
     is_number = (
         pa.types.is_integer(arrow_type)
         or pa.types.is_floating(arrow_type)

@@ -11,16 +11,16 @@ import pyarrow as pa
 
 from mumacro.answer import add
 from mumacro.files import reading
-from mumacro.files.errors import FilesError
+from mumacro.files.reading import Block, ParquetSource, TextSource, lines_of
 from mumacro.files.record_batch import (
     REJECTS,
+    FilesError,
     answer_columns,
     answer_fields,
     find_columns,
     kind_in,
     names_of_columns,
 )
-from mumacro.files.text_source import Block
 from mumacro.files.writing import Output, csv_lines, written_as
 from mumacro.inputs.cases import KIND
 from mumacro.inputs.doubts import Remark
@@ -115,24 +115,6 @@ class _State(NamedTuple):
     rejects: str = ""
 
 
-_Source = reading.ParquetSource | reading.TextSource
-
-
-def _source_of(
-    files: Sequence[Path],
-    file_format: str,
-    folder: str | None,
-    rigid: bool,
-    dialect: Dialect,
-    verbatim: bool,
-) -> _Source:
-    """What reads the cases of files of one format; ``folder`` is that which holds them, if one was
-    named."""
-    if file_format == "parquet":
-        return reading.ParquetSource(files, folder)
-    return reading.TextSource(files, dialect, names_of_columns(rigid), verbatim)
-
-
 class _Run:
     def __init__(
         self,
@@ -156,14 +138,16 @@ class _Run:
                     f"{output}: is an input, and would be overwritten; give another -o"
                 )
         self.states_at_start = [_state_of(path) for path in self.files]
-        self.verbatim = input_format == output_format != "parquet"
+        #: rows of a text come out as they came in, with the answers behind them
+        self.keeps_lines = input_format == output_format == "text"
         folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
-        self.source = _source_of(self.files, input_format, folder, rigid, dialect, self.verbatim)
-        where = f"{self.files[0]}: "
-        if isinstance(self.source, reading.TextSource):
-            where = self.source.where
-        self.surrogate, self.remarks = surrogate, list[Remark]()
-        names = self.source.schema.names
+        self.source = (
+            ParquetSource(self.files, folder)
+            if input_format == "parquet"
+            else TextSource(self.files, dialect, names_of_columns(rigid), self.keeps_lines)
+        )
+        self.surrogate, self.say, self.remarks = surrogate, say, list[Remark]()
+        names, where = self.source.schema.names, self.source.where
         if words := [name for name in KIND if name in names]:
             first = next(self.source.blocks(0, words), None)
             kind = kind if first is None else kind_in(first.batch, kind, where)
@@ -172,24 +156,17 @@ class _Run:
         sep, decimal = written_as(
             reading.ending_of(out), self.source.sep, self.source.decimal, dialect
         )
-        input_headings = [heading for heading, _ in headings.values()]
         self.output = Output(
             output_format, is_compressed, sep, decimal, headings.get("k", (None,))[0]
         )
-        self.to_text, self.say = self.verbatim and input_format == "text", say
-        if isinstance(self.source, reading.TextSource):
-            self.verbatim = self.source.write_with(sep)
-        as_numbers = input_format != "parquet" and (self.verbatim or not self.to_text)
-        input_fields = [
-            field.with_type(pa.float64()) if field.name in input_headings and as_numbers else field
-            for field in self.source.schema
+        inputs = [heading for heading, _ in headings.values()]
+        self.columns_read = [*inputs, *self.columns.words] if self.keeps_lines else names
+        is_text = input_format == "text"
+        copied = [
+            field.with_type(pa.float64()) if is_text and field.name in inputs else field
+            for field in ([] if self.keeps_lines else self.source.schema)
         ]
-        case_headings = [*input_headings, *self.columns.words]
-        self.columns_read = case_headings if self.verbatim else self.source.schema.names
-        fields = [
-            *([] if self.verbatim else input_fields),
-            *answer_fields(self.columns.answer_names),
-        ]
+        fields = [*copied, *answer_fields(self.columns.answer_names)]
         self.schema = pa.schema(fields, self.source.schema.metadata)
 
     def evaluate(self, force: bool, progress: Callable[[float, int, int], None]) -> Summary:
@@ -225,7 +202,7 @@ class _Run:
 
     def _opened_rejects(self, files: ExitStack) -> BinaryIO:
         stream = files.enter_context(growing(self.rejects))
-        where = REJECTS.names[0] if isinstance(self.source, reading.ParquetSource) else "line"
+        where = REJECTS.names[0] if isinstance(self.source, ParquetSource) else "line"
         head = [*["file"] * (len(self.files) > 1), where, *REJECTS.names[1:]]
         stream.write(csv_lines([head]).encode())
         return stream
@@ -235,8 +212,8 @@ class _Run:
         read; the head comes first."""
         state = _State()
         if self.output.format == "text":
-            headings = [*(self.source.head if self.verbatim else ()), *self.schema.names]
-            mark = "\ufeff" if self.to_text and self.source.has_mark else ""
+            headings = [*(self.source.schema.names if self.keeps_lines else ()), *self.schema.names]
+            mark = "\ufeff" if self.source.has_mark else ""
             yield state, self.output.pack(mark + csv_lines([headings], self.output.sep)), 0.0
         for file in range(len(self.files)):
             state = state._replace(file=file)
@@ -244,7 +221,7 @@ class _Run:
                 state, text = self._piece(state, block)
                 yield state, text, (file + block.share) / len(self.files)
         self._refuse_changed()
-        if isinstance(self.source, reading.TextSource):
+        if isinstance(self.source, TextSource):
             self.source.describe(self.say)
 
     def _refuse_changed(self) -> None:
@@ -256,34 +233,33 @@ class _Run:
 
     def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
-        answered = answer_columns(block.batch, self.surrogate, self.columns, block.signs)
-        if answered.rejects and block.as_text is not None:  # which has the cells, and why
-            block = block.as_text()
-            answered = answer_columns(block.batch, self.surrogate, self.columns, block.signs)
-        answers, rejects, by_heading, remarks = answered
+        answers, rejects, inputs, remarks = answer_columns(
+            block.batch, self.surrogate, self.columns, block.signs
+        )
         for remark in remarks:
             add(self.remarks, remark)
-        faults = {row: reason for row, *reason in rejects}
-        faults |= {i: [None, text, reason] for i, text, reason in block.unreadable}
-        columns = [
-            column if column.type == field.type else pa.array(by_heading[field.name])
+        faults: dict[int, tuple[str | None, Any, str]] = {
+            i: (name, block.value(i, self.columns.headings[name][0]), reason)
+            for i, name, reason in rejects
+        }
+        faults |= {i: (None, text, reason) for i, (text, reason) in block.faults.items()}
+        copied = [
+            column if column.type == field.type else pa.array(inputs[field.name])
             for field, column in zip(
-                self.schema, [] if self.verbatim else block.batch.columns, strict=False
+                self.schema, [] if self.keeps_lines else block.batch.columns, strict=False
             )
         ]
-        batch, texts = (
-            pa.RecordBatch.from_arrays([*columns, *answers], schema=self.schema),
-            block.texts,
-        )
+        batch = pa.RecordBatch.from_arrays([*copied, *answers], schema=self.schema)
+        lines = lines_of(block.rows, self.output.sep) if self.keeps_lines and block.rows else None
         if faults:
             keep = np.ones(len(batch), np.bool_)
             keep[[*faults]] = False
             batch = batch.filter(pa.array(keep))
-            texts = texts.filter(pa.array(keep)) if isinstance(texts, pa.Array) else texts
+            lines = None if lines is None else lines.filter(pa.array(keep))
         file = [self.files[state.file]] * (len(self.files) > 1)
         reject_lines = csv_lines([*file, block.lines[i], *reason] for i, reason in faults.items())
         n, rejected = len(block.batch), state.rejected + len(faults)
-        text = self.output.piece(batch, texts if self.verbatim else None)
+        text = self.output.piece(batch, lines)
         return _State(state.file, state.rows + n, rejected, reject_lines), text
 
 

@@ -70,10 +70,15 @@ class TextError(MumacroError, ValueError):
 
 
 class Piece(NamedTuple):
-    """Lines of a text, without their ends."""
+    """Whole lines of a text."""
 
     first: int  #: the number of the first one, from 1
-    lines: list[str]
+    text: str  #: with a line feed between two lines
+
+    @property
+    def lines(self) -> list[str]:
+        """The lines without their ends."""
+        return self.text.split("\n")
 
 
 def encoding_of(name: str) -> str:
@@ -128,39 +133,32 @@ class Text:
         self._ascii = True  # so far
         self._decoder: codecs.IncrementalDecoder | None = None
         self._line_ends = io.IncrementalNewlineDecoder(None, translate=True)
-        self._back: list[Piece] = []
 
     def __iter__(self) -> Iterator[Piece]:
         return self
 
     def __next__(self) -> Piece:
-        if self._back:
-            return self._back.pop()
         for data in filter(None, self._bytes):
             text = self._decoded(data)
             whole, end, rest = text.rpartition("\n")
-            if end:
-                lines = "".join([*self._begun, whole]).split("\n")
-                self._begun = []
-                self._lines += len(lines)
-            self._begun.append(rest)
+            piece = self._piece("".join([*self._begun, whole])) if end else None
+            self._begun = [rest] if end else [*self._begun, rest]
             if sum(map(len, self._begun)) > LONGEST:
                 where = f"line {self._lines + 1} has more than {LONGEST >> 20} MiB"
                 raise TextError(f"{where}: it is no table, or its line ends are lost")
-            if end:
-                return Piece(self._lines - len(lines) + 1, lines)
+            if piece is not None:
+                return piece
         last = "".join(self._begun) + (self._decoded(b"", final=True) if self._decoder else "")
         self._begun, self._decoder = [], None
         if not last:
             raise StopIteration
-        lines = last.removesuffix("\n").split("\n")
-        self._lines += len(lines)
-        return Piece(self._lines - len(lines) + 1, lines)
+        return self._piece(last.removesuffix("\n"))
 
-    def put_back(self, piece: Piece) -> None:
-        """Give lines out again as the next piece."""
-        if piece.lines:
-            self._back.append(piece)
+    def _piece(self, text: str) -> Piece:
+        """The next lines, which are whole."""
+        first = self._lines + 1
+        self._lines += text.count("\n") + 1
+        return Piece(first, text)
 
     def _decoded(self, data: bytes, final: bool = False) -> str:
         """The text of some bytes, whose lines end in line feeds."""

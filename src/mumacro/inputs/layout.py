@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import NamedTuple
 
-from mumacro.inputs.decoding import NAMES, Piece, TextError
+from mumacro.inputs.decoding import NAMES, TextError
 from mumacro.inputs.fields import is_rigid
 from mumacro.inputs.headings import find_heads, heading, meant_by, unit_in_si
 from mumacro.inputs.signs import Signs
@@ -40,7 +40,7 @@ GAPS = frozenset(
 _CELL = re.compile(r'"([^"]*)"|((?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+)')
 _UNIT_CELL = re.compile(r"\[[^\[\]]*\]|\([^()]*\)|\S+")
 _BEGINNING, _OF_WORD = re.compile(r"(?<![\w.])\S"), re.compile(r"\w")  # of a name in a sentence
-_SEP_LINE = re.compile(r'\ufeff?"?sep=(.)"?', re.IGNORECASE | re.DOTALL)
+_SEP_LINE = re.compile(r'\ufeff?"?sep=([,;|\t])"?', re.IGNORECASE)
 #: what LabVIEW writes behind each of its headers
 END_OF_HEADER = "***End_of_Header***"
 # words before the units in their row, or before the names in a comment
@@ -104,6 +104,11 @@ class Layout(NamedTuple):
     dashes: str  #: before the name of an option, in messages
 
     @property
+    def cell_sep(self) -> str:
+        """What separates the cells of rows, once tabs stand in place of blanks."""
+        return "\t" if self.sep == BLANKS else self.sep
+
+    @property
     def without_comments(self) -> bool:
         """Whether rows end before the last column, as LabVIEW writes them."""
         return self.labview and self.heads[-1:] == ["Comment"]
@@ -118,8 +123,8 @@ class Layout(NamedTuple):
         """Return how the table is read, with the unit of each input, in a few words.
 
         >>> column_names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
-        >>> start = Piece(1, ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"])
-        >>> layout = find_layout(start, column_names, Dialect())
+        >>> lines = ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"]
+        >>> layout = find_layout(lines, column_names, Dialect())
         >>> layout.described(Signs(",", None))
         'semicolon, decimal comma, head in line 2, units in line 3; v0 [mm/s], mu_macro [%]'
         """
@@ -156,7 +161,7 @@ class _Head(NamedTuple):
 
 
 def find_layout(
-    start: Piece, column_names: ColumnNames, dialect: Dialect, encoding: str = ""
+    lines: list[str], column_names: ColumnNames, dialect: Dialect, encoding: str = ""
 ) -> Layout:
     """Find how a table is written, from its first lines.
 
@@ -164,27 +169,26 @@ def find_layout(
     TextError where there is no line at all, where units are none or contradict each other, and
     where rows stand before the head.
     """
-    lines = start.lines
     preamble = _declared(lines)
     sep = dialect.sep or preamble.sep
-    head = _find_head(start, column_names, dialect, sep, preamble.labview)
+    head = _find_head(lines, column_names, dialect, sep, preamble.labview)
     cells = head.cells
     while cells and not cells[-1]:
         cells = cells[:-1]
     heads = [heading(cell, column_names.like) for cell in cells]
-    found = _Units(heads, column_names.like, start.first)
+    found = _Units(heads, column_names.like)
     if preamble.units is not None:
         label_line = split(lines[preamble.units], head.sep)
         found.take_row(preamble.units, ["", *label_line[1:]])
     elif is_known(heads, column_names):
-        _find_units(found, start, head, dialect)
+        _find_units(found, lines, head, dialect)
     heads = found.heads()
     data = head.end
     in_units = {preamble.units, *found.lines}
     while data < len(lines) and (data in in_units or not lines[data].strip(f" \t{head.sep}")):
         data += 1
     rows = dialect.rows
-    first = max(start.first + data, rows[0]) if rows else start.first + data
+    first = max(data + 1, rows[0]) if rows else data + 1
     places, _ = find_heads(heads, column_names.like)
     return Layout(
         encoding,
@@ -192,14 +196,14 @@ def find_layout(
         preamble.decimal,
         cells,
         heads,
-        start.first + head.at,
-        [start.first + i for i in sorted(found.lines)],
+        head.at + 1,
+        [i + 1 for i in sorted(found.lines)],
         first,
         rows[1] if rows else None,
         {i: name for name, (i, _) in sorted(places.items(), key=lambda one: one[1][0])},
         preamble.labview,
         [
-            start.first + i
+            i + 1
             for i in range(min(data, len(lines)))
             if lines[i].strip() and i not in in_units and not head.at <= i < head.end
         ],
@@ -238,20 +242,20 @@ def _declared(lines: Sequence[str]) -> _Declared:
 
 
 def _find_head(
-    start: Piece, column_names: ColumnNames, dialect: Dialect, sep: str | None, labview: bool
+    lines: list[str], column_names: ColumnNames, dialect: Dialect, sep: str | None, labview: bool
 ) -> _Head:
     """The first line that names all that is needed and fits the row behind it; where the rows are
     said, the last one before them."""
-    lines, seps = start.lines, (sep,) if sep else tuple(SEPARATORS.values())
+    seps = (sep,) if sep else tuple(SEPARATORS.values())
     candidates = [*islice(_heads_in(lines, dialect.skip, seps, column_names), 20)]
     if dialect.rows:
-        candidates = [one for one in candidates if start.first + one.at < dialect.rows[0]][::-1]
+        candidates = [one for one in candidates if one.at + 1 < dialect.rows[0]][::-1]
     head = next((one for one in candidates if _fits(one, lines, labview)), None)
     head = head or (candidates[0] if candidates else _likely_head(lines, dialect.skip, seps))
     if not dialect.rows:
         for one in candidates:
             if one.at < head.at:
-                _refuse_rows_between(one, head, start, dialect)
+                _refuse_rows_between(one, head, lines, dialect)
     for one in candidates:  # the names in a comment may stand above the head itself
         between = lines[head.at : one.at]
         if between and all(is_comment(line) or not line.strip() for line in between):
@@ -259,16 +263,16 @@ def _find_head(
     return head
 
 
-def _refuse_rows_between(before: _Head, head: _Head, start: Piece, dialect: Dialect) -> None:
+def _refuse_rows_between(before: _Head, head: _Head, lines: list[str], dialect: Dialect) -> None:
     """Refuse a table with rows below a head that did not fit them, before the one that fits."""
     for i in range(before.end, head.at):
-        cells = [] if is_comment(start.lines[i]) else split(start.lines[i], before.sep)
+        cells = [] if is_comment(lines[i]) else split(lines[i], before.sep)
         if len(cells) > 1 and any(map(is_number, cells)):
             raise TextError(
-                f"line {start.first + i}: rows of a segment stand between the heads of lines "
-                f"{start.first + before.at} and {start.first + head.at}: "
+                f"line {i + 1}: rows of a segment stand between the heads of lines "
+                f"{before.at + 1} and {head.at + 1}: "
                 + (
-                    f"{dialect.dashes}skip {start.first + head.at - 1} leaves them out"
+                    f"{dialect.dashes}skip {head.at} leaves them out"
                     if dialect.dashes
                     else "give the rows of one"
                 )
@@ -385,8 +389,8 @@ def is_number(cell: str) -> bool:
 class _Units:
     """The units of the columns, from every line that has some; TextError where two differ."""
 
-    def __init__(self, heads: list[str], like: Mapping[str, str], number: int) -> None:
-        self._heads, self.like, self._number = heads, like, number
+    def __init__(self, heads: list[str], like: Mapping[str, str]) -> None:
+        self._heads, self.like = heads, like
         self.names = [split_unit(head)[0] for head in heads]
         self._units: dict[int, tuple[str, int | None]] = {}  # by place: the unit, and its line
         for i, head in enumerate(heads):
@@ -405,14 +409,14 @@ class _Units:
 
     def take(self, i: int, unit: str, index: int) -> None:
         """Take the unit of a column from a line."""
-        line, name = self._number + index, self.names[i]
+        line, name = index + 1, self.names[i]
         if name in self.like:
             scale = scale_of(self.like[name], unit)
             if scale is None:
                 raise TextError(f"line {line}: {unit[:40]!r} is no unit of {name}")
             before, where = self._units.get(i, (unit, None))
             if scale_of(self.like[name], before) not in (scale, None):
-                says = "its head says" if where is None else f"line {self._number + where} says"
+                says = "its head says" if where is None else f"line {where + 1} says"
                 raise TextError(
                     f"line {line}: {name} is in {unit}, {says} {before}; leave one of them out"
                 )
@@ -438,7 +442,7 @@ class _Units:
                 continue
             if field == name or "unit" in what.lower():
                 raise TextError(
-                    f"line {self._number + index}: {what!r} has the unit {unit}, and {name} has "
+                    f"line {index + 1}: {what!r} has the unit {unit}, and {name} has "
                     f"none: write it behind the name, as in {name} [{unit}]"
                 )
 
@@ -448,13 +452,13 @@ class _Units:
             self.take(self.names.index(name), unit, index)
 
 
-def _find_units(found: _Units, start: Piece, head: _Head, dialect: Dialect) -> None:
+def _find_units(found: _Units, lines: list[str], head: _Head, dialect: Dialect) -> None:
     """Find the units beside the head and in legends; the first row behind it may be theirs."""
-    lines, skip = start.lines, dialect.skip
-    end = dialect.rows[0] - start.first if dialect.rows else len(lines)
+    skip = dialect.skip
+    end = dialect.rows[0] - 1 if dialect.rows else len(lines)
     above = [i for i in range(head.at - 1, skip - 1, -1) if lines[i].strip()][:_BESIDE]
     for i in above:
-        if cells := units_in(lines[i], head.sep, found.names, found.like, start.first + i):
+        if cells := units_in(lines[i], head.sep, found.names, found.like, i + 1):
             found.take_row(i, cells)
             break
     for i in range(head.end, min(end, len(lines))):
@@ -462,13 +466,13 @@ def _find_units(found: _Units, start: Piece, head: _Head, dialect: Dialect) -> N
         if not text.strip(f" \t{head.sep}"):
             continue
         if dialect.rows or (is_comment(text) and not _is_whole_row(text, head, found)):
-            if cells := units_in(text, head.sep, found.names, found.like, start.first + i):
+            if cells := units_in(text, head.sep, found.names, found.like, i + 1):
                 found.take_row(i, cells)
             else:
                 _take_legend(found, text, i)
             continue
         if split(text, head.sep) != head.cells and is_row_of_units(
-            split(text, head.sep), found.names, found.like, start.first + i
+            split(text, head.sep), found.names, found.like, i + 1
         ):
             found.take_row(i, split(text, head.sep))
             continue

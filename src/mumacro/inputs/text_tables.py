@@ -2,19 +2,21 @@
 
 Every line of a table is accounted for: it is before the head, the head, units, data, a comment or
 empty (:mod:`mumacro.inputs.layout` finds how it is written).  What cannot be is refused by its
-line: another head, another segment, a row of statistics.  :func:`read_table` reads a table into
-memory; files of any length are read in pieces (:mod:`mumacro.files.text_source`).
+line: another head, another segment, a row of statistics.  :class:`TextTable` gives the rows in
+pieces, whatever the length of the file; :func:`read_table` reads a table into memory.
 """
 
 import csv
+import io
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
-from itertools import chain, islice
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mumacro.inputs.decoding import LONGEST, Piece, Text, TextError, file_pieces
 from mumacro.inputs.fields import QUANTITY_OF, RIGID
@@ -43,10 +45,10 @@ from mumacro.inputs.numbers import TOO_LARGE, read_number, split_number, tidy
 from mumacro.inputs.signs import Cell, Signs
 from mumacro.inputs.units import Scale, scale_of, split_unit
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
-from mumacro.kernel.arrays import Array
+from mumacro.kernel.arrays import Array, Places
 
 SI_UNIT = Scale()
-_QUOTED = re.compile(r'"([^"]*)"|(?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+')
+_BETWEEN_BLANKS = re.compile(r'"[^"]*"|\S+')
 _BETWEEN = re.compile(r"[,;|\s]+")  # whatever separates cells
 # what a row of statistics begins with, in small letters
 _STATISTICS = re.compile(
@@ -56,15 +58,39 @@ _STATISTICS = re.compile(
     r"|standardabweichung|stabw"
     r"|[ée]cart[ -]type)(?:\.? ?(?:value|wert|of .{1,20}))?\W*"
 )
-#: the first two letters of each of these
-BEGIN_OF_STATISTICS = frozenset(
+# the first two letters of each of these
+_BEGIN_OF_STATISTICS = frozenset(
     (
         *("me", "av", "mi", "mw", "mo", "ma", "su", "to", "ra"),
         *("sp", "va", "co", "cv", "sd", "rs", "st", "ec", "s."),
     )
 )
+_PAIRS = [(first, second) for first in map(chr, range(256)) for second in map(chr, range(256))]
+# by the first two bytes of a cell, whether it begins as numbers do
+_BEGINS_NUMBER = np.array(
+    [a.isascii() and (a.isdigit() or (a in "+-." and b in "0123456789.")) for a, b in _PAIRS]
+)
+# by the first two bytes of a name, whether the line may be a comment, or begin with a word such as
+# mean; signs that are neither ASCII letters nor those of numbers are looked at
+_MAY_BE_OTHERWISE = np.array(
+    [
+        not (a.isascii() and (a.isalpha() or a in "0123456789+-."))
+        or (a + b).lower() in _BEGIN_OF_STATISTICS
+        for a, b in _PAIRS
+    ]
+)
+_END, _QUOTE = ord("\n"), ord('"')
+# a quoted cell, and a quote that begins a cell, by the separator; blanks may stand before
+_QUOTED = {
+    sep: re.compile(rb'(?<![^%b\n]) *+("(?:[^"]++|"")*+")(?=[%b\n])' % (sep.encode(), sep.encode()))
+    for sep in ",;|\t"
+}
+_OPEN_QUOTE = {sep: re.compile(rb'(?<![^%b\n]) *+"' % sep.encode()) for sep in ",;|\t"}
+_UNCLOSED = re.compile(rb' *+"(?:[^"]++|"")*+\Z')
+_EXCERPT = 500  # characters that are kept of a row that is refused
+_AT_ONCE = 2_000  # rows that are searched for the decimal sign at a time
 _WITH_POINTS = str.maketrans(",.", ".?")
-_OF_NUMBERS = re.compile(r"[0-9eE+\-.\n]*")  # the signs of plain numbers, line by line
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")
 
 
 class Most(NamedTuple):
@@ -78,7 +104,7 @@ class Most(NamedTuple):
         """Check lines before they are taken apart, whatever separates their cells: TextError for
         one with too many cells or too long a cell.
 
-        >>> Most(cell=3).check(Piece(7, ["a,b", "a,abcd"]))
+        >>> Most(cell=3).check(Piece(7, "a,b\\na,abcd"))
         Traceback (most recent call last):
         mumacro.inputs.decoding.TextError: line 8: a cell may have up to 3 characters
         """
@@ -91,39 +117,60 @@ class Most(NamedTuple):
                     raise TextError(f"line {number}: there may be up to {self.columns:,} columns")
 
 
-class Record(NamedTuple):
-    """A row of a table."""
+class Rows(NamedTuple):
+    """Rows of a table in order, as text: each has as many cells as the head."""
 
-    line: int  #: where it begins, as an editor counts
-    cells: list[str]
-    fault: str | None = None  #: why it is no row of this table
-    text: str = ""  #: as it stands there
-    is_whole: bool = True  #: whether the text has the cells and no others
+    data: bytes  #: UTF-8; each row ends with a line feed
+    ends: Places  #: the places of these line feeds
+    lines: Places  #: the line of the file in which each row begins
+    #: by the index of a row: its text, and why it is none of this table; its cells are empty
+    faults: dict[int, tuple[str, str]]
+    sep: str
+
+    @property
+    def has_quotes(self) -> bool:
+        """Whether there is a quote."""
+        return b'"' in self.data
+
+    @property
+    def is_cut_by_lines(self) -> bool:
+        """Whether each line feed ends a row."""
+        return not self.has_quotes or self.data.count(b"\n") == self.ends.size
+
+    def cells(self) -> Iterator[list[str]]:
+        """Yield the cells of each row."""
+        text = self.data.decode()
+        if not self.has_quotes:
+            yield from (line.split(self.sep) for line in text.split("\n")[:-1])
+            return
+        try:
+            yield from csv.reader(io.StringIO(text, newline="\n"), delimiter=self.sep)
+        except csv.Error as error:
+            raise TextError(f"line {self.lines[0]} or one of those behind it: {error}") from None
+
+    def of(self, i: int) -> list[str]:
+        """Return the cells of one row."""
+        start = self.ends[i - 1] + 1 if i else 0
+        text = self.data[start : self.ends[i]].decode()
+        return _cells_of(text, self.sep)
 
 
-def begin(
-    text: Text,
-    column_names: ColumnNames,
-    dialect: Dialect,
-    check: Callable[[Piece], None] = lambda _piece: None,
-) -> tuple[Layout, Iterator[tuple[int, str]]]:
-    """Find how a text is written; return that and the numbered lines of data.  Every piece is
-    checked before it is taken apart."""
-    start = list[str]()
-    for piece in text:
-        check(piece)
-        start += piece.lines
-        if len(start) >= LOOKED_AT:
-            break
+def _cells_of(text: str, sep: str) -> list[str]:
+    """The cells of a row."""
+    if '"' not in text:
+        return text.split(sep)
+    return next(csv.reader(io.StringIO(text, newline="\n"), delimiter=sep), [])
 
-    def following() -> Iterator[str]:
-        for piece in text:
-            check(piece)
-            yield from piece.lines
 
-    layout = find_layout(Piece(1, start), column_names, dialect, text.encoding)
-    lines = islice(chain(start, following()), layout.first - 1, layout.last)
-    return layout, iter(enumerate(lines, layout.first))
+def joined(cells: Iterable[object], sep: str) -> str:
+    """Return cells as a row of text, those in quotes that need them.
+
+    >>> joined(["a", "b;c", 1], ";")
+    'a;"b;c";1'
+    """
+    stream = io.StringIO(newline="")
+    csv.writer(stream, delimiter=sep, lineterminator="\n").writerow(cells)
+    return stream.getvalue()[:-1]
 
 
 # --- its rows -------------------------------------------------------------------------------------
@@ -133,7 +180,7 @@ class Account:
     """What each line of data is; TextError for one that cannot be any of it."""
 
     def __init__(self, layout: Layout, column_names: ColumnNames) -> None:
-        self._layout, self._column_names = layout, column_names
+        self.layout, self._column_names = layout, column_names
         self._names = [split_unit(head)[0] for head in layout.heads]
         self._units = {
             name: scale_of(column_names.like[name], split_unit(layout.heads[i])[1] or "")
@@ -142,67 +189,88 @@ class Account:
         self._first_is_input = 0 in layout.inputs
         # every head has this name: looked for first, as most lines lack it
         groups = column_names.required_groups
-        self._name = max((names[0] for names in groups if len(names) == 1), key=len, default="")
+        self.name = max((names[0] for names in groups if len(names) == 1), key=len, default="")
         self.repeated: list[int] = []  #: lines that have the head or its units again
         self.skipped: list[int] = []  #: those, and comments
 
-    def may_be_data(self, line: int, text: str) -> bool:
+    def row(self, line: int, text: str) -> tuple[str, str | None] | None:
+        """Return the text of a row, with as many cells as the head, and its fault; None for a line
+        that is none."""
+        sep, width = self.layout.cell_sep, len(self.layout.heads)
+        if not self._may_be_data(line, text):
+            return None
+        if text.count(sep) > 2 * width + 1000:  # no use in taking it apart
+            return sep * (width - 1), irregular(text.count(sep) + 1, width)
+        cells = _cells_of(text, sep)
+        if not self._is_row(line, text, cells):
+            return None
+        if len(cells) == width:
+            return text, None
+        if len(cells) > width and not any(map(str.strip, cells[width:])):
+            return joined(cells[:width], sep), None
+        if len(cells) == width - 1 and self.layout.without_comments:
+            return text + sep, None
+        return sep * (width - 1), irregular(len(cells), width)
+
+    def _may_be_data(self, line: int, text: str) -> bool:
         """Whether a line is neither empty nor a comment; a name such as #1 in the first column
         makes no comment of a row that is whole."""
-        layout = self._layout
+        layout = self.layout
         if not text.strip(f" \t{layout.sep}"):
             return False
         if not is_comment(text) or (
             not self._first_is_input and may_be_row(text, layout.sep, len(layout.heads))
         ):
             return True
+        if "\n" in text:
+            raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
         self.skipped.append(line)
-        if self.may_be_head(text) and self._repeats_head(line, text):
+        if self._may_be_head(text) and self._repeats_head(line, text):
             self.repeated.append(line)
             return False
         self._check_comment(line, text)
         return False
 
-    def may_be_head(self, text: str) -> bool:
+    def _may_be_head(self, text: str) -> bool:
         """Whether a text has all names that a head needs, or begins another segment of LabVIEW."""
-        if self._layout.labview and END_OF_HEADER in text:
+        if self.layout.labview and END_OF_HEADER in text:
             return True
-        if self._name not in text:
+        if self.name not in text:
             return False
         groups = self._column_names.required_groups
         return all(any(name in text for name in names) for names in groups)
 
-    def is_row(self, line: int, text: str, cells: list[str]) -> bool:
+    def _is_row(self, line: int, text: str, cells: list[str]) -> bool:
         """Whether a line of cells is a row; False for the head or its units again."""
         first = next((cell for cell in cells if cell.strip()), "").strip()
-        if self.may_be_head(text) and self._repeats_head(line, text):
+        if self._may_be_head(text) and self._repeats_head(line, text):
             self.repeated.append(line)
             self.skipped.append(line)
             return False
         if first[:1].isdigit() and not (self.repeated and self.repeated[-1] == line - 1):
             return True
         if len(first) < 40 and _STATISTICS.fullmatch(first.lower()):
-            remedy = self._layout.without(line)
+            remedy = self.layout.without(line)
             raise TextError(f"line {line}: {first!r} begins a row of statistics: {remedy}")
-        inputs = [cells[i] for i in self._layout.inputs if i < len(cells)]
+        inputs = [cells[i] for i in self.layout.inputs if i < len(cells)]
         may_be_units = not any(is_number(cell) and cell.strip(" []()") != "1" for cell in inputs)
         if may_be_units and self._has_units(line, text):
             return False
-        width = len(self._layout.heads)
-        is_whole = len(cells) in (width, width - self._layout.without_comments)
+        width = len(self.layout.heads)
+        is_whole = len(cells) in (width, width - self.layout.without_comments)
         filled = [cell for cell in map(str.strip, cells[:1000]) if cell]
         is_title = len(filled) == 1 and width > 1 and not is_number(first)
         if is_title or (
             not is_whole and not any(is_number(cell) or cell.lower() in GAPS for cell in filled)
         ):
             shown = " ".join(text.split())[:60]
-            remedy = self._layout.without(line)
+            remedy = self.layout.without(line)
             raise TextError(f"line {line}: {shown!r} is neither a row nor a comment: {remedy}")
         return True
 
     def _repeats_head(self, line: int, text: str) -> bool:
         """Whether a line is the head again; TextError where it is another one."""
-        layout, like = self._layout, self._column_names.like
+        layout, like = self.layout, self._column_names.like
         if text.startswith(END_OF_HEADER):
             raise TextError(f"line {line} begins another segment: {layout.without(line)}")
         cells = split(uncommented(text), layout.sep)
@@ -227,7 +295,7 @@ class Account:
 
     def _has_units(self, line: int, text: str) -> bool:
         """Whether a line has the units of the columns again; TextError where they are others."""
-        layout, like = self._layout, self._column_names.like
+        layout, like = self.layout, self._column_names.like
         cells = units_in(text, layout.sep, self._names, like, line)
         if cells is None:
             return False
@@ -245,7 +313,7 @@ class Account:
     def _check_comment(self, line: int, text: str) -> None:
         """Refuse a comment among the rows that says other units than the head."""
         like = self._column_names.like
-        for name, unit in legend(text, [*self._layout.inputs.values()]):
+        for name, unit in legend(text, [*self.layout.inputs.values()]):
             if scale_of(like[name], unit) != (self._units[name] or SI_UNIT):
                 raise TextError(
                     f"line {line}: {name} is in {unit}, but not in the head: leave one of them out"
@@ -253,70 +321,114 @@ class Account:
         self._has_units(line, text)
 
 
-def records(lines: Iterator[tuple[int, str]], layout: Layout, account: Account) -> Iterator[Record]:
-    """Return the rows among numbered lines; a quoted cell may go on in the next lines.
+def rows_in(first: int, text: str, account: Account) -> tuple[Rows, str]:
+    """Return the rows of lines, of which ``first`` is the number of the first, and the beginning of
+    a row that goes on behind them.
 
-    TextError where a quote is not closed, and where a line is none of a table's.
+    Lines that are something else than a row of numbers are looked at one by one.
     """
-    sep, width = layout.sep, len(layout.heads)
-    for line, text in lines:
-        if not account.may_be_data(line, text):
+    sep = account.layout.cell_sep
+    if account.layout.sep == BLANKS:
+        text = "\n".join(
+            sep.join(_BETWEEN_BLANKS.findall(line) if '"' in line else line.split())
+            for line in text.split("\n")
+        )
+    data, bare, rest = _without_quotes(first, f"{text}\n".encode(), sep)
+    ends = np.flatnonzero(np.frombuffer(bare, np.uint8) == _END)
+    starts = np.concatenate([[0], ends[:-1] + 1])[: ends.size]
+    lines = first + np.arange(ends.size)
+    if data.count(b"\n") != ends.size:
+        all_ends = np.flatnonzero(np.frombuffer(data, np.uint8) == _END)
+        lines = first + np.searchsorted(all_ends, starts)
+    lengths, keep, faults = (
+        ends - starts,
+        np.ones(ends.size, np.bool_),
+        dict[int, tuple[str, str]](),
+    )
+    parts, end = list[bytes](), 0
+    for i in _doubtful(account, data, bare, starts, ends):
+        line = data[starts[i] : ends[i]].decode()
+        row = account.row(int(lines[i]), line)
+        if row is None:
+            keep[i] = False
+        elif row[1] is not None:
+            faults[i] = line if len(line) <= _EXCERPT else line[:_EXCERPT] + "…", row[1]
+        if row is None or row[0] != line:
+            new = b"" if row is None else f"{row[0]}\n".encode()
+            parts += [data[end : starts[i]], new]
+            lengths[i], end = len(new) - 1, ends[i] + 1
+    if parts:
+        data, places = b"".join([*parts, data[end:]]), np.cumsum(keep) - 1
+        ends, lines = np.cumsum(lengths[keep] + 1) - 1, lines[keep]
+        faults = {int(places[i]): fault for i, fault in faults.items()}
+    return Rows(data, ends, lines, faults, sep), rest
+
+
+def _without_quotes(first: int, data: bytes, sep: str) -> tuple[bytes, bytes, str]:
+    """Rows, the same with zeros in place of quoted cells, and the beginning of a row whose quote is
+    not closed; TextError where a quote is not at the end of its cell."""
+    if b'"' not in data:
+        return data, data, ""
+    quoted, open_quote = _QUOTED[sep], _OPEN_QUOTE[sep]
+    if b' "' in data:
+        data = quoted.sub(rb"\1", data)
+    bare = quoted.sub(lambda match: b"0" * len(match[0]), data)
+    for match in open_quote.finditer(bare):
+        start = bare.rfind(b"\n", 0, match.start()) + 1
+        if is_comment(data[start : start + 100].decode(errors="ignore")):
             continue
-        if '"' in text:
-            cells, text = _quoted(line, text, lines, sep)
-        elif sep == BLANKS:
-            cells = text.split()
-        elif text.count(sep) > 2 * width + 1000:  # no use in taking it apart
-            yield Record(line, [], irregular(text.count(sep) + 1, width), text)
-            continue
-        else:
-            cells = text.split(sep)
-        if account.is_row(line, text, cells):
-            yield regular(Record(line, cells, None, text), layout)
+        if _UNCLOSED.match(data, match.start()):
+            return data[:start], bare[:start], data[start:-1].decode()
+        raise _unclosed(first + data.count(b"\n", 0, start))
+    return data, bare, ""
 
 
-def _quoted(
-    line: int, text: str, lines: Iterator[tuple[int, str]], sep: str
-) -> tuple[list[str], str]:
-    """The cells of a row with quotes, which may go on in the next lines, and all of its text."""
-    if sep == BLANKS:
-        return [match[0].strip('"') for match in _QUOTED.finditer(text)], text
-    try:  # most rows end in their line
-        return next(csv.reader((text,), delimiter=sep, strict=True, skipinitialspace=True)), text
-    except csv.Error:
-        texts = [text]
-
-    def with_ends() -> Iterator[str]:
-        yield f"{text}\n"
-        for _, following in lines:
-            texts.append(following)
-            yield f"{following}\n"
-
-    try:
-        reader = csv.reader(with_ends(), delimiter=sep, strict=True, skipinitialspace=True)
-        cells = next(reader)
-    except csv.Error as error:
-        fault = f"a quote is not closed, or not at the end of its cell ({error})"
-        raise TextError(f"line {line}: {fault}") from None
-    return cells, "\n".join(texts)
+def _unclosed(line: int) -> TextError:
+    return TextError(f"line {line}: a quote is not closed, or not at the end of its cell")
 
 
-def regular(record: Record, layout: Layout) -> Record:
-    """Return a row with as many cells as the head, or with its fault; empty cells may follow."""
-    cells, width = record.cells, len(layout.heads)
-    if len(cells) == width:
-        return record
-    if len(cells) > width and not any(map(str.strip, cells[width:])):
-        return record._replace(cells=cells[:width], is_whole=False)
-    if len(cells) == width - 1 and layout.without_comments:
-        return record._replace(cells=[*cells, ""], is_whole=False)
-    return record._replace(fault=irregular(len(cells), width))
+def _doubtful(
+    account: Account, data: bytes, bare: bytes, starts: Places, ends: Places
+) -> list[int]:
+    """The rows that are looked at one by one: those that do not begin as numbers do, have not as
+    many cells as the head, or may be the head again."""
+    if not ends.size:
+        return []
+    signs = np.frombuffer(data, np.uint8)
+    seps = np.flatnonzero(np.frombuffer(bare, np.uint8) == ord(account.layout.cell_sep))
+    before = np.searchsorted(seps, starts)
+    is_doubtful = np.searchsorted(seps, ends) - before != len(account.layout.heads) - 1
+    place = min(account.layout.inputs, default=0)
+    first = starts
+    if place and seps.size:  # a name stands first: what matters is the first cell of an input, too
+        is_doubtful |= _MAY_BE_OTHERWISE[_begin_of(starts, signs)]
+        first = np.minimum(seps[np.minimum(before + place, seps.size) - 1] + 1, signs.size - 1)
+    is_doubtful |= ~_BEGINS_NUMBER[_begin_of(first, signs)]
+    # the row of units below the head again may begin like a number
+    is_doubtful[0] |= bool(account.repeated)
+    place = data.find(name := account.name.encode())
+    while place >= 0:
+        i = int(np.searchsorted(ends, place))
+        is_doubtful[i : i + 2] = True
+        place = data.find(name, int(ends[i]))
+    doubtful: list[int] = np.flatnonzero(is_doubtful).tolist()
+    return doubtful
 
 
 def irregular(count: int, width: int) -> str:
     """What is wrong with a row of so many cells."""
     cells = "cell" if count == 1 else "cells"
     return f"has {count:,} {cells}, the head has {width:,}"
+
+
+def _begin_of(cells: Places, signs: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """The first two bytes of the cells that begin at places, behind a quote."""
+    last = signs.size - 1
+    first = cells + (signs[cells] == _QUOTE)
+    second = np.minimum(first + 1, last)
+    pairs: NDArray[np.uint16] = 256 * signs[np.minimum(first, last)].astype(np.uint16)
+    pairs += signs[second]
+    return pairs
 
 
 # --- its numbers ----------------------------------------------------------------------------------
@@ -373,45 +485,131 @@ def _no_number(like: str, text: str, fault: str, signs: Signs) -> str:
     return "must be a number"
 
 
-class Table(NamedTuple):
-    """Columns of numbers that were read."""
+def numbers_of(
+    cells: Iterable[str | None], like: str, signs: Signs, scale: Scale = SI_UNIT
+) -> tuple[Array, Array, dict[int, str]]:
+    """Return the numbers in cells in their own unit and in SI, NaN for a gap, and what is wrong
+    with other cells, by their index; see :func:`read_cell`.
 
-    columns: dict[str, Array]  #: by name, in SI, (n,)
-    units: dict[str, str]  #: of each column in the table; the SI unit where it has none
-    scales: dict[str, Scale]  #: of these units
-    lines: list[int]  #: of each row
-    skipped: list[int]  #: lines that are neither head nor units nor rows, and not empty
-    read_as: str  #: what was found out, see :meth:`Layout.described`
+    >>> numbers_of(["1,5", "-", "x"], "v0", Signs(",", None), Scale(over=1e3))
+    (array([1.5, nan, nan]), array([0.0015,    nan,    nan]), {2: 'must be a number'})
+    """
+    texts = [cell or "" for cell in cells]
+    values, others = np.full(len(texts), math.nan), list[int]()
+    for i, text in enumerate(texts):
+        # where commas are decimal, a point is none
+        plain = text.translate(_WITH_POINTS) if signs.decimal == "," else text
+        try:
+            values[i] = float(_FORTRAN.sub("e", plain) if "D" in plain or "d" in plain else plain)
+        except ValueError:
+            others.append(i)
+            continue
+        if not (math.isfinite(values[i]) and plain.isascii()) or "_" in plain:
+            others.append(i)
+    with np.errstate(over="ignore"):
+        si: Array = values * scale.times / scale.over
+    faults: dict[int, str] = {}
+    for i in [*others, *np.flatnonzero(np.isinf(si)).tolist()]:
+        values[i] = si[i] = math.nan
+        try:
+            si[i] = read_cell(like, texts[i], signs, scale)
+            values[i] = float(f"{si[i] * scale.over / scale.times:.15g}")
+        except ValueError as error:
+            faults[i] = str(error)
+    return values, si, faults
+
+
+# --- whole tables ---------------------------------------------------------------------------------
+
+
+class TextTable:
+    """A table in a file, or in bytes: how it is written, and its rows in pieces.
+
+    TextError tells why it is none; every piece is checked before it is taken apart.
+    """
+
+    def __init__(
+        self,
+        source: Path | bytes,
+        column_names: ColumnNames,
+        dialect: Dialect,
+        check: Callable[[Piece], None] = lambda _piece: None,
+    ) -> None:
+        self._column_names, self._check = column_names, check
+        self._source, self._dialect, self._said = _sheet_in(source, column_names, dialect)
+        text, start = self._text(), list[str]()
+        for piece in text:
+            check(piece)
+            start += piece.lines
+            if len(start) >= LOOKED_AT:
+                break
+        self.layout = find_layout(start, column_names, self._dialect, text.encoding)
+        self.signs = self._dialect.signs(self.layout)
+        self.account = Account(self.layout, column_names)
 
     @property
-    def in_own_units(self) -> dict[str, Array]:
-        """The columns in their units."""
-        return {name: _in_unit(x, self.scales[name]) for name, x in self.columns.items()}
+    def read_as(self) -> str:
+        """How the table was read, once it is."""
+        return self._said + self.layout.described(self.signs) + again(self.account.repeated)
+
+    def rows(self, report_place: Callable[[int], None] = lambda _at: None) -> Iterator[Rows]:
+        """Yield the rows in pieces; ``report_place`` is told how far a file is read."""
+        self.account = Account(self.layout, self._column_names)
+        rest, behind = "", self.layout.first
+        for piece in self._text(report_place):
+            self._check(piece)
+            first, text = _between(piece, self.layout.first, self.layout.last)
+            if text is None:
+                continue
+            if rest:
+                first, text = behind - rest.count("\n") - 1, f"{rest}\n{text}"
+            behind = first + text.count("\n") + 1
+            rows, rest = rows_in(first, text, self.account)
+            if len(rest) > LONGEST:
+                break
+            yield rows
+        if rest:
+            raise _unclosed(behind - rest.count("\n") - 1)
+
+    def see_signs(self, rows: Rows) -> None:
+        """Look at the numbers of some rows until they tell what their signs are."""
+        if b"." not in rows.data and b"," not in rows.data:
+            return
+        numbered = zip(range(rows.ends.size), rows.lines.tolist(), rows.cells(), strict=True)
+        while not self.signs.decimal and (some := [*islice(numbered, _AT_ONCE)]):
+            self.signs.see(
+                Cell(line, name, cells[i])
+                for j, line, cells in some
+                if j not in rows.faults
+                for i, name in self.layout.inputs.items()
+            )
+
+    def _text(self, report_place: Callable[[int], None] = lambda _at: None) -> Text:
+        """The text from its beginning."""
+        source = self._source
+        pieces = [source] if isinstance(source, bytes) else file_pieces(source, report_place)
+        return Text(pieces, self._dialect.encoding)
 
 
-def _in_unit(values: Array, scale: Scale) -> Array:
-    """Values in SI in another unit, with the digits that both have."""
-    numbers = values * scale.over / scale.times
-    return np.array([float(f"{value:.15g}") for value in numbers.tolist()])
+def _between(piece: Piece, first: int, last: int | None) -> tuple[int, str | None]:
+    """The lines of a piece from ``first`` to ``last``, and the number of the first of them; None
+    where there are none."""
+    start, text = piece
+    if start < first:
+        lines = text.split("\n", first - start)
+        if len(lines) <= first - start:
+            return first, None
+        start, text = first, lines[-1]
+    if last is not None:
+        text = "\n".join(text.split("\n", last - start + 1)[: max(last - start + 1, 0)])
+    return start, text if last is None or start <= last else None
 
 
-class Pieces(NamedTuple):
-    """The bytes of a table, from the beginning each time that they are asked for."""
-
-    source: Path | bytes
-
-    def __call__(self, report_place: Callable[[int], None] = lambda _at: None) -> Iterator[bytes]:
-        """Return them in pieces; ``report_place`` is told how far a file is read."""
-        if isinstance(self.source, bytes):
-            return iter([self.source])
-        return file_pieces(self.source, report_place)
-
-
-def source_of(
+def _sheet_in(
     source: Path | bytes, column_names: ColumnNames, dialect: Dialect
-) -> tuple[Pieces, Dialect, str]:
-    """Return the bytes of a table, of a workbook those of the sheet that has the names, how it is
-    written, and what is to be said of the sheets."""
+) -> tuple[Path | bytes, Dialect, str]:
+    """A table as text: of a workbook the sheet that has the names, how it is written, and what is
+    to be said of the sheets."""
     if isinstance(source, bytes):
         start = source[:4]
     else:
@@ -420,14 +618,25 @@ def source_of(
     if start != BEGIN:
         if dialect.sheet is not None:
             raise TextError(f"it is no workbook, and has no sheet {dialect.sheet!r}")
-        return Pieces(source), dialect, ""
+        return source, dialect, ""
 
     def has_names(lines: list[str]) -> bool:
-        layout = find_layout(Piece(1, lines), column_names, dialect._replace(sep=SEP))
+        layout = find_layout(lines, column_names, dialect._replace(sep=SEP))
         return is_known(layout.heads, column_names)
 
     data, said = read_sheet(source, dialect.sheet, dialect.decimal, has_names)
-    return Pieces(data), dialect._replace(sep=SEP, encoding="utf-8"), said
+    return data, dialect._replace(sep=SEP, encoding="utf-8"), said
+
+
+class Table(NamedTuple):
+    """Columns of numbers that were read."""
+
+    columns: dict[str, Array]  #: by name, in SI, (n,)
+    in_own_units: dict[str, Array]  #: the same in the units of the table
+    units: dict[str, str]  #: of each column in the table; the SI unit where it has none
+    lines: list[int]  #: of each row
+    skipped: list[int]  #: lines that are neither head nor units nor rows, and not empty
+    read_as: str  #: what was found out, see :meth:`Layout.described`
 
 
 def read_table(
@@ -447,9 +656,8 @@ def read_table(
     >>> table.read_as
     'tab, decimal comma, head in line 3, units in line 4; v0 [mm/s], mu_macro [%]'
     """
-    pieces, dialect, said = source_of(source, column_names, dialect)
-    text = Text(pieces(), dialect.encoding)
-    layout, lines = begin(text, column_names, dialect, most.check)
+    table = TextTable(source, column_names, dialect, most.check)
+    layout, signs = table.layout, table.signs
     columns, faults = find_heads(layout.heads, column_names.like)
     missing = [
         group[0] for group in column_names.required_groups if not columns.keys() & set(group)
@@ -461,32 +669,39 @@ def read_table(
         )
     if faults:
         raise TextError.of([f"line {layout.head}: {fault}" for fault in faults])
-    account = Account(layout, column_names)
-    rows = [*islice(records(lines, layout, account), most.rows + 1)]
-    if len(rows) > most.rows:
-        fault = f"there are more than {most.rows:,} rows: average them"
-        raise TextError(f"line {rows[-1].line}: {fault}")
-    if not rows:
+    lines, rows, wrong = list[int](), list[list[str]](), list[tuple[int, str]]()
+    for part in table.rows():
+        numbers = part.lines.tolist()
+        if len(lines) + len(numbers) > most.rows:
+            where = f"line {numbers[most.rows - len(lines)]}"
+            raise TextError(f"{where}: there are more than {most.rows:,} rows: average them")
+        for i, cells in enumerate(part.cells()):
+            if i in part.faults:
+                wrong.append((numbers[i], f"line {numbers[i]} {part.faults[i][1]}"))
+            else:
+                lines.append(numbers[i])
+                rows.append(cells)
+    if not rows and not wrong:
         raise TextError(f"line {layout.head}: no row follows the names of the columns")
-    signs = dialect.signs(layout)
-    whole = [row for row in rows if row.fault is None]
     signs.see(
-        Cell(row.line, name, row.cells[i]) for row in whole for name, (i, _) in columns.items()
+        Cell(line, name, cells[i])
+        for line, cells in zip(lines, rows, strict=True)
+        for name, (i, _) in columns.items()
     )
-    wrong = [(row.line, f"line {row.line} {row.fault}") for row in rows if row.fault]
-    numbers: dict[str, Array] = {}
+    si, own = dict[str, Array](), dict[str, Array]()
     for name, (i, scale) in columns.items():
-        numbers[name] = _column(name, column_names.like[name], whole, i, signs, scale, wrong)
+        texts = [cells[i] for cells in rows]
+        own[name], si[name], bad = numbers_of(texts, column_names.like[name], signs, scale)
+        for j in np.flatnonzero(np.isnan(si[name])).tolist():
+            fault = f"{bad[j]}, got {texts[j].strip()[:80]!r}" if j in bad else "is missing"
+            wrong.append((lines[j], f"line {lines[j]}: {name} {fault}"))
     if wrong:
         raise TextError.of([fault for _, fault in sorted(wrong, key=lambda one: one[0])])
     units = {
         name: split_unit(layout.heads[i])[1] or unit_in_si(name) for name, (i, _) in columns.items()
     }
-    scales = {name: scale for name, (_, scale) in columns.items()}
-    lines_of_rows = [row.line for row in whole]
-    skipped = sorted({*layout.skipped, *account.skipped})
-    read_as = said + layout.described(signs) + again(account.repeated)
-    return Table(numbers, units, scales, lines_of_rows, skipped, read_as)
+    skipped = sorted({*layout.skipped, *table.account.skipped})
+    return Table(si, own, units, lines, skipped, table.read_as)
 
 
 def again(lines: list[int]) -> str:
@@ -517,40 +732,3 @@ def read_columns(
     [1.5e-06, 2.5e-06]
     """
     return read_table(source, ColumnNames(like, [(name,) for name in like]), dialect, most)
-
-
-def _column(
-    name: str,
-    like: str,
-    rows: list[Record],
-    i: int,
-    signs: Signs,
-    scale: Scale,
-    wrong: list[tuple[int, str]],
-) -> Array:
-    """A column in SI; what is ``wrong`` with its cells is added, with their lines."""
-    cells = [row.cells[i].strip() for row in rows]
-    column = "\n".join(cells)
-    if signs.decimal == ",":  # with a point in place of each comma; a point itself is none
-        column = column.translate(_WITH_POINTS)
-        cells = column.split("\n")
-    if _OF_NUMBERS.fullmatch(column):
-        try:  # numbers as programs write them, all at once
-            values = np.array([*map(float, cells)])
-        except ValueError:
-            values = np.array([math.inf])
-        if np.isfinite(values).all():
-            with np.errstate(over="ignore"):
-                si: Array = values * scale.times / scale.over
-            if np.isfinite(si).all():
-                return si
-    numbers = np.empty(len(rows))
-    for j, row in enumerate(rows):
-        try:
-            numbers[j] = read_cell(like, row.cells[i], signs, scale)
-            if math.isnan(numbers[j]):
-                raise ValueError("is missing")
-        except ValueError as error:
-            shown = "" if str(error) == "is missing" else f", got {row.cells[i].strip()[:80]!r}"
-            wrong.append((row.line, f"line {row.line}: {name} {error}{shown}"))
-    return numbers

@@ -326,7 +326,7 @@ def test_options_count_for_workbooks(tmp_path: Path) -> None:
         ("# v0: speed [mm/s]", 4, "v0 is in mm/s"),
     ],
 )
-def test_what_is_no_row_ends_the_run_in_either_reader(
+def test_what_is_no_row_ends_the_run_with_and_without_quotes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quote: str, more: str, line: int, part: str
 ) -> None:
     monkeypatch.setattr(decoding, "PIECE", 60)
@@ -389,7 +389,7 @@ def test_a_row_of_statistics_is_found_behind_any_name(
         evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
 
 
-def test_both_readers_give_the_same_rows_and_rejects(tmp_path: Path) -> None:
+def test_quotes_change_no_row_and_no_reject(tmp_path: Path) -> None:
     cells = ["0.3", "-1", "", "1e400", "x", "rigid", "nan", "1.0D-1", "1,5", "2 um", "+0.3"]
     lines = [f"a,{cell if ',' not in cell else '0.3'},10,{k},2e-6,2e4,0.01,µ" for cell in cells
              for k in ("1e6", "rigid", "inf", "1e400", "")]  # fmt: skip

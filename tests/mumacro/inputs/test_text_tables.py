@@ -5,6 +5,8 @@ import csv
 import io
 import itertools
 import re
+import subprocess
+import sys
 import time
 import zipfile
 from collections.abc import Callable
@@ -147,6 +149,15 @@ def test_the_advice_for_an_ambiguous_number_works(rigs: Path) -> None:
     assert as_decimals.tolist() == close([1e-3 * v for v in V0], rel=1e-12)
     same = read_points(rigs / "ambiguous.txt", Dialect(thousands=".")).columns["v0"]
     assert same.tolist() == as_thousands.tolist()
+
+
+def test_a_fit_reads_its_table_without_pyarrow(rigs: Path) -> None:
+    program = (
+        "import sys; sys.modules['pyarrow'] = None; from mumacro.cli.main import main; "
+        f"sys.exit(main(['fit', {str(rigs / 'excel_de.csv')!r}, 'Fz=10N y0=0.4um f=20kHz']))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 # --- every way to write a table -------------------------------------------------------------------
@@ -466,6 +477,8 @@ def test_a_formula_without_a_value_is_refused() -> None:
 @pytest.mark.parametrize(
     ("data", "parts"),
     [
+        (b'v0,mu_macro,note\n1,2,a\n1,2,"b"c\n', ("line 3", "quote")),
+        (b'v0,mu_macro,note\n1,2,a\n# a,"b\n1,2,c\n# "\n', ("line 3", "comment")),
         (b"", ("line 1", "is empty")),
         (b"\n \n\t\n", ("line 1", "is empty")),
         (b"v0,mu_macro\n", ("line 1", "no row")),
