@@ -237,7 +237,9 @@ class TargetAnswer(BaseModel):
     roots: list[Root] = Field(
         description="Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)"
     )
-    reason: str | None = Field(None, description="Why there is no root")
+    reason: str | None = Field(
+        None, description="Why there is no root, or over which range every value is one"
+    )
 
 
 class Reachable(BaseModel):
@@ -293,7 +295,9 @@ class MotionTargetAnswer(BaseModel):
 
     target: float
     roots: list[MotionRoot] = Field(description="Ascending; there may be several")
-    reason: str | None = Field(None, description="Why there is no root")
+    reason: str | None = Field(
+        None, description="Why there is no root, or over which range every value is one"
+    )
 
 
 class SolveMotionAnswer(BaseModel):

@@ -19,7 +19,7 @@ from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.law import Law
-from mumacro.questions.solve_for import Solution
+from mumacro.questions.solve_for import TableSolution
 from mumacro.validity import load_rows
 
 from .. import API_VERSION
@@ -255,7 +255,7 @@ def _with_targets(question: SolveForRequest, results: list[dict[str, Any]]) -> N
 
 
 def _included(
-    question: SolveForRequest, table: LoadedTable, unknown: str, solution: Solution
+    question: SolveForRequest, table: LoadedTable, unknown: str, solution: TableSolution
 ) -> list[dict[str, Any]]:
     """The included quantities of every root, in order."""
     values = np.array([root.value for roots in solution.roots for root in roots])

@@ -22,7 +22,7 @@ from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.reading import read_one
 from mumacro.motions.solve_motion import UNKNOWNS
-from mumacro.questions.solve_for import Root, Solution, solve_for
+from mumacro.questions.solve_for import Root, TableSolution, solve_for
 from mumacro.results import tidy_zeros
 from mumacro.validity import load_rows
 
@@ -129,11 +129,12 @@ def run(words: Sequence[str]) -> str:
         for k, one in solutions.items()
         if not one.roots[0]
     ]
+    ranges = [solution.reason()] if solution.roots[0] and solution.reason() else []
     line = common.case_line(case, units, kind)
-    return "\n".join([line, table, *without, *common.model_lines(model)])
+    return "\n".join([line, table, *ranges, *without, *common.model_lines(model)])
 
 
-def _solutions_by_k(solution: Solution, case: Mapping[str, Any]) -> dict[Any, Solution]:
+def _solutions_by_k(solution: TableSolution, case: Mapping[str, Any]) -> dict[Any, TableSolution]:
     """The solution, of an interval of k also those of its ends, by k [N/m], ascending."""
     middle = common.middle_of(case).get("k")
     if solution.ends is None:
@@ -164,7 +165,7 @@ def _table(
     return in_columns(table)
 
 
-def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: Solution) -> str:
+def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: TableSolution) -> str:
     """What was perhaps meant where a target is out of reach."""
     if solution.constant:
         return ""

@@ -12,7 +12,8 @@ from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.reading import read
 from mumacro.inputs.units import Scale, scale_in, suited
 from mumacro.motions.motion import PARTS
-from mumacro.motions.solve_motion import MotionSolution, quantity_of_unknown, solve_motion
+from mumacro.motions.solve_motion import MotionSolution, solve_motion
+from mumacro.questions.solutions import quantity_of_unknown
 from mumacro.results import known, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --normal 8N@-90deg'
@@ -75,7 +76,8 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
     oscillations = [f"{name} = {text}" for name, text in texts]
     units = common.units_in(options.words)
     first = common.case_line(case, units, kind_of(options.contact), *oscillations)
-    return "\n".join([first.removesuffix(", across"), in_columns(table)])
+    said = filter(None, [solution.reason()])
+    return "\n".join([first.removesuffix(", across"), in_columns(table), *said])
 
 
 def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:
@@ -94,7 +96,4 @@ def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None)
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:
     """What was perhaps meant where a target is out of reach."""
-    reach = solution.reach
-    return common.other_meaning(
-        options.target, options.ratio, case, lambda target: reach.least <= target <= reach.most
-    )
+    return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

@@ -13,7 +13,7 @@ from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.kind import kind_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
-from mumacro.questions.rootfinding import TINY, last_double
+from mumacro.questions.search import TINY, last_double
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import STEEPEST_Y
 

@@ -26,6 +26,8 @@ class InputCurve:
     With a ``stiffening`` the unknown is Fz, and ``k`` is that at one load and grows with Fz.
     """
 
+    costly = False
+
     def __init__(
         self,
         surrogate: Surrogate,
@@ -60,17 +62,10 @@ class InputCurve:
         """mu_macro [-] at ``x`` (n,)."""
         return np.asarray(self.answer(x).mu_macro)
 
-    def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
-        """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN
-        at an edge."""
-        answer = self.answer(x, gradient=True)
-        with np.errstate(over="ignore", invalid="ignore"):
-            gradient: Any = answer.gradient
-            slope = x * gradient[self.unknown]
-            if self.stiffening is not None:
-                k = self.stiffening.stiffness(self.case["k"], x)
-                slope = slope + self.stiffening.exponent * k * gradient["k"]
-            return answer, slope
+    def at(self, x: Array) -> tuple[Array, Array]:
+        """Return mu_macro [-] at ``x`` and the bound of its error, each in the shape of ``x``."""
+        answer = self.answer(x)
+        return np.asarray(answer.mu_macro), np.asarray(answer.error_bound)
 
     def refined(self, values: Array) -> Array:
         """``values`` and more between them, where chords of mu_macro differ from it."""

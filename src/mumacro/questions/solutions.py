@@ -1,65 +1,219 @@
-"""What the solutions of both inverse problems share: their one value, their roots as columns and as
-JSON."""
+"""What an inverse problem gives: the roots of every target, and which targets are reachable."""
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from mumacro.errors import InputError
+from mumacro.inputs.fields import QUANTITY_OF, unit_of
+from mumacro.results import Result, Rows
+
+NO_LIMIT = 1e300  # of the unknown: what is beyond it is all that a double holds
+_WIDE = 0.1  # of a root that is said in words: how wide it is, relative to its value
+_DEGREES = 100.0  # of a phase in place of its value
 
 
-def counts(roots: Sequence[Sequence[Any]]) -> str:
-    """How many targets and roots there are.
+@dataclass(frozen=True)
+class Reach:
+    """Which means of the friction are reachable in a range of the unknown."""
 
-    >>> counts([(1.0,), ()]), counts([(1.0, 2.0)])
-    ('2 targets, 1 root', '1 target, 2 roots')
+    low: float  #: the range of the unknown [SI], of a phase in degrees
+    high: float
+    mu_min: float  #: smallest and largest mean in it [-]
+    mu_max: float
+    min_included: bool = True  #: False where that value is approached and never reached
+    max_included: bool = True
+
+    def holds(self, target: float) -> bool:
+        """Return whether ``target`` is reachable."""
+        return self.mu_min <= target <= self.mu_max and not self.only_approaches(target)
+
+    def only_approaches(self, target: float) -> bool:
+        """Return whether ``target`` is an end, or beyond it, that is never reached."""
+        return (not self.min_included and target <= self.mu_min) or (
+            not self.max_included and target >= self.mu_max
+        )
+
+    def beside(self, target: float) -> tuple[str, str]:
+        """Return the target and the range of means in words, with so many digits that both differ
+        where the numbers do.
+
+        >>> Reach(0.0, 1.0, 0.17172206, 0.3).beside(0.171722)
+        ('0.171722', '0.1717221 to 0.3')
+        """
+        digits = [_apart(end, target) for end in (self.mu_min, self.mu_max)]
+        words = [_shown(end, n) for end, n in zip((self.mu_min, self.mu_max), digits, strict=True)]
+        if self.only_approaches(target):
+            words = [f"{word} (not reached)" if float(word) == target else word for word in words]
+        return _shown(target, max(6, *digits)), " to ".join(words)
+
+
+def _apart(end: float, target: float) -> int:
+    """Return how many digits show that two numbers differ, at least 4."""
+    return next((n for n in range(4, 17) if _shown(end, n) != _shown(target, n)), 4)
+
+
+def _shown(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}"
+
+
+@dataclass(frozen=True, repr=False)
+class Solution(Result):
+    """All roots of every target."""
+
+    unknown: str  #: the input that was solved for
+    of: str  #: "mu_macro", or of a motion "mu_lateral"
+    targets: tuple[float, ...]  #: the wanted values [-]
+    #: of each target, ascending; empty where it is not reachable.  A range of the unknown in which
+    #: every place is a root is one root from ``low`` to ``high``
+    roots: tuple[tuple[Any, ...], ...]
+    reach: Reach  #: what is reachable in the range of the search
+    #: True when the unknown has no influence within the error, such as v0 without oscillation: a
+    #: target then has one root, the whole range, or none
+    constant: bool
+    root_type: ClassVar[Any]
+
+    @property
+    def value(self) -> float:
+        """The one root of the one target [SI], a phase in degrees; InputError where there are none
+        or several, or where every value is one."""
+        every = [root for of_target in self.roots for root in of_target]
+        if len(every) == len(self.roots) == 1 and not self.constant:
+            return float(every[0].value)
+        if len(self.roots) != 1:
+            bound = f"that of one target, and there are {len(self.roots)}: see .roots"
+        elif self.constant and every:
+            bound = f"that of one root: {self.reason()}"
+        elif every:
+            values = ", ".join(f"{root.value:.6g}" for root in every)
+            bound = f"that of one root, and there are {len(every)}, {values}: see .roots"
+        else:
+            bound = f"that of a root, and there is none: {self.reason()}"
+        raise InputError("value", None, bound)
+
+    @property
+    def unit(self) -> str:
+        """The unit of the unknown: SI, of a phase degrees."""
+        return unit_of_unknown(self.unknown)
+
+    def reason(self, index: int = 0) -> str:
+        """Return why a target has no root, or over which range every value is one; empty where it
+        has roots alone."""
+        reach, unknown = self.reach, self.unknown
+        where = f"any {unknown}"  # all that a double holds
+        if reach.high < NO_LIMIT:
+            where = f"{unknown} from {reach.low:.6g} to {reach.high:.6g} {self.unit}"
+        if self.constant:
+            return f"{unknown} has no influence here: {self.of} is {reach.mu_min:.6g} for {where}"
+        roots = self.roots[index]
+        if roots:
+            ranges = [
+                f"from {root.low:.6g} to {root.high:.6g} {self.unit}"
+                for root in roots
+                if self._is_range(root)
+            ]
+            if not ranges:
+                return ""
+            mean = f"{self.of} = {self.targets[index]:.6g}"
+            return f"{mean} within its error for every {unknown} {' and '.join(ranges)}"
+        target, means = reach.beside(self.targets[index])
+        return f"{self.of} = {target} is out of reach: {where} gives {means}"
+
+    def _is_range(self, root: Any) -> bool:
+        """Return whether a root is so wide that it is no place but a range."""
+        scale = _DEGREES if self.unit == "deg" else abs(root.value)
+        return bool(root.high - root.low > _WIDE * scale)
+
+    def _members(self) -> dict[str, Any]:
+        return {"unknown": self.unknown, "unit": self.unit, **self._answers()}
+
+    def _answers(self) -> dict[str, Any]:
+        """Return the roots, what was searched, and what is reachable there."""
+        reach = self.reach
+        return {
+            "results": self._results(),
+            "range": [reach.low, None if reach.high > NO_LIMIT else reach.high],
+            "reachable": {
+                "min": reach.mu_min,
+                "max": reach.mu_max,
+                "min_included": reach.min_included,
+                "max_included": reach.max_included,
+            },
+        }
+
+    def _results(self) -> list[dict[str, Any]]:
+        """Return the targets with their roots, and what is to be said of them."""
+        return [
+            {
+                "target": target,
+                "roots": [root._asdict() for root in of_target],
+                **({"reason": reason} if (reason := self.reason(i)) else {}),
+            }
+            for i, (target, of_target) in enumerate(zip(self.targets, self.roots, strict=True))
+        ]
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The roots as a table, one row a root: target, and what each root has."""
+        rows = [
+            (target, *root)
+            for target, of_target in zip(self.targets, self.roots, strict=True)
+            for root in of_target
+        ]
+        names = ("target", *self.root_type._fields)
+        return {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
+
+    def _heading(self) -> str:
+        name, unit, one = type(self).__name__, self.unit, self._one_root()
+        if one is not None:
+            value = f"{one.value:.6g} {unit}".rstrip(" -")
+            return f"<{name} {self.unknown}: {value}>"
+        roots = sum(map(len, self.roots))
+        counts = f"{_counted(len(self.targets), 'target')}, {_counted(roots, 'root')}"
+        return f"<{name} for {self.unknown} [{unit}], {self.of}: {counts}>"
+
+    def _one_root(self) -> Any:
+        """Return the root of the only target, where it has one that is no range."""
+        every = [root for roots in self.roots for root in roots]
+        alone = len(every) == len(self.targets) == 1 and not self.reason()
+        return every[0] if alone else None
+
+    def _rows(self) -> Rows | None:
+        return None if self._one_root() is None else []
+
+    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
+        return self._heading(), None, self._below()
+
+    def _shown(self) -> dict[str, Any]:
+        return self.columns if any(self.roots) else {}
+
+    def _below(self) -> list[str]:
+        reasons = dict.fromkeys(filter(None, map(self.reason, range(len(self.targets)))))
+        return [*reasons][:4]
+
+
+def unit_of_unknown(unknown: str) -> str:
+    """Return the unit of an unknown: SI, of a phase degrees.
+
+    >>> [unit_of_unknown(name) for name in ("v0", "x.amplitude", "normal.amplitude", "y.phase")]
+    ['m/s', 'm', 'N', 'deg']
     """
-    return f"{_counted(len(roots), 'target')}, {_counted(sum(map(len, roots)), 'root')}"
+    part, _, member = unknown.partition(".")
+    if member == "phase":
+        return "deg"
+    return ("N" if part == "normal" else "m") if member else unit_of(part)
+
+
+def quantity_of_unknown(unknown: str) -> str:
+    """Return what an unknown measures.
+
+    >>> [quantity_of_unknown(name) for name in ("v0", "normal.amplitude", "y.phase")]
+    ['speed', 'force', 'angle']
+    """
+    part, _, member = unknown.partition(".")
+    return "angle" if member == "phase" else QUANTITY_OF[part]
 
 
 def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
-def one_value(roots: Sequence[Sequence[Any]], reason: Callable[[int], str]) -> float:
-    """The value of the one root of one target; InputError where there are none or several."""
-    every = [root for of_target in roots for root in of_target]
-    if len(every) == len(roots) == 1:
-        return float(every[0].value)
-    if len(roots) != 1:
-        bound = f"that of one target, and there are {len(roots)}: see .roots"
-    elif every:
-        values = ", ".join(f"{root.value:.6g}" for root in every)
-        bound = f"that of one root, and there are {len(every)}, {values}: see .roots"
-    else:
-        bound = f"that of a root, and there is none: {reason(0)}"
-    raise InputError("value", None, bound)
-
-
-def results_of(
-    targets: Sequence[float], roots: Sequence[Sequence[Any]], reason: Callable[[int], str]
-) -> list[dict[str, Any]]:
-    """Targets with their roots, and why there is none, as JSON has them."""
-    return [
-        {
-            "target": target,
-            "roots": [root._asdict() for root in of_target],
-            **({} if of_target else {"reason": reason(i)}),
-        }
-        for i, (target, of_target) in enumerate(zip(targets, roots, strict=True))
-    ]
-
-
-def columns_of(
-    root: Any, targets: Sequence[float], roots: Sequence[Sequence[Any]]
-) -> dict[str, Any]:
-    """Targets and their roots, which are tuples with the names of ``root``, as columns."""
-    rows = [
-        (target, *one)
-        for target, of_target in zip(targets, roots, strict=True)
-        for one in of_target
-    ]
-    names = ("target", *root._fields)
-    columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    return {name: np.array(column) for name, column in zip(names, columns, strict=True)}

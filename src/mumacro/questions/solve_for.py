@@ -27,7 +27,7 @@ runs through the same values in the same order, its turning points and its borde
 stand in ln Fz 1/(1 - m) times as far apart.  For m = 1 it is constant.  For normal it rises with Fz
 at constant k and rises with k, so it rises with Fz for every m, up to mu0 where that is reached.
 
-How a level is found on a monotone branch: :mod:`mumacro.questions.rootfinding`.
+How the roots are found: :mod:`mumacro.questions.search`.
 """
 
 import math
@@ -37,30 +37,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.answer import Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
-from mumacro.inputs.fields import ENDS, POSITIVE, QUANTITY_OF, field_of, unit_of
+from mumacro.inputs.fields import ENDS, POSITIVE, QUANTITY_OF, field_of
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.reading import read_one
 from mumacro.inputs.signature import Numbers
-from mumacro.kernel.arrays import Array, Bools, Places
-from mumacro.questions import solutions as tables
+from mumacro.kernel.arrays import Array
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.law import law
-from mumacro.questions.rootfinding import TINY, Branch, branches_between, last_double, samples
-from mumacro.results import Result
+from mumacro.questions.search import TINY, Found, Search, samples
+from mumacro.questions.solutions import Reach, Solution
 from mumacro.surrogate import Surrogate
 
 HUGE = 1.7976931348623157e308
 _DRAWN = 400  # points of a curve in a picture
-_NO_LIMIT = 1e300  # of the unknown: what is beyond it is all that a double holds
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.
 # At r = 10, three percent above its onset, the fold is a sixth of a decade wide; the steep descent
-# (y~ = 1 at large r) holds none. Where mu_macro is monotone, samples only bracket roots, for
-# Newton's method to finish.
+# (y~ = 1 at large r) holds none. Where mu_macro is monotone, samples only bracket roots.
 _PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
 # Direction -> y~, for normal v~/z, of a contact as soft and as stiff as it matters.  Across, mu~ =
 # 1 - O(y~^2), along 1 - O(y~); reverse slip may begin at y~ = 3/c^3, where the angle c =
@@ -72,46 +68,22 @@ class Root(NamedTuple):
     """One value of the unknown."""
 
     value: float  #: the unknown [SI]
-    #: between them, and on the root's side of the next turning point, mu_macro is within the
-    #: surrogate's error bound of the target: the true root cannot be distinguished from any of
-    #: these values [SI]
+    #: between them mu_macro is within the surrogate's error bound of the target: the true root
+    #: cannot be distinguished from any of these values [SI]
     low: float
     high: float
     mu_macro: float  #: the surrogate's value there [-]
     regime: str  #: one of :data:`mumacro.REGIMES`
 
 
-@dataclass(frozen=True)
-class Reach:
-    """Which mu_macro is reachable in a range of the unknown."""
-
-    low: float  #: the range of the unknown [SI]
-    high: float
-    mu_min: float  #: smallest and largest mu_macro in it [-]
-    mu_max: float
-    min_included: bool  #: False where that value is approached and never reached
-    max_included: bool
-
-    def holds(self, target: float) -> bool:
-        """Whether ``target`` is reachable."""
-        above = target > self.mu_min or (self.min_included and target == self.mu_min)
-        return above and (target < self.mu_max or (self.max_included and target == self.mu_max))
-
-
 @dataclass(frozen=True, repr=False)
-class Solution(Result):
-    """All roots of every target."""
+class TableSolution(Solution):
+    """All roots of every target, from a table."""
 
-    unknown: str  #: the input that was solved for
-    targets: tuple[float, ...]  #: the wanted mu_macro [-]
-    #: of each target, ascending; empty where it is not reachable
-    roots: tuple[tuple[Root, ...], ...]
-    reach: Reach  #: the reachable mu_macro in the range of the search
-    #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
-    constant: bool
+    root_type = Root
     #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
     #: its highest value
-    ends: tuple["Solution", "Solution"] | None = None
+    ends: tuple["TableSolution", "TableSolution"] | None = None
     #: how k grows with Fz, where that is solved for; None where k is constant
     stiffening: Stiffening | None = None
     #: what was searched; of an interval of k at its middle
@@ -119,52 +91,11 @@ class Solution(Result):
     #: the range that was asked for [SI]; None for the default one
     within: tuple[float, float] | None = field(default=None, compare=False)
 
-    @property
-    def value(self) -> float:
-        """The one root of the one target [SI]; InputError where there are none or several."""
-        return tables.one_value(self.roots, self.reason)
-
-    @property
-    def unit(self) -> str:
-        """The SI unit of the unknown."""
-        return unit_of(self.unknown)
-
-    def reason(self, index: int = 0) -> str:
-        """Why a target has no root; empty where it has one."""
-        if self.roots[index]:
-            return ""
-        reach, unknown = self.reach, self.unknown
-        where = f"any {unknown}"  # all that a double holds
-        if reach.high < _NO_LIMIT:
-            where = f"{unknown} from {reach.low:.6g} to {reach.high:.6g} {self.unit}"
-        if self.constant:
-            return f"{unknown} has no influence here: mu_macro is {reach.mu_min:.6g} for {where}"
-        return (
-            f"mu_macro = {self.targets[index]:.6g} is out of reach: {where} gives "
-            f"{reach.mu_min:.4g} to {reach.mu_max:.4g}"
-        )
-
     def _members(self) -> dict[str, Any]:
-        """What was solved for, and the answers; ``ends`` have those of the softest and the stiffest
+        """Return what every solution has; ``ends`` have the answers of the softest and the stiffest
         contact of an interval of k."""
         ends = {"ends": [end._answers() for end in self.ends]} if self.ends else {}
-        return {"unknown": self.unknown, "unit": self.unit, **self._answers(), **ends}
-
-    def _answers(self) -> dict[str, Any]:
-        """The roots, what was searched, and what is reachable there."""
-        reach = self.reach
-        reachable = {"min": reach.mu_min, "max": reach.mu_max}
-        reachable |= {"min_included": reach.min_included, "max_included": reach.max_included}
-        return {
-            "results": tables.results_of(self.targets, self.roots, self.reason),
-            "range": [reach.low, None if reach.high > _NO_LIMIT else reach.high],
-            "reachable": reachable,
-        }
-
-    @property
-    def columns(self) -> dict[str, Any]:
-        """The roots as a table: target, value, low, high, mu_macro, regime; one row a root."""
-        return tables.columns_of(Root, self.targets, self.roots)
+        return {**super()._members(), **ends}
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the law over the unknown with the targets and their roots, over the range that was
@@ -202,17 +133,14 @@ class Solution(Result):
         )
         return over.plot(ax, roots_of=roots_of)
 
-    def _heading(self) -> str:
-        return f"<Solution for {self.unknown} [{self.unit}]: {tables.counts(self.roots)}>"
-
     def _below(self) -> list[str]:
         ends = zip(("softest", "stiffest"), self.ends or (), strict=False)
-        at_ends = [
+        of_ends = [
             f"for the {word} contact: {root.value:.6g} {self.unit}"
             for word, end in ends
             for root in end.roots[0]
         ]
-        return [*at_ends, *filter(None, map(self.reason, range(len(self.targets))))][:4]
+        return [*of_ends, *super()._below()][:4]
 
 
 def _around(roots: Sequence[float]) -> tuple[float, float]:
@@ -232,7 +160,7 @@ def solve_for(
     direction: str = "across",
     stiffness_exponent: float | None = None,
     **case: Any,
-) -> Solution:
+) -> TableSolution:
     """Every value of one input at which mu_macro is ``target``.
 
     Parameters
@@ -254,7 +182,7 @@ def solve_for(
     **case : float
         The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
         for ``omega``; ``k_low`` and ``k_high`` for ``k``: see
-        ``Solution.ends``.
+        ``TableSolution.ends``.
 
     Raises
     ------
@@ -323,47 +251,44 @@ def _levels(target: Numbers) -> Array:
 
 def _solution_over(
     curve: InputCurve, levels: Array, within: tuple[float, float] | None
-) -> Solution:
-    """The roots of each level on a curve, in a range or in the default one."""
+) -> TableSolution:
+    """Return the roots of each level on a curve, in a range or in the default one."""
     unknown = curve.unknown
     low, high = _default_range(curve, levels) if within is None else _checked_range(curve, within)
     folds = unknown in ("k", "Fz") and curve.kind.names["direction"] == "across"
-    x = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
-    answer = curve.answer(x)
-    mu, noise = answer.mu_macro, 2.0 * answer.error_bound
-    turns = _turning_points(curve, x, mu, noise) if folds else []
-    branches = branches_between(curve, [low, *turns, high], x, mu)
-    if low == 0.0 and unknown != "v0" and abs(branches[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
-        # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other
-        # value
-        branches = [
-            Branch(curve, np.zeros(1), branches[0].mu[:1]),
-            *branches_between(curve, [TINY, high], x, mu),
-        ]
-    ends = np.concatenate([branch.mu[[0, -1]] for branch in branches])
-    reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
-    constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
-    if within is None and unknown in EVERYWHERE and not constant:
+    places = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
+    search = Search(curve, np.array([low, *places, high]), low, high, levels)
+    found = search.roots()
+    reach = Reach(low, high, *search.extremes)
+    if within is None and unknown in EVERYWHERE and not search.constant:
         reach = _without_limit(curve, reach)
-    targets = levels.tolist()
-    candidates = _roots(curve, [] if constant else branches, levels)
+    targets = tuple(levels.tolist())
     roots = tuple(
-        tuple(of_target) if reach.holds(target) else ()
-        for target, of_target in zip(targets, candidates, strict=True)
+        () if reach.only_approaches(target) else _with_regimes(curve, of_target)
+        for target, of_target in zip(targets, found, strict=True)
     )
-    return Solution(
+    return TableSolution(
         unknown,
-        tuple(targets),
+        "mu_macro",
+        targets,
         roots,
         reach,
-        constant,
+        search.constant,
         stiffening=curve.stiffening,
         curve=curve,
         within=within,
     )
 
 
-def _in_unit(solution: Solution, unknown: str, per: float) -> Solution:
+def _with_regimes(curve: InputCurve, found: list[Found]) -> tuple[Root, ...]:
+    """Return roots with the regime there."""
+    if not found:
+        return ()
+    regimes = curve.answer(np.array([root.value for root in found])).regime.tolist()
+    return tuple(Root(*root[:4], regime) for root, regime in zip(found, regimes, strict=True))
+
+
+def _in_unit(solution: TableSolution, unknown: str, per: float) -> TableSolution:
     """A solution by another name of the unknown, whose unit has ``per`` of the field's."""
     roots = tuple(
         tuple(
@@ -462,123 +387,3 @@ def _without_limit(curve: InputCurve, reach: Reach) -> Reach:
     return replace(
         reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=curve.case["v0"] == 0.0
     )
-
-
-def _turning_points(curve: InputCurve, x: Array, mu: Array, noise: Array) -> list[float]:
-    """Where mu_macro over k or Fz has its minimum and maximum, ascending, from samples ``x``,
-    ``mu`` (n,)."""
-    # along k it falls, may rise by more than the noise, and falls again
-    order = 1 if curve.unknown == "k" else -1
-    falling = mu[::order]
-    rise = falling - np.minimum.accumulate(falling)
-    top = int(np.argmax(rise))
-    if rise[top] <= noise[::order][top]:
-        return []
-    bottom = int(np.argmin(falling[: top + 1]))
-    indices = np.array([bottom, top] if order == 1 else [x.size - 1 - top, x.size - 1 - bottom])
-    sign = np.array([[-1.0], [1.0]])[::order]
-    inside = (indices > 0) & (indices < x.size - 1)
-    indices, sign = indices[inside], sign[inside]
-    _, turns = last_double(
-        lambda at: ~(sign * curve.with_slope(at)[1] < 0.0), x[indices - 1], x[indices + 1]
-    )
-    return [*map(float, turns)]
-
-
-def _roots(curve: InputCurve, branches: list[Branch], targets: Array) -> list[list[Root]]:
-    """All roots on all branches, ascending."""
-    roots: list[list[Root]] = [[] for _ in targets]
-    for branch in branches:
-        indices = np.flatnonzero(branch.holds(targets))
-        if not indices.size:
-            continue
-        levels, start = targets[indices], branch.x[0]
-        # a target equal to the value at an edge has its root there; just inside, rounding may hide
-        # it
-        value = np.where(levels == branch.mu[0], start, branch.meet(levels))
-        last = levels == branch.mu[-1]
-        if last.any():
-            value = np.where(last & (curve.mu(value) != levels), branch.end(), value)
-        answer, slope = curve.with_slope(value)
-        low, high = _enclosures(curve, branch, levels, value, answer, slope)
-        columns = (value, low, high, answer.mu_macro, answer.regime)
-        for i, root in zip(
-            indices.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True
-        ):
-            if not roots[i] or root.value != roots[i][-1].value:
-                roots[i].append(root)
-    return roots
-
-
-def _enclosures(
-    curve: InputCurve,
-    branch: Branch,
-    targets: Array,
-    value: Array,
-    answer: Answer[Any],
-    slope: Array,
-) -> tuple[Array, Array]:
-    """Between which values mu_macro is within its error bound of the target: ``low`` and ``high``
-    of a root, (n,).
-
-    ``answer`` and ``slope`` (d mu_macro / d ln x) are those at the root.
-    """
-    bound = answer.error_bound
-    if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
-        neighbour = np.minimum(np.nextafter(value, HUGE), branch.x[-1])
-        bound = np.maximum(bound, curve.answer(neighbour).error_bound)
-    # a root is exact to rounding only, even where mu_macro is exact
-    bound = np.maximum(bound, 2.0**-50 * targets)
-    # an end may be a jump of mu_macro, at the border or a seam, with a larger bound beyond it: then
-    # that one counts
-    bounds, pending = np.concatenate((bound, bound)), np.arange(2 * value.size)
-    ends, outwards, end_targets = (
-        np.empty(pending.size),
-        np.repeat([0.0, HUGE], value.size),
-        np.concatenate((targets, targets)),
-    )
-    while pending.size:
-        ends[pending] = _where_off(
-            curve,
-            branch,
-            pending % value.size,
-            pending >= value.size,
-            bounds[pending],
-            targets,
-            value,
-            slope,
-        )
-        beyond = curve.answer(
-            np.clip(np.nextafter(ends[pending], outwards[pending]), branch.x[0], branch.x[-1])
-        )
-        exceeds = np.abs(beyond.mu_macro - end_targets[pending]) < 0.97 * beyond.error_bound
-        exceeds &= beyond.error_bound > bounds[pending]
-        pending = pending[exceeds]
-        bounds[pending] = beyond.error_bound[exceeds]
-    return np.minimum(ends[: value.size], value), np.maximum(ends[value.size :], value)
-
-
-def _where_off(
-    curve: InputCurve,
-    branch: Branch,
-    i: Places,
-    above: Bools,
-    bound: Array,
-    targets: Array,
-    value: Array,
-    slope: Array,
-) -> Array:
-    """Where, above or below the roots ``i``, mu_macro is off its target by ``bound``, each (m,)."""
-    sign = np.where(above, 1.0, -1.0)
-    levels = targets[i] + sign * branch.sign * bound
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        step = bound / (branch.sign * slope[i])
-        ends: Array = value[i] * np.exp(sign * step)
-        straight = (ends > branch.x[0]) & (ends < branch.x[-1]) & (step > 0.0)
-    # over so short a way the curve is mostly straight; where it is not, Newton steps follow
-    trial = np.where(straight, ends, branch.x[0])
-    straight &= np.abs(curve.mu(trial) - levels) <= 0.01 * bound
-    bent = np.flatnonzero(~straight)
-    if bent.size:
-        ends[bent] = branch.meet(levels[bent], leave=above[bent])
-    return ends

@@ -69,7 +69,7 @@ def test_in_proportion_to_the_load_friction_does_not_depend_on_it(
     assert not law.border
     solution = solve_for(surrogate, "Fz", [mu, 0.9 * mu], **words, stiffness_exponent=1.0, **case)
     assert solution.constant
-    assert solution.roots == ((), ())
+    assert [len(roots) for roots in solution.roots] == [1, 0]
     # and with one k it does
     other = friction_law(surrogate, "Fz", values=loads, **words, **without(case, "Fz"))
     assert np.ptp(other.answer.mu_macro) > 0.1

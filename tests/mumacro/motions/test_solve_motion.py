@@ -65,7 +65,7 @@ def test_the_other_way_is_named_where_a_speed_would_be_negative() -> None:
     assert backward.roots == ((),)
     assert backward.other_way is not None
     assert backward.other_way.value == close(forward.value, rel=1e-5)
-    assert backward.reach.least > 0.0
+    assert backward.reach.mu_min > 0.0
     with pytest.raises(InputError):
         _ = backward.value
 

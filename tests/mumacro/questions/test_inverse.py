@@ -1,8 +1,6 @@
-"""The inverse problem: roots against the forward answer, folds, reach, the border; bracketed Newton
-steps."""
+"""The inverse problem: roots against the forward answer, folds, reach, the border."""
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,8 +10,6 @@ from hypothesis import strategies as st
 
 from mumacro import Surrogate
 from mumacro.questions.borders import border_crossings
-from mumacro.questions.input_curve import InputCurve
-from mumacro.questions.rootfinding import TINY, Branch, last_double
 from mumacro.questions.solve_for import solve_for
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
@@ -176,15 +172,22 @@ def test_a_range_keeps_its_roots_only(surrogate: Surrogate) -> None:
         ("Fz", {"k": "rigid"}),
     ],
 )
-def test_an_input_without_influence_is_reported(
+def test_an_input_without_influence_has_the_whole_range_as_root_or_none(
     surrogate: Surrogate, unknown: Any, changed: Any
 ) -> None:
     case = {**CASE, **changed}
     value = surrogate.evaluate(**case).mu_macro
     solution = solve_for(surrogate, unknown, [value, 0.9 * value], **without(case, unknown))
     assert solution.constant
-    assert solution.roots == ((), ())
-    assert solution.reach.mu_min == solution.reach.mu_max == value
+    ((root,), none) = solution.roots
+    reach = solution.reach
+    assert (root.low, root.high, none) == (reach.low, reach.high, ())
+    assert reach.mu_min == reach.mu_max == value
+    assert solution.reason(0) == solution.reason(1)
+    assert f"{unknown} has no influence here: mu_macro is {value:.6g}" in solution.reason()
+    with refused("value") as error:
+        _ = solve_for(surrogate, unknown, value, **without(case, unknown)).value
+    assert "no influence" in str(error.value)
 
 
 def test_at_rest_the_frequency_only_matters_by_being_there(surrogate: Surrogate) -> None:
@@ -371,129 +374,6 @@ def test_outside_its_range_there_is_no_border(surrogate: Surrogate) -> None:
     assert border_crossings(surrogate, "v0", without(CASE, "v0"), 1e-12, 1e-3) == ()
     assert border_crossings(surrogate, "v0", {**without(CASE, "v0"), "k": "rigid"}, 0.0, 1e3) == ()
     assert border_crossings(surrogate, "k", {**without(CASE, "k"), "v0": 0.0}, 1e-3, 1e3) == ()
-
-
-# --- bracketed Newton steps -----------------------------------------------------------------------
-
-
-class Curve:
-    """A curve of a known function: f(x) and df / d ln x."""
-
-    def __init__(self, function: Any, slope: Any) -> None:
-        self.function, self.slope, self.calls = function, slope, 0
-
-    def with_slope(self, x: Any) -> Any:
-        self.calls += 1
-        assert self.calls < 1000, "the search does not end"
-        return SimpleNamespace(mu_macro=self.function(x)), self.slope(x)
-
-
-def branch_of(curve: Any, *ends: float) -> Branch:
-    x = np.array(ends)
-    return Branch(curve, x, curve.function(x))
-
-
-def curve_over(surrogate: Surrogate, name: str, **changed: Any) -> Any:
-    return InputCurve(surrogate, without({**CASE, **changed}, name), name)
-
-
-def test_neighbouring_doubles_are_found_at_any_scale() -> None:
-    expected = np.array([5e-324, 1e-300, 0.1, 1.0, math.pi, 1e300])
-
-    def below(x: Any) -> Any:
-        return x < expected[:, None]
-
-    a, b = last_double(below, np.zeros(6), np.full(6, 1.7976931348623157e308))
-    assert b.tolist() == expected.tolist()
-    assert a.tolist() == np.nextafter(expected, 0.0).tolist()
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_levels_are_met_to_rounding_in_a_few_steps(sign: Any) -> None:
-    curve = Curve(lambda x: sign * np.arctan(x), lambda x: sign * x / (1.0 + x * x))
-    branch = branch_of(curve, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
-    level = sign * np.array([1e-290, 1e-12, 0.3, 0.78, 1.5, 1.57])
-    roots = branch.meet(level)
-    # 1,250 times flatter at 1.57 than at 0.3
-    assert roots == close(np.tan(np.abs(level)), rel=1e-12)
-    assert np.all(np.abs(curve.function(roots) - level) <= 2.0 * 2.0**-52 * np.abs(level))
-    curve.calls = 0
-    branch.meet(sign * np.array([0.3]))
-    assert curve.calls <= 8
-
-
-def test_a_slope_that_vanishes_at_the_root_is_no_obstacle() -> None:
-    curve = Curve(lambda x: 1.0 + np.log(x) ** 3, lambda x: 3.0 * np.log(x) ** 2)
-    (roots,) = branch_of(curve, 1e-5, 1e4).meet(np.array([1.0]))
-    assert roots == close(1.0, abs=1e-5)  # closer to the root the cube is below rounding
-
-
-@pytest.mark.parametrize("slope", [math.nan, math.inf, 0.0, -1.0, 1e-300, 1e300])
-def test_a_wrong_slope_costs_steps_but_no_digits(slope: Any) -> None:
-    curve = Curve(lambda x: np.where(x < math.pi, 0.25, 0.75), lambda x: np.full_like(x, slope))
-    branch = branch_of(curve, 0.0, 1e300)
-    (roots,) = branch.meet(np.array([0.5]))
-    assert roots in (math.pi, math.nextafter(math.pi, 0.0))
-    assert curve.calls < 200
-
-
-def test_a_plateau_is_met_at_its_first_double_and_left_at_its_last() -> None:
-    def stairs(x: Any) -> Any:
-        return np.searchsorted([0.1, 10.0, 100.0], x, side="right") - 1.0
-
-    curve = Curve(stairs, np.zeros_like)
-    branch = branch_of(curve, 1e-6, 1e-2, 1.0, 30.0, 1e6)
-    assert branch.meet(np.array([1.0])).tolist() == [10.0]
-    (end,) = branch.meet(np.array([1.0]), leave=True)
-    assert end in (100.0, math.nextafter(100.0, 0.0))
-    both = branch.meet(np.array([1.0, 1.0]), leave=np.array([False, True]))
-    assert both.tolist() == [10.0, end]
-
-
-def test_a_level_that_is_never_reached_gives_an_end() -> None:
-    curve = Curve(np.arctan, lambda x: x / (1.0 + x * x))
-    branch = branch_of(curve, 0.5, 2.0)
-    assert branch.meet(np.array([0.1, 1.5])).tolist() == [0.5, 2.0]
-    assert curve.calls == 0
-    assert branch.holds(np.array([0.1, math.atan(0.5), 1.0, 1.5])).tolist() == [
-        False,
-        True,
-        True,
-        False,
-    ]
-
-
-@pytest.mark.parametrize("name", ["v0", "y0", "omega"])
-def test_newton_meets_the_levels_of_a_table_to_the_last_digits(
-    surrogate: Surrogate, name: str
-) -> None:
-    rng = np.random.default_rng(4)
-    for _ in range(20):
-        changed = {
-            field: value * 10.0 ** rng.uniform(-2.0, 2.0)
-            for field, value in CASE.items()
-            if field != "mu0"
-        }
-        curve = curve_over(surrogate, name, **changed)
-        x = np.geomspace(1e-12, 1e12, 49) * CASE[name]
-        branch = Branch(curve, x, curve.mu(x))
-        low, high = sorted((float(branch.mu[0]), float(branch.mu[-1])))
-        level = low + (high - low) * np.array([0.01, 0.3, 0.5, 0.9])
-        newton = branch.meet(level)
-        off = np.abs(curve.mu(newton) - level)
-        # change of mu_macro for one unit in the last place of the input, where the curve is steep
-        grain = np.abs(curve.mu(np.nextafter(newton, 1e300)) - curve.mu(np.nextafter(newton, 0.0)))
-        assert np.all(off <= 4.0 * 2.0**-52 * level + grain)
-
-
-def test_the_cusp_of_the_static_limit_is_met(surrogate: Surrogate) -> None:
-    curve = curve_over(surrogate, "y0", v0=0.0)
-    x = np.array([0.0, 1e-9, 1e-3])
-    branch = Branch(curve, x, curve.mu(x))
-    level = np.array([0.2, 1e-3, 1e-6])
-    expected = 3e-6 * np.sqrt((1.0 - level / 0.3) * (1.0 + level / 0.3))
-    assert branch.meet(level) == close(expected, rel=4e-16)
-    assert branch.meet(np.array([0.0]))[0] == close(3e-6, rel=4e-16)
 
 
 def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> None:

@@ -1,0 +1,420 @@
+"""The one search for roots: where a function over one unknown reaches its targets.
+
+The function has at every place a value and an estimate of its error.  It is sampled, and sampled
+again between, until no target can be crossed unseen.  Its turning points part it into branches, on
+which it rises or falls by more than its error; on a branch two samples bracket a target.  Bisection
+on the bits of a double then finds the first place that reaches it, and how far around this place
+the function is the target within its error.
+
+Where a call of the function takes long (a motion), the bisection runs over cubics through the
+samples instead, and the function is called at the roots of the cubics until it agrees with them.
+All targets share the samples.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mumacro.kernel.arrays import Array, Bools, Places
+
+TINY = 5e-324
+LEVELS = 7  # how often an interval between samples is halved
+# An interval is not searched if the targets are away by this many times the difference between a
+# sample and the cubic through its neighbours.  Found with 1,000 random problems
+# (benchmarks/solve_motion.py): with 1 a root was missed.
+_CLEAR = 4.0
+_ROUNDING = 2.0**-50  # of a target: a value is exact to rounding only, even without an error
+_ENOUGH = 0.1  # of its error is what the function may be off a target where cubics are used
+_NARROW = 1e-12  # relative width in which a bracket of a costly function counts as one place
+# A step between neighbours by more than this share of the whole span is a jump and no root; that of
+# a cusp, such as that of the static limit at y~ = 1, is the square root of rounding.
+_JUMP = 1e-6
+_MOST_STEPS = 80
+_SHARPENINGS, _INNER = 12, 8  # how often a turning point is narrowed, and places each time
+_PER_CALL = 512
+
+Function = Callable[[Array], tuple[Array, Array]]
+
+
+class Curve(Protocol):
+    """A function over one unknown."""
+
+    #: whether a call takes so long that cubics through the samples stand for it
+    costly: bool
+
+    def at(self, x: Array) -> tuple[Array, Array]:
+        """Return the values at ``x`` and the estimates of their errors, each in the shape of ``x``;
+        NaN where the function has none."""
+        ...
+
+
+class Found(NamedTuple):
+    """One place that reaches a target."""
+
+    value: float  #: the first place that reaches it
+    #: between them the function is the target within its error
+    low: float
+    high: float
+    mean: float  #: the function at ``value``
+    error: float  #: of it
+
+
+class Samples:
+    """Values of a curve and their errors at ascending places."""
+
+    def __init__(self, curve: Curve) -> None:
+        self.curve = curve
+        self.x, self.value, self.error = np.empty(0), np.empty(0), np.empty(0)
+
+    def add(self, places: Array) -> None:
+        """Sample the curve at new places; leave out those where it has no value."""
+        x = np.setdiff1d(places, self.x)
+        if not x.size:
+            return
+        value, error = self.curve.at(x)
+        legal = np.isfinite(value)
+        x, value, error = x[legal], value[legal], error[legal]
+        i = np.searchsorted(self.x, x)
+        self.x = np.insert(self.x, i, x)
+        self.value = np.insert(self.value, i, value)
+        self.error = np.insert(self.error, i, error)
+
+    def cubics(self) -> Function:
+        """Return cubics through the samples, monotone between them, and their errors."""
+        x, y, error = self.x, self.value, self.error
+        width = np.diff(x)
+        chord = np.diff(y) / width
+        before, after = width[:-1], width[1:]
+        slope = np.concatenate((chord[:1], chord[:-1], chord[-1:]))
+        slope[1:-1] = (before * chord[1:] + after * chord[:-1]) / (before + after)
+        least = np.minimum(np.abs(chord[:-1]), np.abs(chord[1:]))
+        same = np.sign(chord[:-1]) == np.sign(chord[1:])
+        slope[1:-1] = np.where(same, np.clip(slope[1:-1], -3.0 * least, 3.0 * least), 0.0)
+
+        def between(places: Array) -> tuple[Array, Array]:
+            i = np.clip(np.searchsorted(x, places, side="right") - 1, 0, x.size - 2)
+            h, t = width[i], (places - x[i]) / width[i]
+            rest = 1.0 - t
+            value = (
+                y[i]
+                + (y[i + 1] - y[i]) * t * t * (3.0 - 2.0 * t)
+                + h * t * rest * (slope[i] * rest - slope[i + 1] * t)
+            )
+            return value, error[i] + (error[i + 1] - error[i]) * t
+
+        return between
+
+
+class Search:
+    """Every root of every target in a range."""
+
+    def __init__(
+        self, curve: Curve, places: Array, low: float, high: float, targets: Array
+    ) -> None:
+        self.curve, self.low, self.high, self.targets = curve, low, high, targets
+        self._sorted = np.sort(targets)
+        self.samples = Samples(curve)
+        self.samples.add(places)
+
+    def roots(self) -> list[list[Found]]:
+        """Return the roots of each target, ascending: a range of roots, and roots whose ranges
+        overlap, are one."""
+        self._refine()
+        self._sharpen()
+        which, places = self._first_places()
+        samples = self.samples
+        if self.curve.costly:
+            i = np.searchsorted(samples.x, places)
+            value, error = samples.value[i], samples.error[i]
+            function = samples.cubics()
+        else:
+            value, error = self.curve.at(places)
+            function = self.curve.at
+        off = np.abs(value - self.targets[which])
+        real = off <= np.maximum(
+            _allowed(error, self.targets[which]), _JUMP * np.ptp(samples.value)
+        )
+        which, places = which[real], places[real]
+        low, high = self._widths(function, which, places)
+        roots: list[list[Found]] = [[] for _ in self.targets]
+        columns = (part.tolist() for part in (places, low, high, value[real], error[real]))
+        for k, root in sorted(zip(which.tolist(), map(Found, *columns), strict=True)):
+            of_target = roots[k]
+            if of_target and root.low <= of_target[-1].high:
+                widest = max(of_target[-1].high, root.high)
+                of_target[-1] = of_target[-1]._replace(high=widest)
+            else:
+                of_target.append(root)
+        return roots
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The smallest and the largest value in the range."""
+        ends = self.samples.value[self._edges()]
+        return float(ends.min()), float(ends.max())
+
+    @property
+    def constant(self) -> bool:
+        """Whether the function is one value within its error."""
+        value, error = self.samples.value, self.samples.error
+        return bool(np.max(value - error) <= np.min(value + error))
+
+    # --- samples ----------------------------------------------------------------------------------
+
+    def _hold(self, low: Array, high: Array) -> Bools:
+        """Return which of the ranges of values hold a target."""
+        first = np.searchsorted(self._sorted, low, side="left")
+        return np.asarray(np.searchsorted(self._sorted, high, side="right") > first)
+
+    def _refine(self) -> None:
+        """Halve the intervals between samples until every part of the curve is decided."""
+        samples = self.samples
+        starts = samples.x[:-1]  # of the intervals that are open
+        for _ in range(LEVELS):
+            i = np.searchsorted(samples.x, starts)
+            middles = _middle(samples.x[i], samples.x[i + 1])
+            inside = (samples.x[i] < middles) & (middles < samples.x[i + 1])
+            i, middles = i[inside], middles[inside]
+            if not i.size:
+                return
+            starts, guess = samples.x[i], samples.cubics()(middles)[0]
+            samples.add(middles)
+            j = np.clip(np.searchsorted(samples.x, middles), 1, samples.x.size - 2)
+            legal = samples.x[j] == middles
+            j, guess, starts, middles = j[legal], guess[legal], starts[legal], middles[legal]
+            still = self._undecided(j, np.abs(samples.value[j] - guess))
+            starts = np.concatenate((starts[still], middles[still]))
+
+    def _undecided(self, j: Places, off: Array) -> Bools:
+        """Return around which of the new samples ``j`` a target may be crossed unseen, where the
+        cubic was ``off``."""
+        value, error = self.samples.value, self.samples.error
+        a, middle, b = value[j - 1], value[j], value[j + 1]
+        away = np.where(np.isnan(off), np.inf, _CLEAR * off + error[j])
+        near = np.any([self._hold(v - away, v + away) for v in (a, middle, b)], axis=0)
+        # a target is the value within its error: halves tell no more, they are one root
+        triples = [(value[j + n], error[j + n]) for n in (-1, 0, 1)]
+        least, most = (
+            pick([v + side * e for v, e in triples], axis=0)
+            for pick, side in ((np.max, -1.0), (np.min, 1.0))
+        )
+        flat = (least <= most) & self._hold(least, most)
+        # an interval that crosses a target is open until the curve in it is smooth
+        crossing = self._hold(np.minimum(a, b), np.maximum(a, b))
+        smooth = off <= 1e-3 * np.abs(b - a) + error[j]
+        monotone = (middle - a) * (b - middle) >= 0.0
+        return np.asarray(near & ~flat & ~(crossing & smooth & monotone))
+
+    def _sharpen(self) -> None:
+        """Sample the curve around its turning points, until targets and extremes are decided."""
+        samples = self.samples
+        turns = [
+            (samples.x[i - 1], samples.x[i + 1], side)
+            for i, side in turning_points(samples.value, samples.error)
+        ]
+        for low, high, side in turns:
+            for _ in range(_SHARPENINGS):
+                samples.add(np.linspace(low, high, _INNER + 2)[1:-1])
+                i = slice(*np.searchsorted(samples.x, [low, np.nextafter(high, np.inf)]))
+                x, value, error = samples.x[i], side * samples.value[i], samples.error[i]
+                best = int(np.argmax(value))
+                top, spread = value[best], np.ptp(value)
+                if spread <= error[best] or not 0 < best < x.size - 1:
+                    break
+                reach = side * np.array([[top - error[best]], [top + _CLEAR * spread]])
+                is_extreme = top >= np.max(side * samples.value)
+                if not (is_extreme or self._hold(reach.min(axis=0), reach.max(axis=0))[0]):
+                    break
+                low, high = x[best - 1], x[best + 1]
+
+    # --- roots ------------------------------------------------------------------------------------
+
+    def _first_places(self) -> tuple[Places, Array]:
+        """Return targets, by their index, and where a branch first reaches them."""
+        samples = self.samples
+        for step in range(_MOST_STEPS):
+            (at_ends, ends), (which, i, sign) = self._brackets()
+            a, b, level = samples.x[i - 1], samples.x[i], self.targets[which]
+            if not self.curve.costly:
+                before, places = _first(self.curve.at, a, b, level, sign)
+                value, error = self.curve.at(np.stack((before, places)))
+                off = np.abs(value - level) - _allowed(error, level)
+                # a step may leave the target within the error of its other side alone
+                places = np.where((off[0] <= 0.0) & (off[1] > 0.0), before, places)
+                break
+            off = np.abs(samples.value[[i - 1, i]] - level) - _ENOUGH * samples.error[[i - 1, i]]
+            places = np.where(off[0] < off[1], a, b)
+            narrow = b - a <= _NARROW * np.maximum(np.abs(a), np.abs(b))
+            j = np.flatnonzero(~(off.min(axis=0) <= 0.0) & ~narrow)
+            if not j.size:
+                break
+            a, b, level, sign = a[j], b[j], level[j], sign[j]
+            halved = step % 4 == 3
+            samples.add(_middle(a, b) if halved else _first(samples.cubics(), a, b, level, sign)[1])
+        return np.concatenate((at_ends, which)), np.concatenate((ends, places))
+
+    def _edges(self) -> list[int]:
+        """Return the samples at the ends of the branches."""
+        samples = self.samples
+        turns = [i for i, _ in turning_points(samples.value, samples.error)]
+        return [0, *turns, samples.x.size - 1]
+
+    def _brackets(self) -> tuple[tuple[Places, Array], tuple[Places, Places, Array]]:
+        """Return targets with the ends of branches that are the target within their error, and
+        targets with the samples that first reach them and whether the branch rises, 1, or falls."""
+        x, value, error = self.samples.x, self.samples.value, self.samples.error
+        at_ends, ends, crossed, firsts, signs = [], [], [], [], []
+        for first, last in pairwise(self._edges()):
+            sign = 1.0 if value[last] >= value[first] else -1.0
+            # rounding may make a plateau fall by a digit; a root is where its level is reached
+            risen = np.maximum.accumulate(sign * value[first : last + 1])
+            j = np.searchsorted(risen, sign * self.targets)
+            inside = np.flatnonzero((j > 0) & (j < risen.size))
+            crossed.append(inside)
+            firsts.append(first + j[inside])
+            signs.append(np.full(inside.size, sign))
+            for beyond, i in ((j == 0, 0), (j == risen.size, int(np.argmax(risen)))):
+                touched = np.abs(value[first + i] - self.targets)
+                k = np.flatnonzero(beyond & (touched <= _allowed(error[first + i], self.targets)))
+                at_ends.append(k)
+                ends.append(np.full(k.size, x[first + i]))
+        every = [np.concatenate(part) for part in (at_ends, ends, crossed, firsts, signs)]
+        return (every[0], every[1]), (every[2], every[3], every[4])
+
+    def _widths(self, function: Function, which: Places, places: Array) -> tuple[Array, Array]:
+        """Return how far below and above places, the roots of the targets ``which``, the function
+        is the target within its error."""
+        x = self.samples.x
+        outside = {
+            k: np.abs(self.samples.value - self.targets[k])
+            > _allowed(self.samples.error, self.targets[k])
+            for k in set(which.tolist())
+        }
+        low, high = np.full(places.size, self.low), np.full(places.size, self.high)
+        below, above = np.full(places.size, -1), np.full(places.size, -1)
+        for n, (k, place) in enumerate(zip(which.tolist(), places.tolist(), strict=True)):
+            i, j = np.searchsorted(x, [place, np.nextafter(place, np.inf)])
+            left, right = np.flatnonzero(outside[k][:i]), np.flatnonzero(outside[k][j:])
+            below[n] = left[-1] if left.size else -1
+            above[n] = j + right[0] if right.size else -1
+
+        def off(q: Array, rows: Places) -> Bools:
+            target = self.targets[which[rows], None]
+            value, error = function(q)
+            return np.asarray(np.abs(value - target) > _allowed(error, target))
+
+        on_cusp = off(places[:, None], np.arange(places.size))[:, 0]  # the next double is off, too
+        low[on_cusp] = high[on_cusp] = places[on_cusp]
+        i, j = np.flatnonzero((below >= 0) & ~on_cusp), np.flatnonzero((above >= 0) & ~on_cusp)
+        low[i] = last_double(lambda q: off(q, i), x[below[i]], places[i])[1]
+        high[j] = last_double(lambda q: ~off(q, j), places[j], x[above[j]])[0]
+        return low, high
+
+
+def _allowed(error: Array, target: Array) -> Array:
+    """Return by how much a value may differ from a target that it is within its error."""
+    return np.maximum(error, _ROUNDING * np.abs(target))
+
+
+def _first(
+    function: Function, a: Array, b: Array, level: Array, sign: Array
+) -> tuple[Array, Array]:
+    """Return the last doubles from ``a`` on before levels are reached, and the first at which they
+    are, (n,)."""
+
+    def below(q: Array) -> Bools:
+        return np.asarray(sign[:, None] * (function(q)[0] - level[:, None]) < 0.0)
+
+    return last_double(below, a, b)
+
+
+def _middle(a: Array, b: Array) -> Array:
+    """Return middles of intervals, in logarithms where these are far from 0."""
+    far = (a > 0.0) & (b > 1.5 * a)
+    root = np.sqrt(np.where(far, a, 1.0)) * np.sqrt(np.where(far, b, 1.0))
+    return np.where(far, root, 0.5 * a + 0.5 * b)
+
+
+def turning_points(value: Array, error: Array) -> list[tuple[int, float]]:
+    """Return the samples at which values turn by more than their error: 1 at a maximum, -1 at a
+    minimum.
+
+    >>> turning_points(np.array([0.0, 2.0, 1.9, 3.0, 0.0, 1.0]), np.full(6, 0.2))
+    [(3, 1.0), (4, -1.0)]
+    """
+    step = np.flatnonzero(np.diff(value))
+    side = np.sign(np.diff(value)[step])
+    bends = step[1:][side[1:] != side[:-1]]
+    turns: list[tuple[int, float]] = []
+    best, way = 0, 0.0  # the furthest sample since the last turn, and the direction since
+    values, errors = value.tolist(), error.tolist()
+    lowest = highest = 0
+    for i in [*bends.tolist(), value.size - 1]:
+        if way == 0.0:
+            lowest = i if values[i] < values[lowest] else lowest
+            highest = i if values[i] > values[highest] else highest
+            for best, way in ((lowest, 1.0), (highest, -1.0)):
+                if way * (values[i] - values[best]) > errors[i] + errors[best]:
+                    best = i
+                    break
+            else:
+                way = 0.0
+        elif way * (values[i] - values[best]) >= 0.0:
+            best = i
+        elif way * (values[best] - values[i]) > errors[i] + errors[best]:
+            turns.append((best, way))
+            best, way = i, -way
+    return turns
+
+
+# --- doubles --------------------------------------------------------------------------------------
+
+
+def samples(low: float, high: float, per_decade: int, most: int = 20_001) -> Array:
+    """Return values > 0 from ``low`` to ``high``, evenly spread over the logarithm."""
+    first = max(low, TINY)
+    start, stop = np.log(first), np.log(high)
+    count = min(max(int((stop - start) / np.log(10.0) * per_decade), 64) + 1, most)
+    with np.errstate(over="ignore"):
+        return np.clip(np.exp(np.linspace(start, stop, count)), first, high)
+
+
+_SIGN = np.uint64(1 << 63)
+
+
+def _key_of(x: ArrayLike) -> NDArray[np.uint64]:
+    """Return whole numbers in the order of the doubles."""
+    bits = (np.array(x, dtype=np.float64) + 0.0).view(np.uint64)  # + 0.0: -0.0 is 0.0
+    return np.where(bits & _SIGN, ~bits, bits | _SIGN)
+
+
+def _double_of(key: NDArray[np.uint64]) -> Array:
+    """Return the doubles of keys."""
+    return np.where(key & _SIGN, key ^ _SIGN, ~key).view(np.float64)
+
+
+def last_double(
+    below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
+) -> tuple[Array, Array]:
+    """Return neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
+
+    Cuts the *bits*: doubles are ordered like whole numbers, so this ends at two neighbours,
+    whatever the scale.  ``below`` maps (n, m) values, row i for bracket i, to bool; from true at
+    ``low`` (n,) to false at ``high`` it changes once.
+    """
+    a, b = np.atleast_1d(_key_of(low)), np.atleast_1d(_key_of(high))
+    rows, one = np.arange(a.size), np.uint64(1)
+    # a call costs as much as some hundred points: few brackets are cut into many parts at once
+    parts = min(max(_PER_CALL // max(a.size, 1), 2), 64)
+    inner, whole = np.arange(1, parts, dtype=np.uint64), np.uint64(parts)
+    while np.any(b - a > one):
+        step, rest = np.divmod(b - a, whole)
+        cuts = a[:, None] + step[:, None] * inner + rest[:, None] * inner // whole
+        last = np.zeros((a.size, 1), dtype=np.bool_)
+        count = np.argmin(np.hstack((below(_double_of(cuts)), last)), axis=1)
+        ends = np.column_stack((a, cuts, b))
+        a, b = ends[rows, count], ends[rows, count + 1]
+    return _double_of(a), _double_of(b)
