@@ -141,7 +141,8 @@ def batches() -> str:
     """Speed of 100,000 cases, also beside orjson and six arrays of the same columns; the waits of
     short requests beside them and beside a million; the largest memory."""
     rows, columns = [], body_of("columns", 100_000)
-    settings = {"MUMACRO_MAX_BODY_BYTES": "1000000000", "MUMACRO_MAX_BATCH": "1000000"}
+    settings = dict.fromkeys(("MUMACRO_MAX_BODY_BYTES", "MUMACRO_MAX_HELD_BYTES"), "1000000000")
+    settings["MUMACRO_MAX_BATCH"] = "1000000"
     with serving(FINEST, before=FIRST, ready=True, **settings) as own:
         for form in ("columns", "rows"):
             body = body_of(form, 100_000)

@@ -1,7 +1,10 @@
 """Every limit of the service at its maximum count: as many clients as are allowed do their worst at
 the same time.
 
-    python fuzz/attacks.py [--only attacks] [--share 0.2] [--write]
+    python fuzz/attacks.py [--share 0.2] [--named fits] [--image localhost/mumacro:test] [--write]
+
+With an image, which deploy/container.sh builds, the service runs in a container of podman with 512
+MiB.  Without --named all attacks are made.
 
 Beside each attack ``/livez`` is asked, one new connection after another, and another client asks
 a case, a law, a motion and ``/metrics`` in turn.  Seen are the most memory of the process, the
@@ -25,7 +28,7 @@ from typing import NamedTuple
 
 from mumacro.outputs import OUTPUTS
 from tests.support.measuring import main, markdown, sections
-from tests.support.serving import CASE, Server, asking, connect, head, serving
+from tests.support.serving import CASE, Server, asking, connect, head, serving, serving_image
 
 # the defaults; a few connections are left
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20
@@ -316,11 +319,11 @@ def neighbour(server: Server) -> Iterator[list[tuple[str, int, float]]]:
         loop.result()
 
 
-def cost_of(attack: Attack, share: float) -> Cost:
+def cost_of(attack: Attack, share: float, image: str = "") -> Cost:
     """What an attack on a new service takes; it must serve afterwards."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(8192, most), most))
-    with serving() as server:
+    with serving_image(image) if image else serving() as server:
         with asking(server) as waits, neighbour(server) as seen:
             # in a process of its own, so that its clients delay no wait that is measured
             attacker = get_context("fork").Process(target=attack, args=(server, share))
@@ -341,10 +344,12 @@ def cost_of(attack: Attack, share: float) -> Cost:
     return Cost(memory, max(waits), longest[0], longest[1], refused, after)
 
 
-def attacks(share: float) -> str:
+def attacks(share: float, named: str, image: str) -> str:
     rows = []
     for name, attack in ATTACKS.items():
-        cost = cost_of(attack, share)
+        if named not in name:
+            continue
+        cost = cost_of(attack, share, image)
         waits = (f"{1e3 * wait:.0f}" for wait in (cost.livez, cost.metrics, cost.other))
         rows.append(
             (name, f"{cost.memory:.0f}", *waits, f"{cost.refused}", f"{1e3 * cost.after:.0f}")
@@ -362,4 +367,4 @@ def attacks(share: float) -> str:
 
 
 if __name__ == "__main__":
-    main(__doc__, sections(attacks), share=1.0)
+    main(__doc__, sections(attacks), share=1.0, named="", image="")

@@ -1,9 +1,9 @@
 """Many cases at once: one model of columns for columns and rows, answered slice by slice.
 
-``forms.py`` reads a body as values, lists and arrays by name; :class:`CaseColumns` checks them, and
-they become the library's ``Cases``, once; :class:`Batch` evaluates slices of these, so that memory
-stays small and other threads run between them; ``forms.py`` writes the slices.  A bad case spoils
-only itself.
+``forms.py`` reads a body as numbers, lists and arrays by name; :class:`CaseColumns` checks them,
+and they become the library's ``Cases``, once; :class:`Batch` evaluates slices of these, so that
+memory stays small and other threads run between them; ``forms.py`` writes the slices.  A bad case
+spoils only itself.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,16 +16,16 @@ from mumacro.answer import Answer, add
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named, other_amplitude
 from mumacro.inputs.doubts import Remark
-from mumacro.inputs.reading import Value
 from mumacro.kernel.arrays import Codes
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost
 
 from .forms import SLICE, Body, Reason, too_large, write_columns, write_rows
+from .json_text import dump
 from .models.inputs import MAX_REASONS, Column
 from .models.options import BatchOptions, CaseColumns
 from .problems import FieldFault, reason_of, refuse
-from .reading import dump, of_members
+from .reading import of_members
 from .tables import LoadedTable, Tables
 
 
@@ -77,11 +77,10 @@ class Batch:
         # the first bad input of a case, in the order of the inputs, is told
         for name, column in [*values.items()]:
             if isinstance(column, Column):
-                values[name] = column.value
+                values[name] = column.numbers
                 for i, reason in column.reasons.items():
                     reasons.setdefault(i, (name, reason))
-        arrays = {name: x.si if isinstance(x, Value) else x for name, x in values.items()}
-        lengths = {name: len(x) for name, x in arrays.items() if isinstance(x, np.ndarray)}
+        lengths = {name: len(x) for name, x in values.items() if isinstance(x, np.ndarray)}
         if len({*lengths.values()}) > 1:
             size = next(iter(lengths.values()))
             text = ", ".join(f"{name}: {length}" for name, length in lengths.items())

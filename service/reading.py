@@ -1,4 +1,4 @@
-"""How a request becomes the model that its endpoint declares, and JSON becomes Python.
+"""How a request becomes the model that its endpoint declares.
 
 :class:`DirectRoute` reads one model from body or query and solves nothing else: FastAPI's own
 reading of a case takes longer than its answer (docs/decisions.md).  A member or a parameter that is
@@ -6,16 +6,13 @@ given twice is refused, numbers of a query are read as people type them, and lim
 """
 
 import asyncio
-import json
 import string
-from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterable, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, TypeVar
 from urllib.parse import parse_qsl
 
-import orjson
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import ValidationError
@@ -24,6 +21,7 @@ from starlette.routing import BaseRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from .admission import Ticket, compute, ticket_of
+from .json_text import decode
 from .problems import ABORT, FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
 from .understood import UNDERSTOOD, understood
 
@@ -37,107 +35,6 @@ _CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
 # the characters of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _LISTS = frozenset(("include",))
-_MOST_MEMBERS = 200  # members of an object in a small body, at most
-
-
-# --- JSON -----------------------------------------------------------------------------------------
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    members = dict(pairs)
-    if len(members) < len(pairs):
-        times = Counter(name for name, _ in pairs)
-        repeats = [name for name in members if times[name] > 1]
-        refuse([FieldFault.of(name, "is given more than once") for name in repeats])
-    return members
-
-
-# Numbers are read by functions of Python, so that other threads run meanwhile; int refuses 4300
-# digits.
-_DECODER = json.JSONDecoder(
-    object_pairs_hook=_unique,
-    parse_int=lambda digits: int(digits) if len(digits) < 4300 else float(digits),
-    parse_float=lambda digits: float(digits),
-)
-
-
-def loads(text: bytes) -> Any:
-    """A JSON text as Python objects.
-
-    ValueError where a name may be given twice: in an object of fewer members than its text has
-    colons.
-    """
-    value = orjson.loads(text)
-    if b"{" in text and _members_in(value) != text.count(b":"):
-        raise ValueError("a name is given twice, or a text has a colon")
-    return value
-
-
-def _members_in(value: Any) -> int:
-    """The number of members of all objects in a value."""
-    number, values = 0, [value]
-    while values:
-        one = values.pop()
-        if isinstance(one, dict):
-            number += len(one)
-            values.extend(one.values())
-        elif isinstance(one, list):
-            values.extend(one)
-    return number
-
-
-def decode(text: bytes, large: bool = False) -> Any:
-    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later.
-
-    Unless the text is ``large``, an object of far too many members is refused.
-    """
-    if not text:
-        raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
-    try:
-        if large:
-            return _DECODER.decode(text.decode())
-        try:
-            value = loads(text)
-        except ValueError:  # _DECODER gives the reason, or reads what the other does not
-            value = _DECODER.decode(text.decode())
-        if text.count(b":") > _MOST_MEMBERS:
-            _few_members(value)
-        return value
-    except RecursionError:
-        raise RequestError(ProblemKind.MALFORMED_BODY, "the body is nested too deeply") from None
-    except ValueError as error:
-        raise RequestError(ProblemKind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
-
-
-def _few_members(value: Any, path: tuple[str | int, ...] = ()) -> None:
-    """Refuse an object of far more members than there are fields: a reason for each would take
-    long."""
-    if isinstance(value, dict):
-        if len(value) > _MOST_MEMBERS:
-            reason = f"has {len(value)} members; send only fields, of which no object has so many"
-            refuse([FieldFault(path, reason, value)])
-        for name, member in value.items():
-            _few_members(member, (*path, name))
-    elif isinstance(value, list):
-        for i, one in enumerate(value):
-            _few_members(one, (*path, i))
-
-
-#: Write JSON as bytes; numbers that are not finite become null.
-dump = partial(orjson.dumps, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
-class Json(Response):
-    """An answer as JSON; Starlette's own looks for what the headers may lack, which takes as long
-    as a case."""
-
-    def __init__(self, content: Any, headers: Mapping[str, str] | None = None) -> None:
-        self.status_code, self.body, self.background = 200, dump(content), None
-        self.raw_headers = [
-            (b"content-length", b"%d" % len(self.body)),
-            (b"content-type", b"application/json"),
-            *((name.lower().encode(), value.encode()) for name, value in (headers or {}).items()),
-        ]
 
 
 # --- time -----------------------------------------------------------------------------------------

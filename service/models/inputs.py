@@ -21,15 +21,14 @@ from pydantic import (
 )
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import A_DEVIATION, AN_END, DEVIATIONS, EXACT, one_word
-from mumacro.inputs.fields import BOUNDS, ENDS, MOST_HZ, POSITIVE, described, refusal
+from mumacro.inputs.cases import DEVIATIONS, EXACT, one_word
+from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, RIGID, described, refusal
 from mumacro.inputs.kind import ContactName, DirectionName
-from mumacro.inputs.reading import Value, no_number, read, reason_of
+from mumacro.inputs.reading import no_number, reason_of
+from mumacro.kernel.arrays import Array
 
 from .values import (
-    PLAIN_TEXT,
-    POSITIVE_TEXT,
-    RIGID,
+    RIGID_SCHEMA,
     Amplitude,
     AngularFrequency,
     Force,
@@ -62,7 +61,7 @@ EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20
 MAX_REASONS = 1000  # bad cases of a batch that are listed
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
-OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, RIGID]
+OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, RIGID_SCHEMA]
 
 
 NULL = {"type": "null"}
@@ -206,10 +205,10 @@ def _given(model: BaseModel) -> dict[str, Any]:
 
 
 class Column(NamedTuple):
-    """One input of many cases: numbers, NaN where there is none, with deviations and ends of
-    intervals where entries have some; and why there is none, by the index of the case."""
+    """One input of many cases: numbers, NaN where there is none, and why there is none, by the
+    index of the case."""
 
-    value: Value
+    numbers: Array
     reasons: Mapping[int, str]
 
 
@@ -217,33 +216,34 @@ _LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in BOUNDS}
 _LEAST |= dict.fromkeys(DEVIATIONS, 0.0)
 _MOST = dict.fromkeys(_LEAST, sys.float_info.max) | {"f": MOST_HZ}
 _NUMBERS = frozenset((float, int))
-_ONE_NUMBER = dict.fromkeys(ENDS, AN_END) | dict.fromkeys(DEVIATIONS, A_DEVIATION)
+_NO_TEXTS = "must be numbers: a column has no texts; a text with a unit is for one case"
 
 
-def entry(name: str, value: object) -> tuple[Value, str | None]:
-    """The value of an input and None, or NaN and the reason why it is none."""
-    if isinstance(value, str):
-        try:
-            one = read(name.removeprefix("std_"), value)
-        except InputError as error:
-            return _NO_VALUE, reason_of(error.bound)
-        if (of := _ONE_NUMBER.get(name)) and (one.std is not None or one.low is not None):
-            return _NO_VALUE, reason_of(of)
-        if name == "k" and one.si == math.inf:
-            return one, None
-    elif type(value) in _NUMBERS:
-        try:
-            one = Value(float(value))  # type: ignore[arg-type]
-        except OverflowError:
-            one = Value(math.inf)
-    else:
-        return _NO_VALUE, no_number(name, value)
-    if _LEAST[name] <= one.si <= _MOST[name]:
-        return one, None
-    return _NO_VALUE, refusal(name, one.si) if name in BOUNDS else f"must be {EXACT}"
+def is_rigid(value: object) -> bool:
+    """Whether a value is the word for a stiffness without limit."""
+    return isinstance(value, str) and value.strip().lower() == RIGID
 
 
-_NO_VALUE = Value(math.nan)
+def not_a_number(name: str, value: object) -> str:
+    """Why a value that is no number is refused where programs send numbers."""
+    if name == "k" and isinstance(value, str):
+        return "must be a number, or the word rigid, and no other text"
+    return no_number(name, value)
+
+
+def entry(name: str, value: object) -> tuple[float, str | None]:
+    """The number of an input and None, or NaN and the reason why there is none."""
+    if name == "k" and is_rigid(value):
+        return math.inf, None
+    if type(value) not in _NUMBERS:
+        return math.nan, not_a_number(name, value)
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        number = math.inf
+    if _LEAST[name] <= number <= _MOST[name]:
+        return number, None
+    return math.nan, refusal(name, number) if name in BOUNDS else f"must be {EXACT}"
 
 
 def column(name: str, values: Sequence[Any]) -> Column:
@@ -254,43 +254,35 @@ def column(name: str, values: Sequence[Any]) -> Column:
         except OverflowError:
             array = np.array([math.inf])
         if np.isfinite(array).all():
-            return Column(Value(array), {})
-    read_values, reasons = [], dict[int, str]()
+            return Column(array, {})
+    if all(isinstance(value, str) and not (name == "k" and is_rigid(value)) for value in values):
+        raise fault(_NO_TEXTS)
+    numbers, reasons = np.empty(len(values)), dict[int, str]()
     for i, value in enumerate(values):
-        one, reason = entry(name, value)
-        read_values.append(one)
+        numbers[i], reason = entry(name, value)
         if reason is not None and len(reasons) < MAX_REASONS:
             reasons[i] = reason
-    si = np.array([one.si for one in read_values], np.float64)
-    std = low = high = None
-    if any(one.std is not None for one in read_values):
-        std = np.array([one.std or 0.0 for one in read_values])
-    if any(one.low is not None for one in read_values):  # a number is an interval of itself
-        low = np.array([one.si if one.low is None else one.low for one in read_values])
-        high = np.array([one.si if one.high is None else one.high for one in read_values])
-    return Column(Value(si, std, low, high), reasons)
+    return Column(numbers, reasons)
 
 
 _ALWAYS = ("mu0", "Fz", "k", "v0")  # where null is refused
 
 
-def cells(name: str, value: Any) -> float | str | Column | None:
-    """A number or a text for all cases, or a list or an array with one for each."""
+def cells(name: str, value: Any) -> float | Column | None:
+    """A number for all cases, or a list or an array with one for each."""
     if isinstance(value, list):
         return column(name, value)
-    if isinstance(value, np.ndarray):  # finite numbers
-        return Column(Value(value), {})
-    if isinstance(value, Value):  # of rows
+    if isinstance(value, np.ndarray):
         return Column(value, {})
     if value is None and name not in _ALWAYS:
         return None
-    one, reason = entry(name, value)
+    number, reason = entry(name, value)
     if reason is not None:
         raise fault(reason)
-    return value if isinstance(value, str) else float(one.si)
+    return number
 
 
-def _of_cases(value: Any, info: ValidationInfo) -> float | str | Column | None:
+def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
     return cells(info.field_name or "", value)
 
 
@@ -305,7 +297,7 @@ def _one_word(value: Any, info: ValidationInfo) -> Any:
 
 
 def _or_listed(one: dict[str, Any], *texts: dict[str, Any]) -> WithJsonSchema:
-    """One value for all cases, which ``texts`` describe, too, or a list of any, where a bad entry
+    """One number for all cases, which ``texts`` describe, too, or a list of any, where a bad entry
     spoils its case only."""
     several = {"type": "array", "items": {"anyOf": [one, {"type": "string"}, NULL]}}
     return WithJsonSchema({"anyOf": [one, *texts, several]})
@@ -314,13 +306,13 @@ def _or_listed(one: dict[str, Any], *texts: dict[str, Any]) -> WithJsonSchema:
 _CELLS = PlainValidator(_of_cases)
 _ABOVE_ZERO: Any = {"type": "number", "exclusiveMinimum": 0}
 _FROM_ZERO: Any = {"type": "number", "minimum": 0}
-PositiveColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, POSITIVE_TEXT)]
-NotNegativeColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO, PLAIN_TEXT)]
-HertzColumn = Annotated[Any, _CELLS, _or_listed({**_FROM_ZERO, "maximum": MOST_HZ}, PLAIN_TEXT)]
-StiffnessColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, POSITIVE_TEXT, RIGID)]
+PositiveColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO)]
+NotNegativeColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO)]
+HertzColumn = Annotated[Any, _CELLS, _or_listed({**_FROM_ZERO, "maximum": MOST_HZ})]
+StiffnessColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, RIGID_SCHEMA)]
 
 
-DeviationColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO, PLAIN_TEXT)]
+DeviationColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO)]
 #: one for all cases; a list of one word repeated is that word
 ContactColumn = Annotated[ContactName, BeforeValidator(_one_word)]
 DirectionColumn = Annotated[DirectionName, BeforeValidator(_one_word)]

@@ -3,9 +3,9 @@
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 
-from mumacro.inputs.cases import DEVIATIONS
+from mumacro.inputs.cases import DEVIATIONS, KIND
 from mumacro.inputs.fields import unit_of
 from mumacro.inputs.kind import ContactName, DirectionName, Kind, kind_of
 from mumacro.outputs import OUTPUTS
@@ -14,6 +14,7 @@ from ..understood import UNDERSTOOD
 from .inputs import (
     ALTERNATIVES,
     EXAMPLE,
+    INPUTS,
     CaseInputs,
     ContactColumn,
     DeviationColumn,
@@ -21,9 +22,11 @@ from .inputs import (
     InputColumns,
     Strict,
     either,
+    is_rigid,
+    not_a_number,
     optional,
 )
-from .values import OR_ONE, Deviation, Positive
+from .values import OR_ONE, Deviation, Positive, fault
 
 MODEL = "model"  # for one case only
 _BESIDE = (MODEL, UNDERSTOOD)  # what the library does not compute
@@ -138,8 +141,18 @@ class CaseRequest(Options, CaseInputs):
     """One case and the options of its answer."""
 
 
+def _without_texts(schema: dict[str, Any]) -> None:
+    """Describe members that are numbers, or the word rigid."""
+    schema |= {"examples": [EXAMPLE], **ALTERNATIVES}
+    for name in schema["properties"].keys() - KIND:
+        member = schema["properties"][name]
+        member["anyOf"] = [kind for kind in member["anyOf"] if "pattern" not in kind]
+
+
 class Case(Deviations, CaseInputs):
-    """One case of a batch in rows."""
+    """One case of a batch in rows: numbers in SI."""
+
+    model_config = ConfigDict(json_schema_extra=_without_texts)
 
     contact: ContactName | None = optional(_CONTACT)
     direction: DirectionName | None = optional(_DIRECTION)
@@ -150,6 +163,14 @@ class Case(Deviations, CaseInputs):
         words = {"contact": self.contact, "direction": self.direction}
         members = {name: word for name, word in words.items() if word is not None}
         return self.inputs | members | self.deviations
+
+    @field_validator(*INPUTS, *DEVIATIONS, mode="before")
+    @classmethod
+    def _no_text(cls, value: Any, info: ValidationInfo) -> Any:
+        name = info.field_name or ""
+        if isinstance(value, str) and not (name == "k" and is_rigid(value)):
+            raise fault(not_a_number(name, value))
+        return value
 
 
 class CaseColumns(DeviationColumns, Outputs, Choice, InputColumns):
@@ -168,7 +189,7 @@ class CaseColumns(DeviationColumns, Outputs, Choice, InputColumns):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """All that the library takes: numbers, texts, and what lists hold."""
+        """All that the library takes: numbers, and what lists hold."""
         words = {"contact": self.contact, "direction": self.direction}
         values = self.__dict__
         deviations = {name: x for name in DEVIATIONS if (x := values[name]) is not None}

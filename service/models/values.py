@@ -19,10 +19,9 @@ from mumacro.inputs.units import QUANTITIES
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
-RIGID = {"const": "rigid", "type": "string"}
+RIGID_SCHEMA = {"const": "rigid", "type": "string"}
 #: a number as text; the library reads more than this pattern
 PLAIN_TEXT = {"type": "string", "pattern": r"^[0-9]{1,9}(\.[0-9]{1,9})?$"}
-POSITIVE_TEXT = {"type": "string", "pattern": r"^[1-9][0-9]{0,8}(\.[0-9]{1,9})?$"}
 
 
 #: one name in place of a list of one
@@ -77,7 +76,7 @@ def _schema(
         number["maximum"] = MOST_HZ
     kinds = [number, text_schema(QUANTITY_OF[name], positive)]
     if rigid and QUANTITY_OF[name] in ("stiffness", "pressure") and positive:
-        kinds.append(RIGID)
+        kinds.append(RIGID_SCHEMA)
     return {"anyOf": kinds, **({} if example is None else {"examples": [example]})}
 
 

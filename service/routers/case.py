@@ -13,10 +13,10 @@ from mumacro.outputs.evaluation import chosen, cost
 from mumacro.validity import digits, effect_of, rows_of
 
 from ..admission import compute
+from ..json_text import Json, dump
 from ..models.answers import CaseAnswer
 from ..models.options import MODEL, CaseRequest, TextQuery
 from ..problems import of_input
-from ..reading import Json, dump
 from ..understood import UNDERSTOOD, understood
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 

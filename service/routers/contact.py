@@ -17,10 +17,11 @@ from mumacro.inputs.workbooks import BEGIN as WORKBOOK
 
 from .. import API_VERSION
 from ..admission import compute
+from ..json_text import Json
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
 from ..problems import FieldFault, refuse, with_members
-from ..reading import Json, understood_in
+from ..reading import understood_in
 from ..tables import LoadedTable
 from . import POST_PROBLEMS, router_of
 

@@ -9,8 +9,8 @@ from fastapi.routing import APIRoute
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from .. import API_VERSION, __version__
+from ..json_text import Json
 from ..models.answers import Health
-from ..reading import Json
 from . import problems, router_of
 
 router = router_of("health", APIRoute, prefix="")

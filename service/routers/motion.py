@@ -10,9 +10,10 @@ from mumacro.errors import InputError
 
 from .. import API_VERSION
 from ..admission import compute
+from ..json_text import Json
 from ..models.motion import MotionAnswer, MotionRequest
 from ..problems import FieldFault, reason_of, refuse, with_members
-from ..reading import Json, understood_in
+from ..reading import understood_in
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")

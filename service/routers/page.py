@@ -12,8 +12,8 @@ from mumacro.inputs.kind import SPRING, kind_of
 
 from .. import __version__
 from ..admission import compute
+from ..json_text import Json
 from ..page_data import POLICY, map_of, names
-from ..reading import Json
 from . import file_answer
 
 STATIC = Path(__file__).resolve().parent.parent / "static"

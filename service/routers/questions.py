@@ -25,12 +25,13 @@ from mumacro.validity import load_rows
 from .. import API_VERSION
 from ..admission import compute
 from ..forms import listed
+from ..json_text import Json
 from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
 from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
 from ..models.questions import LawRequest, SolveForRequest
 from ..problems import with_members
-from ..reading import Json, understood_in
+from ..reading import understood_in
 from ..tables import LoadedTable, Tables
 from ..understood import UNDERSTOOD
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of

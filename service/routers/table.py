@@ -8,10 +8,10 @@ from pydantic import Field
 from mumacro.errors import TableError
 
 from .. import __version__
+from ..json_text import Json
 from ..models.answers import TableAnswer
 from ..models.inputs import Strict
 from ..models.values import Positive
-from ..reading import Json
 from . import GET_PROBLEMS, file_answer, problems, router_of
 
 router = router_of("table")

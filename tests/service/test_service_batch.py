@@ -57,9 +57,31 @@ def test_the_list_of_errors_is_bounded_and_their_number_is_given(client: Any, ca
     assert answer["n_errors"] == 5000
     assert [value is None for value in answer["mu_macro"]] == [True] * 5000 + [False]
     assert answer["groups"]["l0"][:5000] == answer["regime"][:5000] == [None] * 5000
-    answer = client.post(BATCH, json={**case, "v0": [0.1, "10 cm/s", "0.1 N"]}).json()
-    assert answer["mu_macro"][0] == answer["mu_macro"][1]
-    assert [error["index"] for error in answer["errors"]] == [2]
+
+
+TEXTS = ["10 cm/s", "0.1", "rigid", "", "0.1 ± 0.01", "0.1..0.2 m/s"]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+@pytest.mark.parametrize("name", ["v0", "k", "k_low", "std_mu0"])
+def test_a_text_among_numbers_is_a_gap_and_a_column_of_texts_is_refused_once(
+    client: Any, problem: Any, case: Case, name: str, text: str
+) -> None:
+    """A person's text is for one case; a program sends numbers."""
+    if name == "k" and text == "rigid":
+        return
+    if name == "k_low":
+        case = {name: x for name, x in case.items() if name != "k"} | {"k_high": 2e6}
+    numbers = [{**case, name: 0.1}, {**case, name: text}]
+    for body in ({**case, name: [0.1, text]}, numbers):
+        answer = client.post(BATCH, json=body).json()
+        assert [(one["index"], one["field"]) for one in answer["errors"]] == [(1, name)]
+        assert answer["errors"][0]["reason"].startswith("must be a number")
+    for texts in ([text], [text, "1"]):
+        (fault,) = problem(client.post(BATCH, json={**case, name: texts}), 422)["errors"]
+        assert (fault["field"], fault["reason"].startswith("must be numbers")) == (name, True)
+    (fault,) = problem(client.post(BATCH, json={**case, name: text}), 422)["errors"]
+    assert fault["reason"].startswith("must be a number")
 
 
 @pytest.mark.parametrize("gap", [None, "", "  ", float("nan")], ids=repr)
@@ -89,17 +111,17 @@ GOOD = '{"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}'
         (GOOD.replace("0.01", "false"), "v0"),
         (GOOD.replace("1e6", "NaN"), "k"),
         (GOOD.replace("1e6", "null"), "k"),
-        (GOOD.replace("1e6", '"1 N/um"'), ...),
-        (GOOD.replace("1e6", '"1 um"'), "k"),
+        (GOOD.replace("1e6", '"1 N/um"'), "k"),
+        (GOOD.replace("0.01", '"0.01"'), "v0"),
         (GOOD.replace("1e6", '"rigid:"'), "k"),
         (GOOD.replace("1e6", '"Rigid"'), ...),
         (GOOD.replace("1e6", "[]"), "k"),
         (GOOD.replace("1e6", "{}"), "k"),
         (GOOD.replace("v0", "v1"), "v1"),
         (GOOD.replace("v0", "v\\u0030"), ...),
-        (GOOD.replace('"v0": 0.01', '"k": 2e6'), 422),
-        (GOOD.replace('"k": 1e6', '"k": 1e6, "k": 1e6'), 422),
-        (GOOD.replace("}", ', "k": null}'), 422),
+        (GOOD.replace('"v0": 0.01', '"k": 2e6'), "v0"),
+        (GOOD.replace('"k": 1e6', '"k": 2, "k": 1e6'), ...),
+        (GOOD.replace("}", ', "k": null}'), "k"),
         ('["mu0", "Fz", "k", "y0", "f", "v0"]', None),
         ('"mu0"', None),
     ],
@@ -184,13 +206,16 @@ def test_an_entry_that_is_no_case_is_bad_alone(client: Any, case: Case, entry: A
     assert [error["index"] for error in answer["errors"]] == [1]
 
 
-def test_a_name_that_is_given_twice_in_a_row_is_refused(client: Any, case: Case) -> None:
-    row = json.dumps(case)
-    text = f'[{row}, {row[:-1]}, "v0": 1.0}}]'
-    reply = client.post(
-        "/v1/mu-macro/batch", content=text, headers={"Content-Type": "application/json"}
-    )
-    assert reply.status_code == 422
+def test_of_a_name_that_is_given_twice_the_last_counts(client: Any, case: Case) -> None:
+    """In columns and rows, by either of the two readers; one case refuses it."""
+    expected = one(client, {**case, "v0": 1.0})["mu_macro"]
+    for first in ("0.5", "NaN", '"x"', "[3]"):
+        row = f'{json.dumps({**case, "v0": "@"})[:-1]}, "\\u00760": 1.0}}'.replace('"@"', first)
+        columns = client.post(BATCH, content=row).json()
+        rows = client.post(BATCH, content=f"[{json.dumps(case)}, {row}]").json()
+        assert columns["mu_macro"] == [expected]
+        assert [columns["errors"], rows["errors"]] == [[], []]
+        assert rows["results"][1]["mu_macro"] == expected
 
 
 @pytest.mark.parametrize("word", [["ball"], [["ball"]], {"ball": 1}, "\ud800", 1], ids=ascii)
@@ -215,11 +240,9 @@ LIFTED: dict[str, Any] = {**SPRING, "direction": "normal", "y0": None, "Fz_ampli
 STIFFNESSES = st.sampled_from(
     [
         {"k": "rigid"},
-        {"k": "0.8..1.2 N/um"},
         {"k_low": 8e5, "k_high": 1.2e6},
-        {"k_low": "0.8 N/um", "k_high": 1.2e6},
+        {"k_low": 2e6, "k_high": 1e6},
         {"k": None},
-        {"k_low": "1 ± 0.1 N/um", "k_high": 2e6},
         {"k": 1e6},
     ]
 )
@@ -229,10 +252,8 @@ OTHERS = st.sampled_from(
         for more in (
             {},
             {"mu0": None},
-            {"v0": "1e400 m/s"},
-            {"y0": "-2 um"},
+            {"v0": -1.0},
             {"f": 10**400},
-            {"Fz_amplitude": "three"},
             {"Fz_amplitude": 3.0},
         )
     ]
@@ -246,6 +267,9 @@ CASES: st.SearchStrategy[list[Any]] = st.sampled_from(
 )
 
 
+BESIDE_AN_INTERVAL = ("k", "must be finite beside rows with an interval of k")
+
+
 @settings(max_examples=60)
 @given(rows=CASES)
 def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows: Any) -> None:
@@ -253,7 +277,9 @@ def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows
     faults = {fault["index"]: (fault["field"], fault["reason"]) for fault in answer["errors"]}
     for i, (row, result) in enumerate(zip(rows, answer["results"], strict=True)):
         alone = of_one(client, row)
-        if isinstance(alone, set):
+        if result is None and faults[i] == BESIDE_AN_INTERVAL:
+            assert row["k"] == "rigid"
+        elif isinstance(alone, set):
             assert result is None
             assert faults[i] in alone
         else:  # a number is an interval of itself beside others
@@ -261,14 +287,19 @@ def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows
             assert result.get("mu_macro_low", result["mu_macro"]) <= result["mu_macro"]
 
 
-def test_a_rigid_contact_stands_beside_an_interval_in_every_form(client: Any) -> None:
-    k = ["rigid", "0.8..1.2 N/um", 1e6]
-    columns = client.post(BATCH, json={**SPRING, "k": k}).json()
-    rows = client.post(BATCH, json=[{**SPRING, "k": one} for one in k]).json()
-    for name in ("mu_macro", "mu_macro_low", "mu_macro_high"):
-        assert columns[name] == [row[name] for row in rows["results"]]
-    assert columns["errors"] == rows["errors"] == []
-    assert columns["mu_macro"][0] == of_one(client, {**SPRING, "k": "rigid"})["mu_macro"]
+def test_a_number_is_an_interval_of_itself_beside_one_and_a_rigid_contact_is_not(
+    client: Any,
+) -> None:
+    rows = [{"k_low": 8e5, "k_high": 1.2e6}, {"k": 1e6}, {"k": "rigid"}]
+    answer = client.post(BATCH, json=[{**SPRING, **row} for row in rows]).json()
+    band, number, rigid = answer["results"]
+    assert band["mu_macro_low"] < band["mu_macro"] < band["mu_macro_high"]
+    alone = of_one(client, {**SPRING, "k": 1e6})["mu_macro"]
+    assert {number[name] for name in ("mu_macro", "mu_macro_low", "mu_macro_high")} == {alone}
+    assert rigid is None
+    assert [(one["index"], one["field"], one["reason"]) for one in answer["errors"]] == [
+        (2, *BESIDE_AN_INTERVAL)
+    ]
 
 
 @pytest.mark.parametrize("number", [1e400, -1, math.nan, "x", "2 um", 3])
@@ -301,8 +332,7 @@ def test_a_request_has_one_contact_and_one_direction(client: Any, problem: Any, 
 @pytest.mark.parametrize(
     ("columns", "field"),
     [
-        ({"mu0": ["0.3 ± 0.01", 0.3], "std_mu0": 0.05}, "std_mu0"),
-        ({"k": ["0.8..1.2 N/um", 1e6], "k_low": [1e5, 1e5], "k_high": [2e5, 2e5]}, "k"),
+        ({"k": [1e6, 1e6], "k_low": [1e5, 1e5], "k_high": [2e5, 2e5]}, "k"),
         ({"v0": [0.01, 0.1], "std": {"mu0": 0.05}}, "std"),
         ({"v0": [0.01, 0.1], "std_nothing": 0.05}, "std_nothing"),
     ],
@@ -313,16 +343,6 @@ def test_no_column_is_dropped_for_another(
     body = {**SPRING, "k": 1e6, **columns}
     (fault,) = problem(client.post(BATCH, json=body), 422)["errors"]
     assert fault["field"] == field
-
-
-@pytest.mark.parametrize("name", ["k_low", "std_k"])
-def test_an_end_or_a_deviation_has_no_deviation(client: Any, name: str) -> None:
-    values = ["1 ± 0.1 N/um", "1 N/um"]
-    column = {"k_low": values, "k_high": "2 N/um"} if name == "k_low" else {"k": 1e6}
-    std = {"std_k": values} if name == "std_k" else {}
-    (fault,) = client.post(BATCH, json={**SPRING, **column, **std}).json()["errors"]
-    assert (fault["index"], fault["field"]) == (0, name)
-    assert fault["reason"].startswith("must be one number: ")
 
 
 def test_a_query_holds_for_rows_in_whichever_way_they_are_read(client: Any) -> None:

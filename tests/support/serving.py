@@ -43,6 +43,8 @@ class Server:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
+        #: the process that serves, which in a container is another one
+        self.pid = self.process.pid
         while (
             address := re.search(r"(?i)running on http://[^ ]+:(\d+)[ /]", log.read_text("utf-8"))
         ) is None:
@@ -97,13 +99,13 @@ class Server:
 
     def memory(self, what: str = "VmRSS") -> float:
         """Megabytes."""
-        lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
+        lines = Path(f"/proc/{self.pid}/status").read_text().splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith(what)) / 1024.0
 
     def busy(self) -> float:
         """Processor time of all threads [s]; the clock's number is that of clock_getcpuclockid(3)
         on Linux."""
-        return time.clock_gettime(~self.process.pid << 3 | 2)
+        return time.clock_gettime(~self.pid << 3 | 2)
 
     def errors(self) -> list[str]:
         return [line for line in self.lines if re.search(r'"logger": ?"mumacro.error"', line)]
@@ -151,6 +153,25 @@ def serving(
         if ready:
             server.wait_until_ready()
         yield server
+
+
+@contextmanager
+def serving_image(image: str) -> Iterator[Server]:
+    """The service of an image by podman, as in production with 512 MiB, until the context ends."""
+    with tempfile.TemporaryDirectory() as folder:
+        number = Path(folder, "pid")
+        command = ["podman", "run", "--rm", "--network=host", f"--pidfile={number}"]
+        command += ["--memory=512m", "--memory-swap=512m", "--read-only", "--cap-drop=all"]
+        command += ["--security-opt=no-new-privileges", "--env=MUMACRO_HOST=127.0.0.1"]
+        with running([*command, "--env=MUMACRO_PORT=0", image], Path(folder, "log")) as server:
+            server.pid = int(number.read_text())
+            try:
+                server.wait_until_ready()
+                yield server
+            finally:
+                with suppress(ProcessLookupError):
+                    os.kill(server.pid, signal.SIGKILL)
+                server.wait()
 
 
 @contextmanager
