@@ -85,12 +85,12 @@ class Thread(Generic[T]):
         self.done.exception()  # nobody may wait for it any more
 
 
-def join_threads(seconds: float) -> None:
-    """Wait for so long until all work has ended: where Python ends beside a thread that is in
-    compiled code, such as pydantic's, the process aborts."""
+def join_threads(seconds: float) -> bool:
+    """Wait for so long until all work has ended; return whether it has."""
     end = time.monotonic() + seconds
     for thread in [*_threads]:
         thread.join(max(0.0, end - time.monotonic()))
+    return not any(thread.is_alive() for thread in _threads)
 
 
 class _Waiting(NamedTuple):
@@ -112,6 +112,7 @@ class Admission:
         self.queue: list[_Waiting] = []
         self.running: set[Thread[Any]] = set()
         self.is_stopping = False
+        self.stops_at = math.inf  # the end of the grace, on the loop's clock
         #: how many connections are open, as our own server says
         self.connections: Callable[[], int] = lambda: 0
         self._seconds = 0.1  # that a slot is held, in the mean of the last ones
@@ -221,9 +222,9 @@ class Admission:
     def begin_stop(self) -> None:
         """Refuse new work, and end what is running when the grace is over."""
         if not self.is_stopping:
-            self.is_stopping = True
-            grace = self.settings.shutdown_grace_s
-            asyncio.get_running_loop().call_later(grace, self.end)
+            self.is_stopping, loop = True, asyncio.get_running_loop()
+            self.stops_at = loop.time() + self.settings.shutdown_grace_s
+            loop.call_at(self.stops_at, self.end)
 
     def end(self) -> None:
         """Ask all that is running to end."""

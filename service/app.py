@@ -7,6 +7,7 @@ an argument the settings are read from the environment.
 import asyncio
 import gc
 import logging
+import os
 import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -66,7 +67,7 @@ _TAGS = [
 _LOOK_EVERY_S = 1.0  # seconds between two looks at what the process holds
 # held while a description is made: FastAPI cannot make two at the same time
 _DESCRIBING = threading.Lock()
-_END_S = 5.0  # at most, until what is computed has ended at a stop; a file system may hang
+_END_S = 1.6  # after the grace, or a stop without requests, until all that is computed has ended
 _log = logging.getLogger("mumacro.app")
 
 
@@ -107,8 +108,22 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     looking = asyncio.create_task(_look(state))
     yield {"settings": state.settings, "observer": state.observer, "admission": state.admission}
     looking.cancel()
-    app.state.admission.end()
-    await asyncio.to_thread(join_threads, _END_S)
+    await _end(state.admission)
+
+
+async def _end(admission: Admission) -> None:
+    """End all work; in time, whatever a thread waits for, such as a file system that hangs.
+
+    Where Python ends beside a thread in compiled code, such as pydantic's, the process aborts.  So
+    beside a thread that does not end it is left at once, but within another server's process.
+    """
+    admission.end()
+    now = asyncio.get_running_loop().time()
+    seconds = min(admission.stops_at, now) + _END_S - now
+    if not await asyncio.to_thread(join_threads, seconds) and (lines := LogLines.running):
+        _log.warning("the process ends beside a thread that does not end")
+        lines.flush()
+        os._exit(0)
 
 
 class Service(FastAPI):

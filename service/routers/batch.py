@@ -18,6 +18,7 @@ from mumacro.inputs.cases import KIND
 from ..admission import AT_ONCE, ticket_of
 from ..batch import Batch
 from ..forms import MORE_CASES, read
+from ..json_text import count
 from ..models.inputs import EXAMPLE
 from ..models.options import BatchOptions
 from ..problems import ProblemKind, RequestError
@@ -99,8 +100,9 @@ class _Answer(Response):
 
 
 def _by_one(text: bytearray) -> float:
-    """The cost of reading what Python may have to read one by one."""
-    return _ROW * text.count(b"{") + _WORD * (text.count(b'"') / 2 + text.count(b"null"))
+    """The cost of reading what Python may have to read one by one; a null has two of its l."""
+    words = (count(text, b'"') + count(text, b"l")) / 2
+    return _ROW * count(text, b"{") + _WORD * words
 
 
 def _gathered(pieces: Iterator[bytes], least: float) -> Iterator[bytes]:

@@ -1,10 +1,12 @@
 """What one process takes on at the same time: bytes, slots, shares of a client, the end of work."""
 
 import asyncio
+import sys
 import threading
 import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,8 @@ from service import tables
 from service.admission import Admission, client_of
 from service.problems import RequestError
 from service.settings import Settings
-from tests.support.serving import CASE, Server, connect, head, to_end
+from tests.support.places import TABLES
+from tests.support.serving import CASE, Server, connect, head, running, to_end
 
 MOTION: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
 SWEPT = {name: x for name, x in CASE.items() if name != "v0"}
@@ -318,6 +321,30 @@ def test_a_file_system_that_hangs_stops_nobody_else(
         until = time.monotonic() + PATIENCE_S
         while client.get("/readyz").status_code != 200:
             assert time.monotonic() < until
+
+
+HANGING = """
+import sys, threading
+from service.tables import Tables
+
+Tables._check_files = lambda self: threading.Event().wait()
+if __name__ == "__main__":
+    from service.__main__ import main
+    sys.exit(main(["--port", "0"]))
+"""
+
+
+def test_a_stop_waits_for_no_file_system_that_hangs(tmp_path: Path) -> None:
+    """The process ends beside the thread that waits for it, with its last lines and exit code 0."""
+    program = tmp_path / "hanging.py"
+    program.write_text(HANGING)
+    command = [sys.executable, str(program)]
+    settings = {"MUMACRO_SHUTDOWN_GRACE_S": "0", "MUMACRO_TABLES": str(TABLES)}
+    with running(command, tmp_path / "log.jsonl", **settings) as server:
+        status, _, body = server.ask("GET", "/readyz")
+        assert (status, b"do not answer" in body) == (503, True)
+        assert server.stop() == 0
+    assert sum("a thread that does not end" in line for line in server.lines) == 1
 
 
 def test_no_work_goes_on_when_the_service_has_ended(
