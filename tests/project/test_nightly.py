@@ -10,7 +10,14 @@ from tests.support.places import ROOT
 
 #: the functions with a longer form, by their files
 NIGHTLY = {
+    "builder/export/test_c_header.py": {
+        "test_every_level_gives_the_librarys_bits",
+        "test_no_compiler_warns",
+    },
     "builder/tables/test_seams.py": {"test_a_table_of_an_odd_tolerance_keeps_its_bounds"},
+    "builder/tables/test_verify.py": {
+        "test_a_block_off_by_a_hundred_thousandth_is_found_and_named"
+    },
     "mumacro/fits/test_fitting.py": {"test_inputs_lie_within_their_covariance"},
     "mumacro/fits/test_loop.py": {"test_intervals_of_noisy_loops_hold_the_truth"},
     "mumacro/kernel/test_kernel_safety.py": {"test_sanitizers_are_silent"},

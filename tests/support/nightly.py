@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 
-def nightly(*values: Any, marks: Any = ()) -> Any:
-    """A set of parameters that only the nightly run has."""
-    ids = "-".join(["nightly", *(value for value in values if isinstance(value, str))])
-    return pytest.param(*values, id=ids, marks=[pytest.mark.nightly, *marks])
+def nightly(*values: Any) -> Any:
+    """Return a set of parameters that only the nightly run has."""
+    return pytest.param(*values, marks=pytest.mark.nightly)
